@@ -1,0 +1,52 @@
+# Every target sets up .venv from the lock files by itself. Needs: make, Python 3.11 to 3.13.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+SCENE  ?= living-room
+ARGS   ?=
+
+.PHONY: run test check bench reproduce lock scenes clean
+
+run: $(VENV)/.core  ## the app in the browser, with a scene reconstructed
+	$(BIN)/packetmesh serve --scene $(SCENE) --open $(ARGS)
+
+test: $(VENV)/.dev  ## all tests, in parallel
+	$(BIN)/python -m pytest -n 2 --dist loadgroup $(ARGS)
+
+check: $(VENV)/.dev  ## style, types, import rules
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/.dev  ## speed and memory, beside peers
+	$(BIN)/packetmesh bench --out runs/bench $(ARGS)
+
+reproduce: $(VENV)/.core  ## the thesis's claims beside ours
+	$(BIN)/packetmesh reproduce --out runs/reproduce $(ARGS)
+
+scenes: $(VENV)/.core  ## render the demo scenes again
+	$(BIN)/python -m assets.make_scenes $(ARGS)
+
+lock: $(VENV)/.uv  ## pin everything anew
+	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 pyproject.toml -o requirements.lock
+	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 pyproject.toml --group dev -o requirements-dev.lock
+
+clean:
+	rm -rf $(VENV)
+
+$(VENV)/.uv: requirements-uv.lock
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
+	  { echo "PacketMesh needs Python 3.11 to 3.13, and '$(PYTHON)' is another: try make PYTHON=python3.12 ..." >&2; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements-uv.lock
+	@touch $@
+
+$(VENV)/.core: $(VENV)/.uv requirements.lock pyproject.toml
+	$(BIN)/uv pip install -q --python $(BIN)/python --require-hashes -r requirements.lock
+	$(BIN)/uv pip install -q --python $(BIN)/python --no-deps --no-build-isolation -e .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.core requirements-dev.lock
+	$(BIN)/uv pip install -q --python $(BIN)/python --require-hashes -r requirements-dev.lock
+	@touch $@
