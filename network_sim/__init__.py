@@ -1,0 +1,1 @@
+"""The camera network: nodes, radio, sink. Headless; knows neither the app nor the pipeline."""

@@ -1,0 +1,71 @@
+"""The outlier filter of the thesis and two that do not eat far surfaces (eqs. 3.5-3.6, SPEC 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.config import AcquisitionConfig
+from pipeline.errors import InputError
+from pipeline.types import BoolArray, FloatArray, PointCloud
+
+_MAD_TO_SIGMA = 1.4826
+_ROBUST_SIGMAS = 3.0
+_ROUNDING = 1e-9
+"""Relative slack of the threshold, so that a cloud of equal scores is not split by rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class FilterResult:
+    """A cloud split in two, and why."""
+
+    kept: PointCloud
+    outliers: PointCloud
+    keep: BoolArray
+    """(N,) True for the kept points of the cloud that was filtered."""
+    score: FloatArray
+    """(N,) mean distance to the neighbours: metres in mode ``thesis``, else pixels (d f / z)."""
+    threshold: float
+    """Largest score that is kept, in the unit of ``score``."""
+
+
+def filter_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: float) -> FilterResult:
+    """Split off the points whose mean distance to their N nearest neighbours is unusual.
+
+    Args:
+        cloud: camera frame, because the spacing of a back-projected depth map grows as z / f.
+        config: mode, N and t.
+        focal_px: focal length of the camera.
+
+    Raises:
+        InputError: not more than N points, or points behind the camera.
+    """
+    if len(cloud) <= config.outlier_neighbours:
+        raise InputError(
+            f"The cloud has {len(cloud)} points, too few to compare each with {config.outlier_neighbours} "
+            "neighbours; check the depth image or lower outlier_neighbours."
+        )
+    score = mean_neighbour_distance_m(cloud.points_m, config.outlier_neighbours)
+    if config.outlier_mode != "thesis":
+        z_m = cloud.points_m[:, 2]
+        if z_m.min() <= 0:
+            raise InputError(
+                f"Outlier mode '{config.outlier_mode}' needs points in front of the camera (z > 0); "
+                "give the cloud in the camera frame or use mode 'thesis'."
+            )
+        score = score * focal_px / z_m
+    if config.outlier_mode == "robust":
+        median = np.median(score)
+        threshold = median + _ROBUST_SIGMAS * _MAD_TO_SIGMA * np.median(np.abs(score - median))
+    else:
+        threshold = score.mean() + config.outlier_t * score.std()
+    keep = score <= threshold * (1.0 + _ROUNDING)
+    return FilterResult(cloud.select(keep), cloud.select(~keep), keep, score, float(threshold))
+
+
+def mean_neighbour_distance_m(points_m: FloatArray, neighbours: int) -> FloatArray:
+    """(N,) mean distance of each point to its nearest others (eq. 3.5)."""
+    distances_m, _ = cKDTree(points_m).query(points_m, k=neighbours + 1, workers=-1)
+    return distances_m[:, 1:].mean(axis=1)

@@ -1,0 +1,156 @@
+"""One frozen config a stage: it is the command line, the sliders, the preset and the record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from pipeline.errors import InputError
+
+OutlierMode = Literal["thesis", "depth_normalised", "robust"]
+AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]
+Method = Literal["icp", "ceicp-n", "ceicp-a"]
+Metric = Literal["point", "plane"]
+Direction = Literal["q2p", "p2q", "both"]
+FusionMode = Literal["union", "fill"]
+RadiusRule = Literal["thesis", "thesis+", "manual"]
+
+
+def _at_least(key: str, value: float, least: float) -> None:
+    if value < least:
+        raise InputError(f"{key} is {value}; try at least {least}")
+
+
+def _above(key: str, value: float, bound: float) -> None:
+    if not value > bound:
+        raise InputError(f"{key} is {value}; try a value above {bound}")
+
+
+@dataclass(frozen=True, slots=True)
+class AcquisitionConfig:
+    """Depth image to filtered point cloud (SPEC 2)."""
+
+    outlier_mode: OutlierMode = "robust"
+    """How a point's mean neighbour distance is judged: against mu + t sigma of the cloud (thesis),
+    the same after division by depth (depth_normalised), or median + 3 robust sigma (robust)."""
+    outlier_neighbours: int = 4
+    """Neighbours N whose mean distance is judged (eq. 3.5)."""
+    outlier_t: float = 1.0
+    """Threshold t in sigmas (eq. 3.6); the robust mode does not use it."""
+
+    def __post_init__(self) -> None:
+        _at_least("acquisition.outlier_neighbours", self.outlier_neighbours, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class DepthConfig:
+    """RGB image to metric depth (SPEC 3)."""
+
+    model: str | None = None
+    """ONNX file of the depth network; None takes the one that ships."""
+    crop: bool = False
+    """Infer on the thesis's 304 x 228 centre crop instead of the whole image."""
+    alignment: AlignmentMode = "local"
+    """How inferred depth is made metric against the sensor (SPEC 3.5)."""
+
+
+@dataclass(frozen=True, slots=True)
+class RegistrationConfig:
+    """Iterative closest points, plain or weighted by information (SPEC 4)."""
+
+    method: Method = "ceicp-a"
+    metric: Metric = "plane"
+    """Residual that is minimised: point to point, or point to the target's tangent plane."""
+    direction: Direction = "q2p"
+    """q2p: each source point finds a target point; p2q: the reverse; both: their union."""
+    with_scale: bool = False
+    """Estimate a similarity instead of a rigid motion (point metric only)."""
+    gate_m: float = 0.3
+    """Largest pair distance T_d of CEICP."""
+    sigma_min_m: float | None = None
+    """Smallest weight scale of CEICP-A; None takes 0.6 times the target's median spacing, or its median
+    depth noise where that is larger."""
+    sigma_decay: float = 0.85
+    """Factor rho by which CEICP-A's scale shrinks an iteration."""
+    max_iterations: int = 100
+    max_points: int = 6000
+    """Points drawn from each cloud for matching."""
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _above("registration.gate_m", self.gate_m, 0.0)
+        _at_least("registration.max_iterations", self.max_iterations, 1)
+        _at_least("registration.max_points", self.max_points, 6)
+        if not 0.0 < self.sigma_decay < 1.0:
+            raise InputError(
+                f"registration.sigma_decay is {self.sigma_decay}; try a value between 0.5 and 0.95"
+            )
+        if self.sigma_min_m is not None:
+            _above("registration.sigma_min_m", self.sigma_min_m, 0.0)
+        if self.with_scale and self.metric == "plane":
+            raise InputError("registration.with_scale needs the point metric; try metric=point")
+
+
+@dataclass(frozen=True, slots=True)
+class FusionConfig:
+    """Two clouds to one (SPEC 4.9)."""
+
+    mode: FusionMode = "fill"
+    """union: all points of both; fill: inferred points only where the sensor has none."""
+    align_nodes_with: Literal["sensor", "fused"] = "sensor"
+    """Which points register one node to another."""
+    register_inferred: bool = False
+    """Move each node's inferred cloud rigidly onto its sensor cloud, as the thesis does; without it
+    the pixel-wise alignment of the depth stage stands, which SPEC 3.5 measures to be better."""
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceConfig:
+    """Ball pivoting (SPEC 5)."""
+
+    radius_rule: RadiusRule = "thesis+"
+    """thesis: r_F + {0, 1/4, 1/2, 1} sigma_D; thesis+: r_F + {0, 1, 2, 4} sigma_D; manual."""
+    radii_m: tuple[float, ...] = ()
+    """Ball radii of the manual rule."""
+    max_points: int = 30_000
+    """The clouds are voxel-averaged to about this many points before the ball rolls."""
+    smoothing_passes: int = 2
+    """How often every thinned point is moved onto the plane of its neighbours; 0 leaves the noise in."""
+
+    def __post_init__(self) -> None:
+        _at_least("surface.max_points", self.max_points, 3)
+        _at_least("surface.smoothing_passes", self.smoothing_passes, 0)
+        for radius_m in self.radii_m:
+            _above("surface.radii_m", radius_m, 0.0)
+        if self.radius_rule == "manual" and not self.radii_m:
+            raise InputError(
+                "surface.radius_rule is manual but surface.radii_m is empty; try radii_m=0.02,0.04"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class PipelineConfig:
+    """Everything the way from images to a surface can be told."""
+
+    acquisition: AcquisitionConfig = field(default_factory=AcquisitionConfig)
+    depth: DepthConfig = field(default_factory=DepthConfig)
+    inferred_registration: RegistrationConfig = field(default_factory=RegistrationConfig)
+    """Inferred cloud on sensor cloud within a node, if ``fusion.register_inferred``."""
+    node_registration: RegistrationConfig = field(default_factory=RegistrationConfig)
+    """Node on node."""
+    fusion: FusionConfig = field(default_factory=FusionConfig)
+    surface: SurfaceConfig = field(default_factory=SurfaceConfig)
+
+
+PRESETS: dict[str, PipelineConfig] = {
+    "packetmesh": PipelineConfig(),
+    "thesis": PipelineConfig(
+        acquisition=AcquisitionConfig(outlier_mode="thesis"),
+        depth=DepthConfig(crop=True, alignment="median"),
+        inferred_registration=RegistrationConfig(method="ceicp-n", metric="point"),
+        node_registration=RegistrationConfig(method="ceicp-n", metric="point"),
+        fusion=FusionConfig(mode="union", align_nodes_with="fused", register_inferred=True),
+        surface=SurfaceConfig(radius_rule="thesis", smoothing_passes=0),
+    ),
+}
+"""The two ways through the chain: ours (the default) and the thesis's own."""

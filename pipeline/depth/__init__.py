@@ -1,0 +1,7 @@
+"""Inferred depth: the network, its metric alignment with the sensor, and its errors (SPEC 3)."""
+
+from pipeline.depth.alignment import AlignmentResult, align_depth
+from pipeline.depth.inference import DepthNetwork
+from pipeline.depth.metrics import DepthErrors, depth_errors
+
+__all__ = ["AlignmentResult", "DepthErrors", "DepthNetwork", "align_depth", "depth_errors"]

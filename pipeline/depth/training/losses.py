@@ -1,0 +1,55 @@
+"""The supervised loss of SPEC 3.3: scale-invariant logarithmic error, its gradients, smoothness."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+SCALE_INVARIANCE = 0.85
+
+
+def supervised_loss(depths_m: list[Tensor], target_m: Tensor, image: Tensor) -> Tensor:
+    """The loss of one batch, a scalar.
+
+    Args:
+        depths_m: predictions (N, 1, H/s, W/s) at strides s = 1, 2, 4, 8.
+        target_m: (N, 1, H, W), NaN where unknown.
+        image: (N, 3, H, W) any normalisation; guides the smoothness.
+    """
+    loss = target_m.new_zeros(())
+    for level, depth_m in enumerate(depths_m):
+        target = target_m[..., :: 2**level, :: 2**level]
+        valid = torch.isfinite(target)
+        error = torch.where(valid, depth_m.log() - torch.where(valid, target, 1.0).log(), 0.0)
+        loss = loss + scale_invariant(error, valid) / len(depths_m)
+        loss = loss + 0.5 * gradient_error(error, valid)
+    return loss + 1e-3 * smoothness(depths_m[0], image)
+
+
+def scale_invariant(error: Tensor, valid: Tensor) -> Tensor:
+    """10 sqrt(mean(g^2) - 0.85 mean(g)^2), each image for itself (Eigen et al. 2014)."""
+    count = valid.sum(dim=(1, 2, 3)).clamp(min=1)
+    mean = error.sum(dim=(1, 2, 3)) / count
+    mean_square = error.square().sum(dim=(1, 2, 3)) / count
+    return 10.0 * (mean_square - SCALE_INVARIANCE * mean.square() + 1e-6).sqrt().mean()
+
+
+def gradient_error(error: Tensor, valid: Tensor) -> Tensor:
+    """mean |dx g| + mean |dy g| over neighbouring pixels that both have a target."""
+    total = error.new_zeros(())
+    for axis in (2, 3):
+        size = error.shape[axis] - 1
+        both = valid.narrow(axis, 0, size) & valid.narrow(axis, 1, size)
+        total = total + (error.diff(dim=axis).abs() * both).sum() / both.sum().clamp(min=1)
+    return total
+
+
+def smoothness(depth_m: Tensor, image: Tensor) -> Tensor:
+    """Edge-aware first differences of the mean-normalised disparity (Godard et al. 2019)."""
+    disparity = 1.0 / depth_m
+    disparity = disparity / disparity.mean(dim=(2, 3), keepdim=True)
+    total = depth_m.new_zeros(())
+    for axis in (2, 3):
+        edge = image.diff(dim=axis).abs().mean(dim=1, keepdim=True)
+        total = total + (disparity.diff(dim=axis).abs() * torch.exp(-edge)).mean()
+    return total

@@ -1,0 +1,95 @@
+"""Rigid motions and the pinhole camera."""
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pipeline.types import CameraIntrinsics, FloatArray
+
+
+def rigid(rotation: FloatArray, translation_m: FloatArray) -> FloatArray:
+    """The (4, 4) transform x -> rotation @ x + translation."""
+    T = np.eye(4)
+    T[:3, :3] = rotation
+    T[:3, 3] = translation_m
+    return T
+
+
+def inverse(T_a_b: FloatArray) -> FloatArray:
+    """T_b_a of a rigid (4, 4) transform, by transposing its rotation."""
+    rotation = T_a_b[:3, :3].T
+    return rigid(rotation, -rotation @ T_a_b[:3, 3])
+
+
+def apply(T_a_b: FloatArray, points_m: FloatArray) -> FloatArray:
+    """(N, 3) points in frame a, from points in frame b."""
+    return points_m @ T_a_b[:3, :3].T + T_a_b[:3, 3]
+
+
+def rotation_exp(omega_rad: FloatArray) -> FloatArray:
+    """The (3, 3) rotation about the (3,) axis ``omega_rad`` by its length (Rodrigues)."""
+    return cv2.Rodrigues(np.asarray(omega_rad, dtype=np.float64))[0]
+
+
+def rotation_angle_rad(rotation: FloatArray) -> float:
+    """Angle of a (3, 3) rotation, accurate near zero and near pi."""
+    skew = rotation - rotation.T
+    sine = 0.5 * np.linalg.norm([skew[2, 1], skew[0, 2], skew[1, 0]])
+    return float(np.arctan2(sine, 0.5 * (np.trace(rotation) - 1.0)))
+
+
+def look_at(eye_m: ArrayLike, target_m: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> FloatArray:
+    """T_world_camera of a camera at ``eye_m`` that looks at ``target_m``."""
+    eye_m = np.asarray(eye_m, float)
+    forward = np.asarray(target_m, float) - eye_m
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, np.asarray(up, float))
+    right /= np.linalg.norm(right)
+    return rigid(np.stack([right, np.cross(forward, right), forward], axis=1), eye_m)
+
+
+def scaled(intrinsics: CameraIntrinsics, factor: float) -> CameraIntrinsics:
+    """The camera of an image resized by ``factor``: pixel centres stay at integers."""
+    matrix = intrinsics.matrix.copy()
+    matrix[:2, :2] *= factor
+    matrix[:2, 2] = (matrix[:2, 2] + 0.5) * factor - 0.5
+    size = round(intrinsics.width_px * factor), round(intrinsics.height_px * factor)
+    return CameraIntrinsics(matrix, intrinsics.distortion, *size)
+
+
+def pixel_rays(intrinsics: CameraIntrinsics) -> FloatArray:
+    """(H, W, 3) camera-frame directions of the pixel centres, scaled to z = 1, undistorted."""
+    u, v = np.meshgrid(np.arange(intrinsics.width_px), np.arange(intrinsics.height_px))
+    return undistorted_rays(intrinsics, np.stack([u, v], axis=-1).reshape(-1, 2)).reshape(*u.shape, 3)
+
+
+def undistorted_rays(intrinsics: CameraIntrinsics, pixels: ArrayLike) -> FloatArray:
+    """(N, 3) camera-frame directions with z = 1 of (N, 2) image positions, SPEC 1.1.
+
+    The distortion is inverted by fixed-point iteration to 1e-10 of the normalised plane.
+    """
+    pixels = np.asarray(pixels, dtype=np.float64)
+    if not len(pixels):
+        return np.empty((0, 3))
+    if not np.any(intrinsics.distortion):
+        x = (pixels[:, 0] - intrinsics.cx_px) / intrinsics.fx_px
+        y = (pixels[:, 1] - intrinsics.cy_px) / intrinsics.fy_px
+        return np.stack([x, y, np.ones_like(x)], axis=1)
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
+    xy = cv2.undistortPoints(pixels[:, None], intrinsics.matrix, intrinsics.distortion, criteria=criteria)[
+        :, 0
+    ]
+    return np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
+
+
+def project(intrinsics: CameraIntrinsics, points_m: FloatArray) -> FloatArray:
+    """(N, 2) image positions of (N, 3) camera-frame points in front of the camera (eq. 3.1-3.3)."""
+    if not len(points_m):
+        return np.empty((0, 2))
+    return cv2.projectPoints(
+        np.ascontiguousarray(points_m, dtype=np.float64),
+        np.zeros(3),
+        np.zeros(3),
+        intrinsics.matrix,
+        intrinsics.distortion,
+    )[0][:, 0]

@@ -1,0 +1,147 @@
+"""Colour and depth images."""
+
+from __future__ import annotations
+
+import os
+import zlib
+
+import cv2
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.io.atomic import atomic_path
+from pipeline.io.limits import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes
+from pipeline.types import ByteArray, DepthMap
+
+COMMON_DEPTH_SCALES = (1.0, 100.0, 256.0, 1000.0, 5000.0, 10000.0)
+"""Units per metre that RGB-D data sets use."""
+PLAUSIBLE_MEDIAN_M = (0.01, 100.0)
+_TYPICAL_DEPTH_M = 2.0
+_PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_JPEG_SIGNATURE = b"\xff\xd8"
+_JPEG_END = b"\xff\xd9"
+
+Path = str | os.PathLike[str]
+
+
+def read_color(path: Path) -> ByteArray:
+    """(H, W, 3) RGB of a PNG or JPEG file; grey images get three equal channels.
+
+    Raises:
+        InputError: missing, truncated, too large, or neither PNG nor JPEG.
+    """
+    bgr = _decode(path, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION, "colour image")
+    return np.ascontiguousarray(bgr[..., ::-1])
+
+
+def read_depth(path: Path, depth_scale: float = 1000.0) -> DepthMap:
+    """Metric depth of a 16-bit PNG, whose value 0 means unknown.
+
+    Args:
+        path: the PNG file.
+        depth_scale: image units per metre; 1000 when the image holds millimetres.
+
+    Raises:
+        InputError: missing, truncated, too large, not 16-bit grey, without any depth, or with a
+            median depth that no room has at this scale.
+    """
+    if not (np.isfinite(depth_scale) and depth_scale > 0):
+        raise InputError(f"The depth scale for {path} is {depth_scale}; try 1000 for an image in millimetres")
+    units = _decode(path, cv2.IMREAD_UNCHANGED, "depth image")
+    if units.dtype != np.uint16 or units.ndim != 2:
+        channels = 1 if units.ndim == 2 else units.shape[2]
+        raise InputError(
+            f"The depth image {path} has {channels} channel(s) of {8 * units.itemsize} bits where one of 16 "
+            "is needed; try the file with the raw depth, not a preview of it"
+        )
+    known = units > 0
+    if not known.any():
+        raise InputError(f"The depth image {path} is zero everywhere; try another exposure of the scene")
+    _check_scale(path, float(np.median(units[known])), depth_scale)
+    z_m = (units / depth_scale).astype(np.float32)
+    z_m[~known] = np.nan
+    return DepthMap(z_m)
+
+
+def write_color(path: Path, rgb: ByteArray) -> None:
+    """Write (H, W, 3) RGB in the format of the suffix.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    with atomic_path(path) as sibling:
+        sibling.write_bytes(cv2.imencode(sibling.suffix, rgb[..., ::-1])[1].tobytes())
+
+
+def write_depth_mm(path: Path, depth: DepthMap) -> None:
+    """Write a 16-bit PNG in millimetres, 0 where the depth is unknown.
+
+    Raises:
+        InputError: a depth that 16 bits cannot hold, or a folder that cannot be written.
+    """
+    depth_mm = np.rint(np.where(depth.valid, depth.z_m, 0.0).astype(np.float64) * 1000.0)
+    if depth_mm.min() < 0 or depth_mm.max() > np.iinfo(np.uint16).max:
+        raise InputError(
+            f"{path} cannot hold depths from {depth_mm.min() / 1000:.1f} m to {depth_mm.max() / 1000:.1f} m; "
+            "try to keep to 0 to 65.5 m"
+        )
+    with atomic_path(path) as sibling:
+        sibling.write_bytes(cv2.imencode(".png", depth_mm.astype(np.uint16))[1].tobytes())
+
+
+def _decode(path: Path, flags: int, what: str) -> np.ndarray:
+    data = read_bytes(path, MAX_IMAGE_BYTES, what)
+    if not data.startswith((_PNG_SIGNATURE, _JPEG_SIGNATURE)):
+        raise InputError(f"The {what} {path} is neither a PNG nor a JPEG file; try to convert it to PNG")
+    complete = _png_is_whole(data) if data.startswith(_PNG_SIGNATURE) else data.rfind(_JPEG_END) >= 0
+    width_px, height_px = _size_px(data)
+    if complete and width_px * height_px > MAX_IMAGE_PIXELS:
+        raise InputError(
+            f"The {what} {path} has {width_px} x {height_px} pixels, more than the "
+            f"{MAX_IMAGE_PIXELS / 1e6:g} million that are read; try a smaller one"
+        )
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), flags) if complete else None
+    if image is None:
+        raise InputError(f"The {what} {path} is truncated or damaged; try to copy or export it again")
+    return image
+
+
+def _png_is_whole(data: bytes) -> bool:
+    """Whether all chunks up to the last are there with right checksums; decoders trust their lengths."""
+    view = memoryview(data)
+    position = len(_PNG_SIGNATURE)
+    while position + 12 <= len(data):
+        end = position + 8 + int.from_bytes(view[position : position + 4], "big")
+        if zlib.crc32(view[position + 4 : end]) != int.from_bytes(view[end : end + 4], "big"):
+            return False
+        if view[position + 4 : position + 8] == b"IEND":
+            return True
+        position = end + 4
+    return False
+
+
+def _size_px(data: bytes) -> tuple[int, int]:
+    """Width and height from the header of a PNG or JPEG file, before anything is decoded; 0 x 0 if absent."""
+    if data.startswith(_PNG_SIGNATURE):
+        return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    position = 2
+    while position + 9 <= len(data) and data[position] == 0xFF:
+        marker = data[position + 1]
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):  # start of frame
+            height, width = data[position + 5 : position + 7], data[position + 7 : position + 9]
+            return int.from_bytes(width, "big"), int.from_bytes(height, "big")
+        position += 2 + int.from_bytes(data[position + 2 : position + 4], "big")
+    return 0, 0
+
+
+def _check_scale(path: Path, median_units: float, depth_scale: float) -> None:
+    nearest_m, farthest_m = PLAUSIBLE_MEDIAN_M
+    median_m = median_units / depth_scale
+    if nearest_m <= median_m <= farthest_m:
+        return
+    typical_scale = median_units / _TYPICAL_DEPTH_M
+    suggestion = min(COMMON_DEPTH_SCALES, key=lambda scale: abs(np.log(scale / typical_scale)))
+    raise InputError(
+        f"The depth image {path} has a median depth of {median_m:.3g} m at depth scale {depth_scale:g}; "
+        f"try depth scale {suggestion:g}, which makes it {median_units / suggestion:.3g} m"
+    )

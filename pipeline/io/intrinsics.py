@@ -1,0 +1,144 @@
+"""Camera intrinsics in the styles that people have them in, told apart by their keys."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.io.atomic import atomic_path
+from pipeline.io.limits import read_text
+from pipeline.types import CameraIntrinsics
+
+_BROWN_CONRADY = {"", "plumb_bob", "rational_polynomial"}
+"""Distortion models whose first five coefficients are k1, k2, p1, p2, k3."""
+_YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTILINE)
+_NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?(?![\w.])")
+
+Path = str | os.PathLike[str]
+
+
+def read_intrinsics(path: Path) -> CameraIntrinsics:
+    """Intrinsics from JSON or YAML.
+
+    Three styles: ``width height fx fy cx cy [distortion]``; Open3D's ``intrinsic_matrix``, which is
+    column-major; ROS's camera_info (``K``, ``D``) or OpenCV's and ROS's calibration file
+    (``camera_matrix``, ``distortion_coefficients``).
+
+    Raises:
+        InputError: unreadable, of no known style, or with impossible values.
+    """
+    text = read_text(path, "intrinsics file")
+    values = _parse_json(text, path) if text.lstrip().startswith("{") else _parse_yaml(text)
+    try:
+        camera = _from_keys(values)
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
+        camera = None
+    if camera is None:
+        raise InputError(
+            f"The intrinsics file {path} is of no known style; try JSON with width, height, fx, fy, cx and cy"
+        )
+    _check(path, camera, str(values.get("distortion_model", "")))
+    return replace(camera, distortion=camera.distortion[:5])
+
+
+def write_intrinsics(path: Path, intrinsics: CameraIntrinsics) -> None:
+    """Write the JSON style ``width height fx fy cx cy distortion``, exact to the last bit.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    values = {
+        "width": intrinsics.width_px,
+        "height": intrinsics.height_px,
+        "fx": intrinsics.fx_px,
+        "fy": intrinsics.fy_px,
+        "cx": intrinsics.cx_px,
+        "cy": intrinsics.cy_px,
+        "distortion": intrinsics.distortion.tolist(),
+    }
+    with atomic_path(path) as sibling:
+        sibling.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n")
+
+
+def _parse_json(text: str, path: Path) -> dict[str, Any]:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"The intrinsics file {path} is not valid JSON ({error}); try to export it again"
+        ) from None
+
+
+def _parse_yaml(text: str) -> dict[str, Any]:
+    """The numbers and words of block-style YAML, two levels deep, which is all that camera files use."""
+    values: dict[str, Any] = {}
+    parent = ""
+    for indent, key, body in _YAML_ENTRY.findall(text):
+        numbers = [float(number) for number in _NUMBER.findall(body)]
+        is_list = "[" in body or body.lstrip().startswith("-")
+        value = numbers if is_list else numbers[0] if numbers else body.strip().strip("\"'")
+        if indent and isinstance(values.get(parent), dict):
+            values[parent][key] = value
+        elif not indent:
+            parent = key
+            values[key] = value if body.strip() and "!!" not in body else {}
+    return values
+
+
+def _from_keys(values: dict[str, Any]) -> CameraIntrinsics | None:
+    """The camera as the file has it, with five distortion coefficients or more; None in an unknown style."""
+    if "intrinsic_matrix" in values:
+        matrix = np.array(values["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T
+        distortion: Any = []
+    elif "camera_matrix" in values or "K" in values or "k" in values:
+        rows = values.get("camera_matrix") or values.get("K") or values.get("k")
+        matrix = np.array(_data(rows), dtype=np.float64).reshape(3, 3)
+        distortion = values.get("distortion_coefficients") or values.get("D") or values.get("d") or []
+    elif "fx" in values:
+        fx, fy, cx, cy = (float(values[key]) for key in ("fx", "fy", "cx", "cy"))
+        matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+        distortion = values.get("distortion") or []
+    else:
+        return None
+    coefficients = np.array(_data(distortion), dtype=np.float64).reshape(-1)
+    coefficients = np.pad(coefficients, (0, max(0, 5 - len(coefficients))))
+    width, height = (values.get(f"image_{key}") or values[key] for key in ("width", "height"))
+    return CameraIntrinsics(matrix, coefficients, int(width), int(height))
+
+
+def _data(value: Any) -> Any:
+    return value["data"] if isinstance(value, dict) else value
+
+
+def _check(path: Path, camera: CameraIntrinsics, distortion_model: str) -> None:
+    """Raise InputError for a camera that cannot be."""
+
+    def wrong(what: str, hint: str) -> InputError:
+        return InputError(f"The intrinsics file {path} has {what}; try {hint}")
+
+    matrix = camera.matrix
+    if distortion_model not in _BROWN_CONRADY or np.any(camera.distortion[5:]):
+        model = distortion_model or f"of {len(camera.distortion)} coefficients"
+        raise wrong(
+            f"the distortion model {model}", "a calibration with plumb_bob, which has five coefficients"
+        )
+    if not (np.isfinite(matrix).all() and np.isfinite(camera.distortion).all()):
+        raise wrong("values that are not finite numbers", "to calibrate again")
+    if camera.width_px < 1 or camera.height_px < 1:
+        raise wrong(f"an image size of {camera.width_px} x {camera.height_px}", "the size of the images")
+    if camera.fx_px <= 0 or camera.fy_px <= 0:
+        raise wrong(f"focal lengths {camera.fx_px:g} and {camera.fy_px:g} px", "positive ones")
+    if matrix[0, 1] or matrix[1, 0] or not np.array_equal(matrix[2], (0.0, 0.0, 1.0)):
+        raise wrong("a matrix with skew or in the wrong order", "fx 0 cx, 0 fy cy, 0 0 1")
+    if not (0 <= camera.cx_px < camera.width_px and 0 <= camera.cy_px < camera.height_px):
+        raise wrong(
+            f"a principal point ({camera.cx_px:g}, {camera.cy_px:g}) outside the "
+            f"{camera.width_px} x {camera.height_px} image",
+            "the size at which the camera was calibrated",
+        )

@@ -1,0 +1,133 @@
+"""Camera nodes on disk: ``RIG/node_00/{color.png, depth.png, intrinsics.json, pose.txt}``."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.geometry import look_at
+from pipeline.io.atomic import atomic_path
+from pipeline.io.images import read_color, read_depth, write_color, write_depth_mm
+from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
+from pipeline.io.limits import read_text
+from pipeline.types import FloatArray, RgbdFrame, Rig
+
+MAX_NODES = 6
+LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
+"""T_world_camera of a node that says nothing about its pose: at the origin, upright, looking along +y."""
+_RIGID_TOLERANCE = 1e-4
+
+AnyPath = str | os.PathLike[str]
+
+
+def load_frame(
+    color: AnyPath,
+    depth: AnyPath,
+    intrinsics: AnyPath,
+    depth_scale: float = 1000.0,
+    name: str = "node_00",
+) -> RgbdFrame:
+    """One registered RGB-D pair, placed at ``LEVEL_POSE``.
+
+    Raises:
+        InputError: a file that cannot be used, or images and intrinsics of different sizes.
+    """
+    camera = read_intrinsics(intrinsics)
+    rgb = read_color(color)
+    depth_map = read_depth(depth, depth_scale)
+    size_px = (rgb.shape[1], rgb.shape[0])
+    for path, what, other_px in (
+        (depth, "depth image", depth_map.z_m.shape[::-1]),
+        (intrinsics, "intrinsics file", (camera.width_px, camera.height_px)),
+    ):
+        if other_px != size_px:
+            raise InputError(
+                f"The {what} {path} is for {other_px[0]} x {other_px[1]} pixels but the colour image {color} "
+                f"has {size_px[0]} x {size_px[1]}; try files of one size, registered to one camera"
+            )
+    return RgbdFrame(name, rgb, depth_map, camera, LEVEL_POSE.copy())
+
+
+def load_rig(directory: AnyPath) -> Rig:
+    """The nodes below ``directory`` in the order of their folders' names.
+
+    Raises:
+        InputError: no folder, no node or more than six, or a file of a node that cannot be used.
+    """
+    directory = Path(directory)
+    if not directory.is_dir():
+        raise InputError(f"The rig folder {directory} does not exist; check the path")
+    folders = _node_folders(directory)
+    if not folders:
+        raise InputError(
+            f"The rig folder {directory} holds no node; try {directory.name}/node_00/ with color.png, "
+            "depth.png and intrinsics.json"
+        )
+    if len(folders) > MAX_NODES:
+        raise InputError(
+            f"The rig folder {directory} holds {len(folders)} nodes; try to move some away, so that at most "
+            f"{MAX_NODES} remain"
+        )
+    return Rig(directory.resolve().name, tuple(_load_node(folder) for folder in folders))
+
+
+def save_rig(directory: AnyPath, rig: Rig) -> None:
+    """Write every frame of ``rig`` as ``directory/node_NN``; the truth of a rendered rig is not written.
+
+    Raises:
+        InputError: the folder cannot be written, or holds nodes of a larger rig.
+    """
+    directory = Path(directory)
+    names = [f"node_{index:02d}" for index in range(len(rig.frames))]
+    for folder in _node_folders(directory):
+        if folder.name not in names:
+            raise InputError(f"{directory} already holds {folder.name} of another rig; try an empty folder")
+    for name, frame in zip(names, rig.frames, strict=True):
+        folder = directory / name
+        write_color(folder / "color.png", frame.rgb)
+        write_depth_mm(folder / "depth.png", frame.depth)
+        write_intrinsics(folder / "intrinsics.json", frame.intrinsics)
+        with atomic_path(folder / "pose.txt") as sibling:
+            np.savetxt(sibling, frame.T_world_camera, fmt="%.17g")
+
+
+def read_pose(path: AnyPath) -> FloatArray:
+    """The (4, 4) rigid transform in a text file.
+
+    Raises:
+        InputError: the file does not hold sixteen numbers that make a rotation and a translation.
+    """
+    rows = [
+        line.split("#")[0].replace(",", " ").split() for line in read_text(path, "pose file").splitlines()
+    ]
+    try:
+        T = np.array([row for row in rows if row], dtype=np.float64)
+    except ValueError:
+        T = np.empty(0)
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        raise InputError(f"The pose file {path} does not hold 4 x 4 numbers; try four lines of four numbers")
+    rotation = T[:3, :3]
+    orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), atol=_RIGID_TOLERANCE)
+    if not orthonormal or np.linalg.det(rotation) < 0 or not np.allclose(T[3], (0, 0, 0, 1)):
+        raise InputError(
+            f"The pose file {path} is not a rigid transform; try a rotation and a translation in metres, "
+            "with 0 0 0 1 as the last line"
+        )
+    return T
+
+
+def _node_folders(directory: Path) -> list[Path]:
+    return sorted(folder for folder in directory.glob("node_*") if folder.is_dir())
+
+
+def _load_node(folder: Path) -> RgbdFrame:
+    frame = load_frame(
+        folder / "color.png", folder / "depth.png", folder / "intrinsics.json", name=folder.name
+    )
+    pose = folder / "pose.txt"
+    if not pose.exists():
+        return frame
+    return RgbdFrame(frame.name, frame.rgb, frame.depth, frame.intrinsics, read_pose(pose))

@@ -1,0 +1,16 @@
+"""Registration of two clouds as a sequence of steps, and their fusion (SPEC 4)."""
+
+from pipeline.registration.fusion import fuse
+from pipeline.registration.loop import iterate, register
+from pipeline.registration.metrics import average_hausdorff_m, point_error_m, rotation_error_rad
+from pipeline.registration.visibility import hidden_from
+
+__all__ = [
+    "average_hausdorff_m",
+    "fuse",
+    "hidden_from",
+    "iterate",
+    "point_error_m",
+    "register",
+    "rotation_error_rad",
+]

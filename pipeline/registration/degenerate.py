@@ -1,0 +1,7 @@
+"""When pairs do not determine a motion (SPEC 4.1)."""
+
+from pipeline.errors import ReconstructionError
+
+
+class DegenerateError(ReconstructionError):
+    """The pairs leave the motion undetermined; the message says why, in a few words."""

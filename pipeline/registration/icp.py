@@ -1,0 +1,20 @@
+"""Plain ICP: every closest pair counts the same (thesis Table 3.1, SPEC 4.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.registration.matching import Matching
+from pipeline.registration.weighting import PairWeighting, PairWeights
+
+
+@dataclass(frozen=True, slots=True)
+class Icp(PairWeighting):
+    """Equal weights, no gate."""
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """All pairs, with equal weights."""
+        count = len(matching.distances_m)
+        return PairWeights(np.arange(count), np.full(count, 1.0 / count))

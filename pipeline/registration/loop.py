@@ -1,0 +1,134 @@
+"""The loop that all iterative closest-point methods share: match, weigh, move, until still."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+
+from pipeline.config import RegistrationConfig
+from pipeline.errors import InputError, ReconstructionError
+from pipeline.geometry import apply, rotation_angle_rad
+from pipeline.registration.degenerate import DegenerateError
+from pipeline.registration.matching import Matcher, Matching
+from pipeline.registration.methods import WEIGHTINGS
+from pipeline.registration.residual import residual_for
+from pipeline.registration.sample import Sample, draw
+from pipeline.registration.stop import TRANSLATION_TOLERANCE_OF_GATE, StopRule
+from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.types import FloatArray, PointCloud, RegistrationResult, RegistrationStep
+
+MIN_PAIRS = 6
+MIN_EFFECTIVE_PAIRS = 10.0
+
+
+def iterate(
+    source: PointCloud, target: PointCloud, config: RegistrationConfig, T_init: FloatArray | None = None
+) -> Generator[RegistrationStep, None, str]:
+    """Register ``source`` to ``target`` one iteration at a time; the generator returns the stop reason.
+
+    Args:
+        source: the cloud that moves, in its own frame.
+        target: the cloud that stays; its ``normals`` are used by the plane metric when it has them.
+        config: method, metric, direction and their parameters.
+        T_init: (4, 4) start pose T_target_source; None is the identity.
+
+    Raises:
+        InputError: fewer than three points, points that are not finite, a start pose that is none.
+        ReconstructionError: not one pair lies within the gate at the start pose.
+    """
+    T = np.eye(4) if T_init is None else np.array(T_init, dtype=np.float64)
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        raise InputError("The start pose must be a 4 x 4 matrix of finite numbers.")
+    return _iterations(
+        draw(source, config.max_points, config.seed, "source"),
+        draw(target, config.max_points, config.seed, "target"),
+        config,
+        T,
+    )
+
+
+def register(
+    source: PointCloud, target: PointCloud, config: RegistrationConfig, T_init: FloatArray | None = None
+) -> RegistrationResult:
+    """All steps of ``iterate`` and their outcome; ``converged`` also holds for ``stalled``.
+
+    A degenerate end keeps the last good pose.
+    """
+    steps: list[RegistrationStep] = []
+    remaining = iterate(source, target, config, T_init)
+    while True:
+        try:
+            steps.append(next(remaining))
+        except StopIteration as end:
+            reason: str = end.value
+            break
+    start = np.eye(4) if T_init is None else np.asarray(T_init, dtype=np.float64)
+    T = steps[-1].T_target_source if steps else start
+    return RegistrationResult(T, tuple(steps), reason in ("converged", "stalled"), reason)
+
+
+def _iterations(
+    source: Sample, target: Sample, config: RegistrationConfig, T: FloatArray
+) -> Generator[RegistrationStep, None, str]:
+    matcher = Matcher(source.points_m, target.points_m, config.direction)
+    residual = residual_for(config, target.cloud)
+    method = WEIGHTINGS[config.method](config, target.cloud)
+    stop = StopRule(TRANSLATION_TOLERANCE_OF_GATE * config.gate_m)
+    center_m = source.points_m.mean(axis=0, keepdims=True)
+    for index in range(config.max_iterations):
+        matching = matcher.match(T)
+        try:
+            method, kept = _weigh(method, matching, first=index == 0)
+            support = matching.select(kept.rows)
+            motion = residual.solve(support, kept.weights)
+        except DegenerateError as error:
+            return f"degenerate: {error}"
+        moved_T = motion @ T
+        step = RegistrationStep(
+            index=index,
+            T_target_source=moved_T,
+            pairs=np.stack([source.rows[support.source_rows], target.rows[support.target_rows]], axis=1),
+            weights=kept.weights,
+            distances_m=support.distances_m,
+            sigma_m=kept.sigma_m,
+            objective=float(kept.weights @ residual.squared_m2(support, motion)),
+            rmse_m=float(np.sqrt(kept.weights @ support.distances_m**2)),
+            effective_pairs=_effective(kept.weights),
+            entropy_nat=kept.entropy_nat,
+            rotation_step_rad=_turn_rad(motion),
+            translation_step_m=float(np.linalg.norm(apply(moved_T - T, center_m))),
+        )
+        yield step
+        T = moved_T
+        if method.settled and (reason := stop.reason(step)) is not None:
+            return reason
+        method = method.following()
+    return "max_iterations"
+
+
+def _weigh(method: PairWeighting, matching: Matching, first: bool) -> tuple[PairWeighting, PairWeights]:
+    """The pairs that count, after widening the method if it keeps too few; it comes back as it ended."""
+    kept = method.weigh(matching)
+    if len(kept.rows) < MIN_PAIRS and (wider := method.widened()) is not None:
+        method, kept = wider, wider.weigh(matching)
+    if first and not len(kept.rows):
+        raise ReconstructionError(
+            f"No point of the source lies within {method.gate_m:.2f} m of the target: the start poses are "
+            "too far apart or the clouds do not overlap; give a closer start pose or raise gate_m."
+        )
+    if len(kept.rows) < MIN_PAIRS:
+        raise DegenerateError(f"only {len(kept.rows)} pairs are close enough")
+    if _effective(kept.weights) < MIN_EFFECTIVE_PAIRS:
+        raise DegenerateError(f"only {_effective(kept.weights):.1f} pairs carry all the weight")
+    return method, kept
+
+
+def _effective(weights: FloatArray) -> float:
+    """(sum w)^2 / sum w^2 of weights that sum to one."""
+    return float(1.0 / np.sum(weights**2))
+
+
+def _turn_rad(motion: FloatArray) -> float:
+    """Rotation angle of a rigid or similarity motion."""
+    return rotation_angle_rad(motion[:3, :3] / np.cbrt(np.linalg.det(motion[:3, :3])))

@@ -1,0 +1,36 @@
+"""When to stop iterating (SPEC 4.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.types import RegistrationStep
+
+ROTATION_TOLERANCE_RAD = 1e-4
+TRANSLATION_TOLERANCE_OF_GATE = 1e-4 / 0.3
+"""1e-4 m at the default gate of 0.3 m; relative, so that the unit of length does not matter."""
+RMSE_TOLERANCE = 1e-6
+"""Relative change of the RMSE that counts as none."""
+STILL_STEPS = 2
+"""Consecutive steps without a change of the RMSE that count as stalled."""
+
+
+@dataclass(slots=True)
+class StopRule:
+    """Watches steps go by and says when they have become pointless."""
+
+    translation_tolerance_m: float
+    _rmse_m: float = float("nan")
+    _still_steps: int = 0
+
+    def reason(self, step: RegistrationStep) -> str | None:
+        """``converged`` after a negligible motion, ``stalled`` after an RMSE that stays, else None."""
+        still = abs(self._rmse_m - step.rmse_m) <= RMSE_TOLERANCE * self._rmse_m
+        self._still_steps = self._still_steps + 1 if still else 0
+        self._rmse_m = step.rmse_m
+        if (
+            step.rotation_step_rad < ROTATION_TOLERANCE_RAD
+            and step.translation_step_m < self.translation_tolerance_m
+        ):
+            return "converged"
+        return "stalled" if self._still_steps >= STILL_STEPS else None

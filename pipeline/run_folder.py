@@ -1,0 +1,125 @@
+"""What a reconstruction leaves on disk: its settings, its numbers, its clouds and its surfaces."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from pipeline.io.clouds import write_cloud
+from pipeline.io.json_file import write_json
+from pipeline.io.meshes import write_mesh
+from pipeline.reconstruct import NodeRegistration, Reconstruction
+from pipeline.settings import settings
+from pipeline.types import PointCloud, PointSource, SurfaceResult
+
+
+def write_run_folder(
+    reconstruction: Reconstruction, metrics: dict[str, Any], folder: Path, commands: dict[str, str]
+) -> list[Path]:
+    """Write everything but the report into ``folder``, each file whole or not at all.
+
+    Args:
+        commands: what to record in ``config.json`` about how the run was asked for (scene, preset).
+
+    Returns:
+        The files written.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    surfaces = reconstruction.surfaces
+    files = [folder / "config.json", folder / "metrics.json"]
+    write_json(files[0], commands | {"settings": settings(reconstruction.config)})
+    write_json(files[1], metrics)
+    fused = surfaces.fused
+    inferred = fused.select(fused.source == PointSource.INFERRED) if fused.source is not None else fused
+    clouds = {"sensor.ply": surfaces.sensor, "inferred.ply": inferred, "fused.ply": fused}
+    for name, cloud in clouds.items():
+        files.append(folder / name)
+        write_cloud(files[-1], cloud)
+    meshes = {
+        "surface_before.ply": surfaces.before,
+        "surface_after.ply": surfaces.after,
+        "surface.glb": surfaces.after,
+    }
+    for name, mesh in meshes.items():
+        files.append(folder / name)
+        write_mesh(files[-1], mesh.vertices_m, mesh.triangles, mesh.colors)
+    return files
+
+
+def metrics_of(reconstruction: Reconstruction, scene: str, preset: str) -> dict[str, Any]:
+    """The numbers of a run; every length in metres, every share from 0 to 1."""
+    surfaces = reconstruction.surfaces
+    truth = None
+    if reconstruction.truth_before is not None:
+        truth = {"surface_before": reconstruction.truth_before, "surface_after": reconstruction.truth_after}
+    return {
+        "scene": scene,
+        "preset": preset,
+        "nodes": [
+            {
+                "name": node.name,
+                "sensor_points": len(node.sensor),
+                "sensor_coverage": frame.depth.coverage,
+                "outliers": len(node.filtered.outliers),
+                "provider": node.provider,
+                "alignment": {
+                    "mode": node.alignment.mode,
+                    "residual_rms_m": node.alignment.residual_rms_m,
+                    "coefficients": node.alignment.coefficients,
+                },
+                "filled_points": inferred_points(node.fused),
+            }
+            for node, frame in zip(reconstruction.nodes, reconstruction.rig.frames, strict=True)
+        ],
+        "registration": [_registration(item, reconstruction) for item in reconstruction.registrations],
+        "spacing": {"r_F_m": surfaces.r_F_m, "sigma_D_m": surfaces.sigma_D_m},
+        "surface_before": surface_metrics(surfaces.before),
+        "surface_after": surface_metrics(surfaces.after),
+        "truth": truth,
+        "timings_s": reconstruction.timings_s,
+        "peak_memory_bytes": peak_memory_bytes(),
+    }
+
+
+def inferred_points(cloud: PointCloud) -> int:
+    """How many points of ``cloud`` the network contributed."""
+    return 0 if cloud.source is None else int((cloud.source == PointSource.INFERRED).sum())
+
+
+def _registration(item: NodeRegistration, reconstruction: Reconstruction) -> dict[str, Any]:
+    steps = item.result.steps
+    config = reconstruction.config.node_registration
+    return {
+        "source": item.source,
+        "target": item.target,
+        "method": f"{config.method}/{config.metric}",
+        "iterations": len(steps),
+        "stop_reason": item.result.stop_reason,
+        "rmse_m": steps[-1].rmse_m if steps else None,
+        "T_target_source": item.result.T_target_source,
+    }
+
+
+def surface_metrics(surface: SurfaceResult) -> dict[str, Any]:
+    """The measures of one surface by name."""
+    return {
+        "radii_m": surface.radii_m,
+        "vertices": len(surface.vertices_m),
+        "triangles": len(surface.triangles),
+    } | asdict(surface.quality)
+
+
+def peak_memory_bytes() -> int:
+    """The most memory this process has held at once."""
+    if sys.platform == "win32":
+        return int(psutil.Process().memory_info().peak_wset)
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return int(peak if sys.platform == "darwin" else peak * 1024)

@@ -1,0 +1,66 @@
+"""A procedural place: solid parts with materials, lights, and the cameras that look at it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pipeline.types import CameraIntrinsics, FloatArray, IntArray
+
+Texture = Callable[[FloatArray, FloatArray], FloatArray]
+"""(N, 3) positions and (N, 3) normals in the part's own frame, metres -> (N, 3) linear albedo, 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """What a surface does to light, visible and infrared."""
+
+    texture: Texture
+    """Albedo as a function of the place on the part; a solid texture needs no unwrapping."""
+    gloss: float = 0.0
+    """Strength of the mirror-like reflection, 0 (chalk) to 1 (polished metal); loses depth when high."""
+    infrared: float = 1.0
+    """Infrared albedo relative to the visible luminance; black plastic and screens are near 0."""
+    emission: float = 0.0
+    """Own light, in units of albedo (lamps, windows, screens)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One solid with one material."""
+
+    vertices_m: FloatArray
+    """(V, 3) in the part's own frame."""
+    triangles: IntArray
+    """(F, 3), counter-clockwise seen from outside."""
+    material: Material
+    T_world_part: FloatArray
+    """(4, 4)."""
+    smooth: bool = False
+    """Shade with interpolated vertex normals (spheres, cushions) instead of flat triangles."""
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """A small area light: a lamp (``position_m``) or a window's sky, with soft shadows."""
+
+    position_m: FloatArray
+    """(3,) centre, world frame."""
+    color: FloatArray
+    """(3,) linear RGB intensity at 1 m."""
+    size_m: float = 0.1
+    """Radius of the emitting ball; larger makes softer shadows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Everything needed to render a rig with ground truth; the world frame has Z up."""
+
+    name: str
+    parts: tuple[Part, ...]
+    lights: tuple[Light, ...]
+    ambient: FloatArray
+    """(3,) linear RGB of the light that comes from everywhere, dimmed by ambient occlusion."""
+    cameras: tuple[FloatArray, ...]
+    """True T_world_camera of every node."""
+    intrinsics: CameraIntrinsics

@@ -1,0 +1,27 @@
+"""From an oriented cloud to a triangle mesh and its measures (SPEC 5)."""
+
+from pipeline.surface.ball_pivoting import reconstruct_surface
+from pipeline.surface.boundary import boundary_loops
+from pipeline.surface.normals import estimate_normals
+from pipeline.surface.quality import measure_quality
+from pipeline.surface.radii import nearest_distances_m, radii, spacing
+from pipeline.surface.rays import Camera, hit_depth
+from pipeline.surface.smooth import smooth
+from pipeline.surface.truth import compare_with_truth
+from pipeline.surface.voxel import voxel_average, voxel_for_count
+
+__all__ = [
+    "Camera",
+    "boundary_loops",
+    "compare_with_truth",
+    "estimate_normals",
+    "hit_depth",
+    "measure_quality",
+    "nearest_distances_m",
+    "radii",
+    "reconstruct_surface",
+    "smooth",
+    "spacing",
+    "voxel_average",
+    "voxel_for_count",
+]

@@ -1,0 +1,74 @@
+"""A surface from a cloud by ball pivoting (Bernardini et al. 1999, SPEC 5), through Open3D."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipeline.errors import InputError, ReconstructionError
+from pipeline.open3d_runtime import o3d
+from pipeline.surface.quality import measure_quality
+from pipeline.surface.radii import spacing
+from pipeline.surface.rays import Camera
+from pipeline.types import FloatArray, IntArray, PointCloud, SurfaceResult
+
+
+def reconstruct_surface(
+    cloud: PointCloud, radii_m: Sequence[float], cameras: Sequence[Camera] = ()
+) -> SurfaceResult:
+    """Roll balls over an oriented cloud, the smallest first; its points become the vertices.
+
+    Args:
+        cloud: points with normals towards the outside.
+        radii_m: ball radii.
+        cameras: whose rays measure the share without a surface; NaN without any.
+
+    Raises:
+        InputError: fewer than three points, no normals, or a radius that is not positive.
+        ReconstructionError: the balls fall through everywhere.
+    """
+    if len(cloud) < 3:
+        raise InputError(f"A surface needs at least 3 points, not {len(cloud)}; check the depth image")
+    if cloud.normals is None:
+        raise InputError("Ball pivoting needs normals and the cloud has none; try to estimate them first")
+    if not len(radii_m) or not min(radii_m) > 0.0:
+        raise InputError(
+            f"The ball radii are {list(radii_m)} m; try about one to four times the point spacing"
+        )
+    radii_m = tuple(sorted(float(radius_m) for radius_m in radii_m))
+    triangles = _pivot(cloud.points_m, cloud.normals, radii_m)
+    if not len(triangles):
+        raise ReconstructionError(_why_nothing(cloud, radii_m[-1]))
+    used, corners = np.unique(triangles, return_inverse=True)
+    kept, triangles = cloud.select(used), corners.reshape(-1, 3).astype(np.int32)
+    return SurfaceResult(
+        vertices_m=kept.points_m,
+        triangles=triangles,
+        colors=kept.colors,
+        radii_m=radii_m,
+        quality=measure_quality(kept.points_m, triangles, cameras, len(cloud)),
+    )
+
+
+def _pivot(points_m: FloatArray, normals: FloatArray, radii_m: Sequence[float]) -> IntArray:
+    """(F, 3) point indices."""
+    points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
+    points.normals = o3d.utility.Vector3dVector(normals)
+    mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(
+        points, o3d.utility.DoubleVector(radii_m)
+    )
+    return np.asarray(mesh.triangles)
+
+
+def _why_nothing(cloud: PointCloud, radius_m: float) -> str:
+    r_F_m, sigma_D_m = spacing(cloud.points_m)
+    if radius_m < r_F_m / 2:
+        return (
+            f"The ball radius {radius_m:.4g} m is smaller than half the point spacing {r_F_m:.4g} m, so it "
+            f"falls through; try at least {r_F_m:.4g} m"
+        )
+    return (
+        f"No ball of radius {radius_m:.4g} m rests on three points whose normals agree; try a radius of "
+        f"{max(r_F_m + sigma_D_m, 2 * radius_m):.4g} m"
+    )

@@ -1,0 +1,110 @@
+"""Where a mesh ends: edges with one face, and the loops they make."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from pipeline.types import FloatArray, IntArray
+
+LONGEST_HOLE_M = 1.0
+"""A boundary loop of this length or more is a rim of the scene, not a hole (SPEC 5)."""
+
+
+def edges_and_faces(triangles: IntArray) -> tuple[IntArray, IntArray]:
+    """(E, 2) undirected edges, smaller index first, and (E,) how many faces share each."""
+    vertices = int(triangles.max(initial=-1)) + 1
+    pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
+    keys, faces = np.unique(pairs[:, 0] * vertices + pairs[:, 1], return_counts=True)
+    return np.stack(np.divmod(keys, max(vertices, 1)), axis=1), faces
+
+
+def boundary_loops(triangles: IntArray) -> list[IntArray]:
+    """The boundary of a mesh as closed loops of vertex indices, the first vertex not repeated.
+
+    Each edge with exactly one face is walked once, in the direction that its face gives it (a hole's
+    loop is seen clockwise from outside). Loops that touch in a vertex are parted there, so no loop
+    meets itself.
+    """
+    following = _boundary_successors(triangles)
+    loops = []
+    for start in sorted(following):
+        while following[start]:
+            loops.extend(_walk(start, following))
+    return loops
+
+
+def connected_parts(edges: IntArray, vertices: int) -> IntArray:
+    """(vertices,) label of the connected part each vertex belongs to, from (E, 2) edges."""
+    graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (vertices, vertices))
+    return connected_components(graph, directed=False)[1]
+
+
+def hole_area_m2(vertices_m: FloatArray, triangles: IntArray, loops: Sequence[IntArray]) -> float:
+    """Area of the loops shorter than 1 m, without the longest loop of each connected part of the mesh."""
+    if not loops:
+        return 0.0
+    lengths_m, areas_m2 = loop_measures(vertices_m, loops)
+    parts = connected_parts(edges_and_faces(triangles)[0], len(vertices_m))
+    part = parts[[loop[0] for loop in loops]]
+    order = np.lexsort((lengths_m, part))
+    hole = lengths_m < LONGEST_HOLE_M
+    hole[order[np.append(part[order][1:] != part[order][:-1], True)]] = False
+    return float(areas_m2[hole].sum())
+
+
+def loop_measures(vertices_m: FloatArray, loops: Sequence[IntArray]) -> tuple[FloatArray, FloatArray]:
+    """(L,) lengths in m and (L,) areas in square metres of closed loops.
+
+    The area is that of the fan of triangles from a loop's first vertex, added as vectors, which is
+    exact for flat loops that are not convex.
+    """
+    sizes = np.array([len(loop) for loop in loops])
+    owner = np.repeat(np.arange(len(loops)), sizes)
+    first = np.cumsum(sizes) - sizes
+    following = np.arange(len(owner)) + 1
+    following[first + sizes - 1] = first
+    start_m = vertices_m[np.concatenate(loops)]
+    end_m, apex_m = start_m[following], start_m[first[owner]]
+    lengths_m = np.add.reduceat(np.linalg.norm(end_m - start_m, axis=1), first)
+    twice_areas_m2 = np.add.reduceat(np.cross(start_m - apex_m, end_m - apex_m), first, axis=0)
+    return lengths_m, 0.5 * np.linalg.norm(twice_areas_m2, axis=1)
+
+
+def _boundary_successors(triangles: IntArray) -> dict[int, list[int]]:
+    """Where the boundary's directed edges lead from each of its vertices."""
+    edges, faces = edges_and_faces(triangles)
+    vertices = int(triangles.max(initial=-1)) + 1
+    rims = edges[faces == 1] @ [vertices, 1]
+    directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    on_rim = np.isin(np.sort(directed, axis=1) @ [vertices, 1], rims)
+    following: dict[int, list[int]] = {}
+    for start, end in directed[on_rim].tolist():
+        following.setdefault(start, []).append(end)
+        following.setdefault(end, [])
+    return following
+
+
+def _walk(start: int, following: dict[int, list[int]]) -> list[IntArray]:
+    """Use up the edges of one trail from ``start``, split into simple loops.
+
+    Only where faces disagree in their orientation does a trail end without closing; what is left
+    then counts as a loop of its own.
+    """
+    loops = []
+    trail = [start]
+    place = {start: 0}
+    while following[trail[-1]]:
+        vertex = following[trail[-1]].pop()
+        if vertex in place:
+            loops.append(np.array(trail[place[vertex] :]))
+            for passed in trail[place[vertex] + 1 :]:
+                del place[passed]
+            del trail[place[vertex] + 1 :]
+        else:
+            place[vertex] = len(trail)
+            trail.append(vertex)
+    return loops if len(trail) == 1 else [*loops, np.array(trail)]

@@ -1,0 +1,54 @@
+"""Which balls to roll: the thesis's rule r_F to r_F + sigma_D, and wider ones (SPEC 5)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.config import SurfaceConfig
+from pipeline.errors import InputError
+from pipeline.types import FloatArray
+
+SIGMAS = {"thesis": (0.0, 0.25, 0.5, 1.0), "thesis+": (0.0, 1.0, 2.0, 4.0)}
+"""Multiples of sigma_D that each rule adds to r_F."""
+
+
+def nearest_distances_m(points_m: FloatArray) -> FloatArray:
+    """(N,) distance of each of (N, 3) points to its nearest neighbour.
+
+    Raises:
+        InputError: fewer than two points.
+    """
+    if len(points_m) < 2:
+        raise InputError(f"A cloud of {len(points_m)} points has no spacing; try one of at least 2")
+    return cKDTree(points_m).query(points_m, k=2, workers=-1)[0][:, 1]
+
+
+def spacing(points_m: FloatArray) -> tuple[float, float]:
+    """r_F and sigma_D, metres: mean and standard deviation of the nearest-neighbour distance.
+
+    Raises:
+        InputError: fewer than two points.
+    """
+    distances_m = nearest_distances_m(points_m)
+    return float(distances_m.mean()), float(distances_m.std())
+
+
+def radii(config: SurfaceConfig, r_F_m: float, sigma_D_m: float) -> tuple[float, ...]:
+    """The ball radii of a config, metres, ascending and each once.
+
+    Raises:
+        InputError: no radius, or one that is not positive.
+    """
+    if config.radius_rule == "manual":
+        chosen = config.radii_m
+    else:
+        chosen = tuple(r_F_m + factor * sigma_D_m for factor in SIGMAS[config.radius_rule])
+    if not chosen:
+        raise InputError("There is no ball radius; try about one to four times the point spacing")
+    for radius_m in chosen:
+        if not (math.isfinite(radius_m) and radius_m > 0.0):
+            raise InputError(f"A ball radius is {radius_m} m; try about one to four times the point spacing")
+    return tuple(np.unique(chosen).tolist())

@@ -1,0 +1,65 @@
+"""What cameras see of a mesh, by ray casting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.geometry import pixel_rays
+from pipeline.open3d_runtime import o3d
+from pipeline.types import CameraIntrinsics, DepthMap, FloatArray, IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A camera in the world."""
+
+    intrinsics: CameraIntrinsics
+    T_world_camera: FloatArray
+    """(4, 4)."""
+
+
+def hit_depth(
+    vertices_m: FloatArray, triangles: IntArray, intrinsics: CameraIntrinsics, T_world_camera: FloatArray
+) -> DepthMap:
+    """The depth image of a mesh, on the camera's (distorted) pixel grid; NaN where a ray misses."""
+    return next(hit_depths(vertices_m, triangles, [Camera(intrinsics, T_world_camera)]))
+
+
+def hit_depths(vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> Iterator[DepthMap]:
+    """The depth image of a mesh in each camera."""
+    scene = triangle_scene(vertices_m, triangles)
+    for camera in cameras:
+        directions = pixel_rays(camera.intrinsics) @ camera.T_world_camera[:3, :3].T
+        origins_m = np.broadcast_to(camera.T_world_camera[:3, 3], directions.shape)
+        z_m = first_hits(scene, origins_m, directions)  # ray parameter, and the directions have z = 1
+        yield DepthMap(np.where(np.isfinite(z_m), z_m, np.float32(np.nan)))
+
+
+def triangle_scene(vertices_m: FloatArray, triangles: IntArray) -> o3d.t.geometry.RaycastingScene:
+    """Open3D's scene of one mesh, for rays and distances."""
+    scene = o3d.t.geometry.RaycastingScene()
+    if len(triangles):
+        scene.add_triangles(tensor(vertices_m, np.float32), tensor(triangles, np.uint32))
+    return scene
+
+
+def first_hits(
+    scene: o3d.t.geometry.RaycastingScene, origins_m: FloatArray, directions: FloatArray
+) -> FloatArray:
+    """(...) lengths of (..., 3) rays up to the first triangle, in units of their directions; inf for none."""
+    rays = np.concatenate([origins_m, directions], axis=-1)
+    return scene.cast_rays(tensor(rays, np.float32))["t_hit"].numpy()
+
+
+def tensor(array: np.ndarray, dtype: type[np.generic]) -> o3d.core.Tensor:
+    """Open3D's view of an array."""
+    return o3d.core.Tensor.from_numpy(np.ascontiguousarray(array, dtype=dtype))
+
+
+def triangle_areas_m2(vertices_m: FloatArray, triangles: IntArray) -> FloatArray:
+    """(F,)."""
+    a, b, c = (vertices_m[triangles[:, corner]] for corner in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)

@@ -1,0 +1,143 @@
+"""A surface against what is really there (SPEC 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.geometry import apply, inverse, project
+from pipeline.open3d_runtime import o3d
+from pipeline.surface.rays import Camera, first_hits, hit_depths, tensor, triangle_areas_m2, triangle_scene
+from pipeline.types import BoolArray, FloatArray, IntArray, RigTruth
+
+TOLERANCES_M = (0.01, 0.03, 0.05)
+SAMPLES = 20_000
+"""Points drawn on each surface: a standard error of at most 0.4 percentage points."""
+_CLOSE_DEPTH = 0.05
+_SELF_HIT_M = 1e-3
+"""What a ray hits this near to its point is the point itself."""
+_DRAWS_A_SAMPLE = 4
+"""Points drawn on the whole true surface for each wanted on the part that cameras see."""
+
+
+def compare_with_truth(
+    vertices_m: FloatArray, triangles: IntArray, truth: RigTruth, cameras: Sequence[Camera], seed: int = 0
+) -> dict[str, float]:
+    """Measures of a mesh beside the true surface.
+
+    Registration knows the nodes' places only relative to each other, so the mesh is first moved to
+    where its first camera truly is.
+
+    Args:
+        vertices_m: (V, 3) world frame of ``cameras``.
+        triangles: (F, 3).
+        truth: the true surface, poses and depth maps.
+        cameras: one for each of the truth's, with the poses the mesh was made with.
+        seed: draws the sample points.
+
+    Returns:
+        For each of 1, 3 and 5 cm: ``coverage_1cm``, share of the true surface that a camera sees and
+        that has the mesh within 1 cm; ``accuracy_1cm``, share of the mesh within 1 cm of the true
+        surface; ``f_score_1cm``, their harmonic mean; all by area and by exact distances. Along the
+        rays of the true cameras: ``no_hit_ray_share``, ``within_5pct_depth_share`` of all rays that
+        meet the true surface, and ``median_depth_error_m`` of those that meet both (NaN if none).
+
+    Raises:
+        InputError: the mesh has no triangle.
+    """
+    if not len(triangles):
+        raise InputError("There is no triangle to compare with the truth; try a larger ball radius")
+    T_true_mesh = truth.T_world_camera[0] @ inverse(cameras[0].T_world_camera)
+    mesh_m = apply(T_true_mesh, vertices_m)
+    true_cameras = [
+        Camera(camera.intrinsics, T) for camera, T in zip(cameras, truth.T_world_camera, strict=True)
+    ]
+    rng = np.random.default_rng(seed)
+    return _surface_measures(mesh_m, triangles, truth, true_cameras, rng) | _ray_measures(
+        mesh_m, triangles, truth, true_cameras
+    )
+
+
+def _surface_measures(
+    mesh_m: FloatArray,
+    triangles: IntArray,
+    truth: RigTruth,
+    true_cameras: Sequence[Camera],
+    rng: np.random.Generator,
+) -> dict[str, float]:
+    true_scene = triangle_scene(truth.vertices_m, truth.triangles)
+    seen_m = _seen_samples(truth, true_scene, true_cameras, rng)
+    missing_m = _distances_m(triangle_scene(mesh_m, triangles), seen_m)
+    error_m = _distances_m(true_scene, sample_surface(mesh_m, triangles, SAMPLES, rng))
+    measures = {}
+    for tolerance_m in TOLERANCES_M:
+        name = f"{100 * tolerance_m:.0f}cm"
+        coverage = float((missing_m <= tolerance_m).mean())
+        accuracy = float((error_m <= tolerance_m).mean())
+        measures[f"coverage_{name}"] = coverage
+        measures[f"accuracy_{name}"] = accuracy
+        measures[f"f_score_{name}"] = 2 * coverage * accuracy / max(coverage + accuracy, 1e-12)
+    return measures
+
+
+def _ray_measures(
+    mesh_m: FloatArray, triangles: IntArray, truth: RigTruth, true_cameras: Sequence[Camera]
+) -> dict[str, float]:
+    seen_m = [depth.z_m for depth in hit_depths(mesh_m, triangles, true_cameras)]
+    z_m = np.concatenate([depth.z_m[depth.valid] for depth in truth.depth])
+    mesh_z_m = np.concatenate([z[depth.valid] for z, depth in zip(seen_m, truth.depth, strict=True)])
+    error_m = np.abs(mesh_z_m - z_m)
+    hit = np.isfinite(error_m)
+    return {
+        "no_hit_ray_share": float(1.0 - hit.mean()),
+        "within_5pct_depth_share": float((error_m <= _CLOSE_DEPTH * z_m).mean()),
+        "median_depth_error_m": float(np.median(error_m[hit])) if hit.any() else float("nan"),
+    }
+
+
+def sample_surface(
+    vertices_m: FloatArray, triangles: IntArray, count: int, rng: np.random.Generator
+) -> FloatArray:
+    """(count, 3) points uniform by area on a mesh."""
+    area_m2 = triangle_areas_m2(vertices_m, triangles)
+    a, b, c = vertices_m[triangles[rng.choice(len(triangles), count, p=area_m2 / area_m2.sum())]].swapaxes(
+        0, 1
+    )
+    root, share = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
+    return (1 - root) * a + root * (1 - share) * b + root * share * c
+
+
+def _seen_samples(
+    truth: RigTruth,
+    true_scene: o3d.t.geometry.RaycastingScene,
+    true_cameras: Sequence[Camera],
+    rng: np.random.Generator,
+) -> FloatArray:
+    """(at most SAMPLES, 3) points uniform by area on what at least one camera sees of the true surface."""
+    points_m = sample_surface(truth.vertices_m, truth.triangles, _DRAWS_A_SAMPLE * SAMPLES, rng)
+    seen = np.zeros(len(points_m), dtype=bool)
+    for camera in true_cameras:
+        seen |= _seen(points_m, true_scene, camera)
+    return points_m[seen][:SAMPLES]
+
+
+def _seen(points_m: FloatArray, scene: o3d.t.geometry.RaycastingScene, camera: Camera) -> BoolArray:
+    """(N,) True where the point is in the image and nothing stands before it."""
+    in_camera_m = apply(inverse(camera.T_world_camera), points_m)
+    inside = in_camera_m[:, 2] > _SELF_HIT_M
+    uv = project(camera.intrinsics, in_camera_m[inside])
+    size_px = (camera.intrinsics.width_px, camera.intrinsics.height_px)
+    inside[inside] = np.all((uv > -0.5) & (uv < np.array(size_px) - 0.5), axis=1)
+    eye_m = camera.T_world_camera[:3, 3]
+    sight_m = points_m[inside] - eye_m
+    distance_m = np.linalg.norm(sight_m, axis=1, keepdims=True)
+    first_hit_m = first_hits(scene, np.broadcast_to(eye_m, sight_m.shape), sight_m / distance_m)
+    inside[inside] = first_hit_m >= distance_m[:, 0] - _SELF_HIT_M
+    return inside
+
+
+def _distances_m(scene: o3d.t.geometry.RaycastingScene, points_m: FloatArray) -> FloatArray:
+    """(N,) exact distance of each point to the nearest triangle."""
+    return scene.compute_distance(tensor(points_m, np.float32)).numpy()

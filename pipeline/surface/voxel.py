@@ -1,0 +1,90 @@
+"""Thinning a cloud to one averaged point a voxel."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.types import ByteArray, FloatArray, IntArray, PointCloud
+
+_COUNT_TOLERANCE = 0.02
+"""How near the wanted number of points is near enough, as a share of it."""
+_FINEST = 1e-6
+"""Smallest voxel that is tried, as a share of the cloud's extent."""
+_MAX_TRIALS = 40
+
+
+def voxel_average(cloud: PointCloud, voxel_m: float) -> PointCloud:
+    """One point for every occupied cube of edge ``voxel_m``: the mean of its points.
+
+    The cubes have a corner at the origin, so clouds in one frame are thinned on one grid, and the
+    result is ordered by x, then y, then z of the cubes. Colours and sigmas are averaged, normals
+    averaged and made unit again; the source is that of the majority, the sensor's in a tie. Pixels
+    have no mean and are dropped.
+
+    Raises:
+        InputError: ``voxel_m`` is not positive, or too small for the extent of the cloud.
+    """
+    _, first, cell, count = np.unique(
+        _cube_keys(cloud.points_m, voxel_m), return_index=True, return_inverse=True, return_counts=True
+    )
+
+    def mean(column: FloatArray | ByteArray) -> FloatArray:
+        sums = [np.bincount(cell, weights=part, minlength=len(count)) for part in column.T]
+        return np.stack(sums, axis=1) / count[:, None]
+
+    return PointCloud(
+        points_m=mean(cloud.points_m),
+        colors=None if cloud.colors is None else np.rint(mean(cloud.colors)).astype(np.uint8),
+        normals=None if cloud.normals is None else _unit(mean(cloud.normals), cloud.normals[first]),
+        sigma_m=None if cloud.sigma_m is None else mean(cloud.sigma_m[:, None])[:, 0],
+        source=None if cloud.source is None else (mean(cloud.source[:, None])[:, 0] > 0.5).astype(np.uint8),
+    )
+
+
+def voxel_for_count(points_m: FloatArray, count: int) -> float:
+    """The voxel edge, metres, that thins (N, 3) points to about ``count``; tiny if there are no more.
+
+    Bisection that first guesses by the rule of surfaces, count ~ 1 / voxel^2.
+
+    Raises:
+        InputError: no point, or all in one place.
+    """
+    extent_m = float(np.ptp(points_m, axis=0).max()) if len(points_m) else 0.0
+    if not extent_m > 0.0:
+        raise InputError(
+            f"A cloud of {len(points_m)} points in one place has no spacing; check the depth image"
+        )
+    low_m, high_m = extent_m * _FINEST, extent_m
+    if len(points_m) <= count:
+        return low_m
+    voxel_m = extent_m / np.sqrt(count)
+    for _ in range(_MAX_TRIALS):
+        occupied = len(np.unique(_cube_keys(points_m, voxel_m)))
+        if abs(occupied - count) <= _COUNT_TOLERANCE * count:
+            break
+        low_m, high_m = (voxel_m, high_m) if occupied > count else (low_m, voxel_m)
+        guess_m = voxel_m * np.sqrt(occupied / count)
+        voxel_m = guess_m if low_m < guess_m < high_m else np.sqrt(low_m * high_m)
+    return float(voxel_m)
+
+
+def _cube_keys(points_m: FloatArray, voxel_m: float) -> IntArray:
+    """(N,) one integer a cube, ascending in x, then y, then z."""
+    if not voxel_m > 0.0:
+        raise InputError(f"The voxel size is {voxel_m} m; try a positive one, for example 0.01")
+    if not len(points_m):
+        return np.empty(0, dtype=np.int64)
+    cubes = np.floor(points_m / voxel_m)
+    cubes -= cubes.min(axis=0)
+    sizes = cubes.max(axis=0) + 1.0
+    if not np.prod(sizes) < 2.0**63:
+        raise InputError(f"The voxel size {voxel_m:.3g} m is too small for this cloud; try a larger one")
+    x, y, z = cubes.astype(np.int64).T
+    return (x * int(sizes[1]) + y) * int(sizes[2]) + z
+
+
+def _unit(vectors: FloatArray, fallback: FloatArray) -> FloatArray:
+    """Unit vectors; ``fallback`` where opposite ones cancelled out."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(length > 1e-6, vectors / np.maximum(length, 1e-6), fallback)

@@ -1,0 +1,243 @@
+"""The records that stages hand to each other: frozen, plain arrays, units in the names.
+
+Conventions: metres, seconds, radians; OpenCV camera axes (x right, y down, z forward); pixel
+centres at integers; ``T_a_b`` is the (4, 4) matrix that maps coordinates in frame b to frame a;
+unknown depth is NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from enum import IntEnum
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.floating]
+IntArray = NDArray[np.integer]
+BoolArray = NDArray[np.bool_]
+ByteArray = NDArray[np.uint8]
+
+
+class PointSource(IntEnum):
+    """Where a fused point came from."""
+
+    SENSOR = 0
+    INFERRED = 1
+
+
+@dataclass(frozen=True, slots=True)
+class CameraIntrinsics:
+    """A pinhole camera with Brown-Conrady distortion (SPEC 1.1, OpenCV's direction)."""
+
+    matrix: FloatArray
+    """(3, 3) camera matrix, pixels, zero skew."""
+    distortion: FloatArray
+    """(5,) k1, k2, p1, p2, k3; dimensionless."""
+    width_px: int
+    height_px: int
+
+    @property
+    def fx_px(self) -> float:
+        return float(self.matrix[0, 0])
+
+    @property
+    def fy_px(self) -> float:
+        return float(self.matrix[1, 1])
+
+    @property
+    def cx_px(self) -> float:
+        return float(self.matrix[0, 2])
+
+    @property
+    def cy_px(self) -> float:
+        return float(self.matrix[1, 2])
+
+    @staticmethod
+    def pinhole(
+        fx_px: float, fy_px: float, cx_px: float, cy_px: float, width_px: int, height_px: int
+    ) -> CameraIntrinsics:
+        """An undistorted camera."""
+        matrix = np.array([[fx_px, 0.0, cx_px], [0.0, fy_px, cy_px], [0.0, 0.0, 1.0]])
+        return CameraIntrinsics(matrix, np.zeros(5), width_px, height_px)
+
+
+@dataclass(frozen=True, slots=True)
+class DepthMap:
+    """Depth along the optical axis (z, not ray length) for every pixel."""
+
+    z_m: FloatArray
+    """(H, W) float32, metres; NaN where unknown."""
+    kind: Literal["metric", "relative"] = "metric"
+
+    @property
+    def valid(self) -> BoolArray:
+        """(H, W) True where the depth is known."""
+        return np.isfinite(self.z_m)
+
+    @property
+    def coverage(self) -> float:
+        """Share of pixels with known depth, 0 to 1."""
+        return float(self.valid.mean())
+
+
+@dataclass(frozen=True, slots=True)
+class RgbdFrame:
+    """One registered colour and depth image of one camera node."""
+
+    name: str
+    rgb: ByteArray
+    """(H, W, 3) RGB."""
+    depth: DepthMap
+    """(H, W), on the same pixel grid as ``rgb``."""
+    intrinsics: CameraIntrinsics
+    T_world_camera: FloatArray
+    """(4, 4) pose as the node believes it to be; registration corrects it."""
+
+
+@dataclass(frozen=True, slots=True)
+class RigTruth:
+    """What is really there, known for rendered scenes only."""
+
+    vertices_m: FloatArray
+    """(V, 3) world frame."""
+    triangles: IntArray
+    """(F, 3)."""
+    T_world_camera: tuple[FloatArray, ...]
+    """True pose of every node."""
+    depth: tuple[DepthMap, ...]
+    """True, hole-free depth of every node."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """One to six camera nodes that look at the same place; a single RGB-D pair is a rig of one."""
+
+    name: str
+    frames: tuple[RgbdFrame, ...]
+    truth: RigTruth | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PointCloud:
+    """Points with what is known about each; optional columns are None or have N rows."""
+
+    points_m: FloatArray
+    """(N, 3) float64."""
+    colors: ByteArray | None = None
+    """(N, 3) RGB."""
+    normals: FloatArray | None = None
+    """(N, 3) unit vectors towards the observing camera."""
+    pixels: IntArray | None = None
+    """(N, 2) the (u, v) image pixel each point was back-projected from."""
+    sigma_m: FloatArray | None = None
+    """(N,) standard deviation of the depth."""
+    source: ByteArray | None = None
+    """(N,) ``PointSource`` of each point."""
+
+    def __len__(self) -> int:
+        return len(self.points_m)
+
+    def select(self, rows: BoolArray | IntArray) -> PointCloud:
+        """The points at ``rows``: an (N,) mask or indices."""
+        columns: dict[str, Any] = {}
+        for column in fields(self):
+            values = getattr(self, column.name)
+            columns[column.name] = None if values is None else values[rows]
+        return PointCloud(**columns)
+
+    @staticmethod
+    def concatenate(clouds: Sequence[PointCloud]) -> PointCloud:
+        """All points of all clouds in order, with the columns that every one of them has."""
+        columns: dict[str, Any] = {}
+        for column in fields(PointCloud):
+            parts = [getattr(cloud, column.name) for cloud in clouds]
+            columns[column.name] = None if any(part is None for part in parts) else np.concatenate(parts)
+        return PointCloud(**columns)
+
+    def transformed(self, T_target_source: FloatArray) -> PointCloud:
+        """The same points after a (4, 4) rigid or similarity transform."""
+        linear, translation = T_target_source[:3, :3], T_target_source[:3, 3]
+        scale = np.cbrt(np.linalg.det(linear))
+        return replace(
+            self,
+            points_m=self.points_m @ linear.T + translation,
+            normals=None if self.normals is None else self.normals @ (linear / scale).T,
+            sigma_m=None if self.sigma_m is None else self.sigma_m * scale,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class RegistrationStep:
+    """One iteration of any registration method, all of it that a player or plot needs."""
+
+    index: int
+    """0 for the first matching, made at the start pose."""
+    T_target_source: FloatArray
+    """(4, 4) pose after this step's update."""
+    pairs: IntArray
+    """(M, 2) source index, target index, matched at the pose before the update."""
+    weights: FloatArray
+    """(M,) weight of each pair, summing to one."""
+    distances_m: FloatArray
+    """(M,) distance of each pair before the update."""
+    sigma_m: float
+    """Scale of the weight function; NaN for methods without one."""
+    objective: float
+    """Weighted mean square the update minimised, after the update, in square metres."""
+    rmse_m: float
+    """Root of the weighted mean squared point distance of the pairs, before the update."""
+    effective_pairs: float
+    """(sum w)^2 / sum w^2."""
+    entropy_nat: float
+    """Entropy -sum p log p of the matching, in nats; NaN for methods without p."""
+    rotation_step_rad: float
+    translation_step_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class RegistrationResult:
+    """The folded steps of a registration."""
+
+    T_target_source: FloatArray
+    """(4, 4) maps the source cloud onto the target cloud."""
+    steps: tuple[RegistrationStep, ...]
+    converged: bool
+    stop_reason: str
+    """``converged``, ``stalled``, ``max_iterations`` or ``degenerate: <why>``."""
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceQuality:
+    """Measures of a mesh's holes and health (SPEC 5); the first is the headline."""
+
+    no_hit_ray_share: float
+    """Share of the cameras' pixel rays that miss the mesh, 0 to 1."""
+    boundary_loops: int
+    """Connected components of the graph of edges with exactly one face."""
+    boundary_length_m: float
+    hole_area_m2: float
+    """Fan-triangulated area of loops shorter than 1 m, without each component's outer loop."""
+    non_manifold_edges: int
+    """Edges with more than two faces."""
+    components: int
+    area_m2: float
+    unused_points: int
+    """Input points that no triangle uses."""
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceResult:
+    """A triangle mesh grown from a point cloud."""
+
+    vertices_m: FloatArray
+    """(V, 3)."""
+    triangles: IntArray
+    """(F, 3) int32, counter-clockwise seen from outside."""
+    colors: ByteArray | None
+    """(V, 3) RGB."""
+    radii_m: tuple[float, ...]
+    """Ball radii used, ascending."""
+    quality: SurfaceQuality
