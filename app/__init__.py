@@ -1,0 +1,1 @@
+"""The command line, the web app and the written reports: the only place that knows viser and plotly."""

@@ -1,0 +1,269 @@
+"""The command line: one entry point; heavy imports happen inside the command that needs them.
+
+Exit code 0: done; 1: it could not be done, one sentence says why; 2: wrong use.
+With ``--json`` exactly one JSON object goes to stdout; everything else goes to stderr.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import tyro
+
+from pipeline.config import PRESETS
+from pipeline.errors import PacketMeshError
+from pipeline.settings import load_config, with_settings
+
+Settings = Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="KEY=VALUE")]
+PresetName = Annotated[str, tyro.conf.arg(metavar="{" + "|".join(PRESETS) + "|FILE.json}")]
+
+
+def serve(
+    scene: str = "living-room",
+    preset: PresetName = "packetmesh",
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    open: bool = False,
+    lecture: bool = False,
+) -> None:
+    """Open the app: step through a reconstruction in the browser.
+
+    Args:
+        scene: Demo scene to start with (see `packetmesh scenes`), or a rig folder.
+        preset: Settings to start with.
+        host: Address to listen on; other machines can reach only what is not loopback.
+        port: Port to listen on.
+        open: Open a browser window.
+        lecture: Share one session among all browsers instead of one each.
+    """
+    from app.server import serve as serve_app
+
+    def announce(url: str) -> None:
+        _say(f"PacketMesh is at {url} (stop with Ctrl-C)")
+
+    serve_app(
+        scene=scene,
+        config=load_config(preset),
+        host=host,
+        port=port,
+        open_browser=open,
+        lecture=lecture,
+        announce=announce,
+    )
+
+
+def reconstruct(
+    out: Path,
+    scene: str | None = None,
+    rig: Path | None = None,
+    color: Path | None = None,
+    depth: Path | None = None,
+    intrinsics: Path | None = None,
+    depth_scale: float = 1000.0,
+    preset: PresetName = "packetmesh",
+    set: Settings = (),
+    json: bool = False,
+) -> None:
+    """Go the whole way from images to a surface before and after fusion.
+
+    Args:
+        out: Folder for config.json, metrics.json, the clouds, the surfaces and report.html.
+        scene: A demo scene (see `packetmesh scenes`).
+        rig: A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/...
+        color: Colour image of a single RGB-D pair.
+        depth: Its registered 16-bit depth image.
+        intrinsics: Its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info.
+        depth_scale: Depth units per metre in the depth image.
+        preset: Settings to start from.
+        set: Settings to change, for example `--set depth.alignment=median surface.max_points=20000`.
+        json: Print the metrics as one JSON object.
+    """
+    config = with_settings(load_config(preset), set)
+    name, loaded = _load(scene, rig, color, depth, intrinsics, depth_scale)
+
+    from app.reports.reconstruction import write_reconstruction_report
+    from pipeline.io.atomic import writable_folder
+    from pipeline.reconstruct import iterate_reconstruction
+    from pipeline.run_folder import metrics_of, write_run_folder
+
+    writable_folder(out)
+    steps = iterate_reconstruction(loaded, config)
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as stop:
+            result = stop.value
+            break
+        _say(f"{progress.fraction:4.0%}  {progress.stage}")
+    metrics = metrics_of(result, name, preset)
+    write_run_folder(result, metrics, out, {"scene": name, "preset": preset})
+    write_reconstruction_report(result, metrics, out / "report.html")
+    before, after = metrics["surface_before"], metrics["surface_after"]
+    _say(
+        f"100%  rays without a surface: {before['no_hit_ray_share']:.1%} before fusion, "
+        f"{after['no_hit_ray_share']:.1%} after; see {out / 'report.html'}"
+    )
+    if json:
+        _print_json(metrics)
+
+
+def reproduce(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
+    """Compute the thesis's claims anew and set them beside its own numbers.
+
+    Args:
+        out: Folder for reproduce.html and reproduce.json.
+        only: Claims to compute (C10, C22, ...); all without it.
+        json: Print the verdicts as one JSON object.
+    """
+    from app.reports.reproduction import write_reproduction_report
+    from pipeline.experiments import run_experiments
+    from pipeline.io.atomic import writable_folder
+    from pipeline.io.json_file import write_json
+
+    writable_folder(out)
+    verdicts = {}
+    for verdict in run_experiments(only):
+        _say(f"{verdict.id}  {verdict.verdict}: {verdict.why}")
+        verdicts[verdict.id] = verdict
+    report = {key: verdict.record() for key, verdict in verdicts.items()}
+    write_json(out / "reproduce.json", report)
+    write_reproduction_report(list(verdicts.values()), out / "reproduce.html")
+    if json:
+        _print_json(report)
+
+
+def bench(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
+    """Measure speed and memory beside peers, in one run.
+
+    Args:
+        out: Folder for bench.json.
+        only: Cases to run; all without it.
+        json: Print the results as one JSON object.
+    """
+    from pipeline.experiments.benchmarks import run_benchmarks
+    from pipeline.io.atomic import writable_folder
+    from pipeline.io.json_file import write_json
+
+    writable_folder(out)
+    results = {}
+    for case, result in run_benchmarks(only):
+        peers = ", ".join(f"{name} {seconds:.3f} s" for name, seconds in result.peers.items()) or "no peer"
+        _say(f"{case}: {result.ours_s:.3f} s ({peers}), {result.peak_memory_bytes / 1e6:.0f} MB at most")
+        results[case] = result.record()
+    write_json(out / "bench.json", results)
+    if json:
+        _print_json(results)
+
+
+def scenes(json: bool = False) -> None:
+    """List the demo scenes that can be loaded.
+
+    Args:
+        json: Print them as one JSON object.
+    """
+    from pipeline.scenes import DEMO_SCENES
+
+    if json:
+        _print_json(DEMO_SCENES)
+        return
+    for name, description in DEMO_SCENES.items():
+        print(f"{name:<14} {description}")
+
+
+def doctor(json: bool = False) -> None:
+    """Tell what this machine has, and what is wrong with it.
+
+    Args:
+        json: Print the findings as one JSON object.
+    """
+    from app.doctor import examine
+
+    findings = examine()
+    if json:
+        _print_json({finding.name: {"ok": finding.ok, "detail": finding.detail} for finding in findings})
+    else:
+        for finding in findings:
+            print(f"{'ok ' if finding.ok else 'BAD'} {finding.name:<14} {finding.detail}")
+    bad = [finding.name for finding in findings if not finding.ok]
+    if bad:
+        raise PacketMeshError(f"Not everything is well: {', '.join(bad)} (see above)")
+
+
+COMMANDS: dict[str, Any] = {
+    "serve": serve,
+    "reconstruct": reconstruct,
+    "reproduce": reproduce,
+    "bench": bench,
+    "scenes": scenes,
+    "doctor": doctor,
+}
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Run one command and exit with its code."""
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    try:
+        tyro.extras.subcommand_cli_from_dict(
+            COMMANDS,
+            prog="packetmesh",
+            description="From a camera node's packets to a surface mesh.",
+            args=argv,
+            config=(tyro.conf.FlagCreatePairsOff,),
+        )
+    except PacketMeshError as error:
+        _say(f"packetmesh: {error}")
+        sys.exit(1)
+    except KeyboardInterrupt:
+        _say("packetmesh: stopped")
+        sys.exit(130)
+
+
+def _load(
+    scene: str | None,
+    rig: Path | None,
+    color: Path | None,
+    depth: Path | None,
+    intrinsics: Path | None,
+    depth_scale: float,
+) -> tuple[str, Any]:
+    """The rig that the options name, and a name for it."""
+    pair = (color, depth, intrinsics)
+    ways = [scene is not None, rig is not None, any(part is not None for part in pair)]
+    if sum(ways) != 1:
+        _wrong_use("say what to reconstruct: --scene NAME, --rig DIR, or --color C --depth D --intrinsics K")
+    from pipeline.io.rigs import load_frame, load_rig
+    from pipeline.scenes import load_demo
+    from pipeline.types import Rig
+
+    if scene is not None:
+        return scene, load_demo(scene)
+    if rig is not None:
+        return str(rig), load_rig(rig)
+    if color is None or depth is None or intrinsics is None:
+        _wrong_use("a single pair needs all of --color, --depth and --intrinsics")
+    return f"{color.parent.name}/{color.name}", Rig(
+        color.stem, (load_frame(color, depth, intrinsics, depth_scale),)
+    )
+
+
+def _wrong_use(sentence: str) -> NoReturn:
+    _say(f"packetmesh: {sentence}")
+    sys.exit(2)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _print_json(value: Any) -> None:
+    from pipeline.io.json_file import finite
+
+    print(json.dumps(finite(value), allow_nan=False))
+
+
+if __name__ == "__main__":
+    main()

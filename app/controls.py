@@ -1,0 +1,186 @@
+"""Config fields as GUI controls: labels with units, hints from the field's own documentation."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import functools
+import inspect
+import textwrap
+import typing
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import viser
+
+from pipeline.config import PipelineConfig
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A drop-down over the values of a ``Literal`` field."""
+
+    label: str
+    path: str
+    """Dotted name of the field, such as ``depth.alignment``."""
+    names: Mapping[str, str] = field(default_factory=dict)
+    """What to call a value; values that are missing call themselves."""
+    hint: str | None = None
+    """None takes the field's docstring."""
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A slider over a numeric field."""
+
+    label: str
+    """With the unit shown in the app."""
+    path: str
+    least: float
+    most: float
+    step: float
+    per_unit: float = 1.0
+    """Units shown in the app in one unit of the field: 100 for a field in metres shown in cm."""
+    hint: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Toggle:
+    """A checkbox over a boolean field."""
+
+    label: str
+    path: str
+    hint: str | None = None
+
+
+Control = Choice | Number | Toggle
+
+
+def get(config: Any, path: str) -> Any:
+    """The value at a dotted path."""
+    return functools.reduce(getattr, path.split("."), config)
+
+
+def put(config: Any, path: str, value: Any) -> Any:
+    """``config`` with the value at a dotted path replaced.
+
+    Raises:
+        InputError: the config refuses the value.
+    """
+    head, _, rest = path.partition(".")
+    inner = put(getattr(config, head), rest, value) if rest else value
+    return dataclasses.replace(config, **{head: inner})
+
+
+def hint_of(control: Control) -> str:
+    """What the control does, in one or two sentences."""
+    if control.hint is not None:
+        return control.hint
+    owner, name = _owner(control.path)
+    return _field_docs(owner).get(name, "")
+
+
+def shown(control: Control, config: PipelineConfig) -> Any:
+    """The value as the control shows it."""
+    value = get(config, control.path)
+    if isinstance(control, Choice):
+        return control.names.get(value, value)
+    if isinstance(control, Number):
+        lowest, highest = control.least, control.most
+        return type(control.step)(min(max(value * control.per_unit, lowest), highest))
+    return bool(value)
+
+
+def stored(control: Control, display: Any, config: PipelineConfig) -> PipelineConfig:
+    """``config`` with what the control shows put into the field."""
+    if isinstance(control, Choice):
+        values = {name: value for value, name in control.names.items()}
+        return put(config, control.path, values.get(display, display))
+    if isinstance(control, Number):
+        value = display / control.per_unit if control.per_unit != 1.0 else display
+        return put(config, control.path, type(get(config, control.path))(value))
+    return put(config, control.path, bool(display))
+
+
+class Controls:
+    """The controls of some fields, kept equal to a config that somebody else owns."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        controls: Sequence[Control],
+        config: PipelineConfig,
+        on_change: Callable[[Callable[[PipelineConfig], PipelineConfig]], None],
+    ) -> None:
+        """Add the controls to the current container.
+
+        Args:
+            gui: where to add them.
+            controls: which fields.
+            config: their first values.
+            on_change: called with the edit that a person made.
+        """
+        self._controls = tuple(controls)
+        self._handles = [_add(gui, control, config) for control in controls]
+        for control, handle in zip(self._controls, self._handles, strict=True):
+            handle.on_update(functools.partial(self._edited, control, handle, on_change))
+
+    def write(self, config: PipelineConfig) -> None:
+        """Show another config."""
+        for control, handle in zip(self._controls, self._handles, strict=True):
+            value = shown(control, config)
+            if handle.value != value:
+                handle.value = value
+
+    @staticmethod
+    def _edited(
+        control: Control,
+        handle: viser.GuiInputHandle,
+        on_change: Callable[[Callable[[PipelineConfig], PipelineConfig]], None],
+        event: viser.GuiEvent,
+    ) -> None:
+        if event.client is not None:
+            on_change(lambda config: stored(control, handle.value, config))
+
+
+def _add(gui: viser.GuiApi, control: Control, config: PipelineConfig) -> Any:
+    hint, value = hint_of(control), shown(control, config)
+    if isinstance(control, Choice):
+        options = [control.names.get(option, option) for option in options_of(control.path)]
+        return gui.add_dropdown(control.label, options, initial_value=value, hint=hint)
+    if isinstance(control, Number):
+        return gui.add_slider(
+            control.label, control.least, control.most, control.step, initial_value=value, hint=hint
+        )
+    return gui.add_checkbox(control.label, value, hint=hint)
+
+
+def options_of(path: str) -> tuple[str, ...]:
+    """The values that a ``Literal`` field takes."""
+    owner, name = _owner(path)
+    hint = typing.get_type_hints(owner)[name]
+    if typing.get_origin(hint) is not Literal:
+        raise TypeError(f"{path} is not a choice")
+    return typing.get_args(hint)
+
+
+def _owner(path: str) -> tuple[type, str]:
+    """The dataclass that has the field at a dotted path, and the field's name."""
+    parents, _, name = path.rpartition(".")
+    owner: type = type(get(PipelineConfig(), parents))
+    return owner, name
+
+
+@functools.cache
+def _field_docs(owner: type) -> dict[str, str]:
+    """The docstrings under the fields of a dataclass, read from its source."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
+    assert isinstance(body, ast.ClassDef)
+    docs = {}
+    for statement, following in zip(body.body, body.body[1:], strict=False):
+        if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+            text = following.value if isinstance(following, ast.Expr) else None
+            if isinstance(text, ast.Constant) and isinstance(text.value, str):
+                docs[statement.target.id] = " ".join(text.value.split())
+    return docs

@@ -1,0 +1,1 @@
+"""What each screen puts into the 3-D scene."""

@@ -1,0 +1,73 @@
+"""Camera nodes in space, and where to look at them from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from app.drawing.colors import NEUTRAL
+from app.drawing.poses import place
+from app.jobs.records import SceneNode
+from pipeline.geometry import apply
+from pipeline.types import FloatArray
+
+
+def add_camera(
+    scene: viser.SceneApi, name: str, node: SceneNode, T_world_camera: FloatArray, with_image: bool = True
+) -> viser.CameraFrustumHandle:
+    """A frustum with the node's picture on it and its name above."""
+    frustum = scene.add_camera_frustum(
+        name,
+        fov=node.fov_rad,
+        aspect=node.aspect,
+        scale=0.15,
+        thickness=0.006,
+        color=NEUTRAL,
+        image=node.color.rgb[::4, ::4] if with_image else None,
+    )
+    place(frustum, T_world_camera)
+    scene.add_label(f"{name}/name", node.name, position=(0.0, -0.14, 0.1), font_screen_scale=0.9)
+    return frustum
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """Where to stand to see a scene, and where to put a second one beside it."""
+
+    viewpoint_m: FloatArray
+    middle_m: FloatArray
+    """What to look at."""
+    right: FloatArray
+    """Unit vector to the right of the picture, horizontal."""
+    width_m: float
+    """Extent of the scene in that direction."""
+    top_m: FloatArray
+    """A place for a label above the scene."""
+
+
+def stage_of(nodes: Sequence[SceneNode]) -> Stage:
+    """Behind and above the cameras, looking at the middle of what they see."""
+    seen_m = [apply(node.T_world_camera, node.sensor.points_m.astype(float)) for node in nodes]
+    middle_m = np.mean([np.median(points_m, axis=0) for points_m in seen_m], axis=0)
+    cameras_m = np.mean([node.T_world_camera[:3, 3] for node in nodes], axis=0)
+    back_m = cameras_m - middle_m
+    distance_m = float(np.linalg.norm(back_m))
+    viewpoint_m = cameras_m + 0.4 * back_m + np.array([0.0, 0.0, 0.45 * distance_m])
+    right = np.cross(middle_m - viewpoint_m, (0.0, 0.0, 1.0))
+    right /= max(float(np.linalg.norm(right)), 1e-9)
+    points_m = np.concatenate(seen_m)
+    low_m, high_m = np.percentile(points_m @ right, [1, 99])
+    top_m = np.array([middle_m[0], middle_m[1], float(np.percentile(points_m[:, 2], 98)) + 0.4])
+    return Stage(viewpoint_m, middle_m, right, float(high_m - low_m), top_m)
+
+
+def look(clients: Iterable[viser.ClientHandle], stage: Stage, wide: bool = False) -> None:
+    """Turn every browser's view to the scene, from farther away if two lie side by side."""
+    away = 1.35 if wide else 1.0
+    for client in clients:
+        with client.atomic():
+            client.camera.position = stage.middle_m + away * (stage.viewpoint_m - stage.middle_m)
+            client.camera.look_at = stage.middle_m

@@ -1,0 +1,27 @@
+"""The app's fixed colours, told apart by colour-blind people too (after Okabe and Ito)."""
+
+SOURCE = (230, 159, 0)
+"""Orange: the cloud that moves."""
+TARGET = (0, 114, 178)
+"""Blue: the cloud that stays, and the sensor's points."""
+INFERRED = (148, 80, 200)
+"""Violet: what the network inferred."""
+LOSS = (213, 40, 30)
+"""Red: holes, outliers and losses."""
+DELIVERED = (0, 158, 115)
+"""Green: what is there and right."""
+HOLE = (255, 0, 255)
+"""Magenta: pixels without depth in a picture."""
+NEUTRAL = (120, 130, 140)
+"""Grey: frames and what is only context."""
+BRAND = (0, 90, 140)
+"""The theme's colour."""
+
+
+def css(color: tuple[int, int, int]) -> str:
+    """The colour as ``#rrggbb``."""
+    return "#{:02x}{:02x}{:02x}".format(*color)
+
+
+BACKGROUND = (214, 219, 224)
+"""Behind the scene: white walls and dark furniture both stand out."""

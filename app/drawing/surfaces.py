@@ -1,0 +1,45 @@
+"""Surfaces before and after fusion, their holes as red loops."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from app.drawing.colors import LOSS
+from app.jobs.records import MeshView
+from pipeline.types import FloatArray
+
+
+class SurfaceDrawing:
+    """One mesh and its boundary loops below a scene node."""
+
+    def __init__(self, scene: viser.SceneApi, below: str, label: str) -> None:
+        self._scene, self._below, self._label = scene, below, label
+        self._mesh: viser.GlbHandle | None = None
+        self._loops: viser.LineSegmentsHandle | None = None
+        self._frame = scene.add_frame(below, show_axes=False)
+
+    def draw(self, view: MeshView) -> None:
+        """Replace what is drawn."""
+        for handle in (self._mesh, self._loops):
+            if handle is not None:
+                handle.remove()
+        self._mesh = self._loops = None
+        if view.glb:
+            self._mesh = self._scene.add_glb(f"{self._below}/mesh", view.glb)
+        if len(view.rims_m):
+            self._loops = self._scene.add_line_segments(
+                f"{self._below}/loops", view.rims_m, np.array(LOSS), thickness=1.5, thickness_units="screen"
+            )
+
+    def show(self, visible: bool, loops: bool, offset_m: FloatArray, top_m: FloatArray | None) -> None:
+        """Whether and where to show it; a label at ``top_m`` tells two apart."""
+        self._frame.visible = visible
+        self._frame.position = offset_m
+        if self._loops is not None:
+            self._loops.visible = loops
+        name = f"{self._below}/label"
+        if top_m is not None:
+            self._scene.add_label(name, self._label, position=top_m, anchor="bottom-center")
+        elif self._scene.get_handle_by_name(name) is not None:
+            self._scene.remove_by_name(name)

@@ -1,0 +1,214 @@
+"""The stages of one spec, each remembered, each from the one before it."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import time
+from collections import OrderedDict
+from collections.abc import Generator, Hashable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from app.jobs.records import SpacingView
+from app.jobs.store import Store
+from app.state import Spec
+from pipeline.depth import DepthNetwork
+from pipeline.errors import InputError, ReconstructionError
+from pipeline.io.rigs import load_frame, load_rig
+from pipeline.progress import Progress
+from pipeline.reconstruct import (
+    NodeClouds,
+    NodeRegistration,
+    merged_clouds,
+    prepare_node,
+    register_nodes,
+)
+from pipeline.scenes import load_demo
+from pipeline.surface import Camera, measure_quality, radii, reconstruct_surface, spacing
+from pipeline.types import ByteArray, DepthMap, FloatArray, PointCloud, Rig, SurfaceQuality, SurfaceResult
+
+HISTOGRAM_BINS = 60
+REMEMBERED_INFERENCES = 12
+
+
+class RememberingNetwork(DepthNetwork):
+    """A depth network that does not look twice at the same image."""
+
+    def __init__(self, model: str | None) -> None:
+        super().__init__(model)
+        self._seen: OrderedDict[Hashable, DepthMap] = OrderedDict()
+        self.elapsed_s: float | None = None
+        """Time of the last inference; None if its result was remembered."""
+
+    def infer(self, rgb: ByteArray, crop: bool = False) -> DepthMap:
+        """As ``DepthNetwork.infer``."""
+        key = (hashlib.sha256(np.ascontiguousarray(rgb).data).digest(), crop)
+        if key in self._seen:
+            self.elapsed_s = None
+            return self._seen[key]
+        started = time.perf_counter()
+        depth = super().infer(rgb, crop=crop)
+        self.elapsed_s = time.perf_counter() - started
+        self._seen[key] = depth
+        if len(self._seen) > REMEMBERED_INFERENCES:
+            self._seen.popitem(last=False)
+        return depth
+
+
+@functools.lru_cache(maxsize=2)
+def network_for(model: str | None) -> RememberingNetwork:
+    """The network of that file, loaded once in a process."""
+    return RememberingNetwork(model)
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedNodes:
+    """The depth stage of all nodes."""
+
+    nodes: tuple[NodeClouds, ...]
+    inference_s: tuple[float | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedNodes:
+    """The nodes beside each other."""
+
+    registrations: tuple[NodeRegistration, ...]
+    T_world_camera: tuple[FloatArray, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BallClouds:
+    """The clouds that the ball rolls over, world frame, with normals."""
+
+    sensor: PointCloud
+    fused: PointCloud
+    spacing: SpacingView
+
+
+def rig_of(store: Store, spec: Spec) -> Generator[Progress, None, Rig]:
+    """The images and, for demo scenes, the truth."""
+
+    def load() -> Generator[Progress, None, Rig]:
+        yield Progress(f"loading {spec.source.title}", 0.1)
+        source = spec.source
+        if source.scene is not None:
+            return load_demo(source.scene)
+        if source.rig is not None:
+            return load_rig(source.rig)
+        if source.color is None or source.depth is None or source.intrinsics is None:
+            raise InputError("A pair needs a colour image, a depth image and intrinsics; add all three.")
+        frame = load_frame(source.color, source.depth, source.intrinsics, source.depth_scale)
+        return Rig("uploaded pair", (frame,))
+
+    return (yield from store.remember(spec.key("scene"), load))
+
+
+def prepared(store: Store, spec: Spec) -> Generator[Progress, None, PreparedNodes]:
+    """The clouds of every node."""
+
+    def prepare() -> Generator[Progress, None, PreparedNodes]:
+        rig = yield from rig_of(store, spec)
+        yield Progress("loading the depth network", 0.05)
+        network = network_for(spec.config.depth.model)
+        nodes, times = [], []
+        for index, frame in enumerate(rig.frames):
+            yield Progress(f"depth of {frame.name}", 0.1 + 0.8 * index / len(rig.frames))
+            nodes.append(prepare_node(frame, spec.config, network))
+            times.append(network.elapsed_s)
+        return PreparedNodes(tuple(nodes), tuple(times))
+
+    return (yield from store.remember(spec.key("depth"), prepare))
+
+
+def placed(store: Store, spec: Spec) -> Generator[Progress, None, PlacedNodes]:
+    """Where the nodes are."""
+
+    def place() -> Generator[Progress, None, PlacedNodes]:
+        rig = yield from rig_of(store, spec)
+        clouds = yield from prepared(store, spec)
+        yield Progress("registering the nodes", 0.3)
+        return PlacedNodes(*register_nodes(rig.frames, clouds.nodes, spec.config))
+
+    return (yield from store.remember(spec.key("fuse"), place))
+
+
+def ball_clouds(store: Store, spec: Spec) -> Generator[Progress, None, BallClouds]:
+    """The thinned clouds before and after fusion, and how far apart their points are."""
+
+    def merge() -> Generator[Progress, None, BallClouds]:
+        rig = yield from rig_of(store, spec)
+        clouds = yield from prepared(store, spec)
+        places = yield from placed(store, spec)
+        yield Progress("merging the clouds", 0.2)
+        sensor, fused = merged_clouds(clouds.nodes, rig.frames, places.T_world_camera, spec.config)
+        return BallClouds(sensor, fused, _spacing_view(sensor, fused))
+
+    thinning = (spec.config.surface.max_points, spec.config.surface.smoothing_passes)
+    return (yield from store.remember(("clouds", *spec.key("fuse"), *thinning), merge))
+
+
+@dataclass(frozen=True, slots=True)
+class RolledBalls:
+    """The surfaces of a spec; while they are made, what is there so far."""
+
+    radii_m: tuple[float, ...]
+    after: SurfaceResult
+    before: SurfaceResult | None
+    elapsed_s: float
+    """Of the surface after fusion."""
+
+
+def rolled(store: Store, spec: Spec) -> Generator[Progress | RolledBalls, None, RolledBalls]:
+    """Both surfaces, with the same radii; first their shape, then what the cameras' rays say about it."""
+    rig = yield from rig_of(store, spec)
+    places = yield from placed(store, spec)
+    clouds = yield from ball_clouds(store, spec)
+    cameras = cameras_of(rig, places)
+    radii_m = radii(spec.config.surface, clouds.spacing.r_F_m, clouds.spacing.sigma_D_m)
+
+    def roll() -> Generator[Progress | RolledBalls, None, RolledBalls]:
+        yield Progress("rolling the ball over the fused cloud", 0.2)
+        started = time.perf_counter()
+        after = _rolled_over(clouds.fused, radii_m)
+        elapsed_s = time.perf_counter() - started
+        yield RolledBalls(radii_m, after, None, elapsed_s)
+        yield Progress("rolling the ball over the sensor cloud", 0.5)
+        before = _rolled_over(clouds.sensor, radii_m)
+        yield Progress("counting the rays that miss", 0.7)
+        after, before = (
+            replace(
+                surface,
+                quality=measure_quality(surface.vertices_m, surface.triangles, cameras, len(cloud)),
+            )
+            for surface, cloud in ((after, clouds.fused), (before, clouds.sensor))
+        )
+        return RolledBalls(radii_m, after, before, elapsed_s)
+
+    return (yield from store.remember(spec.key("surface"), roll))
+
+
+def _rolled_over(cloud: PointCloud, radii_m: tuple[float, ...]) -> SurfaceResult:
+    """The surface of a cloud; without a triangle if the ball falls through everywhere."""
+    try:
+        return reconstruct_surface(cloud, radii_m)
+    except ReconstructionError:
+        nothing = SurfaceQuality(1.0, 0, 0.0, 0.0, 0, 0, 0.0, len(cloud))
+        return SurfaceResult(np.empty((0, 3)), np.empty((0, 3), np.int32), None, radii_m, nothing)
+
+
+def cameras_of(rig: Rig, places: PlacedNodes) -> list[Camera]:
+    """The registered cameras, whose rays measure the surface."""
+    return [
+        Camera(frame.intrinsics, pose) for frame, pose in zip(rig.frames, places.T_world_camera, strict=True)
+    ]
+
+
+def _spacing_view(sensor: PointCloud, fused: PointCloud) -> SpacingView:
+    r_F_m, sigma_D_m = spacing(fused.points_m)
+    distances_m = cKDTree(fused.points_m).query(fused.points_m, k=2)[0][:, 1]
+    counts, edges_m = np.histogram(distances_m, bins=HISTOGRAM_BINS, range=(0.0, r_F_m + 5 * sigma_D_m))
+    return SpacingView(r_F_m, sigma_D_m, edges_m, counts, len(sensor), len(fused))

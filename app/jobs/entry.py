@@ -1,0 +1,27 @@
+"""The door to the jobs: the serving process names them here and never imports what they need."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+JOBS = {
+    "scene": "app.jobs.views:scene_job",
+    "depth": "app.jobs.views:depth_job",
+    "fuse": "app.jobs.views:fuse_job",
+    "surface": "app.jobs.views:surface_job",
+    "race": "app.jobs.race:race_job",
+    "export": "app.jobs.export:export_job",
+}
+
+
+def run(job: str, *arguments: Any) -> Any:
+    """Start a job by name, in a computing process."""
+    module, _, function = JOBS[job].partition(":")
+    return getattr(importlib.import_module(module), function)(*arguments)
+
+
+def warm_up() -> None:
+    """Import everything heavy before the first job comes."""
+    for address in JOBS.values():
+        importlib.import_module(address.partition(":")[0])

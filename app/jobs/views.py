@@ -1,0 +1,220 @@
+"""The jobs that the session runs, one for each step: compute what is missing, answer with a view."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from app.jobs.chain import (
+    RolledBalls,
+    ball_clouds,
+    cameras_of,
+    placed,
+    prepared,
+    rig_of,
+    rolled,
+)
+from app.jobs.meshes import mesh_view
+from app.jobs.pictures import depth_picture, depth_range_m, difference_picture
+from app.jobs.records import (
+    DepthNode,
+    DepthView,
+    FuseView,
+    Picture,
+    RegistrationRow,
+    Sample,
+    SceneNode,
+    SceneView,
+    SpacingView,
+    SurfaceView,
+    sample,
+)
+from app.jobs.store import Store
+from app.state import Spec
+from pipeline import geometry
+from pipeline.acquisition import back_project
+from pipeline.progress import Progress
+from pipeline.reconstruct import NodeClouds, NodeRegistration
+from pipeline.registration import point_error_m
+from pipeline.surface import Camera, compare_with_truth
+from pipeline.types import FloatArray, PointCloud, PointSource, RgbdFrame, Rig, SurfaceResult
+
+SCREEN_POINTS = 60_000
+"""Points of all nodes together that are sent to the screen for one kind of cloud."""
+
+
+def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
+    """The rig as it was loaded."""
+    rig = yield from rig_of(store, spec)
+    most = SCREEN_POINTS // len(rig.frames)
+    nodes = tuple(_scene_node(frame, most) for frame in rig.frames)
+    return SceneView(spec.source.title, nodes, rig.truth is not None)
+
+
+def _scene_node(frame: RgbdFrame, most: int) -> SceneNode:
+    cloud = back_project(frame)
+    range_m = depth_range_m(frame.depth)
+    camera = frame.intrinsics
+    return SceneNode(
+        name=frame.name,
+        color=Picture(frame.rgb, f"Colour image of {frame.name}"),
+        depth=depth_picture(frame.depth, range_m, "Sensor depth"),
+        sensor=sample(cloud.points_m, cloud.colors, most),
+        T_world_camera=frame.T_world_camera,
+        fov_rad=2.0 * float(np.arctan2(camera.height_px / 2, camera.fy_px)),
+        aspect=camera.width_px / camera.height_px,
+        coverage=frame.depth.coverage,
+        nearest_m=range_m[0],
+        farthest_m=range_m[1],
+    )
+
+
+def depth_job(store: Store, spec: Spec) -> Generator[Progress, None, DepthView]:
+    """Every node's depth, sensed, inferred and fused."""
+    rig = yield from rig_of(store, spec)
+    work = yield from prepared(store, spec)
+    yield Progress("pictures", 0.95)
+    return DepthView(
+        tuple(
+            _depth_node(rig, index, clouds, elapsed_s)
+            for index, (clouds, elapsed_s) in enumerate(zip(work.nodes, work.inference_s, strict=True))
+        )
+    )
+
+
+def _depth_node(rig: Rig, index: int, clouds: NodeClouds, elapsed_s: float | None) -> DepthNode:
+    drawn = SCREEN_POINTS / len(rig.frames) / len(clouds.fused)
+    frame, alignment = rig.frames[index], clouds.alignment
+    range_m = depth_range_m(frame.depth)
+    filled = clouds.fused.select(_inferred_rows(clouds.fused))
+    return DepthNode(
+        name=clouds.name,
+        sensor_picture=depth_picture(frame.depth, range_m, "Sensor depth"),
+        inferred_picture=depth_picture(alignment.depth, range_m, "Inferred depth, made metric"),
+        difference_picture=difference_picture(alignment.depth, frame.depth),
+        sensor=_thinned(clouds.sensor, drawn),
+        inferred=_thinned(clouds.inferred, drawn),
+        outliers=_thinned(replace(clouds.filtered.outliers, colors=None), drawn),
+        fused=_thinned(clouds.fused, drawn),
+        filled=_thinned(filled, drawn),
+        alignment_mode=alignment.mode,
+        coefficients=dict(alignment.coefficients),
+        residual_rms_m=alignment.residual_rms_m,
+        inlier_share=alignment.inliers,
+        truth_error_m=_filled_error_m(rig, index, clouds),
+        provider=clouds.provider,
+        inference_s=elapsed_s,
+    )
+
+
+def _thinned(cloud: PointCloud, share: float) -> Sample:
+    """The same share of every cloud, so that their densities can be compared by eye."""
+    return sample(cloud.points_m, cloud.colors, int(share * len(cloud)) + 1)
+
+
+def _inferred_rows(cloud: PointCloud) -> np.ndarray:
+    if cloud.source is None:
+        return np.zeros(len(cloud), dtype=bool)
+    return cloud.source == PointSource.INFERRED
+
+
+def _filled_error_m(rig: Rig, index: int, clouds: NodeClouds) -> float | None:
+    """Median absolute error of the inferred depth where the sensor has none."""
+    if rig.truth is None:
+        return None
+    error_m = np.abs(clouds.alignment.depth.z_m - rig.truth.depth[index].z_m)
+    error_m = error_m[~rig.frames[index].depth.valid & np.isfinite(error_m)]
+    return float(np.median(error_m)) if len(error_m) else None
+
+
+def fuse_job(store: Store, spec: Spec) -> Generator[Progress, None, FuseView]:
+    """Where registration placed the nodes."""
+    rig = yield from rig_of(store, spec)
+    work = yield from prepared(store, spec)
+    places = yield from placed(store, spec)
+    believed = tuple(frame.T_world_camera for frame in rig.frames)
+    rows = tuple(
+        _registration_row(rig, row, work.nodes, spec.config.node_registration.method)
+        for row in places.registrations
+    )
+    return FuseView(believed, places.T_world_camera, rows)
+
+
+def _registration_row(
+    rig: Rig, registration: NodeRegistration, nodes: Sequence[NodeClouds], method: str
+) -> RegistrationRow:
+    names = [node.name for node in nodes]
+    source, target = names.index(registration.source), names.index(registration.target)
+    result, points_m = registration.result, nodes[source].sensor.points_m
+    before = after = None
+    T_true = true_pose(rig, source, target)
+    if T_true is not None:
+        T_believed = geometry.inverse(rig.frames[target].T_world_camera) @ rig.frames[source].T_world_camera
+        before = point_error_m(T_believed, T_true, points_m)
+        after = point_error_m(result.T_target_source, T_true, points_m)
+    return RegistrationRow(
+        source=registration.source,
+        target=registration.target,
+        method=method,
+        iterations=len(result.steps),
+        stop_reason=result.stop_reason,
+        rmse_m=result.steps[-1].rmse_m if result.steps else float("nan"),
+        error_before_m=before,
+        error_after_m=after,
+    )
+
+
+def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, None, SurfaceView]:
+    """The surfaces; the one after fusion is yielded as soon as it is there."""
+    rig = yield from rig_of(store, spec)
+    places = yield from placed(store, spec)
+    clouds = yield from ball_clouds(store, spec)
+    balls = yield from _shown(rolled(store, spec), clouds.spacing)
+    if rig.truth is None:
+        return _surface_view(clouds.spacing, balls)
+    yield _surface_view(clouds.spacing, balls)
+    yield Progress("comparing with the truth", 0.9)
+    cameras = cameras_of(rig, places)
+    truth = [
+        None if surface is None else compared(rig, surface, cameras)
+        for surface in (balls.after, balls.before)
+    ]
+    return _surface_view(clouds.spacing, balls, *truth)
+
+
+def _shown(
+    work: Generator[Progress | RolledBalls, None, RolledBalls], distances: SpacingView
+) -> Generator[Progress | SurfaceView, None, RolledBalls]:
+    """Pass reports on, surfaces as views."""
+    while True:
+        try:
+            said = next(work)
+        except StopIteration as stop:
+            return stop.value
+        yield _surface_view(distances, said) if isinstance(said, RolledBalls) else said
+
+
+def _surface_view(
+    distances: SpacingView,
+    balls: RolledBalls,
+    truth_after: dict[str, float] | None = None,
+    truth_before: dict[str, float] | None = None,
+) -> SurfaceView:
+    before = None if balls.before is None else mesh_view(balls.before, truth_before)
+    return SurfaceView(distances, balls.radii_m, mesh_view(balls.after, truth_after), before, balls.elapsed_s)
+
+
+def compared(rig: Rig, surface: SurfaceResult, cameras: Sequence[Camera]) -> dict[str, float] | None:
+    """How far a surface is from the truth, where there is one."""
+    if rig.truth is None or not len(surface.triangles):
+        return None
+    return compare_with_truth(surface.vertices_m, surface.triangles, rig.truth, cameras)
+
+
+def true_pose(rig: Rig, source: int, target: int) -> FloatArray | None:
+    """T_target_source of two nodes, where the truth is known."""
+    if rig.truth is None:
+        return None
+    return geometry.inverse(rig.truth.T_world_camera[target]) @ rig.truth.T_world_camera[source]

@@ -1,0 +1,1 @@
+"""The figures: plotly for histograms, uPlot for curves."""

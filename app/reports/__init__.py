@@ -1,0 +1,1 @@
+"""The HTML and pictures that commands write; no display needed."""

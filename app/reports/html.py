@@ -1,0 +1,73 @@
+"""The few pieces that every written report is made of: one self-contained HTML file, no scripts."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from html import escape
+from pathlib import Path
+
+import cv2
+
+from pipeline.io.atomic import atomic_path
+from pipeline.types import ByteArray
+
+STYLE = """
+:root { color-scheme: light dark; --line: #8884; --soft: #8881; --good: #1a7f4b; --bad: #b3261e; }
+body { font: 15px/1.55 system-ui, sans-serif; max-width: 1180px; margin: 2rem auto; padding: 0 1.2rem; }
+h1 { font-size: 1.7rem; margin: 0 0 .3rem; } h2 { font-size: 1.2rem; margin: 2.2rem 0 .6rem; }
+p.lead { font-size: 1.05rem; } .note { opacity: .75; font-size: .92em; }
+table { border-collapse: collapse; width: 100%; } th { font-weight: 600; }
+th:not(:first-child) { text-align: right; }
+th, td { text-align: left; padding: .35rem .7rem .35rem 0; border-bottom: 1px solid var(--line);
+  vertical-align: top; }
+td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.pictures { display: grid; gap: .9rem; margin-bottom: 1.1rem; }
+figure { margin: 0; } figure img { width: 100%; border-radius: 6px; display: block; background: var(--soft); }
+figcaption { font-size: .88em; opacity: .8; margin-top: .3rem; }
+code { background: var(--soft); padding: .1em .35em; border-radius: 4px; }
+.reproduced { color: var(--good); font-weight: 600; } .not-reproduced { color: var(--bad); font-weight: 600; }
+"""
+
+
+def page(title: str, body: str) -> str:
+    """A whole HTML document."""
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<style>{STYLE}</style></head><body>{body}</body></html>\n"
+    )
+
+
+def write_page(path: Path, title: str, body: str) -> None:
+    """Write a document to ``path``, whole or not at all."""
+    with atomic_path(path) as temporary:
+        Path(temporary).write_text(page(title, body), encoding="utf-8")
+
+
+def picture(rgb: ByteArray, caption: str) -> str:
+    """An (H, W, 3) RGB image with what it shows, as an HTML figure holding the image itself."""
+    _, jpeg = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88])
+    data = base64.b64encode(jpeg.tobytes()).decode()
+    return (
+        f'<figure><img alt="{escape(caption)}" src="data:image/jpeg;base64,{data}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
+
+
+def pictures(figures: Iterable[str], columns: int) -> str:
+    """Figures side by side, ``columns`` to a row."""
+    style = f"grid-template-columns: repeat({columns}, 1fr)"
+    return f'<div class="pictures" style="{style}">{"".join(figures)}</div>'
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str | float | int]]) -> str:
+    """A table with a name first in each row; what follows is aligned to the right."""
+
+    def cell(value: str | float | int, first: bool) -> str:
+        text = value if isinstance(value, str) else f"{value:,}" if isinstance(value, int) else f"{value:.4g}"
+        return f"<td>{escape(text)}</td>" if first else f'<td class="number">{escape(text)}</td>'
+
+    head = "".join(f"<th>{escape(name)}</th>" for name in header)
+    body = "".join(f"<tr>{''.join(cell(v, i == 0) for i, v in enumerate(row))}</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

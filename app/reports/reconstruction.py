@@ -1,0 +1,158 @@
+"""The report of one reconstruction: what came in, what each stage made of it, and how good it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from app.jobs.pictures import depth_picture, depth_range_m
+from app.reports.html import picture, pictures, table, write_page
+from app.reports.pictures import mesh_picture
+from pipeline.reconstruct import Reconstruction
+from pipeline.surface import Camera
+
+QUALITY_ROWS = (
+    ("no_hit_ray_share", "camera rays that miss the surface (%)", 100.0),
+    ("hole_area_m2", "area of the holes inside the surface (m²)", 1.0),
+    ("boundary_loops", "boundary loops", None),
+    ("boundary_length_m", "length of the boundary (m)", 1.0),
+    ("non_manifold_edges", "edges with more than two faces", None),
+    ("components", "connected pieces", None),
+    ("area_m2", "area (m²)", 1.0),
+    ("vertices", "vertices", None),
+    ("triangles", "triangles", None),
+    ("unused_points", "points without a triangle", None),
+)
+
+
+def write_reconstruction_report(result: Reconstruction, metrics: dict[str, Any], path: Path) -> None:
+    """Write the self-contained HTML report of a run to ``path``."""
+    write_page(path, f"PacketMesh: {metrics['scene']}", "".join(_sections(result, metrics)))
+
+
+def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
+    before, after = metrics["surface_before"], metrics["surface_after"]
+    yield f"<h1>{escape(metrics['scene'])}</h1>"
+    yield (
+        f'<p class="lead">Preset <code>{escape(metrics["preset"])}</code>. Of all camera rays, '
+        f"<b>{before['no_hit_ray_share']:.1%}</b> find no surface before fusion and "
+        f"<b>{after['no_hit_ray_share']:.1%}</b> after it.</p>"
+    )
+    yield from _surfaces(result, before, after)
+    yield from _truth(metrics)
+    yield from _nodes(result, metrics)
+    yield from _registrations(metrics)
+    yield "<h2>Time and settings</h2>"
+    yield table(("stage", "seconds"), metrics["timings_s"].items())
+    memory_mb = metrics["peak_memory_bytes"] / 1e6
+    yield (
+        f'<p class="note">At most {memory_mb:,.0f} MB of memory. All settings are in '
+        "<code>config.json</code>, all numbers in <code>metrics.json</code>.</p>"
+    )
+
+
+def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, Any]) -> Iterator[str]:
+    yield "<h2>The surface before and after fusion</h2>"
+    radii = ", ".join(f"{1000 * radius:.1f}" for radius in before["radii_m"])
+    yield (
+        f'<p class="note">Ball radii {radii} mm on both. Magenta: a ray that hits nothing. '
+        f"Seen from each node's camera.</p>"
+    )
+    for frame, pose in zip(result.rig.frames, result.T_world_camera, strict=True):
+        camera = Camera(frame.intrinsics, pose)
+        surfaces = (("before", result.surfaces.before), ("after", result.surfaces.after))
+        figures = (
+            picture(mesh_picture(surface, camera, colored), f"{frame.name}, {when} fusion{how}")
+            for colored, how in ((True, ""), (False, ", shape only"))
+            for when, surface in surfaces
+        )
+        yield pictures(figures, columns=2)
+    rows = (
+        (
+            label,
+            *(quality[key] if scale is None else float(scale * quality[key]) for quality in (before, after)),
+        )
+        for key, label, scale in QUALITY_ROWS
+    )
+    yield table(("", "before", "after"), rows)
+
+
+def _truth(metrics: dict[str, Any]) -> Iterator[str]:
+    if metrics["truth"] is None:
+        return
+    before, after = metrics["truth"]["surface_before"], metrics["truth"]["surface_after"]
+    yield "<h2>Against the ground truth</h2>"
+    yield (
+        '<p class="note">Of what the cameras can see. Coverage: share of the true surface with a mesh point '
+        "so near; accuracy: share of the mesh with a true surface so near; F-score: their harmonic mean.</p>"
+    )
+    yield table(
+        ("", "before", "after"), ((_truth_label(key), *_in_units(key, before, after)) for key in before)
+    )
+
+
+def _truth_label(key: str) -> str:
+    known = {
+        "no_hit_ray_share": "rays that miss the surface but not the truth (%)",
+        "within_5pct_depth_share": "rays that hit within 5 % of the true depth (%)",
+        "median_depth_error_m": "median depth error of the rays that hit (mm)",
+    }
+    name, _, distance = key.rpartition("_")
+    return known.get(key, f"{name.replace('f_score', 'F-score')} at {distance.replace('cm', ' cm')} (%)")
+
+
+def _in_units(key: str, *records: dict[str, float]) -> tuple[float, ...]:
+    return tuple(record[key] * (1000.0 if key.endswith("_m") else 100.0) for record in records)
+
+
+def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
+    yield "<h2>What the nodes saw, and what the network inferred</h2>"
+    for frame, node in zip(result.rig.frames, result.nodes, strict=True):
+        range_m = depth_range_m(frame.depth)
+        sensor = depth_picture(frame.depth, range_m, f"sensor depth ({frame.depth.coverage:.0%} known)")
+        inferred = depth_picture(
+            node.alignment.depth,
+            range_m,
+            f"inferred depth (alignment {node.alignment.mode}, {node.provider})",
+        )
+        figures = (
+            picture(frame.rgb, f"{frame.name}, colour"),
+            picture(sensor.rgb, sensor.caption),
+            picture(inferred.rgb, inferred.caption),
+        )
+        yield pictures(figures, columns=3)
+    yield table(
+        ("node", "sensor points", "outliers removed", "inferred points kept", "alignment residual (mm)"),
+        (
+            (
+                node["name"],
+                node["sensor_points"],
+                node["outliers"],
+                node["filled_points"],
+                1000 * node["alignment"]["residual_rms_m"],
+            )
+            for node in metrics["nodes"]
+        ),
+    )
+
+
+def _registrations(metrics: dict[str, Any]) -> Iterator[str]:
+    if not metrics["registration"]:
+        return
+    yield "<h2>How the nodes found each other</h2>"
+    yield table(
+        ("node", "onto", "method", "iterations", "stopped because", "weighted RMSE (mm)"),
+        (
+            (
+                item["source"],
+                item["target"],
+                item["method"],
+                item["iterations"],
+                item["stop_reason"],
+                "–" if item["rmse_m"] is None else 1000 * item["rmse_m"],
+            )
+            for item in metrics["registration"]
+        ),
+    )

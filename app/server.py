@@ -1,0 +1,176 @@
+"""The web server: one session a browser, loopback by default, nothing left behind when it stops."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import os
+import shutil
+import signal
+import socket
+import tempfile
+import threading
+import webbrowser
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import viser
+
+from app.drawing.colors import BACKGROUND, BRAND
+from app.jobs.entry import warm_up
+from app.jobs.store import Store
+from app.panels import PANELS
+from app.session import Session, Target
+from app.state import SharedViews, Source, Spec
+from app.worker import ComputePool
+from pipeline.config import PRESETS, PipelineConfig
+from pipeline.errors import InputError
+
+logger = logging.getLogger(__name__)
+
+PANEL_WIDTH_PX = 440
+
+
+@dataclass(slots=True)
+class AppServer:
+    """A running app."""
+
+    viser_server: viser.ViserServer
+    pool: ComputePool
+    folder: Path
+    sessions: dict[int, Session] = field(default_factory=dict)
+
+    @property
+    def url(self) -> str:
+        """Where a browser finds it."""
+        host = self.viser_server.get_host()
+        return f"http://{'127.0.0.1' if host == '0.0.0.0' else host}:{self.viser_server.get_port()}"
+
+    def stop(self) -> None:
+        """End all sessions and processes."""
+        for session in list(self.sessions.values()):
+            session.close()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.viser_server.stop()
+        self.pool.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def build_server(
+    scene: str = "living-room",
+    config: PipelineConfig | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    lecture: bool = False,
+) -> AppServer:
+    """Start serving and return at once.
+
+    Args:
+        scene: name of a demo scene, or a rig folder.
+        config: settings to start with; None takes the preset ``packetmesh``.
+        host: address to listen on.
+        port: port to listen on; 0 lets the system choose one.
+        lecture: share one session among all browsers.
+
+    Raises:
+        InputError: the port is taken or the address is not this machine's.
+    """
+    _check_address(host, port)
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a port scan is no reason for a stack trace
+    spec = start_spec(scene, config or PipelineConfig())
+    folder = Path(tempfile.mkdtemp(prefix="packetmesh-"))
+    pool = ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host=host, port=port, label="PacketMesh", verbose=False)
+    app = AppServer(server, pool, folder)
+    if port and server.get_port() != port:
+        app.stop()
+        raise InputError(_taken(port))
+    _dress(server)
+    store, shared = Store(str(folder)), SharedViews()
+
+    def begin(target: Target, number: int) -> None:
+        app.sessions[number] = Session(target, pool, store, shared, spec, PANELS)
+
+    if lecture:
+        begin(server, -1)
+    else:
+        server.on_client_connect(lambda client: begin(client, client.client_id))
+
+        @server.on_client_disconnect
+        def _(client: viser.ClientHandle) -> None:
+            session = app.sessions.pop(client.client_id, None)
+            if session is not None:
+                session.close()
+
+    return app
+
+
+def serve(
+    scene: str = "living-room",
+    config: PipelineConfig | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    open_browser: bool = False,
+    lecture: bool = False,
+    announce: Callable[[str], None] = logger.info,
+) -> None:
+    """Serve until SIGINT or SIGTERM.
+
+    Raises:
+        InputError: as ``build_server``.
+    """
+    stopped = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stopped.set())
+    app = build_server(scene, config, host, port, lecture)
+    try:
+        announce(app.url)
+        if open_browser:
+            webbrowser.open(app.url)
+        stopped.wait()
+    finally:
+        app.stop()
+
+
+def start_spec(scene: str, config: PipelineConfig) -> Spec:
+    """What a session wants first: a demo scene by name or a rig folder, with these settings."""
+    preset = next((name for name, known in PRESETS.items() if known == config), "packetmesh")
+    source = Source(rig=str(Path(scene).resolve())) if Path(scene).is_dir() else Source(scene=scene)
+    return Spec(source, preset, config)
+
+
+def _check_address(host: str, port: int) -> None:
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except PermissionError:
+            raise InputError(f"Port {port} needs administrator rights; try --port 8080.") from None
+        except OverflowError:
+            raise InputError(f"There is no port {port}; try one from 1024 to 65535.") from None
+        except socket.gaierror:
+            raise InputError(f"'{host}' is not an address of this machine; try --host 127.0.0.1.") from None
+        except OSError as error:
+            if error.errno == 98 or "in use" in str(error):
+                raise InputError(_taken(port)) from None
+            raise InputError(f"Cannot listen on {host} ({error.strerror}); try --host 127.0.0.1.") from None
+
+
+def _taken(port: int) -> str:
+    return f"Port {port} is taken by another program; stop it or try --port {port + 1}."
+
+
+def _dress(server: viser.ViserServer) -> None:
+    """Name, colours and place of the control panel; no tunnel to the outside."""
+    server.gui.configure_theme(
+        control_width="large", show_logo=False, show_share_button=False, brand_color=BRAND
+    )
+    server.gui.main_panel.dock_right()
+    server.gui.main_panel.set_width(PANEL_WIDTH_PX)
+    server.scene.set_up_direction("+z")
+    server.scene.set_background_image(np.full((4, 4, 3), BACKGROUND, np.uint8), format="png")
+    setattr(server, "request_share_url", lambda *_, **__: None)  # noqa: B010

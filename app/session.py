@@ -1,0 +1,278 @@
+"""One browser's session: what it wants, what it has, and the one thread on which it all happens."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import viser
+
+from app.drawing.cameras import look, stage_of
+from app.drawing.colors import BRAND, DELIVERED
+from app.jobs import entry
+from app.jobs.store import Store
+from app.panel import Panel
+from app.state import CHAIN, Results, SharedViews, Spec, Step
+from app.stepper import Stepper
+from app.tables import command_html
+from app.worker import ComputePool, LatestWins, Outcome
+from pipeline.config import PipelineConfig
+from pipeline.errors import PacketMeshError
+from pipeline.progress import Progress
+
+logger = logging.getLogger(__name__)
+
+Target: TypeAlias = viser.ClientHandle | viser.ViserServer
+"""Where a session lives: one browser, or the server for a session that all browsers share."""
+
+
+class Session:
+    """Runs the chain for one browser and keeps its panels up to date.
+
+    Whatever happens (a click, a finished job, a tick of the player) is posted to one thread, so
+    nothing in the panels needs a lock and nothing slow runs there.
+    """
+
+    def __init__(
+        self,
+        target: Target,
+        pool: ComputePool,
+        store: Store,
+        shared: SharedViews,
+        spec: Spec,
+        panels: Sequence[type[Panel]],
+    ) -> None:
+        self.target = target
+        self.gui, self.scene = target.gui, target.scene
+        self.store = store
+        self._shared = shared
+        self.spec = spec
+        self._start = spec
+        self.results = Results()
+        self.folder = Path(tempfile.mkdtemp(prefix="upload-", dir=store.folder))
+        self._chain = LatestWins(pool, self)
+        self._side = LatestWins(pool, self)
+        self._running: Step | None = None
+        self._submitted: tuple[Any, ...] | None = None
+        self._wide = False
+        self._closed = False
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="session")
+        self._panels = [panel(self) for panel in panels]
+        self._current = self._panels[0]
+        self._thread.submit(self._guarded, self._build)
+
+    # What others ask of it, from any thread.
+
+    def post(self, function: Callable[..., None], *arguments: Any) -> None:
+        """Have something done on the session's thread; its errors become notifications."""
+        if not self._closed:
+            with contextlib.suppress(RuntimeError):
+                self._thread.submit(self._guarded, function, *arguments)
+
+    def close(self) -> None:
+        """Stop computing and forget everything; the browser is gone."""
+        self._closed = True
+        self._chain.cancel()
+        self._side.cancel()
+        for panel in self._panels:
+            panel.close()
+        self._thread.shutdown(wait=False, cancel_futures=True)
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def clients(self) -> Iterable[viser.ClientHandle]:
+        """The browsers that show this session."""
+        if isinstance(self.target, viser.ViserServer):
+            return self.target.get_clients().values()
+        return [self.target]
+
+    def notify(self, title: str, sentence: str, color: Any = "red") -> None:
+        """Tell the people who watch."""
+        for client in self.clients():
+            client.add_notification(title, sentence, color=color, auto_close_seconds=15.0)
+
+    # What panels ask of it, on its thread.
+
+    def edit(self, change: Callable[[PipelineConfig], PipelineConfig]) -> None:
+        """Change the settings and recompute what depends on them."""
+        self.want(replace(self.spec, config=change(self.spec.config)))
+
+    def want(self, spec: Spec) -> None:
+        """Want something else; whatever is still right is kept."""
+        if spec != self.spec:
+            self.spec = spec
+            for panel in self._panels:
+                panel.on_spec(spec)
+        self.advance()
+
+    def side_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
+        """Run a job beside the chain; ``on_end`` gets its result, or None, on this thread."""
+
+        def ended(outcome: Outcome) -> None:
+            if outcome.kind == "error":
+                self.notify("That did not work", outcome.value)
+            on_end(outcome.value if outcome.kind == "result" else None)
+            self._say()
+
+        self._side.submit(
+            entry.run,
+            job,
+            *arguments,
+            on_progress=lambda value: self.post(self._progressed, None, value),
+            on_end=lambda outcome: self.post(ended, outcome),
+        )
+
+    def advance(self) -> None:
+        """Compute the first step that is out of date."""
+        while (step := self.results.first_stale(self.spec)) is not None:
+            view = self._shared.get(self.spec.key(step))
+            if view is None:
+                break
+            self._take(step, self.spec.key(step), view)
+        if step is None:
+            self._running = self._submitted = None
+            self._say()
+            return
+        key = self.spec.key(step)
+        if key == self._submitted:
+            return
+        self._running, self._submitted = step, key
+        self._say()
+        self._chain.submit(
+            entry.run,
+            step,
+            self.store,
+            self.spec,
+            on_progress=lambda value: self.post(self._progressed, step, value),
+            on_end=lambda outcome: self.post(self._ended, step, key, outcome),
+        )
+
+    def _ended(self, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
+        latest = key == self._submitted
+        if latest:
+            self._running = self._submitted = None
+        if outcome.kind == "result":
+            self._shared.put(key, outcome.value)
+            self._take(step, key, outcome.value)
+        elif outcome.kind == "error":
+            self.results.fail(step, key, outcome.value)
+            if latest:
+                self.notify(f"{step.capitalize()} failed", outcome.value)
+        elif latest:
+            self.results.fail(step, key, "Cancelled.")
+        self.advance()
+
+    def _take(self, step: Step, key: tuple[Any, ...], view: Any) -> None:
+        self.results.put(step, key, view)
+        for panel in self._panels:
+            panel.on_view(step, view)
+
+    def _progressed(self, step: Step | None, value: Any) -> None:
+        if isinstance(value, Progress):
+            self._bar.value = min(100.0, 100.0 * value.fraction)
+            self._status.content = f"**Computing** · {value.stage}"
+            return
+        for panel in self._panels:
+            if panel.step == step:
+                panel.on_partial(value)
+
+    # Its own part of the control panel.
+
+    def _build(self) -> None:
+        titles = [panel.title for panel in self._panels]
+        self._stepper = Stepper(self.gui, titles, lambda title: self.post(self.show, title))
+        self._status = self.gui.add_markdown("**Starting** …")
+        self._bar = self.gui.add_progress_bar(0.0)
+        actions = self.gui.add_button_group(
+            "All steps",
+            ("Cancel", "Retry", "Reset", "Copy as command"),
+            hint="Cancel stops what is computing; Retry runs a cancelled or failed step again; Reset goes "
+            "back to the settings of the start; Copy as command shows the command that computes the same.",
+        )
+        actions.on_click(lambda event: self.post(self._act, event.target.value))
+        self._folders: dict[str, viser.GuiFolderHandle] = {}
+        for panel in self._panels:
+            self.scene.add_frame(panel.drawn_below, show_axes=False, visible=False)
+            self._folders[panel.title] = self.gui.add_folder(None, visible=panel is self._current)
+            with self._folders[panel.title]:
+                panel.build()
+        self.show(self._current.title)
+        self.advance()
+
+    def show(self, title: str) -> None:
+        """Make a step the current one."""
+        self._current = next(panel for panel in self._panels if panel.title == title)
+        with self.target.atomic():
+            for panel in self._panels:
+                self._folders[panel.title].visible = panel is self._current
+            for name in {panel.drawn_below for panel in self._panels}:
+                frame = self.scene.get_handle_by_name(name)
+                if frame is not None:
+                    frame.visible = name == self._current.drawn_below
+        self._current.on_show()
+        self.frame_view()
+        self._say()
+
+    def frame_view(self, anew: bool = False) -> None:
+        """Turn the view to the scene when it is new, or when one thing becomes two or two become one."""
+        below = self._current.drawn_below
+        wide = any(panel.wide for panel in self._panels if panel.drawn_below == below)
+        scene = self.results.view("scene")
+        if scene is not None and (anew or wide != self._wide):
+            look(self.clients(), stage_of(scene.nodes), wide)
+            self._wide = wide
+
+    def _act(self, action: str) -> None:
+        if action == "Cancel":
+            self._chain.cancel()
+            self._side.cancel()
+        elif action == "Retry":
+            self.results.forgive()
+            self.advance()
+        elif action == "Reset":
+            self.want(self._start)
+        else:
+            self._show_command()
+
+    def _show_command(self) -> None:
+        with self.gui.add_modal("The same from the command line") as modal:
+            self.gui.add_markdown("This computes and writes what the app shows now:")
+            self.gui.add_html(command_html(self.spec.command()))
+            self.gui.add_button("Close").on_click(lambda _: modal.close())
+
+    def _say(self) -> None:
+        """Bring the stepper and the status line up to date."""
+        statuses = {
+            panel.title: self.results.status(panel.step, self.spec, self._running)
+            for panel in self._panels
+            if panel.step is not None
+        }
+        self._stepper.show(self._current.title, statuses)
+        failures = [self.results.failure(step, self.spec) for step in CHAIN]
+        failure = next((sentence for sentence in failures if sentence), None)
+        if self._running is not None:
+            self._status.content = f"**Computing** · {self._running}"
+        elif failure is not None:
+            self._status.content = f"**Stopped** · {failure} Change a setting or press Retry."
+            self._bar.value = 0.0
+        elif not self._side.busy:
+            self._status.content = "**Up to date**"
+            self._bar.value = 100.0
+        self._bar.color = BRAND if self._running is not None or self._side.busy else DELIVERED
+
+    def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
+        if self._closed:
+            return
+        try:
+            function(*arguments)
+        except PacketMeshError as error:
+            self.notify("That did not work", str(error))
+        except Exception as error:
+            logger.exception("a session callback failed")
+            self.notify("Something unexpected happened", f"{type(error).__name__}: {error}")

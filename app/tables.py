@@ -1,0 +1,61 @@
+"""Small tables of numbers, each explained when the pointer rests on its name."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+_CELL = "padding: 2px 8px 2px 0; vertical-align: top;"
+_NAME = "border-bottom: 1px dotted #999; cursor: help;"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One quantity."""
+
+    name: str
+    hint: str
+    """What it means, in a sentence."""
+    values: tuple[str, ...]
+    """With units, one for each column."""
+
+
+def table(rows: Sequence[Row], columns: Sequence[str] = ()) -> str:
+    """HTML of rows of numbers; ``columns`` head the values when there are several."""
+    lines = []
+    if columns:
+        heads = "".join(f'<th style="{_CELL} text-align: right">{html.escape(c)}</th>' for c in columns)
+        lines.append(f"<tr><th></th>{heads}</tr>")
+    for row in rows:
+        hint = html.escape(row.hint, quote=True)
+        name = f'<span style="{_NAME}" title="{hint}">{html.escape(row.name)}</span>'
+        values = "".join(
+            f'<td style="{_CELL} text-align: right; font-variant-numeric: tabular-nums">{html.escape(v)}</td>'
+            for v in row.values
+        )
+        lines.append(f'<tr><td style="{_CELL}">{name}</td>{values}</tr>')
+    return (
+        '<div style="padding: 0 0.8em 0.8em 0.8em; font-size: 13px; overflow-x: auto">'
+        f'<table style="border-collapse: collapse; width: 100%">{"".join(lines)}</table></div>'
+    )
+
+
+def command_html(command: str) -> str:
+    """A command line to select or copy with one click."""
+    look = (
+        "margin: 0; padding: 0.8em; white-space: pre-wrap; overflow-wrap: anywhere; font-size: 12px; "
+        "user-select: all; border: 1px solid #bbb; border-radius: 4px"
+    )
+    copy = "navigator.clipboard.writeText(this.previousElementSibling.textContent);this.textContent='Copied'"
+    return (
+        f'<div style="padding: 0 0.8em 0.8em 0.8em"><pre style="{look}">{html.escape(command)}</pre>'
+        f'<button style="margin-top: 0.5em; padding: 0.2em 1em" onclick="{copy}">Copy</button></div>'
+    )
+
+
+def number(value: float | None, digits: int = 1, unit: str = "", scale: float = 1.0) -> str:
+    """A value with its unit, or a dash where it is unknown."""
+    if value is None or value != value:
+        return "–"
+    return f"{value * scale:,.{digits}f}{unit and ' '}{unit}"
