@@ -1,0 +1,38 @@
+"""Addresses that cannot be used, and what a session starts with."""
+
+import socket
+
+import pytest
+
+from app.server import build_server, start_spec
+from app.state import Source
+from pipeline.config import PRESETS, PipelineConfig
+from pipeline.errors import InputError
+
+
+def test_a_taken_port_is_one_sentence():
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(InputError, match=f"Port {port} is taken .* --port {port + 1}"):
+            build_server(port=port)
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "sentence"),
+    [
+        ("no.such.host.invalid", 8080, "not an address of this machine"),
+        ("192.0.2.1", 8080, "Cannot listen on 192.0.2.1"),
+        ("127.0.0.1", 70000, "no port 70000"),
+    ],
+)
+def test_an_address_that_cannot_be_used_is_one_sentence(host, port, sentence):
+    with pytest.raises(InputError, match=sentence):
+        build_server(host=host, port=port)
+
+
+def test_a_folder_is_a_rig_and_a_name_is_a_demo(tmp_path):
+    assert start_spec(str(tmp_path), PipelineConfig()).source == Source(rig=str(tmp_path))
+    assert start_spec("office", PRESETS["thesis"]).source == Source(scene="office")
+    assert start_spec("office", PRESETS["thesis"]).preset == "thesis"

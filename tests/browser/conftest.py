@@ -1,0 +1,94 @@
+"""A real Chromium and a running app; skipped where there is no browser."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+
+
+def chromium_path() -> str | None:
+    """The browser that the environment names, or the first that is installed."""
+    named = os.environ.get("PACKETMESH_CHROMIUM")
+    candidates = [named] if named else ["/usr/bin/chromium", "chromium", "chromium-browser", "google-chrome"]
+    return next((shutil.which(name) for name in candidates if shutil.which(name)), None)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark every test here, and keep them on one worker: they share a browser and a server."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.browser)
+            item.add_marker(pytest.mark.xdist_group("browser"))
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Chromium, closed at the end."""
+    path = chromium_path()
+    if path is None:
+        pytest.skip(
+            "no Chromium found: install the package 'chromium' or set PACKETMESH_CHROMIUM to its path"
+        )
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def app(browser):
+    """The app with the smallest demo scene, on a port of its own."""
+    from app.server import build_server
+
+    app = build_server("box-on-table", port=0)
+    yield app
+    app.stop()
+
+
+@pytest.fixture(scope="module")
+def tab(browser, app):
+    """A tab with the app, small so that drawing in software is quick."""
+    context = browser.new_context(viewport={"width": 900, "height": 640}, accept_downloads=True)
+    page = context.new_page()
+    page.set_default_timeout(60_000)
+    page.goto(app.url)
+    yield page
+    context.close()
+
+
+@pytest.fixture
+def page(tab):
+    """The tab with the settings of the start, on its first step."""
+    tab.get_by_role("button", name="Reset", exact=True).click()
+    tab.get_by_role("button", name="Scene").click()
+    tab.get_by_text("Each camera node delivers").wait_for()
+    tab.get_by_text("Up to date").wait_for()
+    dismiss_notifications(tab)
+    return tab
+
+
+def dismiss_notifications(page) -> None:
+    """Close viser's notice about software rendering and anything else in the corner."""
+    for _ in range(5):
+        buttons = page.locator(".mantine-Notification-closeButton")
+        if not buttons.count():
+            return
+        buttons.first.click()
+        page.wait_for_timeout(400)

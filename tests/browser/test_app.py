@@ -1,0 +1,215 @@
+"""What a person does with the app, in a real browser."""
+
+from __future__ import annotations
+
+import re
+import statistics
+import time
+from pathlib import Path
+
+import pytest
+
+STEPS = ("Scene", "Depth", "Fuse", "Surface", "Export")
+TEXTS = {
+    "Scene": "Each camera node delivers",
+    "Depth": "points the sensor measured",
+    "Fuse": "move the orange cloud",
+    "Surface": "A ball rolls over the points",
+    "Export": "Take it along",
+}
+
+
+def go(page, step):
+    page.get_by_role("button", name=re.compile(f"^{step}( .)?$")).click()
+    page.get_by_text(TEXTS[step]).wait_for()
+
+
+def canvas(page):
+    """The 3-D picture once it stands still."""
+    last = b""
+    for _ in range(40):
+        page.wait_for_timeout(200)
+        picture = page.locator("canvas").first.screenshot()
+        if picture == last:
+            return picture
+        last = picture
+    return last
+
+
+def changed_from(page, picture):
+    """Whether the 3-D picture becomes another one within ten seconds."""
+    return any(canvas(page) != picture for _ in range(25))
+
+
+def slider(page, label):
+    identity = page.locator("label", has_text=label).first.get_attribute("for")
+    return page.locator(f'[id="{identity}"] [role=slider]')
+
+
+def test_every_step_shows_its_own_picture_and_no_error(page):
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    pictures = {}
+    for step in STEPS:
+        go(page, step)
+        pictures[step] = canvas(page)
+    assert len({pictures[step] for step in STEPS[:4]}) == 4
+    assert pictures["Export"] == pictures["Surface"]
+    assert not errors
+
+
+def test_the_radius_slider_changes_the_surface(page):
+    go(page, "Surface")
+    before, numbers = canvas(page), page.get_by_role("row", name="Triangles").inner_text()
+    handle = slider(page, "Radius")
+    handle.focus()
+    for _ in range(15):
+        handle.press("ArrowLeft")
+    page.wait_for_function(
+        "old => [...document.querySelectorAll('tr')].some(r => r.innerText.startsWith('Triangles')"
+        " && r.innerText !== old && !r.innerText.includes('…'))",
+        arg=numbers,
+    )
+    page.get_by_text("Up to date").wait_for()
+    assert changed_from(page, before)
+    assert page.get_by_label("Radii").first.input_value() == "one radius (slider)"
+
+
+def test_the_player_steps_through_the_race(page):
+    go(page, "Fuse")
+    page.get_by_role("row", name="End error").wait_for()
+    start = canvas(page)
+    page.get_by_role("button", name="Step", exact=True).click()
+    assert changed_from(page, start)
+    page.wait_for_timeout(2000)  # until all that the race draws has arrived
+    first = canvas(page)
+    page.get_by_role("button", name="Step", exact=True).click()
+    assert changed_from(page, first)
+    page.get_by_role("button", name="Step back").click()
+    assert any(canvas(page) == first for _ in range(25))
+    handle = slider(page, "Iteration")
+    handle.focus()
+    handle.press("End")
+    assert changed_from(page, first)
+
+
+def test_changing_an_early_step_recomputes_the_later_ones(page):
+    go(page, "Depth")
+    row = page.get_by_role("row", name="Alignment")
+    page.get_by_label("Alignment").first.click()
+    page.get_by_role("option", name="one scale").click()
+    row.get_by_text("median").wait_for()
+    page.get_by_text("Up to date").wait_for()
+    go(page, "Export")
+    assert "depth.alignment=median" in page.locator("pre").first.inner_text()
+
+
+def test_a_surface_can_be_downloaded(page):
+    go(page, "Export")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="PLY", exact=True).click()
+    content = Path(download.value.path()).read_bytes()
+    assert content.startswith(b"ply\n")
+    assert b"element face" in content[:1000]
+
+
+def test_the_command_is_shown(page):
+    page.get_by_role("button", name="Copy as command").click()
+    text = page.locator("pre").first.inner_text()
+    page.get_by_role("button", name="Close").click()
+    assert text.startswith("packetmesh reconstruct --scene box-on-table --preset packetmesh")
+
+
+def test_a_wrong_upload_is_a_sentence_and_the_session_goes_on(page):
+    page.get_by_text("Use your own RGB-D pair").click()
+    files = page.locator("input[type=file]")
+    for index, (name, content) in enumerate(
+        [("color.png", b"not a picture"), ("depth.png", b"nor this"), ("k.json", b"{}")]
+    ):
+        files.nth(index).set_input_files({"name": name, "mimeType": "image/png", "buffer": content})
+    page.get_by_text("All there: press the button.").wait_for()
+    page.get_by_role("button", name="Reconstruct this pair").click()
+    page.get_by_text("Scene failed").wait_for()
+    page.get_by_text("Stopped").wait_for()
+    page.get_by_role("button", name="Reset", exact=True).click()
+    page.get_by_text("Up to date").wait_for()
+
+
+def test_a_browser_answers_while_another_one_meshes(page, browser, app):
+    go(page, "Surface")
+    context = browser.new_context(viewport={"width": 620, "height": 240})
+    other = context.new_page()
+    other.set_default_timeout(60_000)
+    other.goto(app.url)
+    other.get_by_text("Up to date").wait_for()
+    handle = slider(page, "Radius")
+    handle.focus()
+    delays = []
+    for key in ("End", *["ArrowLeft"] * 5):  # a new radius every time, so that nothing is remembered
+        handle.press(key)
+        page.get_by_text(re.compile("rolling the ball")).wait_for()
+        delay_s = answer_s(other)
+        if page.get_by_text("Computing").count():
+            delays.append(delay_s)
+        other.get_by_role("button", name="Close").click()
+        other.get_by_text("The same from the command line").wait_for(state="detached")
+        page.get_by_text("Up to date").wait_for()
+    context.close()
+    assert len(delays) >= 3, "the meshing was over before the answers came"
+    assert statistics.median(delays) <= 0.3, delays
+
+
+def answer_s(page):
+    """Time from a click until the server's answer is on the page, measured in the page."""
+    milliseconds = page.evaluate(
+        """() => new Promise(resolve => {
+            const button = [...document.querySelectorAll('button')]
+                .find(b => b.innerText === 'Copy as command');
+            const began = performance.now();
+            const observer = new MutationObserver(() => {
+                if (document.body.innerText.includes('The same from the command line')) {
+                    observer.disconnect();
+                    resolve(performance.now() - began);
+                }
+            });
+            observer.observe(document.body, {childList: true, subtree: true, characterData: true});
+            button.click();
+        })"""
+    )
+    return milliseconds / 1000.0
+
+
+def test_a_closed_browser_leaves_no_session(page, browser, app):
+    known = set(app.sessions)
+    context = browser.new_context()
+    context.new_page().goto(app.url)
+    deadline = time.monotonic() + 30
+    while set(app.sessions) == known and time.monotonic() < deadline:
+        page.wait_for_timeout(100)
+    assert len(app.sessions) == len(known) + 1
+    context.close()
+    while set(app.sessions) != known and time.monotonic() < deadline:
+        page.wait_for_timeout(100)
+    assert set(app.sessions) == known
+
+
+@pytest.fixture
+def lecture(browser):
+    from app.server import build_server
+
+    app = build_server("box-on-table", port=0, lecture=True)
+    yield app
+    app.stop()
+
+
+def test_a_lecture_is_one_session_for_all(lecture, browser):
+    pages = []
+    for _ in range(2):
+        page = browser.new_context(viewport={"width": 700, "height": 480}).new_page()
+        page.set_default_timeout(60_000)
+        page.goto(lecture.url)
+        pages.append(page)
+    go(pages[0], "Export")
+    pages[1].get_by_text(TEXTS["Export"]).wait_for()
+    for page in pages:
+        page.context.close()

@@ -1,0 +1,85 @@
+"""Rig folders: what is saved is loaded, and the nodes' order and poses hold."""
+
+import numpy as np
+import pytest
+
+from pipeline.geometry import look_at
+from pipeline.io import load_frame, load_rig, save_rig
+from pipeline.io.rigs import LEVEL_POSE
+from pipeline.types import CameraIntrinsics, DepthMap, RgbdFrame, Rig
+
+
+def small_frame(seed: int) -> RgbdFrame:
+    rng = np.random.default_rng(seed)
+    z_m = (rng.integers(500, 4000, (12, 16)) / 1000.0).astype(np.float32)
+    z_m[rng.random((12, 16)) < 0.2] = np.nan
+    return RgbdFrame(
+        name=f"node_{seed:02d}",
+        rgb=rng.integers(0, 256, (12, 16, 3), dtype=np.uint8),
+        depth=DepthMap(z_m),
+        intrinsics=CameraIntrinsics.pinhole(14.0, 14.5, 7.5, 5.5, 16, 12),
+        T_world_camera=look_at(rng.normal(size=3), rng.normal(size=3)),
+    )
+
+
+def rig_of(count: int) -> Rig:
+    return Rig("rig", tuple(small_frame(seed) for seed in range(count)))
+
+
+def assert_same(first: RgbdFrame, second: RgbdFrame):
+    assert first.name == second.name
+    np.testing.assert_array_equal(first.rgb, second.rgb)
+    np.testing.assert_array_equal(first.depth.z_m, second.depth.z_m)
+    np.testing.assert_array_equal(first.intrinsics.matrix, second.intrinsics.matrix)
+    np.testing.assert_array_equal(first.T_world_camera, second.T_world_camera)
+
+
+@pytest.mark.parametrize("count", [1, 3, 6])
+def test_what_is_saved_is_loaded_to_the_last_bit(tmp_path, count):
+    rig = rig_of(count)
+    save_rig(tmp_path / "rig", rig)
+    again = load_rig(tmp_path / "rig")
+    assert again.name == "rig"
+    assert again.truth is None
+    assert len(again.frames) == count
+    for frame, expected in zip(again.frames, rig.frames, strict=True):
+        assert_same(frame, expected)
+
+
+def test_a_folder_holds_only_what_the_design_says(tmp_path):
+    save_rig(tmp_path / "rig", rig_of(1))
+    names = sorted(path.name for path in (tmp_path / "rig" / "node_00").iterdir())
+    assert names == ["color.png", "depth.png", "intrinsics.json", "pose.txt"]
+
+
+def test_a_rig_can_be_saved_over_itself(tmp_path):
+    save_rig(tmp_path / "rig", rig_of(2))
+    save_rig(tmp_path / "rig", Rig("rig", rig_of(2).frames[::-1]))
+    np.testing.assert_array_equal(load_rig(tmp_path / "rig").frames[0].rgb, small_frame(1).rgb)
+
+
+def test_a_node_without_pose_stands_level(tmp_path):
+    """World z is up: the image's down axis (y) must point down, and the camera must look at the horizon."""
+    save_rig(tmp_path / "rig", rig_of(1))
+    (tmp_path / "rig" / "node_00" / "pose.txt").unlink()
+    T = load_rig(tmp_path / "rig").frames[0].T_world_camera
+    np.testing.assert_array_equal(T, LEVEL_POSE)
+    np.testing.assert_allclose(T[:3, :3] @ [0.0, 1.0, 0.0], [0.0, 0.0, -1.0], atol=1e-15)
+    np.testing.assert_allclose(T[:3, :3] @ [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], atol=1e-15)
+
+
+def test_a_pair_is_a_node(tmp_path):
+    save_rig(tmp_path / "rig", rig_of(1))
+    folder = tmp_path / "rig" / "node_00"
+    frame = load_frame(folder / "color.png", folder / "depth.png", folder / "intrinsics.json", 500.0, "pair")
+    assert frame.name == "pair"
+    np.testing.assert_allclose(frame.depth.z_m, 2 * small_frame(0).depth.z_m, rtol=1e-6)
+
+
+def test_poses_may_have_comments_and_commas(tmp_path):
+    save_rig(tmp_path / "rig", rig_of(1))
+    pose = "# by hand\n1, 0, 0, 0.5\n0, 1, 0, -1\n\n0, 0, 1, 2\n0, 0, 0, 1\n"
+    (tmp_path / "rig" / "node_00" / "pose.txt").write_text(pose)
+    expected = np.eye(4)
+    expected[:3, 3] = [0.5, -1, 2]
+    np.testing.assert_array_equal(load_rig(tmp_path / "rig").frames[0].T_world_camera, expected)

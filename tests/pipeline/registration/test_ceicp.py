@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipeline.config import RegistrationConfig
+from pipeline.registration.ceicp import CeicpA, CeicpN, entropy_weights
+from pipeline.registration.matching import Matching
+from pipeline.types import PointCloud
+
+
+def _matching(distances_m) -> Matching:
+    rows, points = np.arange(len(distances_m)), np.zeros((len(distances_m), 3))
+    return Matching(rows, rows, points, points, np.asarray(distances_m, dtype=float))
+
+
+@given(distances=st.lists(st.floats(0.0, 1.0), min_size=5, max_size=60), gate_m=st.floats(0.01, 2.0))
+@settings(max_examples=100, deadline=None)
+def test_weights_of_n_are_a_falling_distribution(distances, gate_m):
+    kept = CeicpN(gate_m).weigh(_matching(distances))
+    assert np.flatnonzero(np.asarray(distances) <= gate_m).tolist() == kept.rows.tolist()
+    if not len(kept.rows):
+        return
+    assert (kept.weights >= 0).all()
+    assert kept.weights.sum() == pytest.approx(1.0, abs=1e-12)
+    assert 0 <= kept.entropy_nat <= np.log(len(kept.rows)) + 1e-12
+    if len(kept.rows) >= 5:  # the guarantee of SPEC 4.4
+        by_distance = kept.weights[np.argsort(np.asarray(distances)[kept.rows], kind="stable")]
+        assert (np.diff(by_distance) <= 1e-12).all()
+
+
+@given(seed=st.integers(0, 2**32 - 1), sigma_m=st.floats(0.005, 0.5))
+@settings(max_examples=50, deadline=None)
+def test_weights_of_a_fall_over_its_whole_gate(seed, sigma_m):
+    """245 pairs are enough in the worst case (SPEC 4.4)."""
+    distances_m = np.sort(np.random.default_rng(seed).uniform(0.0, 4.0 * sigma_m, 400))
+    kept = CeicpA(sigma_m, sigma_m, sigma_m, 0.85).weigh(_matching(distances_m))
+    assert (distances_m[kept.rows] <= 3.0 * sigma_m).all()
+    assert (np.diff(kept.weights) < 0).all()
+    assert (kept.weights > 0).all()
+
+
+def test_weights_follow_the_formula():
+    distances_m, sigma_m = np.array([0.0, 0.01, 0.02, 0.05]), 0.03
+    g = np.exp(-(distances_m**2) / (2 * sigma_m**2))
+    p = g / g.sum()
+    w = -p * np.log(p)
+    weights, _, entropy_nat = entropy_weights(distances_m, sigma_m)
+    np.testing.assert_allclose(weights, w / w.sum(), atol=1e-15)
+    assert entropy_nat == pytest.approx(w.sum())
+
+
+def test_weights_do_not_know_the_unit():
+    distances_m = np.random.default_rng(0).uniform(0.0, 0.1, 50)
+    np.testing.assert_allclose(
+        entropy_weights(distances_m, 0.03)[0], entropy_weights(1000.0 * distances_m, 30.0)[0], atol=1e-15
+    )
+
+
+def test_perfect_matches_weigh_the_same():
+    kept = CeicpN(0.3).weigh(_matching(np.zeros(10)))
+    np.testing.assert_allclose(kept.weights, 0.1)
+    assert kept.entropy_nat == pytest.approx(np.log(10))
+
+
+def test_the_scale_of_a_shrinks_to_its_floor_and_doubles_once():
+    grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3) * 0.05
+    method = CeicpA.starting(RegistrationConfig(gate_m=0.3, sigma_decay=0.5), PointCloud(grid))
+    sigmas = [method.sigma_m]
+    while not method.settled:
+        method = method.following()
+        sigmas.append(method.sigma_m)
+    np.testing.assert_allclose(sigmas, [0.2, 0.1, 0.05, 0.03])
+    wider = method.widened()
+    assert wider.sigma_m == pytest.approx(0.06)
+    assert wider.widened() is None
+    assert CeicpA(0.15, 0.2, 0.03, 0.5).widened().sigma_m == 0.2
+
+
+def test_a_noisy_sensor_lifts_the_floor():
+    grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3) * 0.01
+    config = RegistrationConfig()
+    assert CeicpA.starting(config, PointCloud(grid)).sigma_min_m == pytest.approx(0.006)
+    noisy = PointCloud(grid, sigma_m=np.full(len(grid), 0.02))
+    assert CeicpA.starting(config, noisy).sigma_min_m == pytest.approx(0.02)

@@ -1,0 +1,65 @@
+"""Rigid motions and the pinhole camera."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline import geometry
+from pipeline.types import CameraIntrinsics, PointCloud
+
+vectors = st.tuples(*[st.floats(-3, 3)] * 3).map(np.array)
+DISTORTED = CameraIntrinsics(
+    np.array([[529.7, 0, 312.6], [0, 529.6, 257.1], [0, 0, 1.0]]),
+    np.array([0.18, -0.32, 1e-3, -2e-3, 0.01]),
+    640,
+    480,
+)
+
+
+@given(vectors, vectors, vectors)
+def test_inverse_undoes_a_motion(omega_rad, translation_m, point_m):
+    T = geometry.rigid(geometry.rotation_exp(omega_rad), translation_m)
+    back = geometry.apply(geometry.inverse(T), geometry.apply(T, point_m[None]))
+    np.testing.assert_allclose(back[0], point_m, atol=1e-12)
+
+
+@given(vectors)
+def test_rotation_angle_is_the_length_of_its_axis_vector_modulo_the_circle(omega_rad):
+    turns = np.linalg.norm(omega_rad) % (2 * np.pi)
+    expected = min(turns, 2 * np.pi - turns)
+    assert abs(geometry.rotation_angle_rad(geometry.rotation_exp(omega_rad)) - expected) < 1e-7
+
+
+def test_every_pixel_of_a_distorted_camera_projects_back_to_itself():
+    rays = geometry.pixel_rays(DISTORTED)
+    u, v = np.meshgrid(np.arange(640), np.arange(480))
+    uv = geometry.project(DISTORTED, rays.reshape(-1, 3) * 2.5)
+    np.testing.assert_allclose(uv, np.stack([u, v], axis=-1).reshape(-1, 2), atol=1e-9)
+
+
+def test_a_camera_that_looks_at_a_point_sees_it_in_its_centre_and_upright():
+    camera = CameraIntrinsics.pinhole(500, 500, 319.5, 239.5, 640, 480)
+    T_camera_world = geometry.inverse(geometry.look_at((3.0, -2.0, 1.5), (0.5, 1.0, 0.7)))
+    uv = geometry.project(
+        camera, geometry.apply(T_camera_world, np.array([[0.5, 1.0, 0.7], [0.5, 1.0, 0.9]]))
+    )
+    np.testing.assert_allclose(uv[0], (319.5, 239.5), atol=1e-9)
+    assert uv[1, 1] < uv[0, 1]
+
+
+def test_transforming_a_cloud_by_a_similarity_scales_what_has_a_length_and_turns_what_has_a_direction():
+    rotation = geometry.rotation_exp([0.0, 0.0, np.pi / 2])
+    T = geometry.rigid(2.0 * rotation, [1.0, 0.0, 0.0])
+    cloud = PointCloud(np.array([[1.0, 0, 0]]), normals=np.array([[1.0, 0, 0]]), sigma_m=np.array([0.5]))
+    moved = cloud.transformed(T)
+    np.testing.assert_allclose(moved.points_m, [[1.0, 2.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(moved.normals, [[0.0, 1.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(moved.sigma_m, [1.0])
+
+
+def test_concatenation_keeps_only_the_columns_that_all_clouds_have():
+    full = PointCloud(np.zeros((2, 3)), normals=np.ones((2, 3)), sigma_m=np.ones(2))
+    joined = PointCloud.concatenate([full, PointCloud(np.ones((1, 3)), sigma_m=np.zeros(1))])
+    assert len(joined) == 3
+    assert joined.normals is None
+    np.testing.assert_array_equal(joined.sigma_m, [1, 1, 0])
