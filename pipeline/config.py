@@ -9,7 +9,22 @@ from pipeline.errors import InputError
 
 OutlierMode = Literal["thesis", "depth_normalised", "robust"]
 AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]
-Method = Literal["icp", "ceicp-n", "ceicp-a"]
+Method = Literal[
+    "icp",
+    "trimmed-icp",
+    "picp",
+    "ricp",
+    "mricp",
+    "ficp",
+    "hicp",
+    "ceicp-literal",
+    "ceicp-n",
+    "ceicp-a",
+    "ceicp-r",
+    "ceicp-ml",
+    "kernel-correlation",
+    "fast-robust-icp",
+]
 Metric = Literal["point", "plane"]
 Direction = Literal["q2p", "p2q", "both"]
 FusionMode = Literal["union", "fill"]
@@ -72,10 +87,18 @@ class RegistrationConfig:
     depth noise where that is larger."""
     sigma_decay: float = 0.85
     """Factor rho by which CEICP-A's scale shrinks an iteration."""
+    trim: float = 0.9
+    """Share of the closest pairs that trimmed-icp and hicp keep."""
+    unit: Literal["mm", "m"] = "mm"
+    """Unit in which ceicp-literal measures; its weights depend on it."""
+    hue_weight_m: float = 0.3
+    """Length that a whole half turn of hue is worth to hicp."""
     max_iterations: int = 100
     max_points: int = 6000
     """Points drawn from each cloud for matching."""
     seed: int = 0
+    start: Literal["given", "global"] = "given"
+    """given: from the believed pose; global: from a pose found by matching features first."""
 
     def __post_init__(self) -> None:
         _above("registration.gate_m", self.gate_m, 0.0)
@@ -85,6 +108,9 @@ class RegistrationConfig:
             raise InputError(
                 f"registration.sigma_decay is {self.sigma_decay}; try a value between 0.5 and 0.95"
             )
+        if not 0.0 < self.trim <= 1.0:
+            raise InputError(f"registration.trim is {self.trim}; try a share between 0.5 and 1")
+        _at_least("registration.hue_weight_m", self.hue_weight_m, 0.0)
         if self.sigma_min_m is not None:
             _above("registration.sigma_min_m", self.sigma_min_m, 0.0)
         if self.with_scale and self.metric == "plane":

@@ -185,10 +185,14 @@ class RegistrationStep:
     """(M,) distance of each pair before the update."""
     sigma_m: float
     """Scale of the weight function; NaN for methods without one."""
+    gate_m: float
+    """Distance beyond which no pair counted; infinite for methods without a gate."""
     objective: float
     """Weighted mean square the update minimised, after the update, in square metres."""
     rmse_m: float
     """Root of the weighted mean squared point distance of the pairs, before the update."""
+    mean_distance_m: float
+    """Weighted mean point distance of the pairs, before the update (the thesis's error, eq. 3.17)."""
     effective_pairs: float
     """(sum w)^2 / sum w^2."""
     entropy_nat: float

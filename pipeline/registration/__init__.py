@@ -1,7 +1,7 @@
 """Registration of two clouds as a sequence of steps, and their fusion (SPEC 4)."""
 
 from pipeline.registration.fusion import fuse
-from pipeline.registration.loop import iterate, register
+from pipeline.registration.loop import iterate, register, register_timed
 from pipeline.registration.metrics import average_hausdorff_m, point_error_m, rotation_error_rad
 from pipeline.registration.visibility import hidden_from
 
@@ -12,5 +12,6 @@ __all__ = [
     "iterate",
     "point_error_m",
     "register",
+    "register_timed",
     "rotation_error_rad",
 ]

@@ -57,7 +57,7 @@ class CeicpA(PairWeighting):
     """Whether the scale may still be doubled, once, after losing its pairs."""
 
     @staticmethod
-    def starting(config: RegistrationConfig, target: PointCloud) -> CeicpA:
+    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpA:
         """The first iteration, at sigma_0 = gate / 1.5; ``target`` is the thinned cloud."""
         sigma_min_m = config.sigma_min_m or _smallest_sigma_m(target, config.gate_m)
         sigma_0_m = max(START_SIGMA_OF_GATE * config.gate_m, sigma_min_m)
@@ -78,7 +78,7 @@ class CeicpA(PairWeighting):
         """Whether the scale has reached its smallest value."""
         return self.sigma_m <= self.sigma_min_m
 
-    def following(self) -> CeicpA:
+    def following(self, kept: PairWeights, still: bool) -> CeicpA:
         """With the scale shrunk."""
         return replace(self, sigma_m=max(self.sigma_min_m, self.decay * self.sigma_m))
 

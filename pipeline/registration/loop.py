@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Generator
 
 import numpy as np
@@ -9,9 +10,10 @@ import numpy as np
 from pipeline.config import RegistrationConfig
 from pipeline.errors import InputError, ReconstructionError
 from pipeline.geometry import apply, rotation_angle_rad
+from pipeline.registration.acceleration import Acceleration
 from pipeline.registration.degenerate import DegenerateError
 from pipeline.registration.matching import Matcher, Matching
-from pipeline.registration.methods import WEIGHTINGS
+from pipeline.registration.methods import METHODS, MethodStart
 from pipeline.registration.residual import residual_for
 from pipeline.registration.sample import Sample, draw
 from pipeline.registration.stop import TRANSLATION_TOLERANCE_OF_GATE, StopRule
@@ -23,7 +25,11 @@ MIN_EFFECTIVE_PAIRS = 10.0
 
 
 def iterate(
-    source: PointCloud, target: PointCloud, config: RegistrationConfig, T_init: FloatArray | None = None
+    source: PointCloud,
+    target: PointCloud,
+    config: RegistrationConfig,
+    T_init: FloatArray | None = None,
+    method: MethodStart | None = None,
 ) -> Generator[RegistrationStep, None, str]:
     """Register ``source`` to ``target`` one iteration at a time; the generator returns the stop reason.
 
@@ -32,6 +38,7 @@ def iterate(
         target: the cloud that stays; its ``normals`` are used by the plane metric when it has them.
         config: method, metric, direction and their parameters.
         T_init: (4, 4) start pose T_target_source; None is the identity.
+        method: takes the place of the method that the config names, for experiments.
 
     Raises:
         InputError: fewer than three points, points that are not finite, a start pose that is none.
@@ -45,46 +52,76 @@ def iterate(
         draw(target, config.max_points, config.seed, "target"),
         config,
         T,
+        method or METHODS[config.method],
     )
 
 
 def register(
-    source: PointCloud, target: PointCloud, config: RegistrationConfig, T_init: FloatArray | None = None
+    source: PointCloud,
+    target: PointCloud,
+    config: RegistrationConfig,
+    T_init: FloatArray | None = None,
+    method: MethodStart | None = None,
 ) -> RegistrationResult:
     """All steps of ``iterate`` and their outcome; ``converged`` also holds for ``stalled``.
 
     A degenerate end keeps the last good pose.
     """
+    return register_timed(source, target, config, T_init, method)[0]
+
+
+def register_timed(
+    source: PointCloud,
+    target: PointCloud,
+    config: RegistrationConfig,
+    T_init: FloatArray | None = None,
+    method: MethodStart | None = None,
+) -> tuple[RegistrationResult, FloatArray]:
+    """``register``, and apart from its deterministic result the time.
+
+    Returns:
+        The result, and (K,) seconds from the call until each of its steps was done.
+    """
+    started = time.perf_counter()
     steps: list[RegistrationStep] = []
-    remaining = iterate(source, target, config, T_init)
+    elapsed_s: list[float] = []
+    remaining = iterate(source, target, config, T_init, method)
     while True:
         try:
             steps.append(next(remaining))
+            elapsed_s.append(time.perf_counter() - started)
         except StopIteration as end:
             reason: str = end.value
             break
     start = np.eye(4) if T_init is None else np.asarray(T_init, dtype=np.float64)
     T = steps[-1].T_target_source if steps else start
-    return RegistrationResult(T, tuple(steps), reason in ("converged", "stalled"), reason)
+    result = RegistrationResult(T, tuple(steps), reason in ("converged", "stalled"), reason)
+    return result, np.array(elapsed_s)
 
 
 def _iterations(
-    source: Sample, target: Sample, config: RegistrationConfig, T: FloatArray
+    source: Sample, target: Sample, config: RegistrationConfig, T: FloatArray, start: MethodStart
 ) -> Generator[RegistrationStep, None, str]:
-    matcher = Matcher(source.points_m, target.points_m, config.direction)
-    residual = residual_for(config, target.cloud)
-    method = WEIGHTINGS[config.method](config, target.cloud)
+    method = start(config, source.cloud, target.cloud)
+    matcher = Matcher(source.cloud, target.cloud, method.direction or config.direction, method.features)
+    residual = residual_for(config, target.cloud, method.unweighted_centroids)
     stop = StopRule(TRANSLATION_TOLERANCE_OF_GATE * config.gate_m)
+    acceleration = Acceleration() if method.accelerated else None
     center_m = source.points_m.mean(axis=0, keepdims=True)
     for index in range(config.max_iterations):
-        matching = matcher.match(T)
         try:
-            method, kept = _weigh(method, matching, first=index == 0)
+            method, matching, kept = _weigh(method, matcher, T, first=index == 0)
+            if acceleration is not None and (back := acceleration.way_back(kept)) is not None:
+                T = back
+                method, matching, kept = _weigh(method, matcher, T)
             support = matching.select(kept.rows)
             motion = residual.solve(support, kept.weights)
         except DegenerateError as error:
             return f"degenerate: {error}"
         moved_T = motion @ T
+        if acceleration is not None:
+            moved_T = acceleration.onward(T, moved_T, kept)
+            motion = moved_T @ np.linalg.inv(T)
         step = RegistrationStep(
             index=index,
             T_target_source=moved_T,
@@ -92,8 +129,10 @@ def _iterations(
             weights=kept.weights,
             distances_m=support.distances_m,
             sigma_m=kept.sigma_m,
+            gate_m=method.gate_m,
             objective=float(kept.weights @ residual.squared_m2(support, motion)),
             rmse_m=float(np.sqrt(kept.weights @ support.distances_m**2)),
+            mean_distance_m=float(kept.weights @ support.distances_m),
             effective_pairs=_effective(kept.weights),
             entropy_nat=kept.entropy_nat,
             rotation_step_rad=_turn_rad(motion),
@@ -101,17 +140,26 @@ def _iterations(
         )
         yield step
         T = moved_T
-        if method.settled and (reason := stop.reason(step)) is not None:
+        reason = stop.reason(step, method.tolerance)
+        if reason is not None and method.settled:
             return reason
-        method = method.following()
+        method = method.following(kept, reason is not None)
     return "max_iterations"
 
 
-def _weigh(method: PairWeighting, matching: Matching, first: bool) -> tuple[PairWeighting, PairWeights]:
+def _weigh(
+    method: PairWeighting, matcher: Matcher, T: FloatArray, first: bool = False
+) -> tuple[PairWeighting, Matching, PairWeights]:
     """The pairs that count, after widening the method if it keeps too few; it comes back as it ended."""
+
+    def match(state: PairWeighting) -> Matching:
+        return matcher.match(T, state.neighbours, state.source_share, state.target_share)
+
+    matching = match(method)
     kept = method.weigh(matching)
     if len(kept.rows) < MIN_PAIRS and (wider := method.widened()) is not None:
-        method, kept = wider, wider.weigh(matching)
+        method, matching = wider, match(wider)
+        kept = method.weigh(matching)
     if first and not len(kept.rows):
         raise ReconstructionError(
             f"No point of the source lies within {method.gate_m:.2f} m of the target: the start poses are "
@@ -121,7 +169,7 @@ def _weigh(method: PairWeighting, matching: Matching, first: bool) -> tuple[Pair
         raise DegenerateError(f"only {len(kept.rows)} pairs are close enough")
     if _effective(kept.weights) < MIN_EFFECTIVE_PAIRS:
         raise DegenerateError(f"only {_effective(kept.weights):.1f} pairs carry all the weight")
-    return method, kept
+    return method, matching, kept
 
 
 def _effective(weights: FloatArray) -> float:

@@ -10,9 +10,12 @@ from pipeline.registration.icp import Icp
 from pipeline.registration.weighting import PairWeighting
 from pipeline.types import PointCloud
 
-WEIGHTINGS: dict[str, Callable[[RegistrationConfig, PointCloud], PairWeighting]] = {
-    "icp": lambda config, target: Icp(),
-    "ceicp-n": lambda config, target: CeicpN(config.gate_m),
+MethodStart = Callable[[RegistrationConfig, PointCloud, PointCloud], PairWeighting]
+"""A method's first state, from the config, the thinned source and the thinned target."""
+
+METHODS: dict[str, MethodStart] = {
+    "icp": lambda config, source, target: Icp(),
+    "ceicp-n": lambda config, source, target: CeicpN(config.gate_m),
     "ceicp-a": CeicpA.starting,
 }
-"""Every method's first state, from the config and the thinned target cloud."""
+"""Every method that can be asked for."""

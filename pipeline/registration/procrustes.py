@@ -12,17 +12,23 @@ _SMALLEST_SINGULAR_RATIO = 1e-9
 
 
 def weighted_procrustes(
-    source_m: FloatArray, target_m: FloatArray, weights: FloatArray, with_scale: bool = False
+    source_m: FloatArray,
+    target_m: FloatArray,
+    weights: FloatArray,
+    with_scale: bool = False,
+    unweighted_centroids: bool = False,
 ) -> FloatArray:
     """The (4, 4) motion that minimises sum w |s R q + t - p|^2 over (M, 3) pairs.
 
-    Corrects eqs. 3.12-3.16 of the thesis: weighted centroids, R = U V^T, and no reflections.
+    Corrects eqs. 3.12-3.16 of the thesis: weighted centroids, R = U V^T, and no reflections. With
+    ``unweighted_centroids`` the centroids are those of eq. 3.12, and the sum is not at its minimum.
 
     Raises:
         DegenerateError: the points of one side lie on one line.
     """
     share = (weights / weights.sum())[:, None]
-    source_center_m, target_center_m = (share * source_m).sum(axis=0), (share * target_m).sum(axis=0)
+    at = np.full_like(share, 1.0 / len(share)) if unweighted_centroids else share
+    source_center_m, target_center_m = (at * source_m).sum(axis=0), (at * target_m).sum(axis=0)
     q, p = source_m - source_center_m, target_m - target_center_m
     covariance = (share * p).T @ q
     U, singular, Vt = np.linalg.svd(covariance)

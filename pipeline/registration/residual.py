@@ -33,10 +33,14 @@ class PointResidual:
     """The vector between the two points of a pair."""
 
     with_scale: bool
+    unweighted_centroids: bool = False
+    """Plain centroids, as in eq. 3.12, which do not minimise the weighted error."""
 
     def solve(self, pairs: Matching, weights: FloatArray) -> FloatArray:
-        """Weighted Procrustes: the exact minimum."""
-        return weighted_procrustes(pairs.moved_m, pairs.target_m, weights, self.with_scale)
+        """Weighted Procrustes: the exact minimum, but for plain centroids."""
+        return weighted_procrustes(
+            pairs.moved_m, pairs.target_m, weights, self.with_scale, self.unweighted_centroids
+        )
 
     def squared_m2(self, pairs: Matching, motion: FloatArray) -> FloatArray:
         """(M,) squared distances."""
@@ -60,8 +64,10 @@ class PlaneResidual:
         return np.einsum("mi,mi->m", offsets_m, self.normals[pairs.target_rows]) ** 2
 
 
-def residual_for(config: RegistrationConfig, target: PointCloud) -> Residual:
+def residual_for(
+    config: RegistrationConfig, target: PointCloud, unweighted_centroids: bool = False
+) -> Residual:
     """The configured residual; normals the target does not have are estimated from its points."""
     if config.metric == "point":
-        return PointResidual(config.with_scale)
+        return PointResidual(config.with_scale, unweighted_centroids)
     return PlaneResidual(pca_normals(target.points_m) if target.normals is None else target.normals)

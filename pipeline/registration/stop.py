@@ -23,14 +23,17 @@ class StopRule:
     _rmse_m: float = float("nan")
     _still_steps: int = 0
 
-    def reason(self, step: RegistrationStep) -> str | None:
-        """``converged`` after a negligible motion, ``stalled`` after an RMSE that stays, else None."""
-        still = abs(self._rmse_m - step.rmse_m) <= RMSE_TOLERANCE * self._rmse_m
+    def reason(self, step: RegistrationStep, tolerance: float = 1.0) -> str | None:
+        """``converged`` after a negligible motion, ``stalled`` after an RMSE that stays, else None.
+
+        ``tolerance`` is a factor on what counts as negligible.
+        """
+        still = abs(self._rmse_m - step.rmse_m) <= tolerance * RMSE_TOLERANCE * self._rmse_m
         self._still_steps = self._still_steps + 1 if still else 0
         self._rmse_m = step.rmse_m
         if (
-            step.rotation_step_rad < ROTATION_TOLERANCE_RAD
-            and step.translation_step_m < self.translation_tolerance_m
+            step.rotation_step_rad < tolerance * ROTATION_TOLERANCE_RAD
+            and step.translation_step_m < tolerance * self.translation_tolerance_m
         ):
             return "converged"
         return "stalled" if self._still_steps >= STILL_STEPS else None

@@ -1,6 +1,6 @@
 """What a registration method is: a rule that weighs the pairs of a matching.
 
-A new method is a subclass of ``PairWeighting`` in a file of its own, entered in ``methods.WEIGHTINGS``.
+A new method is a subclass of ``PairWeighting`` in a file of its own, entered in ``methods.METHODS``.
 """
 
 from __future__ import annotations
@@ -8,8 +8,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from pipeline.config import Direction
 from pipeline.registration.matching import Matching
-from pipeline.types import FloatArray, IntArray
+from pipeline.types import FloatArray, IntArray, PointCloud
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,8 @@ class PairWeights:
     """Scale of the weight function; NaN for methods without one."""
     entropy_nat: float = float("nan")
     """Entropy of the matching; NaN for methods without probabilities."""
+    energy: float = float("nan")
+    """What an accelerated method decreases, at this pose; NaN for all others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +47,52 @@ class PairWeighting(ABC):
         """Whether the schedule has reached its end, so that a small update means convergence."""
         return True
 
-    def following(self) -> PairWeighting:
-        """The method in the state of the next iteration."""
+    @property
+    def tolerance(self) -> float:
+        """Factor on the tolerances of the stop rule in this state."""
+        return 1.0
+
+    @property
+    def source_share(self) -> float:
+        """Share of the source's points that this iteration uses, always the same ones for one share."""
+        return 1.0
+
+    @property
+    def target_share(self) -> float:
+        """Share of the target's points that this iteration uses, always the same ones for one share."""
+        return 1.0
+
+    @property
+    def neighbours(self) -> int:
+        """Nearest points that every point asks for; a matching's rows come in blocks, nearest first."""
+        return 1
+
+    @property
+    def direction(self) -> Direction | None:
+        """The direction the method insists on; None for the configured one."""
+        return None
+
+    @property
+    def unweighted_centroids(self) -> bool:
+        """Whether the point residual takes plain centroids of the kept pairs, as eq. 3.12 does."""
+        return False
+
+    @property
+    def accelerated(self) -> bool:
+        """Whether Anderson acceleration extrapolates the poses."""
+        return False
+
+    def features(self, cloud: PointCloud) -> FloatArray | None:
+        """(N, k) coordinates beside x, y, z in which neighbours are near, in metres; None for none."""
+        return None
+
+    def following(self, kept: PairWeights, still: bool) -> PairWeighting:
+        """The method in the state of the next iteration.
+
+        Args:
+            kept: what this state weighed.
+            still: whether the motion of this iteration was below the tolerances.
+        """
         return self
 
     def widened(self) -> PairWeighting | None:

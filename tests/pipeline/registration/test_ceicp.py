@@ -65,10 +65,10 @@ def test_perfect_matches_weigh_the_same():
 
 def test_the_scale_of_a_shrinks_to_its_floor_and_doubles_once():
     grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3) * 0.05
-    method = CeicpA.starting(RegistrationConfig(gate_m=0.3, sigma_decay=0.5), PointCloud(grid))
+    method = CeicpA.starting(RegistrationConfig(gate_m=0.3, sigma_decay=0.5), PointCloud(grid), PointCloud(grid))
     sigmas = [method.sigma_m]
     while not method.settled:
-        method = method.following()
+        method = method.following(kept=None, still=False)
         sigmas.append(method.sigma_m)
     np.testing.assert_allclose(sigmas, [0.2, 0.1, 0.05, 0.03])
     wider = method.widened()
@@ -80,6 +80,6 @@ def test_the_scale_of_a_shrinks_to_its_floor_and_doubles_once():
 def test_a_noisy_sensor_lifts_the_floor():
     grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3) * 0.01
     config = RegistrationConfig()
-    assert CeicpA.starting(config, PointCloud(grid)).sigma_min_m == pytest.approx(0.006)
+    assert CeicpA.starting(config, PointCloud(grid), PointCloud(grid)).sigma_min_m == pytest.approx(0.006)
     noisy = PointCloud(grid, sigma_m=np.full(len(grid), 0.02))
-    assert CeicpA.starting(config, noisy).sigma_min_m == pytest.approx(0.02)
+    assert CeicpA.starting(config, noisy, noisy).sigma_min_m == pytest.approx(0.02)
