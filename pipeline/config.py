@@ -94,7 +94,7 @@ class RegistrationConfig:
     hue_weight_m: float = 0.3
     """Length that a whole half turn of hue is worth to hicp."""
     max_iterations: int = 100
-    max_points: int = 6000
+    max_points: int = 10_000
     """Points drawn from each cloud for matching."""
     seed: int = 0
     start: Literal["given", "global"] = "given"

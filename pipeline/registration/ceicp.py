@@ -22,6 +22,8 @@ START_SIGMA_OF_GATE = 1.0 / 1.5
 """CEICP-A's first scale sigma_0 over the configured gate T_d."""
 SIGMA_MIN_OF_SPACING = 0.6
 """CEICP-A's smallest scale over the target's median spacing."""
+COARSE_POINTS = 2000
+"""Points that look for a partner while CEICP-A's kernel is wide, if there are more."""
 SIGMA_MIN_OF_GATE = 1e-3
 """Floor of CEICP-A's smallest scale over the gate, for targets whose points coincide."""
 
@@ -53,6 +55,9 @@ class CeicpA(PairWeighting):
     sigma_0_m: float
     sigma_min_m: float
     decay: float
+    asking_points: int = 0
+    """Points that look for a partner, in all; zero lets all of them look at every scale."""
+    source_asks: bool = True
     may_widen: bool = True
     """Whether the scale may still be doubled, once, after losing its pairs."""
 
@@ -61,7 +66,9 @@ class CeicpA(PairWeighting):
         """The first iteration, at sigma_0 = gate / 1.5; ``target`` is the thinned cloud."""
         sigma_min_m = config.sigma_min_m or _smallest_sigma_m(target, config.gate_m)
         sigma_0_m = max(START_SIGMA_OF_GATE * config.gate_m, sigma_min_m)
-        return CeicpA(sigma_0_m, sigma_0_m, sigma_min_m, config.sigma_decay)
+        source_asks = config.direction == "q2p"
+        asking = 0 if config.direction == "both" else len(source if source_asks else target)
+        return CeicpA(sigma_0_m, sigma_0_m, sigma_min_m, config.sigma_decay, asking, source_asks)
 
     def weigh(self, matching: Matching) -> PairWeights:
         """Pairs within three sigma."""
@@ -77,6 +84,21 @@ class CeicpA(PairWeighting):
     def settled(self) -> bool:
         """Whether the scale has reached its smallest value."""
         return self.sigma_m <= self.sigma_min_m
+
+    @property
+    def source_share(self) -> float:
+        """All that ask at the last scale, in proportion fewer where the kernel is wider."""
+        return self._asking_share if self.source_asks else 1.0
+
+    @property
+    def target_share(self) -> float:
+        """As ``source_share``, when the target asks."""
+        return 1.0 if self.source_asks else self._asking_share
+
+    @property
+    def _asking_share(self) -> float:
+        least = COARSE_POINTS / self.asking_points if self.asking_points else 1.0
+        return min(1.0, max(least, self.sigma_min_m / self.sigma_m))
 
     def following(self, kept: PairWeights, still: bool) -> CeicpA:
         """With the scale shrunk."""

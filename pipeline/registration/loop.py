@@ -153,7 +153,7 @@ def _weigh(
     """The pairs that count, after widening the method if it keeps too few; it comes back as it ended."""
 
     def match(state: PairWeighting) -> Matching:
-        return matcher.match(T, state.neighbours, state.source_share, state.target_share)
+        return matcher.match(T, state.neighbours, state.source_share, state.target_share, state.gate_m)
 
     matching = match(method)
     kept = method.weigh(matching)

@@ -59,18 +59,21 @@ class Matcher:
         neighbours: int = 1,
         source_share: float = 1.0,
         target_share: float = 1.0,
+        gate_m: float = float("inf"),
     ) -> Matching:
-        """Closest pairs in the matcher's direction at a (4, 4) rigid or similarity pose."""
+        """Closest pairs in the matcher's direction at a (4, 4) rigid or similarity pose.
+
+        A point whose nearest is beyond ``gate_m`` may be left out, which saves the search for it.
+        """
         source, target = self._source.part(source_share), self._target.part(target_share)
         moved_m = apply(T_target_source, source.points_m)
         found = []
         if self._direction != "p2q":
-            asking, nearest = target.nearest(moved_m, source.features, neighbours)
-            found.append(np.stack([asking, nearest], axis=1))
+            found.append(target.nearest(source, moved_m, neighbours, gate_m))
         if self._direction != "q2p":
             back_m = apply(np.linalg.inv(T_target_source), target.points_m)
-            asking, nearest = source.nearest(back_m, target.features, neighbours)
-            found.append(np.stack([nearest, asking], axis=1))
+            scale = float(np.cbrt(np.linalg.det(T_target_source[:3, :3])))
+            found.append(source.nearest(target, back_m, neighbours, gate_m / scale)[:, ::-1])
         pairs = found[0] if len(found) == 1 else np.unique(np.concatenate(found), axis=0)
         moved_m, target_m = moved_m[pairs[:, 0]], target.points_m[pairs[:, 1]]
         distances_m = np.linalg.norm(moved_m - target_m, axis=1)
@@ -83,16 +86,45 @@ class _Part:
     def __init__(self, rows: IntArray, points_m: FloatArray, features: FloatArray | None) -> None:
         self.rows, self.points_m, self.features = rows, points_m, features
         self._tree: cKDTree | None = None
+        self._answers: dict[int, _Answers] = {}
 
-    def nearest(
-        self, points_m: FloatArray, features: FloatArray | None, neighbours: int
-    ) -> tuple[IntArray, IntArray]:
-        """Who asks and whom it finds: (n * k,) rows of ``points_m`` and of this part, nearest first."""
+    def nearest(self, asking: _Part, places_m: FloatArray, neighbours: int, gate_m: float) -> IntArray:
+        """(M, 2) rows of the points that ask, at (n, 3) places, and of those they find, nearest first."""
         if self._tree is None:
             self._tree = cKDTree(_stacked(self.points_m, self.features))
         count = min(neighbours, len(self.points_m))
-        _, nearest = self._tree.query(_stacked(points_m, features), k=count, workers=-1)
-        return np.repeat(np.arange(len(points_m)), count), np.asarray(nearest).reshape(-1)
+        queries_m = _stacked(places_m, asking.features)
+        if count > 1 or len(self.points_m) == 1:
+            found = np.asarray(self._tree.query(queries_m, k=count, workers=-1)[1]).reshape(-1)
+            return np.stack([np.repeat(np.arange(len(places_m)), count), found], axis=1)
+        answers = self._answers.setdefault(id(asking), _Answers(*queries_m.shape))
+        # In more dimensions than three the distance says nothing about the gate.
+        found = answers.updated(self._tree, queries_m, gate_m if self.features is None else np.inf)
+        near = np.flatnonzero(found < len(self.points_m))
+        return np.stack([near, found[near]], axis=1)
+
+
+class _Answers:
+    """Nearest points found before, and how far each query may stray before another can be nearer."""
+
+    def __init__(self, count: int, dimensions: int) -> None:
+        self._found = np.zeros(count, dtype=np.intp)
+        self._places_m = np.zeros((count, dimensions))
+        self._leeway_m = np.full(count, -1.0)
+
+    def updated(self, tree: cKDTree, places_m: FloatArray, gate_m: float) -> IntArray:
+        """(n,) exact nearest points within the gate, or ``tree.n``; who kept to the leeway is not asked."""
+        strayed_m = np.sqrt(np.sum((places_m - self._places_m) ** 2, axis=1))
+        again = np.flatnonzero(strayed_m >= self._leeway_m)
+        if len(again):
+            distances_m, nearest = tree.query(places_m[again], k=2, distance_upper_bound=gate_m, workers=-1)
+            self._found[again] = nearest[:, 0]
+            self._places_m[again] = places_m[again]
+            # A stray of s brings the nearest to d1 + s at most and any other to d2 - s at least.
+            second_m = np.minimum(distances_m[:, 1], gate_m)
+            missing = nearest[:, 0] == tree.n
+            self._leeway_m[again] = np.where(missing, -1.0, 0.5 * (second_m - distances_m[:, 0]))
+        return self._found
 
 
 class _Side:

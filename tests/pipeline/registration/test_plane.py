@@ -39,6 +39,19 @@ def test_the_step_neither_knows_the_origin_nor_the_unit():
     np.testing.assert_allclose(scaled[:3, 3], 1000.0 * step[:3, 3], atol=1e-9)
 
 
+def test_the_free_motions_are_named():
+    rng = np.random.default_rng(4)
+    points = rng.uniform(-1.0, 1.0, (400, 3)) * [1.0, 1.0, 0.0]
+    wall, floor = np.tile([1.0, 0.0, 0.0], (400, 1)), np.tile([0.0, 0.0, 1.0], (400, 1))
+    with pytest.raises(
+        DegenerateError, match="turn about z and to slide along [xy] and to slide along [xy]$"
+    ):
+        solve_plane(points, points, floor, np.ones(400))
+    edge = np.concatenate([points, points[:, [2, 1, 0]]])
+    with pytest.raises(DegenerateError, match="free to slide along y$"):
+        solve_plane(edge, edge, np.concatenate([floor, wall]), np.ones(800))
+
+
 @pytest.mark.parametrize("surface", ["plane", "sphere", "point"])
 def test_surfaces_that_let_the_source_slide_are_refused(surface):
     normals = np.random.default_rng(2).normal(size=(200, 3))
