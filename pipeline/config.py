@@ -92,7 +92,7 @@ class RegistrationConfig:
     unit: Literal["mm", "m"] = "mm"
     """Unit in which ceicp-literal measures; its weights depend on it."""
     hue_weight_m: float = 0.3
-    """Length that a whole half turn of hue is worth to hicp."""
+    """Radius of the circle on which hicp lays the hues beside x, y and z; a half turn is worth twice that."""
     max_iterations: int = 100
     max_points: int = 10_000
     """Points drawn from each cloud for matching."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pipeline.registration.anderson import Anderson
 from pipeline.registration.weighting import PairWeights
 from pipeline.types import FloatArray
@@ -10,8 +12,11 @@ from pipeline.types import FloatArray
 class Acceleration:
     """Anderson extrapolation of poses that never lets the method's energy rise."""
 
-    def __init__(self) -> None:
-        self._mixer = Anderson()
+    def __init__(self, moved_m: FloatArray) -> None:
+        """For a cloud of (N, 3) points at the start pose, whose middle and spread give the frame and unit."""
+        center_m = moved_m.mean(axis=0)
+        spread_m = float(np.sqrt(np.mean(np.sum((moved_m - center_m) ** 2, axis=1))))
+        self._mixer = Anderson(center_m=center_m, spread_m=spread_m or 1.0)
         self._energy = float("inf")
         self._sigma_m = float("nan")
         self._plain: FloatArray | None = None

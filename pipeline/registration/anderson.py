@@ -1,16 +1,83 @@
-"""Anderson acceleration of a sequence of poses."""
+"""Anderson acceleration of a sequence of poses (Zhang, Yao, Deng 2021, section 3.2)."""
 
 from __future__ import annotations
 
+from collections import deque
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from pipeline.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
 
 class Anderson:
-    """Extrapolates from the last poses and their updates."""
+    """Extrapolates the fixed point of T -> T_proposed from the last few poses and their updates.
+
+    Poses are written as logarithms of the motion since the first one: six numbers, and a seventh for
+    the scale. The next pose is the affine combination of the last updates whose residuals cancel best
+    (Walker, Ni 2011); the first call after a reset returns the proposal.
+    """
+
+    def __init__(self, memory: int = 5, center_m: ArrayLike = (0.0, 0.0, 0.0), spread_m: float = 1.0) -> None:
+        """Without a past.
+
+        Args:
+            memory: differences m that are combined.
+            center_m: (3,) point of the target frame about which motions are written down.
+            spread_m: length at which a translation counts like a rotation by one radian. Where both
+                are those of the moving cloud, the poses depend neither on the frame nor on the unit.
+        """
+        self._to_unit = rigid(np.eye(3), -np.asarray(center_m, dtype=np.float64))
+        self._to_unit[:3] /= spread_m
+        self._from_unit = np.linalg.inv(self._to_unit)
+        self._proposals: deque[FloatArray] = deque(maxlen=memory + 1)
+        self._residuals: deque[FloatArray] = deque(maxlen=memory + 1)
+        self._T_first = np.eye(4)
 
     def mix(self, T_current: FloatArray, T_proposed: FloatArray) -> FloatArray:
-        """The next pose."""
-        return T_proposed
+        """The next (4, 4) pose, from the present one and its plain update."""
+        if not self._residuals:
+            self._T_first = np.array(T_current, dtype=np.float64)
+        proposal = self._coordinates(T_proposed)
+        self._proposals.append(proposal)
+        self._residuals.append(proposal - self._coordinates(T_current))
+        if len(self._residuals) == 1:
+            return T_proposed
+        residual_changes = np.diff(np.array(self._residuals), axis=0).T
+        proposal_changes = np.diff(np.array(self._proposals), axis=0).T
+        shares = np.linalg.lstsq(residual_changes, self._residuals[-1])[0]
+        motion = similarity_exp(proposal - proposal_changes @ shares)
+        return self._from_unit @ motion @ self._to_unit @ self._T_first
 
     def reset(self) -> None:
-        """Forget the past."""
+        """Forget the past: the next call starts anew."""
+        self._proposals.clear()
+        self._residuals.clear()
+
+    def _coordinates(self, T: FloatArray) -> FloatArray:
+        """(7,) logarithm of the motion from the first pose to ``T``."""
+        return similarity_log(self._to_unit @ T @ np.linalg.inv(self._T_first) @ self._from_unit)
+
+
+def similarity_log(T: FloatArray) -> FloatArray:
+    """(7,) rotation vector and translation of the logarithm of T's rigid part, logarithm of its scale."""
+    scale = np.cbrt(np.linalg.det(T[:3, :3]))
+    omega_rad = Rotation.from_matrix(T[:3, :3] / scale).as_rotvec()
+    return np.concatenate([omega_rad, np.linalg.solve(_left_jacobian(omega_rad), T[:3, 3]), [np.log(scale)]])
+
+
+def similarity_exp(coordinates: FloatArray) -> FloatArray:
+    """The (4, 4) transform with a (7,) logarithm."""
+    omega_rad, translation, log_scale = coordinates[:3], coordinates[3:6], coordinates[6]
+    return rigid(np.exp(log_scale) * rotation_exp(omega_rad), _left_jacobian(omega_rad) @ translation)
+
+
+def _left_jacobian(omega_rad: FloatArray) -> FloatArray:
+    """(3, 3) I + (1 - cos a)/a^2 [w] + (a - sin a)/a^3 [w]^2 with a = |w|, in forms that are safe at 0."""
+    angle = float(np.linalg.norm(omega_rad))
+    x, y, z = omega_rad
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    second = (angle - np.sin(angle)) / angle**3 if angle > 1e-2 else 1.0 / 6.0 - angle**2 / 120.0
+    return np.eye(3) + 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2 * skew + second * skew @ skew

@@ -100,13 +100,14 @@ def register_timed(
 
 
 def _iterations(
-    source: Sample, target: Sample, config: RegistrationConfig, T: FloatArray, start: MethodStart
+    source: Sample, target: Sample, config: RegistrationConfig, T_init: FloatArray, start: MethodStart
 ) -> Generator[RegistrationStep, None, str]:
+    T: FloatArray = T_init
     method = start(config, source.cloud, target.cloud)
     matcher = Matcher(source.cloud, target.cloud, method.direction or config.direction, method.features)
     residual = residual_for(config, target.cloud, method.unweighted_centroids)
     stop = StopRule(TRANSLATION_TOLERANCE_OF_GATE * config.gate_m)
-    acceleration = Acceleration() if method.accelerated else None
+    acceleration = Acceleration(apply(T, source.points_m)) if method.accelerated else None
     center_m = source.points_m.mean(axis=0, keepdims=True)
     for index in range(config.max_iterations):
         try:
@@ -129,7 +130,7 @@ def _iterations(
             weights=kept.weights,
             distances_m=support.distances_m,
             sigma_m=kept.sigma_m,
-            gate_m=method.gate_m,
+            gate_m=min(method.gate_m, kept.gate_m),
             objective=float(kept.weights @ residual.squared_m2(support, motion)),
             rmse_m=float(np.sqrt(kept.weights @ support.distances_m**2)),
             mean_distance_m=float(kept.weights @ support.distances_m),

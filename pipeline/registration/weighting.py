@@ -25,6 +25,8 @@ class PairWeights:
     """Scale of the weight function; NaN for methods without one."""
     entropy_nat: float = float("nan")
     """Entropy of the matching; NaN for methods without probabilities."""
+    gate_m: float = float("inf")
+    """Distance beyond which no pair was kept, where it follows from the distances themselves."""
     energy: float = float("nan")
     """What an accelerated method decreases, at this pose; NaN for all others."""
 
@@ -39,7 +41,7 @@ class PairWeighting(ABC):
 
     @property
     def gate_m(self) -> float:
-        """Distance beyond which no pair counts."""
+        """Distance beyond which no pair counts, known before the search, which it shortens."""
         return float("inf")
 
     @property

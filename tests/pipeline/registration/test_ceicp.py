@@ -65,7 +65,9 @@ def test_perfect_matches_weigh_the_same():
 
 def test_the_scale_of_a_shrinks_to_its_floor_and_doubles_once():
     grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3) * 0.05
-    method = CeicpA.starting(RegistrationConfig(gate_m=0.3, sigma_decay=0.5), PointCloud(grid), PointCloud(grid))
+    method = CeicpA.starting(
+        RegistrationConfig(gate_m=0.3, sigma_decay=0.5), PointCloud(grid), PointCloud(grid)
+    )
     sigmas = [method.sigma_m]
     while not method.settled:
         method = method.following(kept=None, still=False)

@@ -1,0 +1,43 @@
+"""Fractional ICP: the data say which share of the pairs are inliers (SPEC 4.6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.registration.matching import Matching
+from pipeline.registration.trimmed import closest_rows, evenly
+from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.types import FloatArray
+
+LAMBDA = 0.95
+"""Exponent that pays for every pair kept, for points in space (libpointmatcher's default)."""
+SMALLEST_FRACTION = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Ficp(PairWeighting):
+    """FICP: equal weights for the closest fraction f of the pairs, chosen anew at every matching.
+
+    Source: Phillips, Liu, Tomasi, "Outlier robust ICP for minimizing fractional RMSD", 3DIM 2007.
+    """
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """The fraction of the closest pairs with the least fractional RMSD."""
+        return evenly(closest_rows(matching.distances_m, inlier_fraction(matching.distances_m)))
+
+
+def inlier_fraction(distances_m: FloatArray) -> float:
+    """The f in [0.05, 1] that minimises FRMSD(f) = f^-lambda sqrt(mean of the f n smallest d^2).
+
+    Of several minima the largest, so that perfect pairs are all kept.
+
+    Args:
+        distances_m: (M,) distances, M >= 1.
+    """
+    total = len(distances_m)
+    squared_m2 = np.cumsum(np.sort(distances_m) ** 2)
+    counts = np.arange(int(np.ceil(SMALLEST_FRACTION * total)), total + 1)
+    frmsd_m = (counts / total) ** -LAMBDA * np.sqrt(squared_m2[counts - 1] / counts)
+    return float(counts[::-1][np.argmin(frmsd_m[::-1])] / total)

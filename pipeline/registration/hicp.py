@@ -1,0 +1,73 @@
+"""Hue-assisted ICP: neighbours are near in place and in hue (SPEC 4.6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from pipeline.config import RegistrationConfig
+from pipeline.errors import InputError
+from pipeline.registration.matching import Matching
+from pipeline.registration.trimmed import closest_rows, evenly
+from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.types import ByteArray, FloatArray, PointCloud
+
+LEAST_SATURATION = 0.1
+"""Below it a colour is grey and its hue is noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hicp(PairWeighting):
+    """HICP: the closest share of the pairs, matched by x, y, z and hue; the distances are in space.
+
+    Source: Men, Gebre, Pochiraju, "Color point cloud registration with 4D ICP algorithm", ICRA 2011,
+    whose hue is a line from 0 to 1; here it is the circle that it is, so that reds meet.
+    """
+
+    share: float
+    """Share of the pairs that is kept, above 0 up to 1."""
+    hue_weight_m: float
+    """Radius of the circle of hues."""
+
+    @staticmethod
+    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Hicp:
+        """For two clouds with colours.
+
+        Raises:
+            InputError: a cloud has none.
+        """
+        for name, cloud in (("source", source), ("target", target)):
+            if cloud.colors is None:
+                raise InputError(
+                    f"hicp matches by hue, but the {name} cloud has no colours; try another method."
+                )
+        return Hicp(config.trim, config.hue_weight_m)
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """The closest share, with equal weights."""
+        return evenly(closest_rows(matching.distances_m, self.share))
+
+    def features(self, cloud: PointCloud) -> FloatArray | None:
+        """(N, 2) places on the circle of hues."""
+        return None if cloud.colors is None else hue_coordinates(cloud.colors, self.hue_weight_m)
+
+
+def hue_coordinates(colors: ByteArray, weight_m: float) -> FloatArray:
+    """Places of colours on the circle of hues, w (cos 2 pi h, sin 2 pi h).
+
+    Args:
+        colors: (N, 3) RGB.
+        weight_m: radius w of the circle.
+
+    Returns:
+        (N, 2) metres; the centre where the saturation is below 0.1.
+    """
+    if not len(colors):
+        return np.empty((0, 2))
+    rgb = np.asarray(colors, dtype=np.float32)[None] / np.float32(255.0)
+    hue_deg, saturation, _ = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV))[0].T
+    angle_rad = np.deg2rad(hue_deg.astype(np.float64))
+    circle_m = weight_m * np.stack([np.cos(angle_rad), np.sin(angle_rad)], axis=1)
+    return np.where(saturation[:, None] < LEAST_SATURATION, 0.0, circle_m)

@@ -1,0 +1,42 @@
+"""Kernel correlation: every point pulls on all near points of the other cloud (SPEC 4.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.config import RegistrationConfig
+from pipeline.registration.ceicp import CeicpA
+from pipeline.registration.matching import Matching
+from pipeline.registration.weighting import PairWeights
+from pipeline.types import PointCloud
+
+NEIGHBOURS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class KernelCorrelation(CeicpA):
+    """Gaussian weights for the ten nearest points of every point, scale and gate as in CEICP-A.
+
+    The fixed point of the weighted fit is where -sum_ij exp(-|p_j - T q_i|^2 / 2 sigma^2) is stationary:
+    Tsin, Kanade, "A correlation-based approach to robust point set registration", ECCV 2004. CEICP-A
+    is its truncation to the nearest neighbour, with a lifted tail.
+    """
+
+    @staticmethod
+    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> KernelCorrelation:
+        """The first iteration, on the schedule of CEICP-A."""
+        first = CeicpA.starting(config, source, target)
+        return KernelCorrelation(first.sigma_m, first.sigma_0_m, first.sigma_min_m, first.decay)
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """Pairs within three sigma."""
+        rows = np.flatnonzero(matching.distances_m <= self.gate_m)
+        kernel = np.exp(-0.5 * (matching.distances_m[rows] / self.sigma_m) ** 2)
+        return PairWeights(rows, kernel / max(kernel.sum(), np.finfo(float).tiny), self.sigma_m)
+
+    @property
+    def neighbours(self) -> int:
+        """Ten."""
+        return NEIGHBOURS

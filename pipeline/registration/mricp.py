@@ -1,0 +1,85 @@
+"""Multi-resolution ICP: plain ICP on ever more points of both clouds (SPEC 4.6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.config import RegistrationConfig
+from pipeline.registration.matching import Matching
+from pipeline.registration.trimmed import evenly
+from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.types import PointCloud
+
+LEVELS = 4
+THINNING = 4
+"""Points of a level over those of the next coarser one."""
+FEWEST_POINTS = 64
+"""A level with fewer points than that says little, so that small clouds have fewer levels."""
+
+
+@dataclass(frozen=True, slots=True)
+class CoarseToFine(PairWeighting):
+    """A schedule of levels that ends with all points, at level 0.
+
+    The next finer level follows when this one has come to rest, at the latest after ``most_steps``, so
+    that a coarse level that swings between two poses leaves iterations for the others.
+    """
+
+    level: int
+    most_steps: int
+    steps: int = 0
+    """Iterations that this level has had."""
+
+    @property
+    def settled(self) -> bool:
+        """Whether this is the finest level."""
+        return self.level == 0
+
+    def following(self, kept: PairWeights, still: bool) -> CoarseToFine:
+        """At the next finer level, if this one is done."""
+        if self.level and (still or self.steps + 1 >= self.most_steps):
+            return replace(self, level=self.level - 1, steps=0)
+        return replace(self, steps=self.steps + 1)
+
+
+def coarsest_level(points: int, thinning: int, levels: int) -> int:
+    """The level to start at: ``levels`` - 1, or less if that would leave too few points."""
+    possible = int(np.log(max(points / FEWEST_POINTS, 1.0)) / np.log(thinning) + 1e-9)
+    return min(levels - 1, possible)
+
+
+@dataclass(frozen=True, slots=True)
+class Mricp(CoarseToFine):
+    """MRICP: equal weights, both clouds thinned to one point in 4^l at level l.
+
+    Source: Jost, Huegli, "A multi-resolution ICP with heuristic closest point search for fast and
+    robust 3D registration of range images", 3DIM 2003. Its heuristic, which looks for a point's match
+    near the match of the neighbouring pixel, changes only the speed: here the k-d tree answers.
+    """
+
+    @staticmethod
+    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Mricp:
+        """At the coarsest level that the smaller cloud allows."""
+        level = coarsest_level(min(len(source), len(target)), THINNING, LEVELS)
+        return Mricp(level, max(1, config.max_iterations // LEVELS))
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """All pairs of the level, with equal weights."""
+        return evenly(np.arange(len(matching.distances_m)))
+
+    @property
+    def source_share(self) -> float:
+        """One point in 4^l."""
+        return float(THINNING) ** -self.level
+
+    @property
+    def target_share(self) -> float:
+        """One point in 4^l."""
+        return float(THINNING) ** -self.level
+
+    @property
+    def tolerance(self) -> float:
+        """Looser by the spacing of the level's points, which grows with 2^l on a surface."""
+        return float(np.sqrt(THINNING)) ** self.level
