@@ -100,9 +100,8 @@ def register_timed(
 
 
 def _iterations(
-    source: Sample, target: Sample, config: RegistrationConfig, T_init: FloatArray, start: MethodStart
+    source: Sample, target: Sample, config: RegistrationConfig, T: FloatArray, start: MethodStart
 ) -> Generator[RegistrationStep, None, str]:
-    T: FloatArray = T_init
     method = start(config, source.cloud, target.cloud)
     matcher = Matcher(source.cloud, target.cloud, method.direction or config.direction, method.features)
     residual = residual_for(config, target.cloud, method.unweighted_centroids)
@@ -119,7 +118,7 @@ def _iterations(
             motion = residual.solve(support, kept.weights)
         except DegenerateError as error:
             return f"degenerate: {error}"
-        moved_T = motion @ T
+        moved_T: FloatArray = motion @ T
         if acceleration is not None:
             moved_T = acceleration.onward(T, moved_T, kept)
             motion = moved_T @ np.linalg.inv(T)
