@@ -10,12 +10,12 @@ import json
 import logging
 import sys
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, Literal, NoReturn
 
 import tyro
 
 from pipeline.config import PRESETS
-from pipeline.errors import PacketMeshError
+from pipeline.errors import InputError, PacketMeshError
 from pipeline.settings import load_config, with_settings
 
 Settings = Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="KEY=VALUE")]
@@ -111,24 +111,89 @@ def reconstruct(
         _print_json(metrics)
 
 
+def register(
+    source: Annotated[Path, tyro.conf.Positional],
+    target: Annotated[Path, tyro.conf.Positional],
+    out: Path,
+    method: str = "ceicp-a",
+    metric: Literal["point", "plane"] | None = None,
+    init: Path | None = None,
+    truth: Path | None = None,
+    voxel_m: float | None = None,
+    gate_m: float = 0.3,
+    start: Literal["given", "global"] = "given",
+    scale: bool = False,
+    json: bool = False,
+) -> None:
+    """Move one point cloud onto another: PLY, PCD, NPZ or text (XYZ, TXT, ASC, CSV), in metres.
+
+    Args:
+        source: The cloud that moves.
+        target: The cloud that stays.
+        out: Folder for transform.txt, metrics.json, steps.csv, aligned.ply and config.json.
+        method: A method or peer by name, or `all` to compare them; a wrong name lists them.
+        metric: Residual of our methods; point to plane unless a scale is asked for.
+        init: Start pose of the source in the target's frame, 4 x 4 numbers; the identity without it.
+        truth: The true pose, where it is known, to measure errors by.
+        voxel_m: Thin both clouds to one point per cube of this edge first.
+        gate_m: Largest distance of a pair.
+        start: `global` finds the start pose by matching features.
+        scale: Estimate a scale as well (our methods, point metric).
+        json: Print the metrics as one JSON object.
+    """
+    from pipeline.io.atomic import writable_folder
+    from pipeline.io.clouds import read_cloud
+    from pipeline.io.rigs import read_pose
+    from pipeline.register_folder import answer_metrics, chosen_pose, write_register_folder
+    from pipeline.register_pair import chosen_methods, config_for, prepared_pair, run_methods
+
+    try:
+        methods = chosen_methods(method)
+    except InputError as error:
+        _wrong_use(str(error))
+    config = config_for(methods, metric=metric, gate_m=gate_m, start=start, with_scale=scale)
+    T_init, T_true = (None if path is None else read_pose(path) for path in (init, truth))
+    moving, fixed = read_cloud(source), read_cloud(target)
+    answers = []
+    for answer in run_methods(methods, prepared_pair(moving, fixed, config, voxel_m, T_init, T_true), config):
+        answers.append(answer)
+        _say(f"{answer.method}: {answer.stop_reason}")
+    chosen_pose(answers)  # a run without a pose leaves no folder
+    writable_folder(out)
+    files = {"source": source, "target": target, "init": init, "truth": truth}
+    command: dict[str, Any] = {name: None if path is None else str(path) for name, path in files.items()}
+    command |= {"method": method, "voxel_m": voxel_m}
+    write_register_folder(out, answers, moving, config, command, truth is not None)
+    metrics = answer_metrics(answers, truth is not None)
+    if json:
+        _print_json(metrics)
+    else:
+        _print_answers(metrics)
+
+
 def reproduce(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
     """Compute the thesis's claims anew and set them beside its own numbers.
 
     Args:
-        out: Folder for reproduce.html and reproduce.json.
-        only: Claims to compute (C10, C22, ...); all without it.
+        out: Folder for reproduce.html and reproduce.json; keeps the trials of an interrupted run.
+        only: Claims to compute (`--only C10 C16` or `--only C10,C16`); all without it.
         json: Print the verdicts as one JSON object.
     """
     from app.reports.reproduction import write_reproduction_report
     from pipeline.experiments import run_experiments
     from pipeline.io.atomic import writable_folder
     from pipeline.io.json_file import write_json
+    from pipeline.progress import Progress
 
     writable_folder(out)
     verdicts = {}
-    for verdict in run_experiments(only):
-        _say(f"{verdict.id}  {verdict.verdict}: {verdict.why}")
-        verdicts[verdict.id] = verdict
+    names = [name for names in only for name in names.split(",")]
+    for event in run_experiments(names, out / "trials"):
+        if isinstance(event, Progress):
+            _say(f"{event.fraction:4.0%}  {event.stage}")
+            continue
+        _say(f"{event.id}  {event.verdict}: {event.why}")
+        verdicts[event.id] = event
     report = {key: verdict.record() for key, verdict in verdicts.items()}
     write_json(out / "reproduce.json", report)
     write_reproduction_report(list(verdicts.values()), out / "reproduce.html")
@@ -196,6 +261,7 @@ def doctor(json: bool = False) -> None:
 COMMANDS: dict[str, Any] = {
     "serve": serve,
     "reconstruct": reconstruct,
+    "register": register,
     "reproduce": reproduce,
     "bench": bench,
     "scenes": scenes,
@@ -257,6 +323,18 @@ def _wrong_use(sentence: str) -> NoReturn:
 
 def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
+
+
+def _print_answers(metrics: dict[str, dict[str, Any]]) -> None:
+    """One line a method; centimetres and seconds."""
+    lengths = ["rmse_m", "average_hausdorff_m", "point_error_m"]
+    lengths = [name for name in lengths if all(name in row for row in metrics.values())]
+    headings = [f"{name.removesuffix('_m').replace('_', ' ')} cm" for name in lengths]
+    print(f"{'method':<20}" + "".join(f"{name:>22}" for name in ["iterations", "s", *headings]))
+    for method, row in metrics.items():
+        iterations = "-" if row["iterations"] is None else row["iterations"]
+        values = [f"{row['elapsed_s']:.3f}", *(f"{100.0 * row[name]:.3f}" for name in lengths)]
+        print(f"{method:<20}{iterations:>22}" + "".join(f"{value:>22}" for value in values))
 
 
 def _print_json(value: Any) -> None:

@@ -15,6 +15,8 @@ from pipeline.depth import AlignmentResult, DepthNetwork, align_depth
 from pipeline.errors import ReconstructionError
 from pipeline.progress import Progress
 from pipeline.registration import fuse, hidden_from, register
+from pipeline.registration.global_start import register_from_anywhere
+from pipeline.registration.pose_graph import graph_points, pose_edge, solve_pose_graph
 from pipeline.surface import (
     Camera,
     compare_with_truth,
@@ -36,6 +38,9 @@ from pipeline.types import (
     Rig,
     SurfaceResult,
 )
+
+SHARED_VIEW = 0.25
+"""Share of a node's points in another's image from which on the two are worth registering."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +67,11 @@ class NodeRegistration:
     source: str
     target: str
     result: RegistrationResult
+    loop_error_m: float = float("nan")
+    """How far it is from what the other registrations say about these two nodes; NaN where they say
+    nothing."""
+    used: bool = True
+    """False if it degenerated, or contradicts the loops and was left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,28 +187,70 @@ def prepare_node(frame: RgbdFrame, config: PipelineConfig, network: DepthNetwork
 def register_nodes(
     frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], config: PipelineConfig
 ) -> tuple[tuple[NodeRegistration, ...], tuple[FloatArray, ...]]:
-    """Place every node beside the already placed one that it shares most of its view with.
+    """Place the nodes beside each other by all pairs that share enough of their view.
 
-    The first node keeps the pose it believes in. A node whose registration degenerates keeps its
-    believed pose relative to its partner.
+    The first node keeps the pose it believes in. Registrations that contradict the loops they are part
+    of are left out, and the rest make the poses by least squares. A node that no good registration
+    reaches is placed beside the earlier node that it shares most of its view with; where their
+    registration degenerates, as it believes.
 
     Returns:
-        One registration for each node but the first, and T_world_camera of all nodes.
+        The registrations, those that place each node beside an earlier one first; T_world_camera of all
+        nodes.
     """
+    partners, others = _node_pairs(frames, nodes, config)
+    pairs = [*partners, *others]
+    results = [_register_pair(frames, nodes, config, *pair) for pair in pairs]
+    points_m = [graph_points(getattr(node, config.fusion.align_nodes_with)) for node in nodes]
+    good = [place for place, result in enumerate(results) if _succeeded(result)]
+    edges = [pose_edge(*pairs[place], points_m, results[place].T_target_source) for place in good]
+    graph = solve_pose_graph(points_m, edges)
+    found = {place: (graph.loop_error_m[k], graph.used[k]) for k, place in enumerate(good)}
+    registrations = tuple(
+        NodeRegistration(
+            nodes[source].name, nodes[target].name, result, *found.get(place, (float("nan"), False))
+        )
+        for place, ((source, target), result) in enumerate(zip(pairs, results, strict=True))
+    )
     poses = [frames[0].T_world_camera]
-    registrations = []
+    for (index, partner), result in zip(partners, results, strict=False):
+        T = graph.T_reference_node[index]
+        placed = poses[0] @ T if np.isfinite(T).all() else poses[partner] @ result.T_target_source
+        poses.append(placed)
+    return registrations, tuple(poses)
+
+
+def _node_pairs(
+    frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], config: PipelineConfig
+) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """(later, earlier) node: every node's best partner, and the other pairs that share enough.
+
+    Where poses are unknown, so is what is shared, and all pairs are tried.
+    """
+    unknown = config.node_registration.start == "global"
+    partners, others = [], []
     for index in range(1, len(nodes)):
         shares = [_shared_view(frames[index], nodes[index].sensor, frames[k]) for k in range(index)]
-        partner = int(np.argmax(shares))
-        T_init = geometry.inverse(frames[partner].T_world_camera) @ frames[index].T_world_camera
-        source, target = (getattr(nodes[k], config.fusion.align_nodes_with) for k in (index, partner))
-        try:
-            result = register(source, target, config.node_registration, T_init)
-        except ReconstructionError as error:
-            result = RegistrationResult(T_init, (), False, str(error))
-        registrations.append(NodeRegistration(nodes[index].name, nodes[partner].name, result))
-        poses.append(poses[partner] @ result.T_target_source)
-    return tuple(registrations), tuple(poses)
+        partner = index - 1 if unknown else int(np.argmax(shares))
+        partners.append((index, partner))
+        others += [(index, k) for k in range(index) if k != partner and (unknown or shares[k] >= SHARED_VIEW)]
+    return partners, others
+
+
+def _register_pair(
+    frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], config: PipelineConfig, index: int, partner: int
+) -> RegistrationResult:
+    """One node's cloud onto another's, from the believed poses or from anywhere."""
+    T_init = geometry.inverse(frames[partner].T_world_camera) @ frames[index].T_world_camera
+    source, target = (getattr(nodes[k], config.fusion.align_nodes_with) for k in (index, partner))
+    try:
+        return register_from_anywhere(source, target, config.node_registration, T_init)
+    except ReconstructionError as error:
+        return RegistrationResult(T_init, (), False, str(error))
+
+
+def _succeeded(result: RegistrationResult) -> bool:
+    return bool(result.steps) and not result.stop_reason.startswith("degenerate")
 
 
 def _shared_view(frame: RgbdFrame, cloud: PointCloud, other: RgbdFrame) -> float:

@@ -103,6 +103,8 @@ def _registration(item: NodeRegistration, reconstruction: Reconstruction) -> dic
         "stop_reason": item.result.stop_reason,
         "rmse_m": steps[-1].rmse_m if steps else None,
         "T_target_source": item.result.T_target_source,
+        "loop_error_m": item.loop_error_m,
+        "used": item.used,
     }
 
 
@@ -116,9 +118,17 @@ def surface_metrics(surface: SurfaceResult) -> dict[str, Any]:
 
 
 def peak_memory_bytes() -> int:
-    """The most memory this process has held at once."""
+    """The most memory this process has held at once.
+
+    On Linux from the kernel's own record, because there the resource usage of a new process begins with
+    the memory of the one that started it.
+    """
     if sys.platform == "win32":
         return int(psutil.Process().memory_info().peak_wset)
+    record = Path("/proc/self/status")
+    if record.exists():
+        lines = dict(line.split(":", 1) for line in record.read_text().splitlines() if ":" in line)
+        return 1024 * int(lines["VmHWM"].split()[0])
     import resource
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -6,7 +6,9 @@ import multiprocessing
 import statistics
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, field
+from functools import partial
 from typing import Any
 
 from pipeline.errors import InputError
@@ -24,32 +26,49 @@ class Benchmark:
     """Median seconds of other programs on the same input."""
     peak_memory_bytes: int
     """Most memory of the measuring process, its libraries included."""
+    peer_memory_bytes: dict[str, int] = field(default_factory=dict)
+    """The same of the peers, where each has a process of its own."""
+    errors_m: dict[str, float] = field(default_factory=dict)
+    """How wrong the answers are, ours and the peers', where the truth is known."""
 
     def record(self) -> dict[str, Any]:
-        """Plain values; ``ratio`` is our time over the fastest peer's."""
-        ratio = self.ours_s / min(self.peers.values()) if self.peers else None
-        return asdict(self) | {"ratio": ratio}
+        """Plain values; ``ratio`` is our time over the fastest peer's, ``ratios`` over every one's."""
+        ratios = {name: self.ours_s / peer_s for name, peer_s in self.peers.items()}
+        return asdict(self) | {"ratio": max(ratios.values(), default=None), "ratios": ratios}
 
 
-def _chain(nodes: int) -> Callable[[], None]:
+def _chain(nodes: int) -> Benchmark:
     """Reconstruct the first ``nodes`` nodes of the living room, images in memory."""
     from pipeline.config import PRESETS
     from pipeline.reconstruct import reconstruct
+    from pipeline.run_folder import peak_memory_bytes
     from pipeline.scenes import load_demo
     from pipeline.types import Rig
 
     rig = load_demo("living-room")
     part = Rig(rig.name, rig.frames[:nodes])
-    return lambda: _ignore(reconstruct(part, PRESETS["packetmesh"]))
+    seconds = []
+    for _ in range(ROUNDS):
+        started = time.perf_counter()
+        reconstruct(part, PRESETS["packetmesh"])
+        seconds.append(time.perf_counter() - started)
+    return Benchmark(statistics.median(seconds), {}, peak_memory_bytes())
 
 
-def _ignore(_: object) -> None:
-    return None
+def _registration(peers_thinned: bool) -> Benchmark:
+    """100,000 points on 100,000 points; each program's memory is that of a process of its own."""
+    from pipeline.experiments.registration_speed import OURS, measure_speed
+
+    result = measure_speed(peers_thinned)
+    peers_s, memory = dict(result.elapsed_s), dict(result.peak_memory_bytes)
+    return Benchmark(peers_s.pop(OURS), peers_s, memory.pop(OURS), memory, result.point_error_m)
 
 
-CASES: dict[str, tuple[Callable[[int], Callable[[], None]], int]] = {
-    "reconstruct one 640x480 pair": (_chain, 1),
-    "reconstruct a rig of three": (_chain, 3),
+CASES: dict[str, Callable[[], Benchmark]] = {
+    "reconstruct one 640x480 pair": partial(_chain, 1),
+    "reconstruct a rig of three": partial(_chain, 3),
+    "registration": partial(_registration, peers_thinned=False),
+    "registration, peers thinned like ours": partial(_registration, peers_thinned=True),
 }
 
 
@@ -65,18 +84,9 @@ def run_benchmarks(only: Iterable[str] = ()) -> Iterator[tuple[str, Benchmark]]:
         raise InputError(f"There is no benchmark '{unknown[0]}'; known are {', '.join(CASES)}")
     context = multiprocessing.get_context("spawn")
     for name in wanted:
-        with context.Pool(1) as process:
-            yield name, process.apply(_measure, (name,))
+        with ProcessPoolExecutor(1, mp_context=context) as process:
+            yield name, process.submit(_measure, name).result()
 
 
 def _measure(name: str) -> Benchmark:
-    from pipeline.run_folder import peak_memory_bytes
-
-    prepare, argument = CASES[name]
-    run = prepare(argument)
-    seconds = []
-    for _ in range(ROUNDS):
-        started = time.perf_counter()
-        run()
-        seconds.append(time.perf_counter() - started)
-    return Benchmark(statistics.median(seconds), {}, peak_memory_bytes())
+    return CASES[name]()

@@ -6,12 +6,11 @@ import numpy as np
 
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.registration.degenerate import DegenerateError
+from pipeline.registration.observability import open_motions
 from pipeline.types import FloatArray
 
 _DAMPING = 1e-9
 _LARGEST_CONDITION = 1e8
-_SMALLEST_SHARE_OF_A_MOTION = 0.3
-"""Part of a unit motion below which its turn or its slide is left unsaid."""
 
 
 def solve_plane(
@@ -35,36 +34,10 @@ def solve_plane(
     residuals = np.einsum("mi,mi->m", normals, target_m - source_m) / spread_m
     jacobian = np.concatenate([np.cross(arms, normals), normals], axis=1)
     hessian = (share[:, None] * jacobian).T @ jacobian
-    stiffness, motions = np.linalg.eigh(hessian)
-    free = stiffness < stiffness[-1] / _LARGEST_CONDITION
-    if free.any():
-        raise DegenerateError(f"the target's surfaces leave the source free {free_motions(motions[:, free])}")
+    if not np.linalg.cond(hessian) <= _LARGEST_CONDITION:
+        motions = open_motions(source_m, normals, 1.0 / _LARGEST_CONDITION) or "some motion"
+        raise DegenerateError(f"{motions} changes no distance to the target's surfaces")
     damped = hessian + _DAMPING * np.trace(hessian) / 6.0 * np.eye(6)
     step = np.linalg.solve(damped, jacobian.T @ (share * residuals))
     rotation = rotation_exp(step[:3])
     return rigid(rotation, center_m - rotation @ center_m + spread_m * step[3:])
-
-
-def free_motions(motions: FloatArray) -> str:
-    """What (6, k) undetermined motions (omega, v) do, in words: to turn about and to slide along axes.
-
-    Turns and slides are told apart by the subspaces they span, in the target's frame.
-    """
-    words = []
-    for name, rows in (("to turn about", motions[:3]), ("to slide along", motions[3:])):
-        axes, sizes, _ = np.linalg.svd(rows)
-        axes = axes[:, : len(sizes)][:, sizes > _SMALLEST_SHARE_OF_A_MOTION]
-        if axes.shape[1] == 3:
-            words.append(f"{name} any axis")
-        else:
-            words += [f"{name} {_spelled(axis)}" for axis in axes.T]
-    return " and ".join(words)
-
-
-def _spelled(axis: FloatArray) -> str:
-    """An axis as x, y or z if it is one of them, else its three numbers, the largest positive."""
-    largest = int(np.argmax(np.abs(axis)))
-    if abs(axis[largest]) > 0.999:
-        return "xyz"[largest]
-    axis = axis * np.sign(axis[largest])
-    return "({:.2f}, {:.2f}, {:.2f})".format(*(axis + 0.0))

@@ -1,0 +1,56 @@
+"""NumPy archives with an array ``points`` and, optionally, ``colors`` and ``normals``."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, Path, check_count
+from pipeline.io.limits import MAX_GEOMETRY_BYTES
+
+_COLUMNS = {"points": POSITION, "colors": COLOR, "normals": NORMAL}
+
+
+def parse_npz(path: Path, data: bytes) -> np.ndarray:
+    """The points as a structured array; nothing in the archive is executed (no pickles).
+
+    Raises:
+        InputError: damaged, unpacking to too much, or arrays that are not (N, 3) numbers.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            unpacked = sum(item.file_size for item in archive.infolist())
+        if unpacked > MAX_GEOMETRY_BYTES:
+            raise InputError(
+                f"The point cloud {path} unpacks to more than {MAX_GEOMETRY_BYTES / 1e6:g} MB; try to thin it"
+            )
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in _COLUMNS if name in archive.files}
+    except (ValueError, OSError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile):
+        raise InputError(
+            f"The point cloud {path} is a truncated or damaged archive, or holds more than numbers; "
+            "try numpy.savez(file, points=...)"
+        ) from None
+    if "points" not in arrays:
+        raise InputError(f"The point cloud {path} has no array 'points'; try numpy.savez(file, points=...)")
+    return _table(path, arrays)
+
+
+def _table(path: Path, arrays: dict[str, np.ndarray]) -> np.ndarray:
+    count = len(np.atleast_1d(arrays["points"]))
+    check_count(path, count)
+    for name, array in arrays.items():
+        if array.shape != (count, 3) or array.dtype.kind not in "fiu":
+            raise InputError(
+                f"The array '{name}' in {path} is {array.dtype} of shape {array.shape}; try "
+                f"{count} x 3 numbers"
+            )
+    names = [(column, name) for name in arrays for column in _COLUMNS[name]]
+    table = np.empty(count, [(column, arrays[name].dtype) for column, name in names])
+    for name, array in arrays.items():
+        for place, column in enumerate(_COLUMNS[name]):
+            table[column] = array[:, place]
+    return table

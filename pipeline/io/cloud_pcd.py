@@ -1,0 +1,98 @@
+"""PCD files, the format of the Point Cloud Library, version 0.7 and before: ASCII and binary."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, Path, check_count, number_rows, truncated
+
+_MAX_HEADER_BYTES = 10_000
+_TYPES = {
+    ("F", 4): "<f4", ("F", 8): "<f8", ("I", 1): "<i1", ("I", 2): "<i2", ("I", 4): "<i4", ("I", 8): "<i8",
+    ("U", 1): "<u1", ("U", 2): "<u2", ("U", 4): "<u4", ("U", 8): "<u8",
+}  # fmt: skip
+_OUR_NAMES = {"normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
+
+
+def parse_pcd(path: Path, data: bytes) -> np.ndarray:
+    """The points as a structured array with the names of PLY files; packed colours unpacked.
+
+    Raises:
+        InputError: truncated, compressed, too many points or not a PCD file.
+    """
+    mark = data.find(b"\nDATA ", 0, _MAX_HEADER_BYTES)
+    start = data.find(b"\n", mark + 1) + 1
+    if mark < 0 or start == 0:
+        raise InputError(f"The point cloud {path} is not a PCD file; try to export it as PLY")
+    header = _header(data[:start].decode("ascii", "replace"))
+    kind = " ".join(header["DATA"])
+    if kind == "binary_compressed":
+        raise InputError(
+            f"The point cloud {path} is a compressed PCD file; try to save it as binary or ASCII"
+        )
+    try:
+        count, dtype = _layout(header)
+    except (KeyError, ValueError, IndexError):
+        kind = ""
+    if kind not in ("ascii", "binary"):
+        raise InputError(f"The point cloud {path} has an unusual PCD header; try to export it as PLY")
+    check_count(path, count)
+    if kind == "ascii":
+        return _unpacked(_ascii_table(path, data[start:], count, dtype))
+    there = (len(data) - start) // dtype.itemsize
+    if there < count:
+        raise truncated(path, there, count)
+    return _unpacked(np.frombuffer(data, dtype, count, start))
+
+
+def _header(text: str) -> dict[str, list[str]]:
+    rows = [line.split() for line in text.splitlines()]
+    return {row[0]: row[1:] for row in rows if row and not row[0].startswith("#")}
+
+
+def _layout(header: dict[str, list[str]]) -> tuple[int, np.dtype]:
+    """Number of points and their layout; ``_`` is padding and may come more than once."""
+    names = header["FIELDS"]
+    repeats = [int(word) for word in header.get("COUNT", ["1"] * len(names))]
+    kinds = [_TYPES[kind, int(size)] for kind, size in zip(header["TYPE"], header["SIZE"], strict=True)]
+    fields = [
+        (_OUR_NAMES.get(name, name) if name != "_" else f"_{place}", kind, (repeat,) if repeat > 1 else ())
+        for place, (name, kind, repeat) in enumerate(zip(names, kinds, repeats, strict=True))
+    ]
+    if "POINTS" in header:
+        count = int(header["POINTS"][0])
+    else:
+        count = int(header["WIDTH"][0]) * int(header["HEIGHT"][0])
+    if count < 0 or min(repeats) < 1 or sum(repeats) > 1000:
+        raise ValueError
+    return count, np.dtype(fields)
+
+
+def _ascii_table(path: Path, body: bytes, count: int, dtype: np.dtype) -> np.ndarray:
+    names = dtype.names or ()
+    widths = [int(np.prod(dtype[name].shape)) for name in names]
+    rows = number_rows(path, body, count, sum(widths))
+    table = np.empty(count, dtype)
+    with np.errstate(invalid="ignore"):
+        for name, width, end in zip(names, widths, np.cumsum(widths), strict=True):
+            table[name] = rows[:, end - 1] if width == 1 else rows[:, end - width : end]
+    return table
+
+
+def _unpacked(table: np.ndarray) -> np.ndarray:
+    """With red, green and blue from ``rgb`` or ``rgba``: four bytes, often declared as a float."""
+    names = table.dtype.names or ()
+    packed = next((name for name in ("rgb", "rgba") if name in names), None)
+    if packed is None or table.dtype[packed].itemsize != 4:
+        return table
+    bits = np.ascontiguousarray(table[packed]).view("<u4")
+    others = [name for name in (*POSITION, *NORMAL) if name in names]
+    out = np.empty(
+        len(table), [(name, table.dtype[name]) for name in others] + [(name, "u1") for name in COLOR]
+    )
+    for name in others:
+        out[name] = table[name]
+    for name, shift in zip(COLOR, (16, 8, 0), strict=True):
+        out[name] = (bits >> shift) & 255
+    return out

@@ -1,0 +1,75 @@
+"""PLY files: the first element, whatever scalar properties it has."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.io.cloud_table import Path, check_count, number_rows, truncated
+
+_MAX_HEADER_BYTES = 10_000
+TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
+    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
+    "double": "f8", "float64": "f8",
+}  # fmt: skip
+
+
+def parse_ply(path: Path, data: bytes) -> np.ndarray:
+    """The vertex element, the first of the file, as a structured array; ASCII and both binary orders.
+
+    Raises:
+        InputError: truncated, too many points or not a PLY file.
+    """
+    end = data.find(b"end_header", 0, _MAX_HEADER_BYTES)
+    start = data.find(b"\n", end) + 1
+    if not data.startswith(b"ply") or end < 0 or start == 0:
+        raise InputError(f"The point cloud {path} is not a PLY file; try to export it as PLY")
+    try:
+        order, count, dtype = _parse_header(data[:end].decode("ascii", "replace").splitlines())
+    except (KeyError, ValueError, IndexError):
+        raise InputError(
+            f"The point cloud {path} has an unusual PLY header; try to export it with points as first element"
+        ) from None
+    check_count(path, count)
+    if order == "a":
+        return _ascii_table(path, data[start:], count, dtype)
+    there = (len(data) - start) // dtype.itemsize
+    if there < count:
+        raise truncated(path, there, count)
+    return np.frombuffer(data, dtype.newbyteorder(order), count, start)
+
+
+def _parse_header(lines: list[str]) -> tuple[Literal["a", "<", ">"], int, np.dtype]:
+    """Byte order (``a`` for ASCII), number of vertices and their layout."""
+    orders: dict[str, Literal["a", "<", ">"]]
+    orders = {"ascii": "a", "binary_little_endian": "<", "binary_big_endian": ">"}
+    order: Literal["a", "<", ">"] | None = None
+    count = -1
+    properties: list[tuple[str, str]] = []
+    for words in (line.split() for line in lines):
+        if words[:1] == ["format"]:
+            order = orders[words[1]]
+        elif words[:1] == ["element"] and count >= 0:
+            break
+        elif words[:1] == ["element"]:
+            if words[1] != "vertex":
+                raise ValueError
+            count = int(words[2])
+        elif words[:1] == ["property"]:
+            properties.append((words[2], TYPES[words[1]]))
+    if order is None or count < 0 or not properties:
+        raise ValueError
+    return order, count, np.dtype(properties)
+
+
+def _ascii_table(path: Path, body: bytes, count: int, dtype: np.dtype) -> np.ndarray:
+    names = dtype.names or ()
+    rows = number_rows(path, body, count, len(names))
+    table = np.empty(count, dtype)
+    with np.errstate(invalid="ignore"):
+        for name, column in zip(names, rows.T, strict=True):
+            table[name] = column
+    return table

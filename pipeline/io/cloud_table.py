@@ -1,0 +1,86 @@
+"""Clouds as tables of named columns, which all file formats are read into."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.types import PointCloud
+
+Path = str | os.PathLike[str]
+
+MAX_POINTS = 20_000_000
+POSITION, NORMAL, COLOR = ("x", "y", "z"), ("nx", "ny", "nz"), ("red", "green", "blue")
+LABEL = "source"
+
+
+def cloud_of(path: Path, table: np.ndarray) -> PointCloud:
+    """The points of a structured array whose fields are named as in PLY files.
+
+    Colours that are no integers run from 0 to 1. Points that are not finite are left out.
+
+    Raises:
+        InputError: no x, y, z, or no finite point.
+    """
+    points_m = columns(table, POSITION, np.float64)
+    if points_m is None:
+        raise InputError(f"The point cloud {path} has no x, y, z; try a file with positions")
+    colors = columns(table, COLOR, np.float64)
+    if colors is not None and table["red"].dtype.kind == "f":
+        colors = np.rint(colors * 255.0)
+    source = columns(table, (LABEL,), np.uint8)
+    cloud = PointCloud(
+        points_m=points_m,
+        colors=None if colors is None else np.clip(np.nan_to_num(colors), 0, 255).astype(np.uint8),
+        normals=columns(table, NORMAL, np.float64),
+        source=None if source is None else source[:, 0],
+    )
+    finite = np.isfinite(points_m).all(axis=1)
+    if not finite.any():
+        raise InputError(f"The point cloud {path} holds no point with finite coordinates; try another file")
+    return cloud if finite.all() else cloud.select(finite)
+
+
+def columns(table: np.ndarray, names: tuple[str, ...], dtype: type) -> np.ndarray | None:
+    """(N, len(names)) of the named fields, None unless the table has them all."""
+    if not set(names) <= set(table.dtype.names or ()):
+        return None
+    return np.stack([table[name].astype(dtype) for name in names], axis=1)
+
+
+def check_count(path: Path, count: int) -> None:
+    """Refuse more than ``MAX_POINTS`` points."""
+    if count > MAX_POINTS:
+        raise InputError(
+            f"The point cloud {path} has {count} points, more than the {MAX_POINTS // 10**6} million that "
+            "are read; try to thin it"
+        )
+
+
+def truncated(path: Path, there: int, count: int) -> InputError:
+    """The error of a file that ends before its last point."""
+    return InputError(
+        f"The point cloud {path} ends after {there} of its {count} points; try to copy or export it again"
+    )
+
+
+def number_rows(path: Path, body: bytes, count: int, width: int) -> np.ndarray:
+    """(count, width) float64 numbers from the first lines of text that are not blank.
+
+    Raises:
+        InputError: fewer lines, or a line without ``width`` numbers.
+    """
+    lines = [line for line in body.splitlines() if line.strip()][:count]
+    if len(lines) < count:
+        raise truncated(path, len(lines), count)
+    try:
+        rows = np.array([line.split()[:width] for line in lines], dtype=np.float64)
+    except ValueError:
+        rows = np.empty(0)
+    if rows.shape != (count, width):
+        raise InputError(
+            f"The point cloud {path} has a line that is not {width} numbers; try to export it again"
+        )
+    return rows

@@ -1,0 +1,74 @@
+"""Points as lines of numbers, separated by blanks, tabs, commas or semicolons: XYZ, TXT, ASC, CSV."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, Path, check_count, number_rows
+
+_NAMES = {"r": "red", "g": "green", "b": "blue", "normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
+_UNIT_TOLERANCE = 0.02
+"""How far from one the lengths of triples may be that are taken for normals."""
+
+
+def parse_text(path: Path, data: bytes) -> np.ndarray:
+    """The points as a structured array.
+
+    A first line of words names the columns (x, y, z, r, g, b, nx, ny, nz in any order). Without one the
+    first three columns are the position; further triples are normals if their lengths are one, or
+    colours if they are integers up to 255. Other columns are ignored, as are lines that begin with # or //.
+
+    Raises:
+        InputError: not such a file, lines of different lengths, or too many points.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"The point cloud {path} is not a text file; try to export it as PLY") from None
+    for separator in ",;\t":
+        text = text.replace(separator, " ")
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith(("#", "//"))]
+    names = None
+    if lines and not _is_number(lines[0].split()[0]):
+        names = [_NAMES.get(word, word) for word in lines.pop(0).lower().replace('"', "").split()]
+    if not lines or len(lines[0].split()) < 3:
+        raise InputError(f"The point cloud {path} has no lines of three numbers or more; try another file")
+    check_count(path, len(lines))
+    rows = number_rows(path, "\n".join(lines).encode(), len(lines), len(lines[0].split()))
+    return _table(rows, names if names is not None and len(names) == rows.shape[1] else _guessed(rows))
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _guessed(rows: np.ndarray) -> list[str]:
+    """Names of the columns by what is in them."""
+    names = list(POSITION)
+    for start in range(3, rows.shape[1] - 2, 3):
+        triple = rows[:, start : start + 3]
+        lengths = np.linalg.norm(triple, axis=1)
+        if "nx" not in names and np.all(np.abs(lengths - 1.0) < _UNIT_TOLERANCE):
+            names += NORMAL
+        elif "red" not in names and np.all((triple >= 0) & (triple <= 255) & (triple == np.rint(triple))):
+            names += COLOR
+        else:
+            names += [f"column_{start + k}" for k in range(3)]
+    return names + [f"column_{k}" for k in range(len(names), rows.shape[1])]
+
+
+def _table(rows: np.ndarray, names: list[str]) -> np.ndarray:
+    """A structured array; colours that are integers become bytes, so that fractions stay fractions."""
+    kinds = dict.fromkeys(names, "f8")
+    places = [place for place, name in enumerate(names) if name in COLOR]
+    if places and np.all(rows[:, places] == np.rint(rows[:, places])) and rows[:, places].max() > 1:
+        kinds |= {names[place]: "i8" for place in places}
+    table = np.empty(len(rows), list(kinds.items()))
+    for name, column in zip(names, rows.T, strict=True):
+        table[name] = column
+    return table

@@ -1,0 +1,138 @@
+"""A start pose from nothing: local features matched across the clouds, and the motion most of them share."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pipeline.config import RegistrationConfig
+from pipeline.errors import InputError, ReconstructionError
+from pipeline.registration.loop import register
+from pipeline.types import FloatArray, PointCloud, RegistrationResult
+
+VOXELS_ACROSS = 50
+"""Edge of the thinning voxel as a part of the target's extent, where none is given."""
+NORMAL_REACH, FEATURE_REACH, PAIR_REACH = 2.0, 5.0, 1.5
+"""Radii of normals and features and the largest distance of a pair, in voxels (Open3D's own proportions)."""
+EDGE_RATIO = 0.9
+"""Least ratio of the lengths between matched points that a guess of RANSAC survives with."""
+RANSAC_ITERATIONS, RANSAC_CONFIDENCE = 100_000, 0.999
+SMALLEST_SHARE = 0.15
+"""Share of the source points that must find a partner, lest the pose be called a guess."""
+
+
+def register_from_anywhere(
+    source: PointCloud, target: PointCloud, config: RegistrationConfig, T_init: FloatArray | None = None
+) -> RegistrationResult:
+    """``register`` from the pose that ``config.start`` names: ``T_init``, or one found by ``global_start``.
+
+    Raises:
+        InputError: clouds that cannot be registered.
+        ReconstructionError: no start pose was found.
+    """
+    if config.start == "global":
+        T_init = global_start(source, target, default_voxel_m(target), config.seed)
+    return register(source, target, replace(config, start="given"), T_init)
+
+
+def default_voxel_m(target: PointCloud) -> float:
+    """A fiftieth of the widest side of the box around nine tenths of the points.
+
+    Raises:
+        InputError: no points, or all in one place.
+    """
+    if not len(target):
+        raise InputError("The target cloud has no points; a start pose cannot be found, so check its file.")
+    extent_m = float(np.ptp(np.quantile(target.points_m, (0.05, 0.95), axis=0), axis=0).max())
+    if not extent_m > 0.0:
+        raise InputError("The target cloud's points are all in one place; check its depth image or file.")
+    return extent_m / VOXELS_ACROSS
+
+
+def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: int = 0) -> FloatArray:
+    """The (4, 4) T_target_source, good to about two voxels, by FPFH features (Rusu et al. 2009).
+
+    RANSAC and fast global registration (Zhou, Park, Koltun 2016), both Open3D's, each propose a pose;
+    the one that brings more points together is taken. Normals that the clouds lack are made to look at
+    the origin, so the clouds should be in their camera's frames.
+
+    Args:
+        source: the cloud that moves.
+        target: the cloud that stays.
+        voxel_m: edge to which both are thinned first.
+        seed: of RANSAC.
+
+    Raises:
+        ReconstructionError: neither pose brings enough points together.
+    """
+    from pipeline.open3d_runtime import o3d
+
+    reach_m = PAIR_REACH * voxel_m
+    (moving, moving_features), (fixed, fixed_features) = (
+        _with_features(cloud, voxel_m) for cloud in (source, target)
+    )
+    if min(len(moving.points), len(fixed.points)) < 3:
+        raise ReconstructionError(
+            f"Too few points remain at {voxel_m:.3g} m to find a start pose; give one, or a smaller voxel."
+        )
+    o3d.utility.random.seed(seed)
+    found = [
+        solve(moving, fixed, moving_features, fixed_features, reach_m) for solve in (_by_ransac, _fast_global)
+    ]
+    best = max(found, key=lambda result: (result.fitness, -result.inlier_rmse))
+    if best.fitness < SMALLEST_SHARE:
+        raise ReconstructionError(
+            f"No start pose brings more than {best.fitness:.0%} of the source points to the target: "
+            "the clouds hardly overlap or have no features; give a start pose."
+        )
+    return np.array(best.transformation)
+
+
+def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
+    """The thinned cloud with normals, and its features."""
+    from pipeline.open3d_runtime import o3d
+
+    points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
+    if cloud.normals is not None:
+        points.normals = o3d.utility.Vector3dVector(cloud.normals)
+    points = points.voxel_down_sample(voxel_m)
+    if cloud.normals is None:
+        points.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(NORMAL_REACH * voxel_m, 30))
+        points.orient_normals_towards_camera_location(np.zeros(3))
+    o3d_registration: Any = o3d.pipelines.registration  # its stubs ask for an optional argument
+    reach = o3d.geometry.KDTreeSearchParamHybrid(FEATURE_REACH * voxel_m, 100)
+    return points, o3d_registration.compute_fpfh_feature(points, reach)
+
+
+def _by_ransac(source: Any, target: Any, source_features: Any, target_features: Any, reach_m: float) -> Any:
+    from pipeline.open3d_runtime import o3d
+
+    o3d_registration = o3d.pipelines.registration
+    return o3d_registration.registration_ransac_based_on_feature_matching(
+        source,
+        target,
+        source_features,
+        target_features,
+        True,
+        reach_m,
+        o3d_registration.TransformationEstimationPointToPoint(False),
+        3,
+        [
+            o3d_registration.CorrespondenceCheckerBasedOnEdgeLength(EDGE_RATIO),
+            o3d_registration.CorrespondenceCheckerBasedOnDistance(reach_m),
+        ],
+        o3d_registration.RANSACConvergenceCriteria(RANSAC_ITERATIONS, RANSAC_CONFIDENCE),
+    )
+
+
+def _fast_global(source: Any, target: Any, source_features: Any, target_features: Any, reach_m: float) -> Any:
+    from pipeline.open3d_runtime import o3d
+
+    o3d_registration = o3d.pipelines.registration
+    option = o3d_registration.FastGlobalRegistrationOption(maximum_correspondence_distance=reach_m)
+    result = o3d_registration.registration_fgr_based_on_feature_matching(
+        source, target, source_features, target_features, option
+    )
+    return o3d_registration.evaluate_registration(source, target, reach_m, result.transformation)

@@ -1,0 +1,58 @@
+"""Which motions a surface leaves open: sliding along it, turning on it (SPEC 4.1, degenerate cases)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.types import FloatArray
+
+OPEN_SHARE = 2e-3
+"""A motion is open if it changes the distances to the planes by less than this share (of squares) of what
+the best determined motion does; normals that are noisy by 2 degrees are worth 1e-3."""
+
+
+def open_motions(points_m: FloatArray, normals: FloatArray, open_share: float = OPEN_SHARE) -> str:
+    """The motions that (N, 3) points with (N, 3) unit normals do not determine, in words; empty if none.
+
+    The 6 x 6 Gauss-Newton matrix of the point-to-plane distances is split: slides are the weak directions
+    of its translation block, turns those of the rotation block once the best translation is allowed for.
+    """
+    arms = points_m - points_m.mean(axis=0)
+    arms = arms / max(float(np.sqrt(np.mean(np.sum(arms**2, axis=1)))), np.finfo(float).tiny)
+    jacobian = np.concatenate([np.cross(arms, normals), normals], axis=1)
+    hessian = jacobian.T @ jacobian / len(points_m)
+    floor = open_share * float(np.linalg.eigvalsh(hessian)[-1])
+    slide_values, slides = np.linalg.eigh(hessian[3:, 3:])
+    held = slide_values > floor
+    inverse = (slides[:, held] / slide_values[held]) @ slides[:, held].T
+    turn_values, turns = np.linalg.eigh(hessian[:3, :3] - hessian[:3, 3:] @ inverse @ hessian[3:, :3])
+    parts = [_slides(slides, held), _turns(turns, turn_values > floor)]
+    return " and ".join(part for part in parts if part)
+
+
+def _slides(axes: FloatArray, held: np.ndarray) -> str:
+    """(3, 3) axes in columns; the ones not held are open."""
+    open_count = int((~held).sum())
+    if open_count == 3:
+        return "sliding anywhere"
+    if open_count == 2:
+        return f"sliding across {_named(axes[:, held][:, 0])}"
+    return f"sliding along {_named(axes[:, ~held][:, 0])}" if open_count else ""
+
+
+def _turns(axes: FloatArray, held: np.ndarray) -> str:
+    open_count = int((~held).sum())
+    if open_count == 3:
+        return "turning about any axis"
+    if open_count == 2:
+        return f"turning about any axis across {_named(axes[:, held][:, 0])}"
+    return f"turning about {_named(axes[:, ~held][:, 0])}" if open_count else ""
+
+
+def _named(direction: FloatArray) -> str:
+    """``x``, ``y`` or ``z`` where the direction is near that axis, else its coordinates."""
+    strongest = int(np.argmax(np.abs(direction)))
+    if abs(direction[strongest]) > 0.98:
+        return "xyz"[strongest]
+    x, y, z = np.round(direction * np.sign(direction[strongest]), 2) + 0.0  # no minus before a zero
+    return f"({x:.2f}, {y:.2f}, {z:.2f})"

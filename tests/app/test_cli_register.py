@@ -1,0 +1,214 @@
+"""`packetmesh register` as a user meets it: any two clouds, any method, one sentence for what cannot be."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from app.cli import main
+from pipeline.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.io import read_cloud, write_cloud
+from pipeline.registration import point_error_m
+from pipeline.registration.methods import METHODS
+from pipeline.registration.peers import available_peers
+from pipeline.types import PointCloud
+
+T_TRUE = rigid(rotation_exp(np.radians(4.0) * np.array([0.6, -0.48, 0.64])), [0.03, -0.02, 0.03])
+KEYS = {"T_target_source", "iterations", "stop_reason", "rmse_m", "average_hausdorff_m", "elapsed_s"}
+
+
+def run(capsys, *argv: object) -> tuple[int, str, str]:
+    try:
+        main(["register", *map(str, argv)])
+        code = 0
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def corner(seed: int, count: int = 1200) -> np.ndarray:
+    """Three walls with a ball before them, in front of a camera at the origin."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(0.0, 1.0, (2, count))
+    zero = np.zeros_like(a)
+    ball = rng.normal(size=(count // 3, 3))
+    ball = 0.25 * ball / np.linalg.norm(ball, axis=1, keepdims=True) + [0.6, 0.5, 0.55]
+    faces = [np.stack(face, axis=1) for face in ((a, zero, b), (zero, a, b), (a, b, zero))]
+    tilt = rotation_exp(np.array([0.6, -0.5, 0.3]))
+    points_m = np.concatenate([*faces, ball]) @ tilt.T + [0.0, 0.2, 1.5]
+    return points_m + rng.normal(scale=0.001, size=points_m.shape)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """The same place twice, 4 degrees and 5 cm apart, and the true pose."""
+    folder = tmp_path_factory.mktemp("clouds")
+    colors = np.random.default_rng(3).integers(0, 256, (4000, 3), dtype=np.uint8)
+    write_cloud(folder / "source.ply", PointCloud(apply(inverse(T_TRUE), corner(1)), colors))
+    write_cloud(folder / "target.ply", PointCloud(corner(2), colors))
+    np.savetxt(folder / "truth.txt", T_TRUE)
+    return folder
+
+
+def test_a_run_leaves_its_pose_numbers_steps_and_cloud(capsys, tmp_path, files):
+    source, target = files / "source.ply", files / "target.ply"
+    code, out, _ = run(capsys, source, target, "--truth", files / "truth.txt", "--json", "--out", tmp_path)
+    assert code == 0
+    metrics = json.loads(out)
+    assert metrics == json.loads((tmp_path / "metrics.json").read_text())
+    assert set(metrics) == {"ceicp-a"}
+    row = metrics["ceicp-a"]
+    assert set(row) == KEYS | {"point_error_m"}
+    assert row["point_error_m"] < 0.003
+    T = np.loadtxt(tmp_path / "transform.txt")
+    np.testing.assert_array_equal(T, row["T_target_source"])
+    moved = read_cloud(tmp_path / "aligned.ply")
+    np.testing.assert_allclose(moved.points_m, apply(T, read_cloud(source).points_m), atol=1e-6)
+    np.testing.assert_array_equal(moved.colors, read_cloud(source).colors)
+    with (tmp_path / "steps.csv").open() as file:
+        steps = list(csv.DictReader(file))
+    assert len(steps) == row["iterations"]
+    np.testing.assert_array_equal(np.array(steps[-1]["T_target_source"].split(), float).reshape(4, 4), T)
+    times_s = [float(step["elapsed_s"]) for step in steps]
+    assert times_s == sorted(times_s)
+    assert times_s[-1] == row["elapsed_s"]
+    assert (
+        json.loads((tmp_path / "config.json").read_text())["settings"]["node_registration.method"]
+        == "ceicp-a"
+    )
+
+
+def test_all_methods_and_peers_are_set_side_by_side(capsys, tmp_path, files):
+    clouds = (files / "source.ply", files / "target.ply")
+    code, out, _ = run(capsys, *clouds, "--method", "all", "--truth", files / "truth.txt", "--out", tmp_path)
+    assert code == 0
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    assert set(metrics) == {*METHODS, *available_peers()}
+    assert [line.split()[0] for line in out.splitlines()] == ["method", *metrics]
+    assert metrics["ceicp-a"]["point_error_m"] == min(
+        metrics[name]["point_error_m"] for name in ("ceicp-a", "icp")
+    )
+    T = np.array(metrics["ceicp-a"]["T_target_source"])
+    np.testing.assert_array_equal(np.loadtxt(tmp_path / "transform.txt"), T)
+
+
+def test_the_alias_and_other_formats_give_the_same_pose(capsys, tmp_path, files):
+    source, target = (read_cloud(files / f"{name}.ply").points_m for name in ("source", "target"))
+    np.savetxt(tmp_path / "source.csv", source, delimiter=",", header="x,y,z", comments="")
+    np.savez(tmp_path / "target.npz", points=target)
+    run(capsys, files / "source.ply", files / "target.ply", "--out", tmp_path / "ply")
+    other = (tmp_path / "source.csv", tmp_path / "target.npz", "--method", "ceicp")
+    assert run(capsys, *other, "--out", tmp_path / "other")[0] == 0
+    first, second = (np.loadtxt(tmp_path / name / "transform.txt") for name in ("ply", "other"))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_a_start_pose_a_voxel_and_a_gate_are_heeded(capsys, tmp_path, files):
+    away = rigid(np.eye(3), [3.0, 0.0, 0.0])
+    far = apply(inverse(away), read_cloud(files / "source.ply").points_m)
+    np.savez(tmp_path / "far.npz", points=far)
+    np.savetxt(tmp_path / "init.txt", away)
+    command = (tmp_path / "far.npz", files / "target.ply", "--voxel-m", 0.03, "--gate-m", 0.2)
+    code, _, _ = run(capsys, *command, "--init", tmp_path / "init.txt", "--out", tmp_path / "out")
+    assert code == 0
+    T = np.loadtxt(tmp_path / "out" / "transform.txt")
+    assert point_error_m(T, T_TRUE @ away, far) < 0.005
+
+
+def test_a_global_start_needs_no_start_pose(capsys, tmp_path, files):
+    turn = rigid(rotation_exp(np.array([0.0, 1.2, 0.3])), [2.0, 1.0, -1.0])
+    far = apply(inverse(turn), read_cloud(files / "source.ply").points_m)
+    np.savez(tmp_path / "far.npz", points=far)
+    command = (tmp_path / "far.npz", files / "target.ply", "--start", "global", "--out", tmp_path / "out")
+    assert run(capsys, *command)[0] == 0
+    assert point_error_m(np.loadtxt(tmp_path / "out" / "transform.txt"), T_TRUE @ turn, far) < 0.01
+
+
+def test_a_scale_is_found(capsys, tmp_path, files):
+    np.savez(tmp_path / "small.npz", points=read_cloud(files / "source.ply").points_m / 1.05)
+    command = (tmp_path / "small.npz", files / "target.ply", "--scale", "--out", tmp_path / "out")
+    assert run(capsys, *command, "--method", "icp")[0] == 0
+    T = np.loadtxt(tmp_path / "out" / "transform.txt")
+    assert np.cbrt(np.linalg.det(T[:3, :3])) == pytest.approx(1.05, abs=0.005)
+
+
+def test_repeated_points_and_points_that_are_nan_do_not_matter(capsys, tmp_path, files):
+    points_m = read_cloud(files / "source.ply").points_m
+    messy = np.concatenate([points_m, points_m[:2000], np.full((7, 3), np.nan)])
+    np.savez(tmp_path / "messy.npz", points=messy)
+    for source, name in ((files / "source.ply", "clean"), (tmp_path / "messy.npz", "messy")):
+        assert run(capsys, source, files / "target.ply", "--out", tmp_path / name)[0] == 0
+    clean, messy = (np.loadtxt(tmp_path / name / "transform.txt") for name in ("clean", "messy"))
+    np.testing.assert_array_equal(clean, messy)
+
+
+def test_a_million_points_are_no_more_work_than_it_takes(capsys, tmp_path):
+    np.savez(tmp_path / "source.npz", points=apply(inverse(T_TRUE), corner(1, 300_000)).astype(np.float32))
+    np.savez(tmp_path / "target.npz", points=corner(2, 300_000).astype(np.float32))
+    code, out, _ = run(
+        capsys, tmp_path / "source.npz", tmp_path / "target.npz", "--json", "--out", tmp_path / "out"
+    )
+    assert code == 0
+    T = np.array(json.loads(out)["ceicp-a"]["T_target_source"])
+    assert point_error_m(T, T_TRUE, corner(1)) < 0.003
+
+
+SQUARE = np.stack([*np.random.default_rng(0).uniform(0, 1, (2, 900)), np.full(900, 2.0)], axis=1)
+BAD_SOURCES = {
+    "no overlap": (corner(1) + 50.0, "No point of the source lies within"),
+    "three points": (corner(1)[:3], "3 distinct points; registration needs at least 6"),
+    "one point often": (np.ones((500, 3)), "1 distinct points"),
+    "all NaN": (np.full((500, 3), np.nan), "no point with finite"),
+    "millimetres": (1000.0 * corner(1), "times as large as the other, as if it were in millimetres"),
+    "microns": (1e6 * corner(1), "across, as if its numbers were millimetres"),
+    "kilometres": (1e-5 * corner(1), "across, as if its numbers were kilometres"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_SOURCES)
+def test_a_cloud_that_cannot_be_registered_is_one_sentence(capsys, tmp_path, files, case):
+    points_m, says = BAD_SOURCES[case]
+    np.savez(tmp_path / "bad.npz", points=points_m)
+    check_one_sentence(
+        run(capsys, tmp_path / "bad.npz", files / "target.ply", "--out", tmp_path / "out"), 1, says
+    )
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("method", ["ceicp-a", "icp", "open3d-point", "all"])
+def test_planes_alone_are_refused_with_the_motion_they_leave_open(capsys, tmp_path, method):
+    np.savez(tmp_path / "plane.npz", points=SQUARE)
+    clouds = (tmp_path / "plane.npz", tmp_path / "plane.npz")
+    got = run(capsys, *clouds, "--method", method, "--out", tmp_path / "out")
+    check_one_sentence(got, 1, "sliding across z and turning about z changes nothing")
+
+
+@pytest.mark.parametrize(
+    ("argv", "code", "says"),
+    [
+        (["source.ply", "missing.ply"], 1, "missing.ply does not exist"),
+        (["source.ply", "cut.ply"], 1, "of its 4000 points"),
+        (["source.ply", "target.ply", "--method", "magic"], 2, "ceicp-a, ceicp-r"),
+        (["source.ply", "target.ply", "--init", "cut.ply"], 1, "pose file"),
+        (["source.ply", "target.ply", "--scale", "--metric", "plane"], 1, "needs the point metric"),
+        (["source.ply", "target.ply", "--gate-m", "-1"], 1, "gate_m"),
+        (["source.ply", "target.ply", "--voxel-m", "0"], 1, "voxel size is 0"),
+    ],
+)
+def test_wrong_use_is_one_sentence_and_leaves_nothing_behind(capsys, tmp_path, files, argv, code, says):
+    (files / "cut.ply").write_bytes((files / "target.ply").read_bytes()[:20_000])
+    argv = [files / word if word.endswith(".ply") else word for word in argv]
+    check_one_sentence(run(capsys, *argv, "--out", tmp_path / "out"), code, says)
+    assert not (tmp_path / "out").exists()
+
+
+def check_one_sentence(got: tuple[int, str, str], code: int, says: str) -> None:
+    assert got[0] == code
+    assert got[1] == ""
+    sentences = [line for line in got[2].splitlines() if line.startswith("packetmesh: ")]
+    assert len(sentences) == 1
+    assert sentences[0] == got[2].splitlines()[-1]
+    assert says in sentences[0]
+    assert "Traceback" not in got[2]

@@ -1,0 +1,61 @@
+"""A start pose from nothing, and how near CEICP-A comes from there."""
+
+import numpy as np
+import pytest
+
+from pipeline.config import RegistrationConfig
+from pipeline.errors import ReconstructionError
+from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.registration import point_error_m
+from pipeline.registration.global_start import default_voxel_m, global_start, register_from_anywhere
+from pipeline.scenes import box_room
+from pipeline.types import PointCloud
+from tests.pipeline.registration.rooms import seen_by
+
+FAR = rigid(rotation_exp(np.radians(70.0) * np.array([0.36, 0.48, 0.8])), [1.0, -0.9, 0.67])
+"""70 degrees and 1.5 m."""
+GLOBAL = RegistrationConfig(start="global")
+
+
+@pytest.fixture(scope="module", params=[0, 3])
+def pair(request) -> tuple[PointCloud, PointCloud, np.ndarray]:
+    """Two views of a room, the source far from where it belongs, and the motion that brings it there."""
+    scene = box_room(request.param)
+    target, source = seen_by(scene, noise_m=0.003)
+    T_true = inverse(scene.cameras[0]) @ scene.cameras[1] @ FAR
+    return source.transformed(inverse(FAR)), target, T_true
+
+
+def test_ceicp_a_comes_within_two_centimetres_from_a_global_start(pair):
+    source, target, T_true = pair
+    assert point_error_m(np.eye(4), T_true, source.points_m) > 1.0
+    result = register_from_anywhere(source, target, GLOBAL)
+    assert result.converged
+    assert point_error_m(result.T_target_source, T_true, source.points_m) < 0.02
+
+
+def test_a_given_start_is_left_alone(pair):
+    source, target, T_true = pair
+    given = register_from_anywhere(source, target, RegistrationConfig(), T_true)
+    assert point_error_m(given.T_target_source, T_true, source.points_m) < 0.02
+    assert given.steps[0].rotation_step_rad < np.radians(1.0)
+
+
+def test_the_same_seed_gives_the_same_bits(pair):
+    source, target, _ = pair
+    voxel_m = default_voxel_m(target)
+    first, second = (global_start(source, target, voxel_m, seed=5) for _ in range(2))
+    assert first.tobytes() == second.tobytes()
+
+
+def test_clouds_that_have_nothing_in_common_are_refused(pair):
+    _, target, _ = pair
+    rng = np.random.default_rng(0)
+    with pytest.raises(ReconstructionError, match="hardly overlap or have no features"):
+        global_start(PointCloud(rng.uniform(0.0, 40.0, (3000, 3))), target, 0.1)
+
+
+def test_too_coarse_a_voxel_is_refused(pair):
+    source, target, _ = pair
+    with pytest.raises(ReconstructionError, match="Too few points remain at 100 m"):
+        global_start(source, target, 100.0)

@@ -1,0 +1,120 @@
+"""Loops betray a wrong registration, and all right ones together beat the chain."""
+
+import numpy as np
+import pytest
+
+from pipeline.config import RegistrationConfig
+from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.open3d_runtime import o3d
+from pipeline.registration import point_error_m, register
+from pipeline.registration.pose_graph import chained, graph_points, pose_edge, solve_pose_graph
+from pipeline.scenes import box_room
+from tests.pipeline.registration.rooms import seen_by
+
+NODES = 6
+APART = 2
+"""Nodes up to this far apart on the arc share enough of their views (50 degrees)."""
+
+
+def small_motion(rng: np.random.Generator, angle_rad: float, length_m: float) -> np.ndarray:
+    axis, way = (v / np.linalg.norm(v) for v in rng.standard_normal((2, 3)))
+    return rigid(rotation_exp(angle_rad * axis), length_m * way)
+
+
+@pytest.fixture(scope="module")
+def ring():
+    """Six nodes' points, their true poses in the frame of the first, and registered edges."""
+    scene = box_room(6, nodes=NODES)
+    clouds = seen_by(scene, noise_m=0.002)
+    truth = [inverse(scene.cameras[0]) @ camera for camera in scene.cameras]
+    points_m = [graph_points(cloud) for cloud in clouds]
+    rng = np.random.default_rng(4)
+    edges = []
+    for source in range(NODES):
+        for target in range(max(0, source - APART), source):
+            T_true = inverse(truth[target]) @ truth[source]
+            T_init = small_motion(rng, np.radians(3.0), 0.06) @ T_true
+            result = register(clouds[source], clouds[target], RegistrationConfig(), T_init)
+            edges.append(pose_edge(source, target, points_m, result.T_target_source))
+    return points_m, truth, edges
+
+
+def worst_error_m(ring, poses) -> float:
+    points_m, truth, _ = ring
+    return max(point_error_m(*pair, points) for *pair, points in zip(poses, truth, points_m, strict=True))
+
+
+def moved(points_m, edge, motion):
+    return pose_edge(edge.source, edge.target, points_m, motion @ edge.T_target_source)
+
+
+def test_a_ring_of_six_closes(ring):
+    points_m, _, edges = ring
+    graph = solve_pose_graph(points_m, edges)
+    assert all(graph.used)
+    assert max(graph.loop_error_m) < 0.02
+    assert worst_error_m(ring, graph.T_reference_node) < 0.02
+
+
+@pytest.mark.parametrize("broken", range(9))
+def test_a_broken_edge_is_rejected_and_the_poses_stay_right(ring, broken):
+    points_m, _, edges = ring
+    damage = small_motion(np.random.default_rng(broken), np.radians(8.0), 0.25)
+    edges = [moved(points_m, edge, damage) if k == broken else edge for k, edge in enumerate(edges)]
+    graph = solve_pose_graph(points_m, edges)
+    assert graph.used == tuple(k != broken for k in range(len(edges)))
+    assert graph.loop_error_m[broken] > 0.1
+    assert worst_error_m(ring, graph.T_reference_node) < 0.02
+
+
+def test_the_graph_beats_the_chain_on_noisy_edges(ring):
+    points_m, _, edges = ring
+    ratios = []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        noisy = [moved(points_m, edge, small_motion(rng, np.radians(0.3), 0.01)) for edge in edges]
+        chain = [edge for edge in noisy if edge.source - edge.target == 1]
+        graph = solve_pose_graph(points_m, noisy)
+        assert all(graph.used)
+        ratios.append(
+            worst_error_m(ring, graph.T_reference_node) / worst_error_m(ring, chained(NODES, chain))
+        )
+    assert np.median(ratios) < 0.8
+
+
+def test_a_tree_is_its_chain_and_has_no_loops(ring):
+    points_m, _, edges = ring
+    chain = [edge for edge in edges if edge.source - edge.target == 1]
+    graph = solve_pose_graph(points_m, chain)
+    assert np.isnan(graph.loop_error_m).all()
+    pose = np.eye(4)
+    for edge, got in zip(chain, graph.T_reference_node[1:], strict=True):
+        pose = pose @ edge.T_target_source
+        np.testing.assert_allclose(got, pose, atol=1e-12)
+
+
+def test_a_node_without_an_edge_has_no_pose(ring):
+    points_m, _, edges = ring
+    graph = solve_pose_graph(points_m, [edge for edge in edges if 5 not in (edge.source, edge.target)])
+    assert np.isnan(graph.T_reference_node[5]).all()
+    assert worst_error_m(ring, [*graph.T_reference_node[:5], ring[1][5]]) < 0.02
+
+
+def test_the_order_of_the_edges_does_not_matter(ring):
+    points_m, _, edges = ring
+    forward, backward = solve_pose_graph(points_m, edges), solve_pose_graph(points_m, edges[::-1])
+    np.testing.assert_allclose(forward.T_reference_node, backward.T_reference_node, atol=1e-6)
+    np.testing.assert_allclose(forward.loop_error_m, backward.loop_error_m[::-1])
+
+
+def test_the_information_is_open3ds(ring):
+    points_m, _, edges = ring
+    for edge in edges:
+        source, target = (
+            o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m[node]))
+            for node in (edge.source, edge.target)
+        )
+        theirs = o3d.pipelines.registration.get_information_matrix_from_point_clouds(
+            source, target, 0.05, edge.T_target_source
+        )
+        np.testing.assert_allclose(edge.information, theirs, rtol=1e-6, atol=1e-3)

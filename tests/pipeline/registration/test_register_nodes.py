@@ -1,0 +1,90 @@
+"""The nodes of a rig beside each other: by all pairs that share enough, by loops, from anywhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline import reconstruct
+from pipeline.config import PRESETS, RegistrationConfig
+from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.reconstruct import NodeClouds, register_nodes
+from pipeline.registration import point_error_m, register
+from pipeline.scenes import box_room
+from pipeline.scenes.demos import disturbed
+from pipeline.types import DepthMap, RgbdFrame
+from tests.pipeline.registration.rooms import seen_by
+
+CONFIG = PRESETS["packetmesh"]
+
+
+def rig_of(nodes: int):
+    """Frames whose nodes are wrong about their poses by 3 degrees and 6 cm, and their sensor clouds."""
+    scene, rng = box_room(6, nodes=nodes), np.random.default_rng(1)
+    frames, works = [], []
+    for index, (camera, cloud) in enumerate(zip(scene.cameras, seen_by(scene, 0.002), strict=True)):
+        believed = camera if index == 0 else disturbed(camera, rng)
+        image = np.zeros((240, 320, 3), np.uint8)
+        depth = DepthMap(np.ones((240, 320), np.float32))
+        frames.append(RgbdFrame(f"node_{index:02d}", image, depth, scene.intrinsics, believed))
+        works.append(NodeClouds(frames[-1].name, cloud, *[None] * 6, fused=cloud))
+    return scene, frames, works
+
+
+@pytest.fixture(scope="module")
+def six():
+    return rig_of(6)
+
+
+def worst_error_m(scene, works, poses) -> float:
+    return max(
+        point_error_m(pose, truth, work.sensor.points_m)
+        for pose, truth, work in zip(poses, scene.cameras, works, strict=True)
+    )
+
+
+def test_six_nodes_find_their_places_by_more_pairs_than_a_tree_has(six):
+    scene, frames, works = six
+    registrations, poses = register_nodes(frames, works, CONFIG)
+    assert len(registrations) > 5
+    assert {row.source for row in registrations[:5]} == {work.name for work in works[1:]}
+    assert all(row.used for row in registrations)
+    assert max(row.loop_error_m for row in registrations) < 0.02
+    np.testing.assert_array_equal(poses[0], frames[0].T_world_camera)
+    assert worst_error_m(scene, works, poses) < 0.02
+
+
+def test_a_registration_that_went_wrong_is_left_out(six, monkeypatch):
+    scene, frames, works = six
+    damage = rigid(rotation_exp(np.array([0.0, 0.1, 0.05])), np.array([0.2, 0.1, 0.0]))
+
+    def misled(source, target, config, T_init):
+        result = register(source, target, config, T_init)
+        wrong = source is works[3].sensor and target is works[2].sensor
+        return replace(result, T_target_source=damage @ result.T_target_source) if wrong else result
+
+    monkeypatch.setattr(reconstruct, "register_from_anywhere", misled)
+    registrations, poses = register_nodes(frames, works, CONFIG)
+    assert [(row.source, row.target) for row in registrations if not row.used] == [("node_03", "node_02")]
+    assert max(row.loop_error_m for row in registrations) > 0.1
+    assert worst_error_m(scene, works, poses) < 0.02
+
+
+def test_two_nodes_are_where_their_registration_says():
+    _, frames, works = rig_of(2)
+    (row,), poses = register_nodes(frames, works, CONFIG)
+    T_init = inverse(frames[0].T_world_camera) @ frames[1].T_world_camera
+    alone = register(works[1].sensor, works[0].sensor, CONFIG.node_registration, T_init)
+    np.testing.assert_array_equal(row.result.T_target_source, alone.T_target_source)
+    np.testing.assert_allclose(poses[1], poses[0] @ alone.T_target_source, atol=1e-12)
+    assert row.used
+    assert np.isnan(row.loop_error_m)
+
+
+def test_nodes_that_do_not_know_where_they_are_find_out():
+    scene, frames, works = rig_of(3)
+    lost = [frames[0], *(replace(frame, T_world_camera=frames[0].T_world_camera) for frame in frames[1:])]
+    config = replace(CONFIG, node_registration=RegistrationConfig(start="global"))
+    registrations, poses = register_nodes(lost, works, config)
+    assert len(registrations) == 3
+    assert worst_error_m(scene, works, poses) < 0.02
