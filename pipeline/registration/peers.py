@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -115,7 +116,9 @@ def run_peer(
         np.eye(4) if T_init is None else np.asarray(T_init, dtype=np.float64),
         max_iterations,
     )
-    import_module("pipeline.open3d_runtime" if PEERS[name].module == "open3d" else PEERS[name].module)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SyntaxWarning)  # pycpd's source compares numbers with "is not"
+        import_module("pipeline.open3d_runtime" if PEERS[name].module == "open3d" else PEERS[name].module)
     started = time.perf_counter()
     T, iterations, reason = PEERS[name].solve(problem)
     return PeerResult(np.array(T), iterations, time.perf_counter() - started, reason)
