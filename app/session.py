@@ -128,6 +128,10 @@ class Session:
             on_end=lambda outcome: self.post(ended, outcome),
         )
 
+    def cancel_side_job(self) -> None:
+        """End the job beside the chain now."""
+        self._side.cancel()
+
     def advance(self) -> None:
         """Compute the first step that is out of date."""
         while (step := self.results.first_stale(self.spec)) is not None:

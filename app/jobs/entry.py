@@ -11,6 +11,7 @@ JOBS = {
     "fuse": "app.jobs.views:fuse_job",
     "surface": "app.jobs.views:surface_job",
     "race": "app.jobs.race:race_job",
+    "capture": "app.jobs.capture:capture_job",
     "export": "app.jobs.export:export_job",
 }
 

@@ -163,6 +163,8 @@ def _registration_row(
         rmse_m=result.steps[-1].rmse_m if result.steps else float("nan"),
         error_before_m=before,
         error_after_m=after,
+        loop_error_m=registration.loop_error_m,
+        used=registration.used,
     )
 
 

@@ -1,4 +1,4 @@
-"""Live curves of a registration race, with the player's iteration marked."""
+"""Live curves of a registration race, with the player's place marked."""
 
 from __future__ import annotations
 
@@ -8,81 +8,89 @@ import numpy as np
 import viser
 from viser import uplot
 
-from app.jobs.records import RaceLane
+from app.drawing.colors import NEUTRAL, css
+from app.raceclock import RaceClock
 from pipeline.types import FloatArray
 
-LANE_COLORS = ("#5b6570", "#009e73")
-LANE_NAMES = ("grey", "green")
-"""Of the first and the second method."""
+LANE_COLORS = ("#5b6570", "#009e73", "#cc6699", "#7a4a00")
+"""Grey, green, pink and brown: of the first to the fourth method."""
+LANE_DASHES = ((), (), (7, 3), (2, 3))
+CURSOR = css(NEUTRAL)
 
 
 class Curves:
-    """One chart: a value in centimetres over the iterations of two methods."""
+    """One chart: a value over the iterations, or over the time, of up to four methods."""
 
-    def __init__(self, gui: viser.GuiApi, title: str) -> None:
-        nothing = np.array([0.0, 1.0])
+    def __init__(self, gui: viser.GuiApi, unit: str, least: float) -> None:
+        """Add an empty chart; ``least`` is the smallest height of its axis."""
+        nothing = np.full(2, np.nan)
+        self._least = least
+        self._unit = unit
         self._plot = gui.add_uplot(
-            data=(nothing, *(np.full(2, np.nan),) * 4),
-            series=_series(("first", "second")),
-            title=title,
-            scales={"x": uplot.Scale(time=False), "y": uplot.Scale(range=(0.0, 1.0))},
-            axes=(
-                uplot.Axis(label="iteration", labelSize=20, size=34),
-                uplot.Axis(label="cm", labelSize=18, size=46),
-            ),
+            data=(np.array([0.0, 1.0]), *[nothing] * (2 * len(LANE_COLORS) + 1)),
+            series=_series(),
+            scales=_scales(1.0),
+            axes=_axes("iteration", unit),
             legend=uplot.Legend(show=False),
-            height=170,
+            cursor=uplot.Cursor(show=False),
+            padding=(12, 16, 0, 0),
+            height=180,
         )
-        self._title = title
-        self._values: list[FloatArray] = [np.full(2, np.nan)] * 2
+        self._clock = RaceClock((np.array([0.0, 1.0]),), 1, False)
+        self._values: list[FloatArray] = [nothing]
+        self._top = 1.0
 
-    @property
-    def visible(self) -> bool:
-        """Whether the chart is shown."""
-        return self._plot.visible
-
-    @visible.setter
-    def visible(self, visible: bool) -> None:
-        self._plot.visible = visible
-
-    def load(self, lanes: Sequence[RaceLane], values: Sequence[Sequence[float | None]]) -> None:
-        """Show new curves, one sequence of metres for each lane."""
-        length = max(2, *(len(lane.steps) for lane in lanes))
-        self._values = [_padded(curve, length) for curve in values]
-        labels = [lane.label for lane in lanes]
-        self._plot.series = _series(labels)
-        self._plot.title = f"{self._title} · {LANE_NAMES[0]}: {labels[0]}, {LANE_NAMES[1]}: {labels[1]}"
+    def load(self, clock: RaceClock, values: Sequence[Sequence[float]]) -> None:
+        """Show new curves, one sequence for each lane of the clock."""
+        self._clock = clock
+        self._values = [np.asarray(curve, dtype=float) for curve in values]
+        highest = max(float(np.nanmax(curve, initial=0.0)) for curve in self._values)
         # A fixed range, because uPlot finds none by itself where a curve has gaps.
-        highest = float(np.nanmax([*(np.nanmax(v, initial=0.0) for v in self._values), 0.1]))
-        self._plot.scales = {
-            "x": uplot.Scale(time=False),
-            "y": uplot.Scale(range=(0.0, 1.08 * highest)),
-        }
+        self._top = 1.08 * max(highest, self._least)
+        self._plot.scales = _scales(self._top)
+        self._plot.axes = _axes("time, ms" if clock.in_ms else "iteration", self._unit)
         self.mark(0)
 
-    def mark(self, position: int) -> None:
-        """Put a dot on each curve at the player's position, or at its end if it ended before."""
-        x = np.arange(len(self._values[0]), dtype=float)
-        dots = []
-        for curve in self._values:
-            dot = np.full(len(curve), np.nan)
-            known = np.flatnonzero(np.isfinite(curve[: position + 1]))
-            if len(known):
-                dot[known[-1]] = curve[known[-1]]
-            dots.append(dot)
-        self._plot.data = (x, *self._values, *dots)
+    def mark(self, place: int) -> None:
+        """Draw the player's place as a line, and a dot on each curve at the step its lane shows."""
+        now = float(place * self._clock.unit)
+        # The cursor is two points above each other, so its place stands twice among the abscissae.
+        x = np.sort(np.concatenate([np.unique(np.concatenate([*self._clock.xs, [now]])), [now]]))
+        cursor = np.full(len(x), np.nan)
+        first = int(np.searchsorted(x, now))
+        cursor[first : first + 2] = 0.0, self._top
+        lanes = list(zip(self._clock.xs, self._values, self._clock.rows(place), strict=True))
+        empty = [np.full(len(x), np.nan)] * (len(LANE_COLORS) - len(lanes))
+        lines = [_line(x, lane_x, curve) for lane_x, curve, _ in lanes]
+        dots = [_dot(x, lane_x[row], curve[row]) for lane_x, curve, row in lanes]
+        self._plot.data = (x, cursor, *lines, *empty, *dots, *empty)
 
 
-def _padded(curve: Sequence[float | None], length: int) -> FloatArray:
-    values = np.full(length, np.nan)
-    values[: len(curve)] = [np.nan if value is None else 100.0 * value for value in curve]
-    return values
+def _line(x: FloatArray, lane_x: FloatArray, curve: FloatArray) -> FloatArray:
+    """A lane's polyline at the chart's abscissae, nothing beyond its end."""
+    if len(curve) == 1:
+        return _dot(x, lane_x[0], curve[0])
+    return np.interp(x, lane_x, curve, left=np.nan, right=np.nan)
 
 
-def _series(labels: Sequence[str]) -> tuple[uplot.Series, ...]:
+def _dot(x: FloatArray, at: float, value: float) -> FloatArray:
+    dot = np.full(len(x), np.nan)
+    dot[int(np.searchsorted(x, at))] = value
+    return dot
+
+
+def _scales(top: float) -> dict[str, uplot.Scale]:
+    return {"x": uplot.Scale(time=False), "y": uplot.Scale(range=(0.0, top))}
+
+
+def _axes(x: str, y: str) -> tuple[uplot.Axis, ...]:
+    return (uplot.Axis(label=x, labelSize=20, size=34), uplot.Axis(label=y, labelSize=18, size=46))
+
+
+def _series() -> tuple[uplot.Series, ...]:
     lines = [
-        uplot.Series(label=label, stroke=color, width=2)
-        for label, color in zip(labels, LANE_COLORS, strict=True)
+        uplot.Series(label=f"lane {index + 1}", stroke=color, width=2, dash=dash)
+        for index, (color, dash) in enumerate(zip(LANE_COLORS, LANE_DASHES, strict=True))
     ]
     dots = [
         uplot.Series(
@@ -90,4 +98,4 @@ def _series(labels: Sequence[str]) -> tuple[uplot.Series, ...]:
         )
         for color in LANE_COLORS
     ]
-    return (uplot.Series(label="iteration"), *lines, *dots)
+    return (uplot.Series(label="x"), uplot.Series(label="cursor", stroke=CURSOR, width=1), *lines, *dots)

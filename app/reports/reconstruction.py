@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from html import escape
 from pathlib import Path
@@ -143,7 +144,16 @@ def _registrations(metrics: dict[str, Any]) -> Iterator[str]:
         return
     yield "<h2>How the nodes found each other</h2>"
     yield table(
-        ("node", "onto", "method", "iterations", "stopped because", "weighted RMSE (mm)"),
+        (
+            "node",
+            "onto",
+            "method",
+            "iterations",
+            "stopped because",
+            "weighted RMSE (mm)",
+            "loop error (mm)",
+            "used",
+        ),
         (
             (
                 item["source"],
@@ -152,6 +162,8 @@ def _registrations(metrics: dict[str, Any]) -> Iterator[str]:
                 item["iterations"],
                 item["stop_reason"],
                 "–" if item["rmse_m"] is None else 1000 * item["rmse_m"],
+                "–" if not math.isfinite(item["loop_error_m"]) else 1000 * item["loop_error_m"],
+                "yes" if item["used"] else "no",
             )
             for item in metrics["registration"]
         ),

@@ -1,0 +1,90 @@
+"""What the Fuse screen says and draws of a race, without a browser."""
+
+import re
+
+import numpy as np
+import pytest
+
+from app.drawing.race import gizmo_pose, start_of
+from app.jobs.records import CaptureView, PairHistogram, RaceLane, RaceStep, Start
+from app.panels.fuse.numbers import race_table, verdict
+from app.plots.capture import CELLS, capture_html, capture_sentence
+from app.plots.histogram import kernel, weights
+
+NOTHING = np.empty((0, 3), np.float32)
+EDGES_M = np.linspace(0.0, 0.3, 31)
+
+
+def lane(label, error_m, reason="converged", sigma_m=float("nan"), kernel=False):
+    shown = PairHistogram(np.ones(30, int), np.ones(30), sigma_m)
+    step = RaceStep(np.eye(4), NOTHING, NOTHING, np.empty(0), 0.0, 0.01, 5.0, error_m, shown)
+    return RaceLane(label, kernel, (step,), reason, 3, 0.2, 0.01, 500.0)
+
+
+@pytest.mark.parametrize(
+    ("errors_m", "sentence"),
+    [
+        ({"ICP point": 0.118, "CEICP-A plane": 0.001}, "**CEICP-A plane** ends 0.10 cm from the truth, "),
+        ({"ICP point": 0.010, "CEICP-A plane": 0.015}, "**CEICP-A plane** 1.5 cm. So CEICP loses here."),
+        ({"ICP point": 0.05, "FICP plane": 0.09}, "Nobody arrives within 2 cm."),
+        (
+            {"ICP point": 0.0100, "CEICP-A plane": 0.0101},
+            "Here both end equally close to the truth (1.0 cm).",
+        ),
+        ({"A": 0.01, "B": 0.01, "C": 0.01}, "Here all end equally close"),
+        ({"ICP point": 0.03}, "**ICP point** ends 3.0 cm from the truth. Nobody arrives"),
+        ({"ICP point": None, "CEICP-A plane": None}, "The truth of this scene is not known."),
+    ],
+)
+def test_the_verdict_says_who_wins(errors_m, sentence):
+    assert sentence in verdict(tuple(lane(label, error_m) for label, error_m in errors_m.items()))
+
+
+def test_a_ceicp_that_ties_with_the_winner_has_not_lost():
+    lanes = (lane("FICP plane", 0.00100), lane("CEICP-A plane", 0.00102), lane("ICP point", 0.1))
+    assert "loses" not in verdict(lanes)
+
+
+def test_one_ceicp_that_loses_to_another_is_no_loss_of_ceicp():
+    lanes = (lane("CEICP-A plane", 0.001), lane("ICP point", 0.01), lane("CEICP-N plane", 0.1))
+    assert "loses" not in verdict(lanes)
+
+
+def test_the_table_has_a_column_for_each_lane_and_explains_every_row():
+    html = race_table(tuple(lane(str(i), 0.01, "No point of the source lies within") for i in range(4)))
+    assert re.findall("[①②③④]", html) == list("①②③④")
+    assert html.count("title=") == 8
+    assert html.count(">lost<") == 4
+
+
+def test_the_kernel_is_a_gaussian_of_the_distance_and_icp_has_none():
+    ceicp = lane("CEICP-A plane", 0.0, sigma_m=0.1, kernel=True)
+    f = kernel(ceicp, ceicp.steps[0].histogram, EDGES_M)
+    assert f[0] == 1.0
+    assert f[10] == pytest.approx(np.exp(-0.5))
+    icp = lane("ICP point", 0.0)
+    assert np.isnan(kernel(icp, icp.steps[0].histogram, EDGES_M)).all()
+
+
+def test_weights_are_bridged_over_empty_bins_and_zero_beyond_the_last_pair():
+    shown = PairHistogram(np.array([1, 0, 1, 0]), np.array([1.0, np.nan, 0.5, np.nan]), 0.1)
+    np.testing.assert_allclose(weights(shown), [1.0, 0.75, 0.5, 0.0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_gizmo_means_the_start_it_stands_for(seed):
+    start, center_m = Start.towards(25.0, 35.0, seed), np.array([0.3, -0.2, 2.0])
+    again = start_of(gizmo_pose(start, center_m), center_m)
+    np.testing.assert_allclose(again.turn_deg, start.turn_deg, atol=0.011)
+    np.testing.assert_allclose(again.shift_cm, start.shift_cm, atol=0.011)
+
+
+def test_the_map_names_every_cell_and_marks_what_arrives():
+    errors_m = np.full((2, 5, 5), 0.3)
+    errors_m[1, :2] = 0.001
+    view = CaptureView(("ICP point", "CEICP-A plane"), errors_m)
+    html = capture_html(view, 1)
+    assert re.findall('data-cell="([^"]+)"', html) == list(CELLS)
+    assert html.count("✓ 0.1") == 10
+    assert html.count("✗ 30") == 15
+    assert "ICP point 0, CEICP-A plane 10" in capture_sentence(view)

@@ -1,0 +1,76 @@
+"""Lesson files: the one that ships, and bad ones."""
+
+import pytest
+
+from app.jobs.records import Race, Start
+from app.lessons import SHIPPED, read_lesson
+from app.racewords import STARTS
+from pipeline.errors import InputError
+
+
+def lesson(tmp_path, text):
+    path = tmp_path / "lesson.md"
+    path.write_text(text)
+    return read_lesson(path)
+
+
+def test_the_lesson_that_ships_has_ten_stops_with_different_titles_and_text():
+    shipped = read_lesson(SHIPPED)
+    assert shipped.title == "ICP against CEICP"
+    assert len(shipped.stops) == len({stop.title for stop in shipped.stops}) == 10
+    assert all("set:" not in stop.text and len(stop.text) > 100 for stop in shipped.stops)
+    assert {stop.race.mode for stop in shipped.stops} == {"nodes", "inferred"}
+    assert any(stop.in_ms for stop in shipped.stops)
+
+
+def test_a_stop_sets_what_it_names_and_leaves_the_rest_at_the_default(tmp_path):
+    (stop,) = lesson(
+        tmp_path,
+        "# A\n## One\nset: methods = ICP point, ficp plane\nset: start = far off\nset: noise = 2.5 cm\n"
+        "set: holes = 30 %\nset: pairs = both\nset: axis = milliseconds\nset: position = 40\nset: lane = 2\n"
+        "\nLook *here*.\n\nAnd there.\n",
+    ).stops
+    assert stop.race == Race(
+        rivals=(("icp", "point"), ("ficp", "plane")),
+        start=Start.towards(*STARTS["far off (20°, 40 cm)"], seed=0),
+        noise_m=0.025,
+        hole_share=0.3,
+        direction="both",
+    )
+    assert (stop.in_ms, stop.place, stop.lane) == (True, 40, 1)
+    assert stop.text == "Look *here*.\n\nAnd there."
+
+
+def test_a_start_in_numbers_and_the_end(tmp_path):
+    (stop,) = lesson(tmp_path, "# A\n## One\nset: start = 10 deg 20 cm\nset: position = end\nx").stops
+    assert stop.race.start == Start.towards(10.0, 20.0, seed=0)
+    assert stop.place is None
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("## One\nx", "has no title"),
+        ("# A\nx", "has no sections"),
+        ("# A\n## One\nset: noise = 1 cm\n", "section 'One', has no text"),
+        ("# A\n## One\nset: colour = red\nx", "cannot set colour = red: try one of mode"),
+        ("# A\n## One\nset: methods = icp\nx", "cannot set methods = icp: try one of icp point"),
+        ("# A\n## One\nset: methods = icp point, icp point, icp point, icp point, icp point\nx", "at most 4"),
+        ("# A\n## One\nset: noise = much\nx", "try 0 to 10 cm"),
+        ("# A\n## One\nset: holes = 95 %\nx", "try 0 to 80 %"),
+        ("# A\n## One\nset: start = near\nx", "try one of aligned, slightly off, far off or such as"),
+        ("# A\n## One\nset: position = -1\nx", "try start, end or the number"),
+        ("# A\n## One\nset: mode\nx", "cannot set mode = : try one of node on node"),
+    ],
+)
+def test_a_bad_lesson_is_one_sentence(tmp_path, text, sentence):
+    with pytest.raises(InputError, match=sentence) as error:
+        lesson(tmp_path, text)
+    assert "\n" not in str(error.value)
+
+
+def test_a_missing_or_binary_lesson_is_one_sentence(tmp_path):
+    (tmp_path / "binary.md").write_bytes(b"\xff\xfe\x00")
+    for name in ("none.md", "binary.md"):
+        with pytest.raises(InputError, match=f"{name} cannot be read"):
+            read_lesson(tmp_path / name)

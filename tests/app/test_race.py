@@ -1,0 +1,163 @@
+"""Races and their capture range as the computing process makes them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.jobs.capture import capture_job
+from app.jobs.chain import prepared, rig_of
+from app.jobs.race import contest_of, race_job
+from app.jobs.records import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, Race, Start
+from app.jobs.store import Store
+from app.state import Source, Spec
+from pipeline.config import PipelineConfig
+from pipeline.errors import InputError
+
+SPEC = Spec(Source(scene="box-on-table"))
+SLIGHT = Race(start=Start.towards(3.0, 6.0, seed=0))
+
+
+def end(job):
+    """What a job answers."""
+    while True:
+        try:
+            next(job)
+        except StopIteration as stop:
+            return stop.value
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    return Store(str(tmp_path_factory.mktemp("store")))
+
+
+@pytest.fixture(scope="module")
+def rig(store):
+    return end(rig_of(store, SPEC))
+
+
+@pytest.fixture(scope="module")
+def work(store):
+    return end(prepared(store, SPEC))
+
+
+@pytest.fixture(scope="module")
+def view(store):
+    rivals = (("icp", "point"), ("ceicp-n", "plane"), ("ceicp-a", "plane"), ("icp", "plane"))
+    return end(race_job(store, SPEC, replace(SLIGHT, rivals=rivals)))
+
+
+def test_all_lanes_start_from_the_same_pose(view):
+    assert [lane.label for lane in view.lanes] == ["ICP point", "CEICP-N plane", "CEICP-A plane", "ICP plane"]
+    first = view.lanes[0].steps[0]
+    for lane in view.lanes:
+        np.testing.assert_array_equal(lane.steps[0].T_target_source, first.T_target_source)
+        assert lane.steps[0].point_error_m == first.point_error_m
+
+
+def test_the_annealed_plane_version_arrives_and_plain_icp_does_not(view):
+    errors_m = {lane.label: lane.steps[-1].point_error_m for lane in view.lanes}
+    assert errors_m["CEICP-A plane"] < 0.005
+    assert errors_m["ICP point"] > 0.05
+
+
+def test_time_runs_forward_from_zero_and_ends_with_the_lane(view):
+    for lane in view.lanes:
+        times_s = np.array([step.time_s for step in lane.steps])
+        assert times_s[0] == 0.0
+        assert np.all(np.diff(times_s) > 0)
+        assert times_s[-1] == lane.elapsed_s
+        assert len(lane.steps) == lane.iterations + 1
+
+
+def test_histograms_count_every_kept_pair_and_only_ceicp_has_the_kernel(view):
+    for lane in view.lanes:
+        assert lane.kernel == lane.label.startswith("CEICP")
+        for step in lane.steps:
+            shown = step.histogram
+            assert len(shown.counts) == len(view.edges_m) - 1
+            assert np.array_equal(shown.counts > 0, np.isfinite(shown.weights))
+            assert np.nanmax(shown.weights) == pytest.approx(1.0)
+            assert (shown.sigma_m > 0) == lane.kernel
+    icp = view.lanes[0].steps[0].histogram
+    assert np.allclose(icp.weights[icp.counts > 0], 1.0)
+
+
+def test_the_weight_of_a_ceicp_pair_falls_with_its_distance(view):
+    weights = view.lanes[2].steps[0].histogram.weights
+    assert np.all(np.diff(weights[np.isfinite(weights)]) < 0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_start_is_as_far_off_as_it_says(rig, work, seed):
+    contest = contest_of(rig, work, Race())
+    start = Start.towards(20.0, 40.0, seed)
+    motion = contest.start_pose(start) @ np.linalg.inv(contest.T_aligned)
+    turn_deg = np.degrees(np.arccos((np.trace(motion[:3, :3]) - 1) / 2))
+    moved_m = motion[:3, :3] @ contest.center_m + motion[:3, 3] - contest.center_m
+    assert turn_deg == pytest.approx(20.0, abs=0.02)
+    assert 100 * np.linalg.norm(moved_m) == pytest.approx(40.0, abs=0.02)
+
+
+def test_aligned_is_the_truth(rig, work):
+    contest = contest_of(rig, work, Race())
+    assert contest.error_m(contest.start_pose(Start())) == 0.0
+
+
+def test_degrading_changes_the_source_only(rig, work):
+    plain, worse = (
+        contest_of(rig, work, race)
+        for race in (Race(), Race(noise_m=0.03, hole_share=0.4, outlier_share=0.1))
+    )
+    np.testing.assert_array_equal(worse.target.points_m, plain.target.points_m)
+    np.testing.assert_array_equal(worse.T_aligned, plain.T_aligned)
+    np.testing.assert_array_equal(worse.start_pose(SLIGHT.start), plain.start_pose(SLIGHT.start))
+    np.testing.assert_array_equal(worse.error_points_m, plain.error_points_m)
+    assert len(worse.source) == pytest.approx(0.6 * len(plain.source), rel=0.05)
+    assert plain.source is work.nodes[1].sensor
+
+
+def test_an_inferred_cloud_belongs_where_it_is(rig, work):
+    contest = contest_of(rig, work, Race(mode="inferred", source=2, target=2))
+    np.testing.assert_array_equal(contest.T_true, np.eye(4))
+    assert contest.source is work.nodes[2].inferred
+    assert contest.target is work.nodes[2].sensor
+
+
+def test_a_node_is_not_moved_onto_itself(rig, work):
+    with pytest.raises(InputError, match="cannot be moved onto itself"):
+        contest_of(rig, work, Race(source=1, target=1))
+
+
+def test_a_method_that_finds_no_pair_stays_at_its_start(store):
+    view = end(race_job(store, SPEC, replace(SLIGHT, start=Start((0.0, 0.0, 0.0), (0.0, 0.0, 5000.0)))))
+    lost = view.lanes[1]
+    assert lost.stop_reason.startswith("No point of the source")
+    assert len(lost.steps) == 1
+    assert lost.iterations == 0
+
+
+@pytest.fixture(scope="module")
+def capture(store):
+    return end(capture_job(store, SPEC, SLIGHT))
+
+
+def test_the_capture_range_has_a_cell_for_every_start_and_tells_methods_apart(capture):
+    assert capture.labels == ("ICP point", "CEICP-A plane")
+    assert capture.errors_m.shape == (2, len(CAPTURE_TURNS_DEG), len(CAPTURE_SHIFTS_M))
+    assert np.isfinite(capture.errors_m).all()
+    reached = (capture.errors_m < 0.02).sum(axis=(1, 2))
+    assert reached[1] > reached[0]
+
+
+def test_the_capture_range_is_the_same_again_and_from_any_start(capture, tmp_path):
+    again = end(capture_job(Store(str(tmp_path)), SPEC, replace(SLIGHT, start=Start())))
+    np.testing.assert_array_equal(again.errors_m, capture.errors_m)
+
+
+def test_without_truth_there_is_no_capture_range(tmp_path, monkeypatch, rig):
+    monkeypatch.setattr("app.jobs.chain.load_demo", lambda name: replace(rig, truth=None))
+    spec = replace(SPEC, config=PipelineConfig())
+    with pytest.raises(InputError, match="truth of this scene is not known"):
+        end(capture_job(Store(str(tmp_path)), replace(spec, source=Source(scene="nowhere")), Race()))
