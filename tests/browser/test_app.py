@@ -7,57 +7,9 @@ import statistics
 import time
 from pathlib import Path
 
-import cv2
-import numpy as np
 import pytest
 
-STEPS = ("Scene", "Depth", "Fuse", "Surface", "Export")
-TEXTS = {
-    "Scene": "Each camera node delivers",
-    "Depth": "points the sensor measured",
-    "Fuse": "move the orange cloud",
-    "Surface": "A ball rolls over the points",
-    "Export": "Take it along",
-}
-
-
-def go(page, step):
-    page.get_by_role("button", name=re.compile(f"^{step}( .)?$")).click()
-    page.get_by_text(TEXTS[step]).wait_for()
-
-
-ALIKE = 0.002
-"""Share of pixels that may differ between two pictures of the same thing."""
-UNCOVERED = ".mantine-Notifications-root, [role=tooltip] { display: none !important }"
-
-
-def canvas(page, still=2):
-    """The 3-D picture once `still` looks at it in a row are the same, without what pops up over it."""
-    last, same = b"", 1
-    for _ in range(40):
-        page.wait_for_timeout(200)
-        picture = page.locator("canvas").first.screenshot(style=UNCOVERED)
-        same = same + 1 if picture == last else 1
-        if same == still:
-            return picture
-        last = picture
-    return last
-
-
-def differing(one, other):
-    """Share of the pixels in which two pictures differ visibly."""
-    first, second = (cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) for png in (one, other))
-    return float(np.mean(cv2.absdiff(first, second).max(axis=2) > 8))
-
-
-def changed_from(page, picture):
-    """Whether the 3-D picture becomes another one within ten seconds."""
-    return any(differing(canvas(page), picture) > ALIKE for _ in range(25))
-
-
-def slider(page, label):
-    identity = page.locator("label", has_text=label).first.get_attribute("for")
-    return page.locator(f'[id="{identity}"] [role=slider]')
+from tests.browser.hands import ALIKE, STEPS, TEXTS, canvas, changed_from, differing, go, slider
 
 
 def test_every_step_shows_its_own_picture_and_no_error(page):

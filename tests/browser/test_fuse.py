@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from test_app import canvas, changed_from, go, slider
+from tests.browser.hands import canvas, changed_from, go, slider
 
 
 @pytest.fixture
