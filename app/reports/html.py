@@ -26,6 +26,9 @@ td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: 
 figure { margin: 0; } figure img { width: 100%; border-radius: 6px; display: block; background: var(--soft); }
 figcaption { font-size: .88em; opacity: .8; margin-top: .3rem; }
 code { background: var(--soft); padding: .1em .35em; border-radius: 4px; }
+h3 { font-size: 1rem; margin: 1.6rem 0 .4rem; } .wide { overflow-x: auto; }
+.picture { display: inline-block; vertical-align: top; max-width: 560px; margin-right: 1.5rem; }
+svg.chart { max-width: 100%; height: auto; }
 .reproduced { color: var(--good); font-weight: 600; } .not-reproduced { color: var(--bad); font-weight: 600; }
 """
 

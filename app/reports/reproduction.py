@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
+from app.reports.exhibits import exhibit_html
 from app.reports.html import table, write_page
 from pipeline.experiments import Verdict
 
@@ -17,7 +18,7 @@ def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
         "<h1>The thesis, computed anew</h1>"
         f'<p class="lead">{reproduced} of {len(verdicts)} claims reproduced.</p>'
         '<p class="note">Shares run from 0 to 1, lengths are in metres; intervals are 95 % bootstrap '
-        "intervals of the mean over frames.</p>"
+        "intervals of the mean over frames, or of the median over rooms.</p>"
     )
     write_page(path, "PacketMesh: the thesis, computed anew", body + "".join(map(_section, verdicts)))
 
@@ -32,5 +33,6 @@ def _section(verdict: Verdict) -> str:
         f'<h2>{escape(verdict.id)} <span class="{mark}">{escape(verdict.verdict)}</span></h2>'
         f"<p>{escape(verdict.claim)}. The thesis: {escape(verdict.thesis)}. "
         f"Counts as reproduced: {escape(verdict.tolerance)}.</p><p><b>Ours:</b> {escape(verdict.why)}.</p>"
-        + table(("measured", "mean", "95 % interval"), rows)
+        + table(("measured", "value", "95 % interval"), rows)
+        + "".join(map(exhibit_html, verdict.exhibits))
     )

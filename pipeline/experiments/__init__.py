@@ -5,17 +5,27 @@ A claim that does not come out is reported as not reproduced; that is a result, 
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
 
 from pipeline.errors import InputError
 from pipeline.experiments import holes, outliers
 from pipeline.experiments.claim import Claim, Verdict
+from pipeline.experiments.registration.claims import CLAIMS as REGISTRATION_CLAIMS
+from pipeline.progress import Progress
 
-CLAIMS: dict[str, Claim] = {claim.id: claim for claim in (outliers.C10, holes.C22)}
+CLAIMS: dict[str, Claim] = {claim.id: claim for claim in (outliers.C10, *REGISTRATION_CLAIMS, holes.C22)}
 
 
-def run_experiments(only: Iterable[str] = ()) -> Iterator[Verdict]:
-    """Compute the claims named, or all of them.
+def run_experiments(only: Iterable[str] = (), folder: Path | None = None) -> Iterator[Progress | Verdict]:
+    """Compute the claims named, or all of them; what takes long reports its progress in between.
+
+    Args:
+        only: names of claims; empty for all.
+        folder: keeps the results of long work, so that an interrupted run goes on where it stopped; None
+            keeps nothing.
 
     Raises:
         InputError: a name is not a claim.
@@ -24,8 +34,15 @@ def run_experiments(only: Iterable[str] = ()) -> Iterator[Verdict]:
     unknown = [name for name in wanted if name not in CLAIMS]
     if unknown:
         raise InputError(f"There is no claim {', '.join(unknown)}; known are {', '.join(CLAIMS)}")
-    for name in wanted:
-        yield CLAIMS[name].judge()
+    with tempfile.TemporaryDirectory() as temporary:
+        prepared: dict[Any, Any] = {}
+        for claim in (CLAIMS[name] for name in wanted):
+            if claim.prepare is None:
+                yield claim.judge()
+                continue
+            if claim.prepare not in prepared:
+                prepared[claim.prepare] = yield from claim.prepare(folder or Path(temporary))
+            yield claim.judge(prepared[claim.prepare])
 
 
 __all__ = ["CLAIMS", "Claim", "Verdict", "run_experiments"]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pipeline.experiments.exhibits import Exhibit
+from pipeline.progress import Progress
 from pipeline.types import FloatArray
 
 
@@ -22,6 +25,8 @@ class Outcome:
     reproduced: bool
     why: str
     """One sentence that a reader can check against ``ours``."""
+    exhibits: tuple[Exhibit, ...] = ()
+    """Tables and pictures for the report."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +42,7 @@ class Verdict:
     verdict: str
     """``reproduced`` or ``not reproduced``."""
     why: str
+    exhibits: tuple[Exhibit, ...] = ()
 
     def record(self) -> dict[str, Any]:
         """The verdict as plain values."""
@@ -54,11 +60,14 @@ class Claim:
     """The thesis's own value."""
     tolerance: str
     """What counts as reproduced."""
-    experiment: Callable[[], Outcome]
+    experiment: Callable[..., Outcome]
+    """Called with what ``prepare`` returned, if there is one, else with nothing."""
+    prepare: Callable[[Path], Generator[Progress, None, Any]] | None = None
+    """Long work that leaves its results in a folder; claims with the same one share a single run of it."""
 
-    def judge(self) -> Verdict:
+    def judge(self, *prepared: Any) -> Verdict:
         """Run the experiment and compare."""
-        outcome = self.experiment()
+        outcome = self.experiment(*prepared)
         verdict = "reproduced" if outcome.reproduced else "not reproduced"
         return Verdict(
             self.id,
@@ -69,6 +78,7 @@ class Claim:
             outcome.ci95,
             verdict,
             outcome.why,
+            outcome.exhibits,
         )
 
 

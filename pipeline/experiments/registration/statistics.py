@@ -1,0 +1,67 @@
+"""Paired comparison of methods over the same cases (SPEC 4.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import wilcoxon
+
+from pipeline.types import FloatArray
+
+SIGNIFICANCE = 0.05
+DRAWS = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """One method against another, case by case."""
+
+    rival: str
+    ratio: float
+    """Median over the cases of our error over the rival's."""
+    win_rate: float
+    """Share of the cases with the smaller error; equal errors count half."""
+    p: float
+    """Two-sided Wilcoxon signed-rank test of the logarithms of the ratios, Holm-corrected by ``holm``."""
+    cases: int
+
+    @property
+    def outcome(self) -> str:
+        """``better``, ``worse``, or ``tie`` when the test cannot tell them apart."""
+        if not self.p < SIGNIFICANCE:
+            return "tie"
+        return "better" if self.ratio < 1.0 else "worse"
+
+
+def compare(rival: str, ours: FloatArray, theirs: FloatArray) -> Comparison:
+    """Errors (N,) of two methods on the same cases; logarithms, so that no condition outweighs another."""
+    ours, theirs = np.asarray(ours, float), np.asarray(theirs, float)
+    log_ratio = np.log(np.maximum(ours, 1e-12)) - np.log(np.maximum(theirs, 1e-12))
+    p = float(wilcoxon(log_ratio).pvalue) if np.any(log_ratio) else 1.0
+    wins = np.mean((log_ratio < 0) + 0.5 * (log_ratio == 0))
+    return Comparison(rival, float(np.exp(np.median(log_ratio))), float(wins), p, len(ours))
+
+
+def holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
+    """The same comparisons with p values corrected for their number (Holm 1979)."""
+    adjusted = holm_p([comparison.p for comparison in comparisons])
+    return tuple(replace(comparison, p=p) for comparison, p in zip(comparisons, adjusted, strict=True))
+
+
+def holm_p(p_values: Sequence[float]) -> list[float]:
+    """Step-down adjusted p values: the k-th smallest times (m - k + 1), never decreasing, at most 1."""
+    count, adjusted, highest = len(p_values), [0.0] * len(p_values), 0.0
+    for rank, row in enumerate(np.argsort(p_values, kind="stable")):
+        highest = min(1.0, max(highest, (count - rank) * p_values[row]))
+        adjusted[row] = float(highest)
+    return adjusted
+
+
+def median_ci95(values: FloatArray, seed: int = 0) -> tuple[float, float]:
+    """95 % percentile bootstrap interval of the median of (N,) ``values``."""
+    values = np.asarray(values, float)
+    rows = np.random.default_rng(seed).integers(0, len(values), (DRAWS, len(values)))
+    low, high = np.percentile(np.median(values[rows], axis=1), (2.5, 97.5))
+    return float(low), float(high)

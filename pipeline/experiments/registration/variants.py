@@ -1,0 +1,149 @@
+"""Methods with a part taken out, for the ablations of SPEC 4.8, or with a parameter laid open, for tuning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from pipeline.config import RegistrationConfig
+from pipeline.registration.ceicp import CeicpA, CeicpN
+from pipeline.registration.ceicp_literal import CeicpLiteral
+from pipeline.registration.ficp import LAMBDA, SMALLEST_FRACTION, Ficp
+from pipeline.registration.icp import Icp
+from pipeline.registration.matching import Matching
+from pipeline.registration.methods import METHODS, MethodStart
+from pipeline.registration.ricp import Ricp
+from pipeline.registration.trimmed import closest_rows, evenly
+from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.types import PointCloud
+
+
+@dataclass(frozen=True, slots=True)
+class GatedIcp(Icp):
+    """Equal weights within a fixed gate: ICP + T_d."""
+
+    fixed_gate_m: float
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """All pairs within the gate, with equal weights."""
+        return evenly(np.flatnonzero(matching.distances_m <= self.fixed_gate_m))
+
+    @property
+    def gate_m(self) -> float:
+        """Distance beyond which no pair counts."""
+        return self.fixed_gate_m
+
+
+@dataclass(frozen=True, slots=True)
+class GaussianA(CeicpA):
+    """CEICP-A without the entropy factor: w = p."""
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """The pairs of CEICP-A, with plain Gaussian weights."""
+        return _gaussian(CeicpA.weigh(self, matching), matching)
+
+
+@dataclass(frozen=True, slots=True)
+class GaussianN(CeicpN):
+    """CEICP-N without the entropy factor: w = p."""
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """The pairs of CEICP-N, with plain Gaussian weights of the same scale."""
+        return _gaussian(CeicpN.weigh(self, matching), matching)
+
+
+@dataclass(frozen=True, slots=True)
+class HardGateA(CeicpA):
+    """CEICP-A's shrinking gate with equal weights inside."""
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """The pairs of CEICP-A, all alike."""
+        kept = CeicpA.weigh(self, matching)
+        return replace(evenly(kept.rows), sigma_m=kept.sigma_m)
+
+
+@dataclass(frozen=True, slots=True)
+class WeightedCentroidsLiteral(CeicpLiteral):
+    """The thesis's weights with the centroids that belong to them, instead of eq. 3.12."""
+
+    @property
+    def unweighted_centroids(self) -> bool:
+        """As a weighted least-squares fit has to."""
+        return False
+
+
+@dataclass(frozen=True, slots=True)
+class GatedRicp(Ricp):
+    """RICP that never looks at pairs beyond a gate."""
+
+    fixed_gate_m: float = float("inf")
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """RICP's choice among the pairs within the gate."""
+        near = np.flatnonzero(matching.distances_m <= self.fixed_gate_m)
+        if len(near) <= 4:
+            return evenly(near)
+        kept = Ricp.weigh(self, matching.select(near))
+        return replace(kept, rows=near[kept.rows])
+
+    @property
+    def gate_m(self) -> float:
+        """Distance beyond which no pair counts."""
+        return self.fixed_gate_m
+
+
+@dataclass(frozen=True, slots=True)
+class FicpWithExponent(Ficp):
+    """FICP with another lambda than 0.95."""
+
+    exponent: float
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """The fraction of the closest pairs with the least fractional RMSD."""
+        total = len(matching.distances_m)
+        counts = np.arange(int(np.ceil(SMALLEST_FRACTION * total)), total + 1)
+        squared_m2 = np.cumsum(np.sort(matching.distances_m) ** 2)
+        frmsd_m = (counts / total) ** -self.exponent * np.sqrt(squared_m2[counts - 1] / counts)
+        return evenly(closest_rows(matching.distances_m, float(counts[np.argmin(frmsd_m)] / total)))
+
+
+def _gaussian(kept: PairWeights, matching: Matching) -> PairWeights:
+    """The same pairs weighing exp(-d^2 / 2 sigma^2)."""
+    variance_m2 = max(kept.sigma_m**2, np.finfo(float).tiny)
+    kernel = np.exp(-0.5 * matching.distances_m[kept.rows] ** 2 / variance_m2)
+    return PairWeights(kept.rows, kernel / kernel.sum() if len(kernel) else kernel, kept.sigma_m)
+
+
+def _as_kind(kind: type[PairWeighting], method: str) -> MethodStart:
+    """A method's own first state, as a state of a subclass."""
+
+    def start(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> PairWeighting:
+        state = METHODS[method](config, source, target)
+        return kind(**{part.name: getattr(state, part.name) for part in fields(state)})
+
+    return start
+
+
+def _fixed_sigma(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> PairWeighting:
+    """CEICP-A whose scale never shrinks: three sigma are the gate T_d."""
+    sigma_m = config.gate_m / 3.0
+    state = CeicpA.starting(config, source, target)
+    return replace(state, sigma_m=sigma_m, sigma_0_m=sigma_m, sigma_min_m=sigma_m)
+
+
+VARIANTS: dict[str, tuple[str, MethodStart]] = {
+    "icp-gated": ("icp", lambda config, source, target: GatedIcp(config.gate_m)),
+    "ceicp-a-gaussian": ("ceicp-a", _as_kind(GaussianA, "ceicp-a")),
+    "ceicp-a-hard-gate": ("ceicp-a", _as_kind(HardGateA, "ceicp-a")),
+    "ceicp-a-fixed-sigma": ("ceicp-a", _fixed_sigma),
+    "ceicp-n-gaussian": ("ceicp-n", _as_kind(GaussianN, "ceicp-n")),
+    "ceicp-literal-centroids": ("ceicp-literal", _as_kind(WeightedCentroidsLiteral, "ceicp-literal")),
+}
+"""Every variant's method in the config, and its first state."""
+
+TUNABLE: dict[str, MethodStart] = {
+    "ricp": lambda config, source, target: GatedRicp(config.seed, fixed_gate_m=config.gate_m),
+    "ficp": lambda config, source, target: FicpWithExponent(LAMBDA),
+}
+"""Methods whose constants are not settings: their first state with the tuned constant as a field."""
