@@ -130,7 +130,7 @@ def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> Point
             "so check its file"
         )
     if len(first) < len(cloud):
-        _log.info("%d repeated points of the %s cloud are left out", len(cloud) - len(first), name)
+        _log.warning("%d repeated points of the %s cloud are left out", len(cloud) - len(first), name)
         cloud = cloud.select(np.sort(first))
     extent_m = _extent_m(cloud)
     if not SMALLEST_M <= extent_m <= LARGEST_M:

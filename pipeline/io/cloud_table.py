@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 
 import numpy as np
@@ -10,6 +11,7 @@ from pipeline.errors import InputError
 from pipeline.types import PointCloud
 
 Path = str | os.PathLike[str]
+_log = logging.getLogger(__name__)
 
 MAX_POINTS = 20_000_000
 POSITION, NORMAL, COLOR = ("x", "y", "z"), ("nx", "ny", "nz"), ("red", "green", "blue")
@@ -40,7 +42,10 @@ def cloud_of(path: Path, table: np.ndarray) -> PointCloud:
     finite = np.isfinite(points_m).all(axis=1)
     if not finite.any():
         raise InputError(f"The point cloud {path} holds no point with finite coordinates; try another file")
-    return cloud if finite.all() else cloud.select(finite)
+    if finite.all():
+        return cloud
+    _log.warning("%d points of %s are left out: their coordinates are not finite", np.sum(~finite), path)
+    return cloud.select(finite)
 
 
 def columns(table: np.ndarray, names: tuple[str, ...], dtype: type) -> np.ndarray | None:
