@@ -41,8 +41,9 @@ def test_plane_curves_are_dashed_and_every_curve_has_its_name():
 def test_a_heat_map_writes_every_share_into_its_cell():
     html = exhibit_html(MAP)
     assert re.findall(r">(\d+%)<", html) == ["100%", "50%", "25%", "0%"]
-    assert "hsl(120" in html
-    assert "hsl(0" in html
+    lightness = [int(share) for share in re.findall(r"hsl\(204 70% (\d+)%\)", html)]
+    assert lightness == sorted(lightness), "the more, the darker"
+    assert len(set(lightness)) == 4
     assert "all told" in html
 
 
