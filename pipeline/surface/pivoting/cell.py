@@ -1,0 +1,176 @@
+"""Which empty balls can touch a point: its Voronoi cell, cut only as far as a ball reaches.
+
+An empty ball of some radius touches point p where the cell has a point at that distance from p. The
+cell is convex, so there is one only if a corner is that far away or farther; and the ball rests on two
+more points where an edge of the cell is at that distance, so these two belong to such a corner.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from pipeline.surface.pivoting.ball import TIE
+from pipeline.types import BoolArray, FloatArray, IntArray
+
+BOX = 6
+"""The first planes are the sides of a box, the others belong to points."""
+_MOST_PLANES = 128
+_MOST_CORNERS = 512
+_BOX_REACH = 1.5
+"""Half the box's side over the ball's radius."""
+
+
+class Cell(NamedTuple):
+    """Scratch for one half of a cell, with its point as origin; corners are where three planes meet."""
+
+    planes: FloatArray
+    """(P, 4): n and h of n . x <= h."""
+    rows: IntArray
+    """(P,) which neighbour made each plane."""
+    corners: IntArray
+    """(C, 3) planes, anticlockwise from the outside."""
+    at: FloatArray
+    """(C, 4) place of each corner, and its squared distance from the origin."""
+    final: BoolArray
+    """(C,) True where no neighbour cuts the corner off."""
+    cut: BoolArray
+    """(P, P) edges of the corners that are being cut off, all False in between."""
+    counts: IntArray
+    """(2,) planes and corners."""
+
+
+def new_cell() -> Cell:
+    """Room for one cell at a time."""
+    return Cell(
+        np.empty((_MOST_PLANES, 4)),
+        np.empty(_MOST_PLANES, np.int32),
+        np.empty((_MOST_CORNERS, 3), np.int32),
+        np.empty((_MOST_CORNERS, 4)),
+        np.empty(_MOST_CORNERS, np.bool_),
+        np.zeros((_MOST_PLANES, _MOST_PLANES), np.bool_),
+        np.zeros(2, np.int64),
+    )
+
+
+@numba.njit(cache=True, nogil=True)
+def begin(cell, nx, ny, nz, radius):  # type: ignore[no-untyped-def]
+    """A box that contains the ball's possible centres on one side of the origin, that of a unit vector n."""
+    sign = 1.0 if nz >= 0.0 else -1.0
+    a = -1.0 / (sign + nz)  # orthonormal basis of Duff et al. 2017
+    b = nx * ny * a
+    cell.counts[0], cell.counts[1] = BOX, 0
+    for side in range(2):
+        s = 1.0 - 2.0 * side
+        _set_plane(cell, side, s * (1.0 + sign * nx * nx * a), s * sign * b, -s * sign * nx)
+        _set_plane(cell, 2 + side, s * b, s * (sign + ny * ny * a), -s * ny)
+        _set_plane(cell, 4 + side, s * nx, s * ny, s * nz)
+    for plane in range(BOX):
+        cell.planes[plane, 3] = _BOX_REACH * radius if plane < BOX - 1 else 0.0
+    for x in range(2):
+        for y in range(2, 4):
+            for z in range(4, 6):
+                if (x + y + z) % 2 == 0:
+                    _add_corner(cell, x, y, z)
+                else:
+                    _add_corner(cell, x, z, y)
+
+
+@numba.njit(cache=True, nogil=True)
+def _set_plane(cell, plane, x, y, z):  # type: ignore[no-untyped-def]
+    cell.planes[plane, 0], cell.planes[plane, 1], cell.planes[plane, 2] = x, y, z
+
+
+@numba.njit(cache=True, nogil=True)
+def shrink(cell, near, count, radius, wanted):  # type: ignore[no-untyped-def]
+    """Cut by the (count, 4) neighbours x, y, z, |x|^2 / 2 until every far corner is final; how many are.
+
+    Far is ``radius`` or more. Each cut is by the neighbour nearest to the farthest corner. Stops when
+    ``wanted`` corners are final, or -1 where there is no room for more.
+    """
+    far2 = radius * radius * (1.0 - 1e-9)
+    while True:
+        corner, n_final = -1, 0
+        for n in range(cell.counts[1]):
+            if cell.at[n, 3] >= far2:
+                if cell.final[n]:
+                    n_final += 1
+                elif corner < 0 or cell.at[n, 3] > cell.at[corner, 3]:
+                    corner = n
+        if corner < 0 or n_final >= wanted:
+            return n_final
+        x, y, z = cell.at[corner, 0], cell.at[corner, 1], cell.at[corner, 2]
+        depth, row = -TIE * radius * radius, -1
+        for n in range(count):
+            outside = near[n, 3] - x * near[n, 0] - y * near[n, 1] - z * near[n, 2]
+            if outside < depth:
+                depth, row = outside, n
+        if row < 0:
+            cell.final[corner] = True
+        elif not _clip(cell, near, row):
+            return -1
+
+
+@numba.njit(cache=True, nogil=True)
+def _clip(cell, near, row):  # type: ignore[no-untyped-def]
+    """Cut off what is nearer to a neighbour than to the origin; False if there is no room."""
+    new = cell.counts[0]
+    if new == _MOST_PLANES or 2 * cell.counts[1] + new > _MOST_CORNERS:
+        return False
+    cell.counts[0] += 1
+    cell.rows[new] = row
+    for axis in range(4):
+        cell.planes[new, axis] = near[row, axis]
+    x, y, z, h = near[row, 0], near[row, 1], near[row, 2], near[row, 3]
+    kept, count = 0, cell.counts[1]
+    for n in range(count):  # those to be cut off go to the end
+        if cell.at[n, 0] * x + cell.at[n, 1] * y + cell.at[n, 2] * z <= h:
+            _swap(cell, n, kept)
+            kept += 1
+    for n in range(kept, count):
+        for k in range(3):
+            cell.cut[cell.corners[n, k], cell.corners[n, (k + 1) % 3]] = True
+    for n in range(kept, count):
+        for k in range(3):
+            a, b = cell.corners[n, k], cell.corners[n, (k + 1) % 3]
+            if not cell.cut[b, a]:
+                _add_corner(cell, a, b, new)
+    for n in range(kept, count):
+        for k in range(3):
+            cell.cut[cell.corners[n, k], cell.corners[n, (k + 1) % 3]] = False
+    for n in range(count, cell.counts[1]):
+        _swap(cell, n, kept + n - count)
+    cell.counts[1] -= count - kept
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _swap(cell, m, n):  # type: ignore[no-untyped-def]
+    for k in range(3):
+        cell.corners[m, k], cell.corners[n, k] = cell.corners[n, k], cell.corners[m, k]
+    for k in range(4):
+        cell.at[m, k], cell.at[n, k] = cell.at[n, k], cell.at[m, k]
+    cell.final[m], cell.final[n] = cell.final[n], cell.final[m]
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_corner(cell, a, b, c):  # type: ignore[no-untyped-def]
+    """The corner where three planes meet; at the origin if they do not."""
+    ax, ay, az, ah = cell.planes[a, 0], cell.planes[a, 1], cell.planes[a, 2], cell.planes[a, 3]
+    bx, by, bz, bh = cell.planes[b, 0], cell.planes[b, 1], cell.planes[b, 2], cell.planes[b, 3]
+    cx, cy, cz, ch = cell.planes[c, 0], cell.planes[c, 1], cell.planes[c, 2], cell.planes[c, 3]
+    ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    vx, vy, vz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+    wx, wy, wz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    volume = ax * ux + ay * uy + az * uz
+    scale = 1.0 / volume if volume != 0.0 else 0.0
+    x = (ah * ux + bh * vx + ch * wx) * scale
+    y = (ah * uy + bh * vy + ch * wy) * scale
+    z = (ah * uz + bh * vz + ch * wz) * scale
+    n = cell.counts[1]
+    cell.counts[1] += 1
+    cell.corners[n, 0], cell.corners[n, 1], cell.corners[n, 2] = a, b, c
+    cell.at[n, 0], cell.at[n, 1], cell.at[n, 2], cell.at[n, 3] = x, y, z, x * x + y * y + z * z
+    cell.final[n] = False

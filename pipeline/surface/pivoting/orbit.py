@@ -1,0 +1,92 @@
+"""The circle on which a ball's centre goes when the ball turns about an edge, and what it meets there."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from pipeline.surface.pivoting.ball import TIE
+
+_NO_TURN = 5.0
+
+
+@numba.njit(cache=True, nogil=True)
+def orbit(points, a, b, toward_x, toward_y, toward_z, radius):  # type: ignore[no-untyped-def]
+    """Frame of the circle about edge a to b: its middle, axis u, axis v, radius, and half the edge squared.
+
+    Angle 0, along u, is in the direction given (from the edge's middle); angles grow towards v, which
+    is where a ball on a triangle to the left of the edge goes. Its radius is 0 if there is no circle.
+    """
+    tx, ty, tz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
+    length2 = tx * tx + ty * ty + tz * tz
+    scale = 1.0 / np.sqrt(length2)
+    tx, ty, tz = tx * scale, ty * scale, tz * scale
+    along = toward_x * tx + toward_y * ty + toward_z * tz
+    ux, uy, uz = toward_x - along * tx, toward_y - along * ty, toward_z - along * tz
+    u2 = ux * ux + uy * uy + uz * uz
+    mx, my, mz = points[a, 0] + points[b, 0], points[a, 1] + points[b, 1], points[a, 2] + points[b, 2]
+    orbit2 = radius * radius - 0.25 * length2
+    if orbit2 <= TIE * radius * radius or u2 <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    scale = 1.0 / np.sqrt(u2)
+    ux, uy, uz = ux * scale, uy * scale, uz * scale
+    vx, vy, vz = ty * uz - tz * uy, tz * ux - tx * uz, tx * uy - ty * ux
+    return 0.5 * mx, 0.5 * my, 0.5 * mz, ux, uy, uz, vx, vy, vz, np.sqrt(orbit2), 0.25 * length2
+
+
+@numba.njit(cache=True, nogil=True)
+def center_at(frame, cosine, sine):  # type: ignore[no-untyped-def]
+    """(x, y, z) of the ball's centre at an angle."""
+    mx, my, mz, ux, uy, uz, vx, vy, vz, size, _ = frame
+    s, t = size * cosine, size * sine
+    return mx + s * ux + t * vx, my + s * uy + t * vy, mz + s * uz + t * vz
+
+
+@numba.njit(cache=True, nogil=True)
+def in_plane(frame, x, y, z):  # type: ignore[no-untyped-def]
+    """(px, py, level, flat2, rest2) of a point, which is on the ball where px cos + py sin = level.
+
+    (px, py) is the point in the plane of the circle, measured from its middle, with squared length
+    flat2; and rest2 = flat2 - level^2 is negative where the ball never gets onto the point.
+    """
+    mx, my, mz, ux, uy, uz, vx, vy, vz, size, half2 = frame
+    dx, dy, dz = x - mx, y - my, z - mz
+    px, py = dx * ux + dy * uy + dz * uz, dx * vx + dy * vy + dz * vz
+    level = (dx * dx + dy * dy + dz * dz - half2) / (2.0 * size)
+    flat2 = px * px + py * py
+    return px, py, level, flat2, flat2 - level * level
+
+
+@numba.njit(cache=True, nogil=True)
+def turn(cosine, sine):  # type: ignore[no-untyped-def]
+    """A number from 0 to 4 that grows with the angle from 0 to 2 pi, exact near 0."""
+    if sine >= 0.0:
+        return sine / (sine + cosine) if cosine >= 0.0 else 1.0 - cosine / (sine - cosine)
+    return 2.0 + sine / (sine + cosine) if cosine < 0.0 else 3.0 + cosine / (cosine - sine)
+
+
+@numba.njit(cache=True, nogil=True)
+def first_met(grid, rows, count, a, b, frame):  # type: ignore[no-untyped-def]
+    """(row, cosine, sine) where an empty ball turning from angle 0 first comes onto a point; or row = -1.
+
+    A point ahead that the ball touches already, or overlaps by rounding, is met at once.
+    """
+    best, best_cosine, best_sine, hit = _NO_TURN, 0.0, 0.0, -1
+    tie = TIE * np.sqrt(frame[9] * frame[9] + frame[10])
+    for n in range(count):
+        row = rows[n]
+        if grid.ids[row] in (a, b):
+            continue
+        px, py, level, flat2, rest2 = in_plane(
+            frame, grid.points_m[row, 0], grid.points_m[row, 1], grid.points_m[row, 2]
+        )
+        if rest2 < 0.0 or flat2 <= 0.0:
+            continue
+        angle, cosine, sine = 0.0, 1.0, 0.0
+        if py <= 0.0 or px - level < -tie:
+            rest = np.sqrt(rest2)
+            cosine, sine = (level * px + rest * py) / flat2, (level * py - rest * px) / flat2
+            angle = turn(cosine, sine)
+        if angle < best:
+            best, best_cosine, best_sine, hit = angle, cosine, sine, row
+    return hit, best_cosine, best_sine

@@ -1,0 +1,211 @@
+"""Ball pivoting of our own: arrays in, records out; runs in batches that can be shown and cancelled."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.surface.pivoting.front import FACES, HEAD, SETTLED, TAIL, grown, new_front
+from pipeline.surface.pivoting.grid import build_grid
+from pipeline.surface.pivoting.roll import advance, restart
+from pipeline.surface.pivoting.seed import new_scratch
+from pipeline.types import ByteArray, FloatArray, IntArray
+
+_JITTER = 1e-10
+"""Points move by up to this share of the first radius, so that no four lie on one ball exactly."""
+_CELL = 2.0
+"""Edge of a grid cell over the ball's radius."""
+_MOST_RADII = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Rolled:
+    """The triangles of all balls."""
+
+    triangles: IntArray
+    """(F, 3) int32 point indices, anticlockwise from the outside."""
+    radius_index: ByteArray
+    """(F,) uint8, which of the radii made each."""
+    ball_centers_m: FloatArray
+    """(F, 3) where the ball lay that made it."""
+
+
+@dataclass(frozen=True, slots=True)
+class BallPivotBatch:
+    """What some pivots added, and where the front is now."""
+
+    triangles: IntArray
+    """(k, 3) int32, new since the batch before."""
+    ball_centers_m: FloatArray
+    """(k, 3)."""
+    radius_m: float
+    front_edges: IntArray
+    """(e, 2) int32 point indices of the active edges, each with its triangle on the left."""
+    progress: float
+    """0 to 1."""
+
+
+class Roller:
+    """Rolls balls of growing radius over an oriented cloud (Bernardini et al. 1999, SPEC 5).
+
+    Memory is linear in the number of points. Points are moved by a fixed random 1e-10 of the first
+    radius at most, which decides consistently between the triangulations of points on one ball.
+    Repeated points count once.
+
+    Args:
+        points_m: (N, 3).
+        normals: (N, 3) towards the outside; a zero normal keeps its point out.
+
+    Raises:
+        InputError: fewer than three points, no normals, or a point that is not finite.
+    """
+
+    def __init__(self, points_m: FloatArray, normals: FloatArray | None) -> None:
+        if len(points_m) < 3:
+            raise InputError(f"A surface needs at least 3 points, not {len(points_m)}; check the depth image")
+        if normals is None or np.shape(normals) != np.shape(points_m):
+            raise InputError("Ball pivoting needs a normal for each point; try to estimate them first")
+        if not np.isfinite(points_m).all():
+            raise InputError("A point of the cloud is not finite; remove such points first")
+        points_m = np.asarray(points_m, dtype=np.float64)
+        self._middle_m = np.median(points_m, axis=0)  # near it, numbers are finest
+        self._points_m = points_m - self._middle_m
+        self._normals = np.ascontiguousarray(normals, dtype=np.float64)
+        self._ids = np.sort(np.unique(points_m, axis=0, return_index=True)[1])
+        n = len(points_m)
+        self._scratch = new_scratch(n)
+        self._front = new_front(n)
+        self._radii_m: list[float] = []
+
+    @property
+    def rolled(self) -> Rolled:
+        """The triangles so far (copies)."""
+        front, count = self._front, self._front.counts[FACES]
+        return Rolled(
+            front.triangles[:count].copy(),
+            front.radius_index[:count].copy(),
+            front.centers_m[:count] + self._middle_m,
+        )
+
+    @property
+    def front_edges(self) -> IntArray:
+        """(e, 2) int32 edges that the present ball has yet to pivot about."""
+        front = self._front
+        waiting = front.queue[front.counts[HEAD] : front.counts[TAIL]]
+        waiting = waiting[front.twin[waiting] < 0]
+        return np.stack([front.triangles.reshape(-1)[waiting], front.end[waiting]], axis=1)
+
+    def roll(self, radius_m: float) -> Rolled:
+        """Go on with a ball that is larger than those before, to its end; all triangles so far.
+
+        Raises:
+            InputError: the radius is not positive, or not larger.
+        """
+        for _ in self.iterate(radius_m, batch=1 << 30):
+            pass
+        return self.rolled
+
+    def iterate(self, radius_m: float, batch: int = 2000) -> Generator[BallPivotBatch]:
+        """The same in steps of ``batch`` triangles; progress is that of this radius.
+
+        A generator closed early leaves its triangles; a larger ball can go on from there.
+
+        Raises:
+            InputError: the radius is not positive, or not larger, or the batch is not positive.
+        """
+        radius_m = self._checked(radius_m, batch)
+        self._radii_m.append(radius_m)
+        if len(self._radii_m) == 1:
+            jitter = np.random.default_rng(0).uniform(-1.0, 1.0, self._points_m.shape)
+            self._points_m += _JITTER / np.sqrt(3.0) * radius_m * jitter
+        grid = build_grid(self._points_m, self._ids, _CELL * radius_m)
+        restart(self._points_m, grid, self._front, self._scratch, radius_m)
+        done = False
+        while not done:
+            first = int(self._front.counts[FACES])
+            while not done and (count := int(self._front.counts[FACES])) < first + batch:
+                if count == len(self._front.triangles):
+                    self._front = grown(self._front)
+                done = advance(
+                    self._points_m,
+                    self._normals,
+                    grid,
+                    self._front,
+                    self._scratch,
+                    radius_m,
+                    len(self._radii_m) - 1,
+                    min(first + batch, len(self._front.triangles)),
+                )
+            yield self._batch(first, done)
+
+    def _batch(self, first: int, done: bool) -> BallPivotBatch:
+        counts = self._front.counts
+        return BallPivotBatch(
+            self._front.triangles[first : counts[FACES]].copy(),
+            self._front.centers_m[first : counts[FACES]] + self._middle_m,
+            self._radii_m[-1],
+            self.front_edges,
+            1.0 if done else min(float(counts[SETTLED] / len(self._ids)), 1.0),
+        )
+
+    def _checked(self, radius_m: float, batch: int) -> float:
+        _check_radius(radius_m)
+        if self._radii_m and not radius_m > self._radii_m[-1]:
+            raise InputError(
+                f"The next ball radius is {radius_m:.4g} m after {self._radii_m[-1]:.4g} m; take a larger one"
+            )
+        if len(self._radii_m) == _MOST_RADII:
+            raise InputError(f"There are more than {_MOST_RADII} ball radii; take fewer")
+        if batch < 1:
+            raise InputError(f"A batch has {batch} triangles; take at least 1")
+        return float(radius_m)
+
+
+def iterate_roll(
+    points_m: FloatArray, normals: FloatArray | None, radii_m: Sequence[float], batch: int = 2000
+) -> Generator[BallPivotBatch, None, Rolled]:
+    """Roll balls over an oriented cloud, the smallest first, in steps of ``batch`` triangles.
+
+    Args:
+        points_m: (N, 3).
+        normals: (N, 3) towards the outside.
+        radii_m: ascending.
+        batch: new triangles in a step at most.
+
+    Returns:
+        The whole result, at the generator's end; closing it earlier cancels.
+
+    Raises:
+        InputError: see ``Roller``; or no radius, one that is not positive, or they do not ascend.
+    """
+    radii_m = tuple(radii_m)
+    if not radii_m:
+        raise InputError("There is no ball radius; try about one to four times the point spacing")
+    for radius_m in radii_m:
+        _check_radius(radius_m)
+    roller = Roller(points_m, normals)
+    for index, radius_m in enumerate(radii_m):
+        for step in roller.iterate(radius_m, batch):
+            progress = (index + step.progress) / len(radii_m)
+            yield BallPivotBatch(
+                step.triangles, step.ball_centers_m, step.radius_m, step.front_edges, progress
+            )
+    return roller.rolled
+
+
+def roll(points_m: FloatArray, normals: FloatArray | None, radii_m: Sequence[float]) -> Rolled:
+    """``iterate_roll`` to its end."""
+    steps = iterate_roll(points_m, normals, radii_m, batch=1 << 30)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+
+
+def _check_radius(radius_m: float) -> None:
+    if not (np.isfinite(radius_m) and radius_m > 0.0):
+        raise InputError(f"A ball radius is {radius_m} m; try about one to four times the point spacing")
