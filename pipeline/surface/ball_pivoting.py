@@ -1,4 +1,4 @@
-"""A surface from a cloud by ball pivoting (Bernardini et al. 1999, SPEC 5), through Open3D."""
+"""A surface from a cloud by ball pivoting (Bernardini et al. 1999, SPEC 5)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.errors import InputError, ReconstructionError
-from pipeline.open3d_runtime import o3d
+from pipeline.surface.pivoting import roll
 from pipeline.surface.quality import measure_quality
 from pipeline.surface.radii import spacing
 from pipeline.surface.rays import Camera
-from pipeline.types import FloatArray, IntArray, PointCloud, SurfaceResult
+from pipeline.types import PointCloud, SurfaceResult
 
 
 def reconstruct_surface(
@@ -36,8 +36,8 @@ def reconstruct_surface(
         raise InputError(
             f"The ball radii are {list(radii_m)} m; try about one to four times the point spacing"
         )
-    radii_m = tuple(sorted(float(radius_m) for radius_m in radii_m))
-    triangles = _pivot(cloud.points_m, cloud.normals, radii_m)
+    radii_m = tuple(sorted({float(radius_m) for radius_m in radii_m}))
+    triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
     if not len(triangles):
         raise ReconstructionError(_why_nothing(cloud, radii_m[-1]))
     used, corners = np.unique(triangles, return_inverse=True)
@@ -49,16 +49,6 @@ def reconstruct_surface(
         radii_m=radii_m,
         quality=measure_quality(kept.points_m, triangles, cameras, len(cloud)),
     )
-
-
-def _pivot(points_m: FloatArray, normals: FloatArray, radii_m: Sequence[float]) -> IntArray:
-    """(F, 3) point indices."""
-    points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
-    points.normals = o3d.utility.Vector3dVector(normals)
-    mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(
-        points, o3d.utility.DoubleVector(radii_m)
-    )
-    return np.asarray(mesh.triangles)
 
 
 def _why_nothing(cloud: PointCloud, radius_m: float) -> str:
