@@ -45,6 +45,7 @@ $(VENV)/.uv: requirements-uv.lock
 $(VENV)/.core: $(VENV)/.uv requirements.lock pyproject.toml
 	$(BIN)/uv pip install -q --python $(BIN)/python --require-hashes -r requirements.lock
 	$(BIN)/uv pip install -q --python $(BIN)/python --no-deps --no-build-isolation -e .
+	$(BIN)/python -m pipeline.surface.pivoting  # compiles it; not at the first use
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.core requirements-dev.lock

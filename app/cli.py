@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, NoReturn
 
 import tyro
 
+from app.cli_text import answers_table, mesh_lines
 from pipeline.config import PRESETS
 from pipeline.errors import InputError, PacketMeshError
 from pipeline.settings import load_config, with_settings
@@ -168,7 +169,48 @@ def register(
     if json:
         _print_json(metrics)
     else:
-        _print_answers(metrics)
+        print(answers_table(metrics))
+
+
+def mesh(
+    cloud: Annotated[Path, tyro.conf.Positional],
+    out: Path,
+    radii_m: Literal["auto"] | tuple[float, ...] = "auto",
+    viewpoint: tuple[float, float, float] | None = None,
+    max_points: int | None = None,
+    smoothing_passes: int = 0,
+    json: bool = False,
+) -> None:
+    """Roll a ball over a point cloud: PLY, PCD, NPZ or text (XYZ, TXT, ASC, CSV), in metres, give a mesh.
+
+    Args:
+        cloud: The points, with or without normals.
+        out: The mesh: a .ply, .obj, .glb or .stl file.
+        radii_m: Radii of the ball; `auto` takes them from the distances of the points.
+        viewpoint: Where the camera was, X Y Z; normals are turned there. Without it normals stay as they
+            are, or point outwards if there are none.
+        max_points: Thin the cloud to about so many points first; all are used without it.
+        smoothing_passes: How often every point is moved onto the plane of its neighbours.
+        json: Print the quality of the mesh as one JSON object.
+    """
+    from pipeline.mesh_cloud import MeshOptions, iterate_mesh_file
+
+    if radii_m == ():
+        _wrong_use("--radii-m needs at least one radius, or auto")
+    given_m = None if radii_m == "auto" else radii_m
+    options = MeshOptions(given_m, viewpoint, max_points, smoothing_passes)
+    steps = iterate_mesh_file(cloud, out, options)
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as stop:
+            report = stop.value
+            break
+        _say(f"{progress.fraction:4.0%}  {progress.stage}")
+    if json:
+        _print_json(report)
+    else:
+        _say(mesh_lines(report))
 
 
 def reproduce(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
@@ -262,6 +304,7 @@ COMMANDS: dict[str, Any] = {
     "serve": serve,
     "reconstruct": reconstruct,
     "register": register,
+    "mesh": mesh,
     "reproduce": reproduce,
     "bench": bench,
     "scenes": scenes,
@@ -323,18 +366,6 @@ def _wrong_use(sentence: str) -> NoReturn:
 
 def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
-
-
-def _print_answers(metrics: dict[str, dict[str, Any]]) -> None:
-    """One line a method; centimetres and seconds."""
-    lengths = ["rmse_m", "average_hausdorff_m", "point_error_m"]
-    lengths = [name for name in lengths if all(name in row for row in metrics.values())]
-    headings = [f"{name.removesuffix('_m').replace('_', ' ')} cm" for name in lengths]
-    print(f"{'method':<20}" + "".join(f"{name:>22}" for name in ["iterations", "s", *headings]))
-    for method, row in metrics.items():
-        iterations = "-" if row["iterations"] is None else row["iterations"]
-        values = [f"{row['elapsed_s']:.3f}", *(f"{100.0 * row[name]:.3f}" for name in lengths)]
-        print(f"{method:<20}{iterations:>22}" + "".join(f"{value:>22}" for value in values))
 
 
 def _print_json(value: Any) -> None:

@@ -93,10 +93,11 @@ class Timeline:
 
 
 class Ticker:
-    """One thread that calls ``tick`` every ``PERIOD_S`` while running, and sleeps otherwise."""
+    """One thread that calls ``tick`` every ``period_s`` while running, and sleeps otherwise."""
 
-    def __init__(self, tick: Callable[[], None]) -> None:
+    def __init__(self, tick: Callable[[], None], period_s: float = PERIOD_S) -> None:
         self._tick = tick
+        self._period_s = period_s
         self._running = threading.Event()
         self._closed = threading.Event()
         threading.Thread(target=self._loop, name="playback", daemon=True).start()
@@ -114,5 +115,5 @@ class Ticker:
         self._running.set()
 
     def _loop(self) -> None:
-        while self._running.wait() and not self._closed.wait(PERIOD_S):
+        while self._running.wait() and not self._closed.wait(self._period_s):
             self._tick()

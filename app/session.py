@@ -59,6 +59,7 @@ class Session:
         self.folder = Path(tempfile.mkdtemp(prefix="upload-", dir=store.folder))
         self._chain = LatestWins(pool, self)
         self._side = LatestWins(pool, self)
+        self._quick = LatestWins(pool, object())
         self._running: Step | None = None
         self._submitted: tuple[Any, ...] | None = None
         self._wide = False
@@ -111,8 +112,36 @@ class Session:
                 panel.on_spec(spec)
         self.advance()
 
-    def side_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
-        """Run a job beside the chain; ``on_end`` gets its result, or None, on this thread."""
+    def side_job(
+        self,
+        job: str,
+        *arguments: Any,
+        on_end: Callable[[Any], None],
+        on_partial: Callable[[Any], None] = lambda _: None,
+    ) -> None:
+        """Run a job after the chain's, in place of the one before.
+
+        On this thread, ``on_partial`` gets what it has so far, and ``on_end`` its result or None.
+        """
+        self._run_beside(self._side, job, arguments, on_end, on_partial)
+
+    def quick_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
+        """Run a job of a fraction of a second, even beside one of the chain; of many, the latest."""
+        self._run_beside(self._quick, job, arguments, on_end, lambda _: None)
+
+    def _run_beside(
+        self,
+        lane: LatestWins,
+        job: str,
+        arguments: tuple[Any, ...],
+        on_end: Callable[[Any], None],
+        on_partial: Callable[[Any], None],
+    ) -> None:
+        def progressed(value: Any) -> None:
+            if not isinstance(value, Progress):
+                on_partial(value)
+            elif lane is self._side:
+                self._progressed(None, value)
 
         def ended(outcome: Outcome) -> None:
             if outcome.kind == "error":
@@ -120,11 +149,11 @@ class Session:
             on_end(outcome.value if outcome.kind == "result" else None)
             self._say()
 
-        self._side.submit(
+        lane.submit(
             entry.run,
             job,
             *arguments,
-            on_progress=lambda value: self.post(self._progressed, None, value),
+            on_progress=lambda value: self.post(progressed, value),
             on_end=lambda outcome: self.post(ended, outcome),
         )
 

@@ -243,5 +243,9 @@ class SurfaceResult:
     colors: ByteArray | None
     """(V, 3) RGB."""
     radii_m: tuple[float, ...]
-    """Ball radii used, ascending."""
+    """Ball radii used, ascending; none for a surface that no ball made."""
     quality: SurfaceQuality
+    normals: FloatArray | None = None
+    """(V, 3) of the points that the vertices were."""
+    source: ByteArray | None = None
+    """(V,) ``PointSource`` of those points."""

@@ -71,3 +71,11 @@ def look(clients: Iterable[viser.ClientHandle], stage: Stage, wide: bool = False
         with client.atomic():
             client.camera.position = stage.middle_m + away * (stage.viewpoint_m - stage.middle_m)
             client.camera.look_at = stage.middle_m
+
+
+def look_closely(clients: Iterable[viser.ClientHandle], center_m: FloatArray, stand_m: FloatArray) -> None:
+    """Turn every browser's view to a place, standing at another."""
+    for client in clients:
+        with client.atomic():
+            client.camera.position = stand_m
+            client.camera.look_at = center_m

@@ -14,6 +14,9 @@ HOLE = (255, 0, 255)
 """Magenta: pixels without depth in a picture."""
 NEUTRAL = (120, 130, 140)
 """Grey: frames and what is only context."""
+DISTANCE_STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
+"""Distances from zero to ``MOST_DISTANCE_M`` and beyond (viridis, dark to light)."""
+MOST_DISTANCE_M = 0.1
 BRAND = (0, 90, 140)
 """The theme's colour."""
 

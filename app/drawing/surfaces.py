@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from app.drawing.colors import LOSS
-from app.jobs.records import MeshView
+from app.jobs.records import MeshView, PaintedMesh
 from pipeline.types import FloatArray
 
 
@@ -15,27 +15,53 @@ class SurfaceDrawing:
 
     def __init__(self, scene: viser.SceneApi, below: str, label: str) -> None:
         self._scene, self._below, self._label = scene, below, label
-        self._mesh: viser.GlbHandle | None = None
+        self._meshes: list[viser.GlbHandle] = []
+        self._made = 0
         self._loops: viser.LineSegmentsHandle | None = None
+        self._loops_shown = True
         self._frame = scene.add_frame(below, show_axes=False)
 
-    def draw(self, view: MeshView) -> None:
-        """Replace what is drawn."""
-        for handle in (self._mesh, self._loops):
-            if handle is not None:
-                handle.remove()
-        self._mesh = self._loops = None
+    def draw(self, view: MeshView | PaintedMesh) -> None:
+        """Draw this one; ``drop_old`` then takes the one before away.
+
+        A browser needs some frames to read a mesh. The one before stays until then, so that the
+        surface does not blink while the radius is dragged.
+        """
+        self._made += 1
         if view.glb:
-            self._mesh = self._scene.add_glb(f"{self._below}/mesh", view.glb)
+            self._meshes.append(self._scene.add_glb(f"{self._below}/mesh-{self._made}", view.glb))
+        else:
+            self.drop_old(keep=0)
+        if self._loops is not None:
+            self._loops.remove()
+        self._loops = None
         if len(view.rims_m):
             self._loops = self._scene.add_line_segments(
-                f"{self._below}/loops", view.rims_m, np.array(LOSS), thickness=1.5, thickness_units="screen"
+                f"{self._below}/loops",
+                view.rims_m,
+                np.array(LOSS),
+                thickness=1.5,
+                thickness_units="screen",
+                visible=self._loops_shown,
             )
+
+    def drop_old(self, keep: int = 1) -> None:
+        """Remove all meshes but the last."""
+        while len(self._meshes) > keep:
+            self._meshes.pop(0).remove()
+
+    def clear(self) -> None:
+        """Draw nothing."""
+        self.drop_old(keep=0)
+        if self._loops is not None:
+            self._loops.remove()
+        self._loops = None
 
     def show(self, visible: bool, loops: bool, offset_m: FloatArray, top_m: FloatArray | None) -> None:
         """Whether and where to show it; a label at ``top_m`` tells two apart."""
         self._frame.visible = visible
         self._frame.position = offset_m
+        self._loops_shown = loops
         if self._loops is not None:
             self._loops.visible = loops
         name = f"{self._below}/label"

@@ -6,7 +6,7 @@ import functools
 import hashlib
 import time
 from collections import OrderedDict
-from collections.abc import Generator, Hashable
+from collections.abc import Generator, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from pipeline.reconstruct import (
     register_nodes,
 )
 from pipeline.scenes import load_demo
-from pipeline.surface import Camera, measure_quality, radii, reconstruct_surface, spacing
+from pipeline.surface import Camera, compare_with_truth, measure_quality, radii, reconstruct_surface, spacing
 from pipeline.types import ByteArray, DepthMap, FloatArray, PointCloud, Rig, SurfaceQuality, SurfaceResult
 
 HISTOGRAM_BINS = 60
@@ -147,8 +147,13 @@ def ball_clouds(store: Store, spec: Spec) -> Generator[Progress, None, BallCloud
         sensor, fused = merged_clouds(clouds.nodes, rig.frames, places.T_world_camera, spec.config)
         return BallClouds(sensor, fused, _spacing_view(sensor, fused))
 
-    thinning = (spec.config.surface.max_points, spec.config.surface.smoothing_passes)
-    return (yield from store.remember(("clouds", *spec.key("fuse"), *thinning), merge))
+    return (yield from store.remember(("clouds", *cloud_key(spec)), merge))
+
+
+def cloud_key(spec: Spec) -> tuple[Hashable, ...]:
+    """What the clouds that the ball rolls over depend on."""
+    surface = spec.config.surface
+    return (*spec.key("fuse"), surface.max_points, surface.smoothing_passes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,11 +178,11 @@ def rolled(store: Store, spec: Spec) -> Generator[Progress | RolledBalls, None, 
     def roll() -> Generator[Progress | RolledBalls, None, RolledBalls]:
         yield Progress("rolling the ball over the fused cloud", 0.2)
         started = time.perf_counter()
-        after = _rolled_over(clouds.fused, radii_m)
+        after = rolled_over(clouds.fused, radii_m)
         elapsed_s = time.perf_counter() - started
         yield RolledBalls(radii_m, after, None, elapsed_s)
         yield Progress("rolling the ball over the sensor cloud", 0.5)
-        before = _rolled_over(clouds.sensor, radii_m)
+        before = rolled_over(clouds.sensor, radii_m)
         yield Progress("counting the rays that miss", 0.7)
         after, before = (
             replace(
@@ -191,7 +196,7 @@ def rolled(store: Store, spec: Spec) -> Generator[Progress | RolledBalls, None, 
     return (yield from store.remember(spec.key("surface"), roll))
 
 
-def _rolled_over(cloud: PointCloud, radii_m: tuple[float, ...]) -> SurfaceResult:
+def rolled_over(cloud: PointCloud, radii_m: tuple[float, ...]) -> SurfaceResult:
     """The surface of a cloud; without a triangle if the ball falls through everywhere."""
     try:
         return reconstruct_surface(cloud, radii_m)
@@ -205,6 +210,13 @@ def cameras_of(rig: Rig, places: PlacedNodes) -> list[Camera]:
     return [
         Camera(frame.intrinsics, pose) for frame, pose in zip(rig.frames, places.T_world_camera, strict=True)
     ]
+
+
+def compared(rig: Rig, surface: SurfaceResult, cameras: Sequence[Camera]) -> dict[str, float] | None:
+    """How far a surface is from the truth, where there is one."""
+    if rig.truth is None or not len(surface.triangles):
+        return None
+    return compare_with_truth(surface.vertices_m, surface.triangles, rig.truth, cameras)
 
 
 def _spacing_view(sensor: PointCloud, fused: PointCloud) -> SpacingView:

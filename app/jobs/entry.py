@@ -10,6 +10,12 @@ JOBS = {
     "depth": "app.jobs.views:depth_job",
     "fuse": "app.jobs.views:fuse_job",
     "surface": "app.jobs.views:surface_job",
+    "paint": "app.jobs.paint:paint_job",
+    "sweep": "app.jobs.sweep:sweep_job",
+    "walk": "app.jobs.walk:walk_job",
+    "explain": "app.jobs.holes:explain_job",
+    "fill": "app.jobs.holes:fill_job",
+    "yardstick": "app.jobs.yardsticks:yardstick_job",
     "race": "app.jobs.race:race_job",
     "capture": "app.jobs.capture:capture_job",
     "export": "app.jobs.export:export_job",
@@ -23,6 +29,7 @@ def run(job: str, *arguments: Any) -> Any:
 
 
 def warm_up() -> None:
-    """Import everything heavy before the first job comes."""
+    """Import everything heavy, and load or compile the ball, before the first job comes."""
     for address in JOBS.values():
         importlib.import_module(address.partition(":")[0])
+    importlib.import_module("pipeline.surface.pivoting").compile_all()

@@ -19,6 +19,7 @@ from app.jobs.chain import (
     RolledBalls,
     ball_clouds,
     cameras_of,
+    compared,
     placed,
     prepared,
     rig_of,
@@ -26,7 +27,6 @@ from app.jobs.chain import (
 )
 from app.jobs.meshes import glb_bytes
 from app.jobs.store import Store
-from app.jobs.views import compared
 from app.reports.reconstruction import write_reconstruction_report
 from app.state import Spec
 from pipeline.io.clouds import write_cloud
@@ -118,7 +118,7 @@ def _page(balls: RolledBalls) -> str:
             extent_m = float(np.ptp(balls.after.vertices_m, axis=0).max())
             server.initial_camera.position = middle_m + extent_m * np.array([-0.4, -0.9, 0.6])
             server.initial_camera.look_at = middle_m
-            server.scene.add_glb("/surface", glb_bytes(balls.after))
+            server.scene.add_glb("/surface", glb_bytes(balls.after, balls.after.colors))
             return server.scene.as_html()
         finally:
             server.stop()

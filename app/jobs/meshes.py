@@ -7,13 +7,13 @@ import trimesh
 from trimesh.visual.color import ColorVisuals
 
 from app.jobs.records import MeshView
-from pipeline.types import FloatArray, SurfaceResult
+from pipeline.types import ByteArray, FloatArray, SurfaceResult
 
 
 def mesh_view(surface: SurfaceResult, truth: dict[str, float] | None) -> MeshView:
     """A surface with the rims of its holes, ready to be sent."""
     return MeshView(
-        glb=glb_bytes(surface),
+        glb=glb_bytes(surface, surface.colors),
         quality=surface.quality,
         rims_m=rim_segments_m(surface),
         vertices=len(surface.vertices_m),
@@ -22,13 +22,18 @@ def mesh_view(surface: SurfaceResult, truth: dict[str, float] | None) -> MeshVie
     )
 
 
-def glb_bytes(surface: SurfaceResult) -> bytes:
-    """The mesh with its vertex colours as binary glTF; empty if it has no triangle."""
+def glb_bytes(surface: SurfaceResult, colors: ByteArray | None) -> bytes:
+    """The mesh with (V, 3) vertex colours as binary glTF; empty if it has no triangle.
+
+    Without normals in it the browser would shade every triangle flat.
+    """
     if not len(surface.triangles):
         return b""
-    mesh = trimesh.Trimesh(surface.vertices_m, surface.triangles, process=False)
-    if surface.colors is not None:
-        mesh.visual = ColorVisuals(mesh, vertex_colors=surface.colors)
+    mesh = trimesh.Trimesh(
+        surface.vertices_m, surface.triangles, vertex_normals=surface.normals, process=False
+    )
+    if colors is not None:
+        mesh.visual = ColorVisuals(mesh, vertex_colors=colors)
     return mesh.export(file_type="glb", include_normals=True)
 
 

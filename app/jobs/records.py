@@ -7,6 +7,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from app.surfacewords import Coloring
 from pipeline.config import Direction, Method, Metric
 from pipeline.types import ByteArray, FloatArray, IntArray, SurfaceQuality
 
@@ -260,6 +261,10 @@ SUCCESS_M = 0.02
 """A registration that ends closer to the truth than this has succeeded (SPEC 4.7)."""
 
 
+Which = Literal["after", "before"]
+"""Fusion."""
+
+
 @dataclass(frozen=True, slots=True)
 class MeshView:
     """A surface as the browser gets it."""
@@ -289,15 +294,37 @@ class SpacingView:
 
 
 @dataclass(frozen=True, slots=True)
-class SurfaceView:
-    """The surfaces before and after fusion; while they are computed, only what is there so far."""
+class PaintWish:
+    """Surfaces to draw in certain colours; with a radius, a quick look while the ball is being chosen."""
 
-    spacing: SpacingView
-    radii_m: tuple[float, ...]
-    after: MeshView
-    before: MeshView | None
-    elapsed_s: float
-    """From the clouds to the surface after fusion."""
+    which: tuple[Which, ...]
+    coloring: Coloring
+    radius_m: float | None = None
+    """None takes the surfaces of the settings as they are."""
+
+
+@dataclass(frozen=True, slots=True)
+class PaintedMesh:
+    """One surface to draw."""
+
+    glb: bytes
+    rims_m: FloatArray
+    """(E, 2, 3) float32."""
+    triangles: int
+
+
+@dataclass(frozen=True, slots=True)
+class PaintedView:
+    """The answer to a ``PaintWish``."""
+
+    wish: PaintWish
+    meshes: dict[Which, PaintedMesh]
+    points: int
+    """That the ball rolled over, of the cloud after fusion or, if that is not shown, before."""
+    all_points: int
+    """Of the whole cloud."""
+    roll_s: float
+    """The ball alone."""
 
 
 def sample(

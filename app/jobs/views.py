@@ -11,11 +11,13 @@ from app.jobs.chain import (
     RolledBalls,
     ball_clouds,
     cameras_of,
+    compared,
     placed,
     prepared,
     rig_of,
     rolled,
 )
+from app.jobs.holes import hole_views, parts_of
 from app.jobs.meshes import mesh_view
 from app.jobs.pictures import depth_picture, depth_range_m, difference_picture
 from app.jobs.records import (
@@ -28,18 +30,18 @@ from app.jobs.records import (
     SceneNode,
     SceneView,
     SpacingView,
-    SurfaceView,
     sample,
 )
 from app.jobs.store import Store
+from app.jobs.surface_records import SurfaceView
+from app.jobs.sweep import suggest_job
 from app.state import Spec
 from pipeline import geometry
 from pipeline.acquisition import back_project
 from pipeline.progress import Progress
 from pipeline.reconstruct import NodeClouds, NodeRegistration
 from pipeline.registration import point_error_m
-from pipeline.surface import Camera, compare_with_truth
-from pipeline.types import FloatArray, PointCloud, PointSource, RgbdFrame, Rig, SurfaceResult
+from pipeline.types import FloatArray, PointCloud, PointSource, RgbdFrame, Rig
 
 SCREEN_POINTS = 60_000
 """Points of all nodes together that are sent to the screen for one kind of cloud."""
@@ -169,21 +171,31 @@ def _registration_row(
 
 
 def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, None, SurfaceView]:
-    """The surfaces; the one after fusion is yielded as soon as it is there."""
+    """The surfaces and everything about them; yielded as far as they are there."""
     rig = yield from rig_of(store, spec)
     places = yield from placed(store, spec)
     clouds = yield from ball_clouds(store, spec)
     balls = yield from _shown(rolled(store, spec), clouds.spacing)
-    if rig.truth is None:
-        return _surface_view(clouds.spacing, balls)
-    yield _surface_view(clouds.spacing, balls)
-    yield Progress("comparing with the truth", 0.9)
-    cameras = cameras_of(rig, places)
-    truth = [
-        None if surface is None else compared(rig, surface, cameras)
-        for surface in (balls.after, balls.before)
-    ]
-    return _surface_view(clouds.spacing, balls, *truth)
+    view = _surface_view(clouds.spacing, balls)
+    assert balls.before is not None
+    assert view.before is not None
+    yield view
+    if rig.truth is not None:
+        yield Progress("comparing with the truth", 0.8)
+        cameras = cameras_of(rig, places)
+        view = replace(
+            view,
+            after=replace(view.after, truth=compared(rig, balls.after, cameras)),
+            before=replace(view.before, truth=compared(rig, balls.before, cameras)),
+        )
+        yield view
+    yield Progress("looking for holes", 0.9)
+    return replace(
+        view,
+        holes={"after": hole_views(balls.after), "before": hole_views(balls.before)},
+        parts=(yield from parts_of(store, spec, balls.after)),
+        suggestions=(yield from suggest_job(store, spec)),
+    )
 
 
 def _shown(
@@ -198,21 +210,9 @@ def _shown(
         yield _surface_view(distances, said) if isinstance(said, RolledBalls) else said
 
 
-def _surface_view(
-    distances: SpacingView,
-    balls: RolledBalls,
-    truth_after: dict[str, float] | None = None,
-    truth_before: dict[str, float] | None = None,
-) -> SurfaceView:
-    before = None if balls.before is None else mesh_view(balls.before, truth_before)
-    return SurfaceView(distances, balls.radii_m, mesh_view(balls.after, truth_after), before, balls.elapsed_s)
-
-
-def compared(rig: Rig, surface: SurfaceResult, cameras: Sequence[Camera]) -> dict[str, float] | None:
-    """How far a surface is from the truth, where there is one."""
-    if rig.truth is None or not len(surface.triangles):
-        return None
-    return compare_with_truth(surface.vertices_m, surface.triangles, rig.truth, cameras)
+def _surface_view(distances: SpacingView, balls: RolledBalls) -> SurfaceView:
+    before = None if balls.before is None else mesh_view(balls.before, None)
+    return SurfaceView(distances, balls.radii_m, mesh_view(balls.after, None), before, balls.elapsed_s)
 
 
 def true_pose(rig: Rig, source: int, target: int) -> FloatArray | None:

@@ -1,14 +1,18 @@
-"""Tables and pictures of an experiment as HTML and inline SVG."""
+"""Tables and pictures of an experiment as HTML, inline SVG and inline PNG."""
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 
+import cv2
 import numpy as np
 
-from app.reports.html import table
-from pipeline.experiments.exhibits import Chart, Curve, Exhibit, HeatMap, Table
+from app.reports.html import pictures, table
+from pipeline.experiments.exhibits import Chart, Curve, Exhibit, HeatMap, Picture, Table
+from pipeline.types import ByteArray
 
 COLORS = (
     "#5b6570",
@@ -25,6 +29,7 @@ COLORS = (
 WIDTH, HEIGHT = 560, 330
 LEFT, TOP, RIGHT, BOTTOM = 52, 12, 150, 44
 CELL_PX = 54
+PICTURES_IN_A_ROW = 3
 
 
 def exhibit_html(exhibit: Exhibit) -> str:
@@ -33,6 +38,8 @@ def exhibit_html(exhibit: Exhibit) -> str:
         kind, body = "wide", _table(exhibit)
     elif isinstance(exhibit, Chart):
         kind, body = "picture", chart_svg(exhibit)
+    elif isinstance(exhibit, Picture):
+        kind, body = "wide", _images(exhibit)
     else:
         kind, body = "picture", heat_map_svg(exhibit)
     note = f'<p class="note">{escape(exhibit.note)}</p>' if exhibit.note else ""
@@ -44,19 +51,75 @@ def _table(exhibit: Table) -> str:
     return table(exhibit.header, rows)
 
 
-def chart_svg(chart: Chart) -> str:
-    """Lines with bands; the vertical axis begins at zero."""
+def _images(exhibit: Picture) -> str:
+    columns = min(PICTURES_IN_A_ROW, len(exhibit.images))
+    return pictures([_image(caption, rgb) for caption, rgb in exhibit.images], columns)
+
+
+def _image(caption: str, rgb: ByteArray) -> str:
+    """A figure whose image loses nothing, so that rays without a surface keep their one colour."""
+    _, png = cv2.imencode(".png", rgb[..., ::-1])
+    data = base64.b64encode(png.tobytes()).decode()
+    return (
+        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """From one value to another, evenly or by powers of ten."""
+
+    low: float
+    high: float
+    logarithmic: bool
+
+    def share(self, value: float) -> float:
+        """Where a value lies: 0 at the low end, 1 at the high one."""
+        if self.logarithmic:
+            return float(np.log(value / self.low) / np.log(self.high / self.low))
+        return (value - self.low) / (self.high - self.low)
+
+    def ticks(self) -> list[tuple[float, str]]:
+        """Round values with their texts."""
+        if self.logarithmic:
+            return [(value, f"{value:,g}" if value < 1e6 else f"{value:,.0f}") for value in self._powers()]
+        return [(value, f"{value:g}") for value in ticks(self.high)]
+
+    def _powers(self) -> list[float]:
+        """Powers of ten, with twos and fives between where they are few."""
+        decades = range(int(np.floor(np.log10(self.low))), int(np.ceil(np.log10(self.high))) + 1)
+        for digits in ((1,), (1, 2, 5)):
+            values = [digit * 10.0**decade for decade in decades for digit in digits]
+            values = [value for value in values if self.low <= value <= self.high]
+            if len(values) >= 3:
+                break
+        return values
+
+
+def chart_axes(chart: Chart) -> tuple[Axis, Axis]:
+    """The horizontal and the vertical axis; those that are not logarithmic begin at zero."""
     x_high = max((curve.x[-1] for curve in chart.curves), default=1.0)
     y_high = 1.05 * max((max(curve.high) for curve in chart.curves), default=1.0) or 1.0
+    x_low = y_low = 0.0
+    if chart.logarithmic:
+        x_low = min(curve.x[0] for curve in chart.curves)
+        y_low = min(min(curve.low) for curve in chart.curves) / 1.2
+    return Axis(x_low, x_high, chart.logarithmic), Axis(y_low, y_high, chart.logarithmic)
+
+
+def chart_svg(chart: Chart) -> str:
+    """Lines with bands."""
+    x_axis, y_axis = chart_axes(chart)
     width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
 
     def at(x: Sequence[float], y: Sequence[float]) -> list[str]:
         return [
-            f"{LEFT + width * a / x_high:.1f},{TOP + height * (1.0 - b / y_high):.1f}"
+            f"{LEFT + width * x_axis.share(a):.1f},{TOP + height * (1.0 - y_axis.share(b)):.1f}"
             for a, b in zip(x, y, strict=True)
         ]
 
-    parts = [_axes(chart, x_high, y_high)]
+    parts = [_axes(chart, x_axis, y_axis)]
     for row, curve in enumerate(chart.curves):
         color = COLORS[row % len(COLORS)]
         band = at(curve.x, curve.high) + at(curve.x, curve.low)[::-1]
@@ -103,18 +166,18 @@ def heat_map_svg(heat_map: HeatMap) -> str:
     return _svg(width, height, heat_map.title, "".join(parts))
 
 
-def _axes(chart: Chart, x_high: float, y_high: float) -> str:
+def _axes(chart: Chart, x_axis: Axis, y_axis: Axis) -> str:
     width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
     parts = []
-    for value in ticks(y_high):
-        y = TOP + height * (1.0 - value / y_high)
+    for value, text in y_axis.ticks():
+        y = TOP + height * (1.0 - y_axis.share(value))
         parts.append(
             f'<line x1="{LEFT}" x2="{LEFT + width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#8884"/>'
-            f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
+            f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{text}</text>'
         )
-    for value in ticks(x_high):
-        x = LEFT + width * value / x_high
-        parts.append(f'<text x="{x:.1f}" y="{TOP + height + 16}" text-anchor="middle">{value:g}</text>')
+    for value, text in x_axis.ticks():
+        x = LEFT + width * x_axis.share(value)
+        parts.append(f'<text x="{x:.1f}" y="{TOP + height + 16}" text-anchor="middle">{text}</text>')
     parts.append(
         f'<text x="{LEFT + width / 2}" y="{HEIGHT - 8}" text-anchor="middle">{escape(chart.x_label)}</text>'
         f'<text transform="translate(14 {TOP + height / 2}) rotate(-90)" text-anchor="middle">'

@@ -10,9 +10,9 @@ from typing import Any
 
 from app.jobs.pictures import depth_picture, depth_range_m
 from app.reports.html import picture, pictures, table, write_page
-from app.reports.pictures import mesh_picture
 from pipeline.reconstruct import Reconstruction
 from pipeline.surface import Camera
+from pipeline.surface.pictures import mesh_picture
 
 QUALITY_ROWS = (
     ("no_hit_ray_share", "camera rays that miss the surface (%)", 100.0),

@@ -11,12 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.errors import InputError
-from pipeline.experiments import holes, outliers
+from pipeline.experiments import outliers
 from pipeline.experiments.claim import Claim, Verdict
 from pipeline.experiments.registration.claims import CLAIMS as REGISTRATION_CLAIMS
+from pipeline.experiments.surface import CLAIMS as SURFACE_CLAIMS
 from pipeline.progress import Progress
 
-CLAIMS: dict[str, Claim] = {claim.id: claim for claim in (outliers.C10, *REGISTRATION_CLAIMS, holes.C22)}
+CLAIMS: dict[str, Claim] = {
+    claim.id: claim for claim in (outliers.C10, *REGISTRATION_CLAIMS, *SURFACE_CLAIMS)
+}
 
 
 def run_experiments(only: Iterable[str] = (), folder: Path | None = None) -> Iterator[Progress | Verdict]:

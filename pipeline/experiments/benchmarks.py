@@ -30,6 +30,8 @@ class Benchmark:
     """The same of the peers, where each has a process of its own."""
     errors_m: dict[str, float] = field(default_factory=dict)
     """How wrong the answers are, ours and the peers', where the truth is known."""
+    runs: tuple[dict[str, Any], ...] = ()
+    """Every single measurement, with what the case alone measures."""
 
     def record(self) -> dict[str, Any]:
         """Plain values; ``ratio`` is our time over the fastest peer's, ``ratios`` over every one's."""
@@ -64,11 +66,28 @@ def _registration(peers_thinned: bool) -> Benchmark:
     return Benchmark(peers_s.pop(OURS), peers_s, memory.pop(OURS), memory, result.point_error_m)
 
 
+def _surface() -> Benchmark:
+    """Ball pivoting of about 50,000 points; the times are those of all four balls together."""
+    from pipeline.experiments.surface_speed import HEADLINE, OURS, ROOM, measure_speed
+
+    runs = tuple(measure_speed())
+    chosen = {run.program: run for run in runs if run.cloud == ROOM and run.balls == HEADLINE}
+    ours = chosen.pop(OURS)
+    return Benchmark(
+        ours.elapsed_s,
+        {name: run.elapsed_s for name, run in chosen.items()},
+        ours.peak_memory_bytes,
+        {name: run.peak_memory_bytes for name, run in chosen.items()},
+        runs=tuple(asdict(run) for run in runs),
+    )
+
+
 CASES: dict[str, Callable[[], Benchmark]] = {
     "reconstruct one 640x480 pair": partial(_chain, 1),
     "reconstruct a rig of three": partial(_chain, 3),
     "registration": partial(_registration, peers_thinned=False),
     "registration, peers thinned like ours": partial(_registration, peers_thinned=True),
+    "surface": _surface,
 }
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pipeline.experiments.exhibits import Exhibit
+from pipeline.experiments.exhibits import Exhibit, exhibit_record
 from pipeline.progress import Progress
 from pipeline.types import FloatArray
 
@@ -46,7 +46,8 @@ class Verdict:
 
     def record(self) -> dict[str, Any]:
         """The verdict as plain values."""
-        return asdict(self)
+        exhibits = [exhibit_record(exhibit) for exhibit in self.exhibits]
+        return asdict(replace(self, exhibits=())) | {"exhibits": exhibits}
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from pipeline.types import ByteArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +39,8 @@ class Chart:
     y_label: str
     curves: tuple[Curve, ...]
     note: str = ""
+    logarithmic: bool = False
+    """Both axes; all values are positive then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,4 +57,25 @@ class HeatMap:
     note: str = ""
 
 
-Exhibit = Table | Chart | HeatMap
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Images side by side."""
+
+    title: str
+    images: tuple[tuple[str, ByteArray], ...]
+    """Each a caption and (H, W, 3) RGB."""
+    note: str = ""
+
+
+Exhibit = Table | Chart | HeatMap | Picture
+
+
+def exhibit_record(exhibit: Exhibit) -> dict[str, Any]:
+    """An exhibit as plain values; of images only their captions and sizes."""
+    if not isinstance(exhibit, Picture):
+        return asdict(exhibit)
+    images = [
+        {"caption": caption, "width_px": rgb.shape[1], "height_px": rgb.shape[0]}
+        for caption, rgb in exhibit.images
+    ]
+    return {"title": exhibit.title, "images": images, "note": exhibit.note}

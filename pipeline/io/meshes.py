@@ -1,4 +1,4 @@
-"""Triangle meshes as PLY, GLB and OBJ files."""
+"""Triangle meshes as PLY, GLB, OBJ and STL files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.io.atomic import atomic_path
 from pipeline.io.limits import MAX_GEOMETRY_BYTES, read_bytes
 from pipeline.types import ByteArray, FloatArray, IntArray
 
-MESH_SUFFIXES = (".ply", ".glb", ".obj")
+MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")
 _T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.zeros(3))
 """glTF has y up and the world frame z; the file's root node carries this rotation."""
 
@@ -40,7 +40,7 @@ def write_mesh(
     """Write a mesh in the format of the suffix.
 
     Args:
-        path: ends in .ply (binary), .glb or .obj.
+        path: ends in .ply (binary), .glb, .obj or .stl (binary, which has no place for colours).
         vertices_m: (V, 3), Z up.
         triangles: (F, 3).
         colors: (V, 3) RGB or None.
@@ -48,7 +48,7 @@ def write_mesh(
     Raises:
         InputError: another suffix, no triangle, or a folder that cannot be written.
     """
-    suffix = _suffix(path)
+    suffix = mesh_suffix(path)
     if not len(triangles):
         raise InputError(f"There is no triangle to write into {path}; try a larger ball radius")
     mesh = trimesh.Trimesh(vertices_m, triangles, vertex_colors=colors, process=False)
@@ -62,12 +62,14 @@ def write_mesh(
 
 
 def read_mesh(path: AnyPath) -> Mesh:
-    """The triangles of a PLY, GLB or OBJ file, everything in it joined to one mesh, Z up.
+    """The triangles of a PLY, GLB, OBJ or STL file, everything in it joined to one mesh, Z up.
+
+    STL repeats a vertex for each of its triangles; equal ones are joined again.
 
     Raises:
         InputError: missing, damaged, too large, of another format or without triangles.
     """
-    suffix = _suffix(path)
+    suffix = mesh_suffix(path)
     data = read_bytes(path, MAX_GEOMETRY_BYTES, "mesh")
     try:
         loaded = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
@@ -76,6 +78,9 @@ def read_mesh(path: AnyPath) -> Mesh:
         mesh = loaded.to_mesh()
         triangles = np.asarray(mesh.faces, dtype=np.int32)
         vertices_m = np.asarray(mesh.vertices, dtype=np.float64)
+        if suffix == ".stl":
+            vertices_m, rows = np.unique(vertices_m, axis=0, return_inverse=True)
+            triangles = rows.reshape(-1)[triangles].astype(np.int32)
     except Exception:  # a parser fails on damaged data in more ways than can be listed
         raise InputError(f"The mesh {path} is truncated or damaged; try to copy or export it again") from None
     if not len(triangles) or not np.isfinite(vertices_m).all():
@@ -85,7 +90,12 @@ def read_mesh(path: AnyPath) -> Mesh:
     return Mesh(vertices_m, triangles, colors)
 
 
-def _suffix(path: AnyPath) -> str:
+def mesh_suffix(path: AnyPath) -> str:
+    """The suffix of a mesh's name, in small letters.
+
+    Raises:
+        InputError: none of ``MESH_SUFFIXES``.
+    """
     suffix = Path(path).suffix.lower()
     if suffix not in MESH_SUFFIXES:
         raise InputError(f"{path} is no name for a mesh; try one that ends in {', '.join(MESH_SUFFIXES)}")

@@ -7,13 +7,14 @@ from pipeline.surface.quality import measure_quality
 from pipeline.surface.radii import nearest_distances_m, radii, spacing
 from pipeline.surface.rays import Camera, hit_depth
 from pipeline.surface.smooth import smooth
-from pipeline.surface.truth import compare_with_truth
+from pipeline.surface.truth import compare_with_truth, distances_to_truth_m
 from pipeline.surface.voxel import voxel_average, voxel_for_count
 
 __all__ = [
     "Camera",
     "boundary_loops",
     "compare_with_truth",
+    "distances_to_truth_m",
     "estimate_normals",
     "hit_depth",
     "measure_quality",

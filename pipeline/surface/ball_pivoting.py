@@ -48,6 +48,8 @@ def reconstruct_surface(
         colors=kept.colors,
         radii_m=radii_m,
         quality=measure_quality(kept.points_m, triangles, cameras, len(cloud)),
+        normals=kept.normals,
+        source=kept.source,
     )
 
 

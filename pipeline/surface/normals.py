@@ -1,14 +1,24 @@
-"""Normals of a cloud seen from one place."""
+"""Normals of a cloud: from its points, and turned to one side."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
+from scipy.spatial import cKDTree
 
 from pipeline.errors import InputError
 from pipeline.open3d_runtime import o3d
-from pipeline.types import FloatArray, PointCloud
+from pipeline.types import FloatArray, IntArray, PointCloud
+
+GRAPH_NEIGHBOURS = 10
+"""Neighbours of a point that it can get its side from."""
+_LEAST_WEIGHT = 1e-6
+"""An edge of weight zero would be no edge."""
+_FLAT = 0.02
+"""A part whose volume is a smaller share of what it could be has no outside."""
 
 
 def estimate_normals(cloud: PointCloud, viewpoint_m: FloatArray, neighbours: int = 20) -> PointCloud:
@@ -22,11 +32,123 @@ def estimate_normals(cloud: PointCloud, viewpoint_m: FloatArray, neighbours: int
     Raises:
         InputError: fewer than three points or neighbours.
     """
+    return turned_to_viewpoint(_with_normals(cloud, neighbours), viewpoint_m)
+
+
+def oriented_normals(
+    cloud: PointCloud, viewpoint_m: FloatArray | None = None, neighbours: int = 20
+) -> PointCloud:
+    """``cloud`` with unit normals that point to the viewpoint, or consistently outwards without one.
+
+    Without a viewpoint, neighbours agree along a minimum spanning tree of their tangent planes (Hoppe et
+    al. 1992), and each connected part is turned so that it encloses a positive volume. A flat part
+    has no outside; its normals point up, or along x or y if it stands.
+
+    Args:
+        cloud: at least three points.
+        viewpoint_m: (3,) the observing camera, in the cloud's frame.
+        neighbours: how many points, itself included, make a point's tangent plane.
+
+    Raises:
+        InputError: fewer than three points or neighbours.
+    """
+    middle_m = np.median(cloud.points_m, axis=0) if len(cloud) else np.zeros(3)
+    near = PointCloud(cloud.points_m - middle_m)  # the principal components lose digits far away
+    if viewpoint_m is not None:
+        return replace(cloud, normals=estimate_normals(near, viewpoint_m - middle_m, neighbours).normals)
+    near = _with_normals(near, neighbours)
+    assert near.normals is not None
+    return replace(cloud, normals=_turned_outwards(near.points_m, near.normals))
+
+
+def turned_to_viewpoint(cloud: PointCloud, viewpoint_m: FloatArray) -> PointCloud:
+    """``cloud`` with the normals it has, those turned round that point away from the viewpoint.
+
+    Raises:
+        InputError: a viewpoint that is not three finite numbers.
+    """
+    viewpoint_m = np.asarray(viewpoint_m, dtype=np.float64)
+    if viewpoint_m.shape != (3,) or not np.isfinite(viewpoint_m).all():
+        raise InputError(f"The viewpoint is {viewpoint_m.tolist()} m; try three finite numbers X Y Z")
+    assert cloud.normals is not None
+    away = np.einsum("ni,ni->n", cloud.normals, viewpoint_m - cloud.points_m) < 0.0
+    return replace(cloud, normals=np.where(away[:, None], -cloud.normals, cloud.normals))
+
+
+def _with_normals(cloud: PointCloud, neighbours: int) -> PointCloud:
+    """Unit normals of either sign."""
     if min(len(cloud), neighbours) < 3:
         raise InputError(
             f"Normals need at least 3 points and 3 neighbours, not {len(cloud)} and {neighbours}; try more"
         )
     points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
     points.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(neighbours))
-    points.orient_normals_towards_camera_location(np.asarray(viewpoint_m, dtype=np.float64))
     return replace(cloud, normals=np.array(points.normals))
+
+
+def _turned_outwards(points_m: FloatArray, normals: FloatArray) -> FloatArray:
+    """(N, 3) normals, neighbours alike and every connected part outwards."""
+    count = min(GRAPH_NEIGHBOURS + 1, len(points_m))
+    distances_m, rows = cKDTree(points_m).query(points_m, k=count, workers=-1)
+    normals = normals * _agreeing_signs(normals, rows[:, 1:])[:, None]
+    ends = np.repeat(np.arange(len(rows)), count - 1), rows[:, 1:].reshape(-1)
+    graph = coo_matrix((np.ones(len(ends[0]), np.int8), ends), (len(rows), len(rows)))
+    part = connected_components(graph, directed=False)[1]
+    facing = _facing(points_m, normals, distances_m[:, -1] ** 2, part)
+    return normals * np.where(facing < 0.0, -1.0, 1.0)[:, None]
+
+
+def _facing(points_m: FloatArray, normals: FloatArray, areas_m2: FloatArray, part: IntArray) -> FloatArray:
+    """(N,) positive where the normals of a point's part face outwards: where its volume is positive.
+
+    Args:
+        points_m: (N, 3).
+        normals: (N, 3), consistent within each part.
+        areas_m2: (N,) of the surface around each point, up to a factor.
+        part: (N,) labels from 0.
+    """
+
+    def totals(rows: FloatArray) -> FloatArray:
+        return np.bincount(part, rows).astype(np.float64)
+
+    size = totals(np.ones(len(part)))
+    centers_m = np.stack([totals(column) / size for column in points_m.T], axis=1)
+    arms_m = points_m - centers_m[part]
+    volumes_m3 = totals(areas_m2 * np.einsum("ni,ni->n", normals, arms_m))
+    largest_m3 = totals(areas_m2 * np.linalg.norm(arms_m, axis=1))
+    sums = np.stack([totals(column) for column in normals.T], axis=1)
+    along_axis = np.take_along_axis(sums, np.abs(sums).argmax(axis=1)[:, None], axis=1)[:, 0]
+    return np.where(np.abs(volumes_m3) > _FLAT * largest_m3, volumes_m3, along_axis)[part]
+
+
+def _agreeing_signs(normals: FloatArray, neighbours: IntArray) -> FloatArray:
+    """(N,) 1 or -1 for every normal, so that those joined by the spanning tree agree.
+
+    Args:
+        normals: (N, 3) of either sign.
+        neighbours: (N, k) rows.
+    """
+    n, k = neighbours.shape
+    ends = np.repeat(np.arange(n), k), neighbours.reshape(-1)
+    turns = 1.0 - np.abs(np.einsum("nki,ni->nk", normals[neighbours], normals)).reshape(-1)
+    tree = minimum_spanning_tree(coo_matrix((np.maximum(turns, 0.0) + _LEAST_WEIGHT, ends), (n, n)).tocsr())
+    parent = _parents(tree.tocoo(), n)
+    signs = np.where(np.einsum("ni,ni->n", normals, normals[parent]) < 0.0, -1.0, 1.0)
+    while not np.array_equal(grand := parent[parent], parent):
+        signs *= signs[parent]  # the product along a path whose length doubles every time
+        parent = grand
+    return signs
+
+
+def _parents(forest: coo_matrix, n: int) -> IntArray:
+    """(n,) the next vertex on the way to the root of each vertex's tree; roots are their own."""
+    _, first = np.unique(connected_components(forest, directed=False)[1], return_index=True)
+    joint = coo_matrix(  # vertex n is a root above all roots, so that one search finds all trees
+        (
+            np.ones(forest.nnz + len(first)),
+            (np.append(forest.row, np.full(len(first), n)), np.append(forest.col, first)),
+        ),
+        (n + 1, n + 1),
+    )
+    parent = breadth_first_order(joint.tocsr(), n, directed=False)[1][:n]
+    return np.where(parent == n, np.arange(n), parent)

@@ -49,8 +49,7 @@ def compare_with_truth(
     """
     if not len(triangles):
         raise InputError("There is no triangle to compare with the truth; try a larger ball radius")
-    T_true_mesh = truth.T_world_camera[0] @ inverse(cameras[0].T_world_camera)
-    mesh_m = apply(T_true_mesh, vertices_m)
+    mesh_m = _where_it_truly_is(vertices_m, truth, cameras)
     true_cameras = [
         Camera(camera.intrinsics, T) for camera, T in zip(cameras, truth.T_world_camera, strict=True)
     ]
@@ -58,6 +57,17 @@ def compare_with_truth(
     return _surface_measures(mesh_m, triangles, truth, true_cameras, rng) | _ray_measures(
         mesh_m, triangles, truth, true_cameras
     )
+
+
+def distances_to_truth_m(vertices_m: FloatArray, truth: RigTruth, cameras: Sequence[Camera]) -> FloatArray:
+    """(N,) distances of (N, 3) points to the true surface, after ``compare_with_truth``'s move."""
+    true_scene = triangle_scene(truth.vertices_m, truth.triangles)
+    return _distances_m(true_scene, _where_it_truly_is(vertices_m, truth, cameras))
+
+
+def _where_it_truly_is(vertices_m: FloatArray, truth: RigTruth, cameras: Sequence[Camera]) -> FloatArray:
+    """The points moved so that their first camera stands where it truly does."""
+    return apply(truth.T_world_camera[0] @ inverse(cameras[0].T_world_camera), vertices_m)
 
 
 def _surface_measures(

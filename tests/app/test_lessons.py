@@ -1,9 +1,11 @@
-"""Lesson files: the one that ships, and bad ones."""
+"""Lesson files, the one about the race that ships and bad ones, and the folder that shows them."""
 
 import pytest
+import viser
 
 from app.jobs.records import Race, Start
-from app.lessons import SHIPPED, read_lesson
+from app.lessonfolder import BEGIN, LessonFolder
+from app.racelesson import race_lesson
 from app.racewords import STARTS
 from pipeline.errors import InputError
 
@@ -11,16 +13,16 @@ from pipeline.errors import InputError
 def lesson(tmp_path, text):
     path = tmp_path / "lesson.md"
     path.write_text(text)
-    return read_lesson(path)
+    return race_lesson(path)
 
 
 def test_the_lesson_that_ships_has_ten_stops_with_different_titles_and_text():
-    shipped = read_lesson(SHIPPED)
+    shipped = race_lesson()
     assert shipped.title == "ICP against CEICP"
     assert len(shipped.stops) == len({stop.title for stop in shipped.stops}) == 10
     assert all("set:" not in stop.text and len(stop.text) > 100 for stop in shipped.stops)
-    assert {stop.race.mode for stop in shipped.stops} == {"nodes", "inferred"}
-    assert any(stop.in_ms for stop in shipped.stops)
+    assert {stop.look.race.mode for stop in shipped.stops} == {"nodes", "inferred"}
+    assert any(stop.look.in_ms for stop in shipped.stops)
 
 
 def test_a_stop_sets_what_it_names_and_leaves_the_rest_at_the_default(tmp_path):
@@ -30,21 +32,21 @@ def test_a_stop_sets_what_it_names_and_leaves_the_rest_at_the_default(tmp_path):
         "set: holes = 30 %\nset: pairs = both\nset: axis = milliseconds\nset: position = 40\nset: lane = 2\n"
         "\nLook *here*.\n\nAnd there.\n",
     ).stops
-    assert stop.race == Race(
+    assert stop.look.race == Race(
         rivals=(("icp", "point"), ("ficp", "plane")),
         start=Start.towards(*STARTS["far off (20°, 40 cm)"], seed=0),
         noise_m=0.025,
         hole_share=0.3,
         direction="both",
     )
-    assert (stop.in_ms, stop.place, stop.lane) == (True, 40, 1)
+    assert (stop.look.in_ms, stop.look.place, stop.look.lane) == (True, 40, 1)
     assert stop.text == "Look *here*.\n\nAnd there."
 
 
 def test_a_start_in_numbers_and_the_end(tmp_path):
     (stop,) = lesson(tmp_path, "# A\n## One\nset: start = 10 deg 20 cm\nset: position = end\nx").stops
-    assert stop.race.start == Start.towards(10.0, 20.0, seed=0)
-    assert stop.place is None
+    assert stop.look.race.start == Start.towards(10.0, 20.0, seed=0)
+    assert stop.look.place is None
 
 
 @pytest.mark.parametrize(
@@ -73,4 +75,35 @@ def test_a_missing_or_binary_lesson_is_one_sentence(tmp_path):
     (tmp_path / "binary.md").write_bytes(b"\xff\xfe\x00")
     for name in ("none.md", "binary.md"):
         with pytest.raises(InputError, match=f"{name} cannot be read"):
-            read_lesson(tmp_path / name)
+            race_lesson(tmp_path / name)
+
+
+def test_the_folder_begins_with_how_to_begin_and_goes_from_stop_to_stop():
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    shown = []
+    by_hand = []
+    folder = LessonFolder(
+        server.gui,
+        race_lesson(),
+        lambda function, *arguments: function(*arguments),
+        lambda _, action: by_hand.append(action),
+        shown.append,
+    )
+    stops = race_lesson().stops
+    assert folder._text.content == BEGIN
+    folder._go(-1)
+    assert shown == []
+    for _ in range(len(stops) + 2):
+        folder._go(1)
+    assert shown == [stop.look for stop in stops]
+    folder._go(-1)
+    assert shown[-1] == stops[-2].look
+    assert folder._text.content == f"**{stops[-2].title}** (9 of 10)\n\n{stops[-2].text}"
+    (picked,) = by_hand
+    folder._stop.value = folder._stop.options[1]
+    picked()
+    assert shown[-1] == stops[0].look
+    folder._stop.value = folder._stop.options[0]
+    picked()
+    assert folder._text.content == BEGIN
+    server.stop()

@@ -31,7 +31,7 @@ def test_the_rim_of_an_open_box_is_its_opening():
 def test_the_mesh_survives_the_way_to_the_browser():
     sphere = trimesh.creation.icosphere()
     colors = np.random.default_rng(0).integers(0, 255, (len(sphere.vertices), 3), dtype=np.uint8)
-    read = trimesh.load(io.BytesIO(glb_bytes(surface(sphere, colors))), file_type="glb", force="mesh")
+    read = trimesh.load(io.BytesIO(glb_bytes(surface(sphere, colors), colors)), file_type="glb", force="mesh")
     assert np.allclose(read.vertices, sphere.vertices, atol=1e-6)
     assert np.array_equal(read.faces, sphere.faces)
     assert np.array_equal(read.visual.vertex_colors[:, :3], colors)

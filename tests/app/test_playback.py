@@ -1,8 +1,10 @@
 """The timeline, driven by a fake clock."""
 
+import time
+
 import pytest
 
-from app.playback import Timeline
+from app.playback import Ticker, Timeline
 
 
 class Clock:
@@ -97,3 +99,18 @@ def test_an_empty_timeline_neither_plays_nor_moves(moves):
     timeline.seek(3)
     assert not timeline.playing
     assert moves == []
+
+
+def test_a_ticker_keeps_its_own_period_and_rests_when_told():
+    ticks = []
+    ticker = Ticker(lambda: ticks.append(time.monotonic()), period_s=0.01)
+    assert ticks == []
+    ticker.run(True)
+    time.sleep(0.3)
+    ticker.run(False)
+    time.sleep(0.03)
+    count = len(ticks)
+    assert 3 < count <= 31
+    time.sleep(0.05)
+    assert len(ticks) == count
+    ticker.close()

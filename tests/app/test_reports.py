@@ -5,10 +5,10 @@ import pytest
 
 from app.drawing.colors import HOLE
 from app.reports.html import page, picture, table
-from app.reports.pictures import mesh_picture
 from app.reports.reproduction import write_reproduction_report
 from pipeline.experiments import Verdict
 from pipeline.surface import Camera, measure_quality
+from pipeline.surface.pictures import mesh_picture
 from pipeline.types import CameraIntrinsics, SurfaceResult
 
 CAMERA = Camera(CameraIntrinsics.pinhole(50, 50, 49.5, 49.5, 100, 100), np.eye(4))

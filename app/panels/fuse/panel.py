@@ -13,14 +13,14 @@ from app.drawing.clouds import add_cloud, clear
 from app.drawing.poses import move, place
 from app.drawing.race import RaceDrawing, gizmo_pose, look_at_lanes
 from app.jobs.records import CaptureView, DepthView, FuseView, Race, RaceView, Start
-from app.lessons import Stop
+from app.lessonfolder import LessonFolder
 from app.panel import Panel
 from app.panels.fuse.capture import COMPUTE, CaptureFolder
 from app.panels.fuse.charts import RaceCharts
-from app.panels.fuse.lesson import LessonFolder
 from app.panels.fuse.numbers import places_table, race_table, verdict
 from app.panels.fuse.player import RacePlayer
 from app.panels.fuse.setup import RaceSetup
+from app.racelesson import RaceLook, race_lesson
 from app.racewords import MODES
 from app.state import Spec, Step
 from pipeline.config import Method
@@ -74,7 +74,7 @@ class FusePanel(Panel):
         self._lanes = 0
         gui.add_markdown(TEXT)
         self._single = gui.add_markdown(SINGLE, visible=False)
-        self._lesson = LessonFolder(gui, session.post, self.when_changed, self._take_stop)
+        self._lesson = LessonFolder(gui, race_lesson(), session.post, self.when_changed, self._take_stop)
         self._shown = gui.add_dropdown("Show", [*RACES, RESULT, BEFORE], hint="What the 3-D view shows.")
         self.when_changed(self._shown, self._picked_shown)
         self._setup = RaceSetup(gui, self.when_changed)
@@ -164,7 +164,7 @@ class FusePanel(Panel):
         self._arrange()
         self._stand_back()
 
-    def _take_stop(self, stop: Stop) -> None:
+    def _take_stop(self, stop: RaceLook) -> None:
         """Set the controls as a stop of the lesson says, and race."""
         single = RACE_NAMES["nodes"] not in self._shown.options
         race = replace(stop.race, mode="inferred") if single else stop.race

@@ -206,6 +206,12 @@ def roll(points_m: FloatArray, normals: FloatArray | None, radii_m: Sequence[flo
             return end.value
 
 
+def compile_all() -> None:
+    """Have the ball compiled, which takes ten seconds once and then stays on the disk."""
+    corner_m = np.eye(3)
+    roll(corner_m, np.full((3, 3), 0.6), [1.0, 2.0])
+
+
 def _check_radius(radius_m: float) -> None:
     if not (np.isfinite(radius_m) and radius_m > 0.0):
         raise InputError(f"A ball radius is {radius_m} m; try about one to four times the point spacing")

@@ -9,8 +9,8 @@ from pipeline.errors import InputError
 from pipeline.experiments import CLAIMS, Claim, run_experiments
 from pipeline.experiments.benchmarks import run_benchmarks
 from pipeline.experiments.claim import Outcome, bootstrap_ci95
-from pipeline.experiments.holes import single_node
 from pipeline.experiments.outliers import brute_force_keep, with_gross_outliers
+from pipeline.experiments.surface.clouds import single_node
 from pipeline.scenes import load_demo
 from pipeline.types import PointCloud
 

@@ -166,13 +166,13 @@ BAD_FILES = {
         "after 1 of its 2 points",
     ),
     "mesh: missing": (lambda path: read_mesh(f"{path}.ply"), b"x", "does not exist"),
-    "mesh: unknown format": (lambda path: read_mesh(f"{path}.stl"), b"x", "no name for a mesh"),
+    "mesh: unknown format": (lambda path: read_mesh(f"{path}.off"), b"x", "no name for a mesh"),
     "cloud to .xyz": (
         lambda path: write_cloud(f"{path}.xyz", PointCloud(np.zeros((1, 3)))),
         b"x",
         "ends in .ply",
     ),
-    "mesh to .stl": (lambda path: write_mesh(f"{path}.stl", EYE[:3, :3], [[0, 1, 2]]), b"x", "ends in"),
+    "mesh to .off": (lambda path: write_mesh(f"{path}.off", EYE[:3, :3], [[0, 1, 2]]), b"x", "ends in"),
     "mesh of nothing": (
         lambda path: write_mesh(f"{path}.ply", EYE[:3, :3], np.empty((0, 3), int)),
         b"x",
@@ -212,7 +212,7 @@ def test_a_bad_file_gets_its_sentence(tmp_path, case):
     assert [p.name for p in tmp_path.iterdir()] == ([] if content is None else ["some_file"])
 
 
-@pytest.mark.parametrize("suffix", [".ply", ".glb", ".obj"])
+@pytest.mark.parametrize("suffix", [".ply", ".glb", ".obj", ".stl"])
 @pytest.mark.parametrize("damage", ["truncated", "text", "noise"])
 def test_a_damaged_mesh_gets_its_sentence(tmp_path, suffix, damage):
     path = tmp_path / f"mesh{suffix}"

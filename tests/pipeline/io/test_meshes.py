@@ -48,3 +48,14 @@ def test_a_glb_stands_upright_in_other_viewers(tmp_path):
     assert seen.bounds[1].tolist() == [1.0, 2.0, 0.0]
     data = (tmp_path / "mesh.glb").read_bytes()
     assert json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])["asset"]["version"] == "2.0"
+
+
+def test_an_stl_keeps_its_triangles_and_joins_its_vertices_but_has_no_colours(tmp_path, sphere):
+    colors = np.full((len(sphere.vertices), 3), 77, np.uint8)
+    write_mesh(tmp_path / "mesh.stl", sphere.vertices, sphere.faces, colors)
+    again = read_mesh(tmp_path / "mesh.stl")
+    assert again.colors is None
+    assert again.vertices_m.shape == sphere.vertices.shape
+    original = again._replace(vertices_m=np.asarray(sphere.vertices), triangles=np.asarray(sphere.faces))
+    assert by_position(again)[1] == by_position(original)[1]
+    assert (tmp_path / "mesh.stl").stat().st_size == 84 + 50 * len(sphere.faces)

@@ -1,17 +1,19 @@
-"""Pictures of meshes for written reports, made without a display."""
+"""Pictures of meshes by ray casting, made without a display."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from app.drawing.colors import HOLE
 from pipeline.geometry import pixel_rays
 from pipeline.surface.rays import Camera, tensor, triangle_scene
 from pipeline.types import ByteArray, SurfaceResult
 
+MISSED = (255, 0, 255)
+"""Magenta: a ray that hits nothing."""
+
 
 def mesh_picture(surface: SurfaceResult, camera: Camera, colored: bool = True) -> ByteArray:
-    """(H, W, 3) picture of a mesh from a camera; rays that hit nothing show ``HOLE``.
+    """(H, W, 3) picture of a mesh from a camera; rays that hit nothing show ``MISSED``.
 
     Args:
         colored: Use the vertex colours; without, a grey surface whose shading shows its shape.
@@ -33,6 +35,6 @@ def mesh_picture(surface: SurfaceResult, camera: Camera, colored: bool = True) -
     else:
         albedo = np.full((len(triangle), 3), 225.0)
     rgb = np.empty((*hit.shape, 3), np.uint8)
-    rgb[:] = HOLE
+    rgb[:] = MISSED
     rgb[hit] = np.clip(albedo * light, 0, 255).astype(np.uint8)
     return rgb

@@ -1,0 +1,32 @@
+"""Something to be done once it has been quiet for a while."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+
+class Delay:
+    """Calls ``action`` when ``wait_s`` have passed since the last ``restart``."""
+
+    def __init__(self, wait_s: float, action: Callable[[], None]) -> None:
+        self._wait_s, self._action = wait_s, action
+        self._timer: threading.Timer | None = None
+
+    @property
+    def pending(self) -> bool:
+        """Whether it is still to come."""
+        return self._timer is not None and self._timer.is_alive()
+
+    def restart(self) -> None:
+        """Begin to wait anew."""
+        self.cancel()
+        self._timer = threading.Timer(self._wait_s, self._action)
+        self._timer.daemon = True
+        self._timer.start()
+
+    def cancel(self) -> None:
+        """Do not do it."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = None

@@ -1,0 +1,84 @@
+"""Which surfaces stand where in the 3-D scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from app.delay import Delay
+from app.drawing.cameras import Stage
+from app.drawing.surfaces import SurfaceDrawing
+from app.jobs.records import MeshView, PaintedMesh, Which
+from app.surfacewords import AFTER, BEFORE, BOTH, YARDSTICKS
+from pipeline.types import FloatArray
+
+BLEND_S = 0.25
+"""How long a mesh stays beside its successor."""
+
+
+class SurfaceStage:
+    """The surfaces after and before fusion, and a yardstick's, of which some are shown."""
+
+    def __init__(self, scene: viser.SceneApi, post: Callable[..., None]) -> None:
+        """Draw below "/surface"; ``post`` runs a function on the session's thread."""
+        self._drawings: dict[Which, SurfaceDrawing] = {
+            "after": SurfaceDrawing(scene, "/surface/after", AFTER),
+            "before": SurfaceDrawing(scene, "/surface/before", BEFORE),
+        }
+        self._drawn: dict[Which, MeshView | PaintedMesh] = {}
+        self._yardstick = SurfaceDrawing(scene, "/surface/yardstick", "yardstick")
+        self._blend = Delay(BLEND_S, lambda: post(self._drop_old))
+        self.shown = AFTER
+        """One of ``app.surfacewords.SHOWN``."""
+        self._offset_m: FloatArray = np.zeros(3)
+
+    def close(self) -> None:
+        """End the timer."""
+        self._blend.cancel()
+
+    @property
+    def which(self) -> tuple[Which, ...]:
+        """The ball's surfaces that are shown, or that stand ready behind a yardstick."""
+        if self.shown == BOTH:
+            return ("after", "before")
+        return ("before",) if self.shown == BEFORE else ("after",)
+
+    def offset_m(self, which: Which) -> FloatArray:
+        """(3,) from the middle of the scene to a surface."""
+        return self._offset_m if which == "after" else -self._offset_m
+
+    def draw(self, which: Which, mesh: MeshView | PaintedMesh) -> None:
+        """Draw one of the ball's surfaces, if it is not drawn already."""
+        if which not in self._drawn or self._drawn[which].glb != mesh.glb:
+            self._drawings[which].draw(mesh)
+            self._drawn[which] = mesh
+            self._blend.restart()
+
+    def draw_yardstick(self, mesh: MeshView | None) -> None:
+        """Draw a yardstick's surface, or none."""
+        self._yardstick.clear()
+        if mesh is not None:
+            self._yardstick.draw(mesh)
+
+    def arrange(self, place: Stage | None, loops: bool, hidden: bool) -> None:
+        """Show what is to be shown, two side by side.
+
+        Args:
+            place: where the scene is; None before there is one.
+            loops: whether the rims of holes are drawn.
+            hidden: whether something else is watched instead.
+        """
+        both = self.shown == BOTH and place is not None
+        self._offset_m = 0.55 * place.width_m * place.right if both and place is not None else np.zeros(3)
+        top_m = place.top_m if both and place is not None else None
+        yardstick = self.shown in YARDSTICKS
+        for which, drawing in self._drawings.items():
+            visible = which in self.which and not hidden and not yardstick
+            drawing.show(visible, loops, self.offset_m(which), top_m)
+        self._yardstick.show(yardstick and not hidden, loops, np.zeros(3), None)
+
+    def _drop_old(self) -> None:
+        for drawing in self._drawings.values():
+            drawing.drop_old()

@@ -1,0 +1,49 @@
+"""One node's clouds as the ball of a chain meets them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from pipeline.config import PipelineConfig
+from pipeline.depth import DepthNetwork
+from pipeline.reconstruct import merged_clouds, prepare_node
+from pipeline.surface import Camera, spacing
+from pipeline.types import DepthMap, PointCloud, Rig, RigTruth
+
+CHAINS = {"thesis": "the thesis's union", "packetmesh": "filling only the holes"}
+"""The presets, and what each does with the inferred points."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChainClouds:
+    """Sensor and fused cloud of one node at its true pose."""
+
+    name: str
+    sensor: PointCloud
+    fused: PointCloud
+    r_F_m: float
+    """Mean nearest-neighbour distance of the fused cloud."""
+    sigma_D_m: float
+    """Its standard deviation."""
+    camera: Camera
+    true_depth: DepthMap
+
+
+def single_node(rig: Rig, index: int) -> Rig:
+    """Node ``index`` of a rig with known truth as a rig of its own, the thesis's set-up."""
+    assert rig.truth is not None
+    pose = rig.truth.T_world_camera[index]
+    frame = replace(rig.frames[index], T_world_camera=pose)
+    truth = RigTruth(rig.truth.vertices_m, rig.truth.triangles, (pose,), (rig.truth.depth[index],))
+    return Rig(f"{rig.name}/{frame.name}", (frame,), truth)
+
+
+def chain_clouds(rig: Rig, index: int, config: PipelineConfig, network: DepthNetwork) -> ChainClouds:
+    """Node ``index`` of a rig with known truth by a chain, up to the ball."""
+    alone = single_node(rig, index)
+    assert alone.truth is not None
+    frame = alone.frames[0]
+    node = prepare_node(frame, config, network)
+    sensor, fused = merged_clouds([node], alone.frames, [frame.T_world_camera], config)
+    camera = Camera(frame.intrinsics, frame.T_world_camera)
+    return ChainClouds(alone.name, sensor, fused, *spacing(fused.points_m), camera, alone.truth.depth[0])

@@ -1,0 +1,181 @@
+"""Closing holes without any measurement: the smallest skin over each loop.
+
+Open3D's ``fill_holes`` chooses loops by a radius, closes rims too and faces its triangles inward.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.surface.holes import find_holes
+from pipeline.surface.quality import measure_quality
+from pipeline.surface.rays import triangle_areas_m2
+from pipeline.surface.truth import sample_surface
+from pipeline.types import BoolArray, FloatArray, IntArray, SurfaceResult
+
+MOST_VERTICES = 256
+"""Loops with more vertices stay open: the triangulation's time grows with their third power."""
+_TIE = 1e-6
+"""Weight of a chord's squared length beside the area: among equal areas, short chords win."""
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Filled:
+    """A surface with its small holes closed."""
+
+    surface: SurfaceResult
+    """The old triangles first, in their order; quality without cameras."""
+    filled: BoolArray
+    """(F,) True for the triangles that no ball made."""
+    holes: int
+    """How many were closed."""
+    area_m2: float
+    """Of the new triangles."""
+
+
+def fill_holes(surface: SurfaceResult, longest_m: float) -> Filled:
+    """Span the triangulation of least area over every hole whose loop is short enough.
+
+    Rims and islands stay, as do loops of more than 256 vertices and those over which every skin would
+    need an edge that the mesh has already: filling leaves no edge with more than two faces, and all
+    triangles anticlockwise from outside.
+
+    Args:
+        surface: a mesh whose triangles agree in their orientation.
+        longest_m: length of the longest loop to close.
+
+    Raises:
+        InputError: ``longest_m`` is not positive.
+    """
+    if not longest_m > 0.0:
+        raise InputError(f"The longest hole to fill is {longest_m} m; try a positive length, for example 0.2")
+    count = len(surface.vertices_m)
+    edges = set((surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2) @ [count, 1]).tolist())
+    patches: list[IntArray] = []
+    left = 0
+    for hole in find_holes(surface.vertices_m, surface.triangles):
+        if hole.rim or hole.island or hole.length_m > longest_m:
+            continue
+        patch = _patch(surface.vertices_m, hole.loop, edges)
+        if patch is None:
+            left += 1
+            continue
+        patches.append(patch)
+        edges.update((patch[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2) @ [count, 1]).tolist())
+    if left:
+        _log.info("%d holes stay open: too many vertices, or no skin without a doubled edge", left)
+    new = np.concatenate([np.empty((0, 3), surface.triangles.dtype), *patches])
+    triangles = np.concatenate([surface.triangles, new]).astype(surface.triangles.dtype)
+    quality = measure_quality(surface.vertices_m, triangles, [], count + surface.quality.unused_points)
+    return Filled(
+        surface=replace(surface, triangles=triangles, quality=quality),
+        filled=np.arange(len(triangles)) >= len(surface.triangles),
+        holes=len(patches),
+        area_m2=float(triangle_areas_m2(surface.vertices_m, new).sum()),
+    )
+
+
+def least_area(corners_m: FloatArray, allowed: BoolArray | None = None) -> IntArray | None:
+    """The triangulation of a closed polygon in space that has the least area (Barequet and Sharir 1995).
+
+    Dynamic programming over the polygon's pieces, O(L^3) in time and O(L^2) in memory.
+
+    Args:
+        corners_m: (L, 3), at least three.
+        allowed: (L, L) symmetric; False where no chord may lie between two corners that are no neighbours.
+
+    Returns:
+        (L - 2, 3) indices of corners in the polygon's direction; None if the chords do not suffice.
+    """
+    count = len(corners_m)
+    cost = np.zeros((count, count))
+    split = np.zeros((count, count), dtype=np.int64)
+    chord_m2 = _TIE * np.sum((corners_m[:, None] - corners_m[None]) ** 2, axis=2)
+    if allowed is not None:
+        chord_m2 = np.where(allowed, chord_m2, np.inf)
+    for span in range(2, count):
+        start = np.arange(count - span)[:, None]
+        end, middle = start + span, start + np.arange(1, span)
+        a, b, c = corners_m[start], corners_m[middle], corners_m[end]
+        area_m2 = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=2)
+        total = area_m2 + cost[start, middle] + cost[middle, end]
+        best = np.argmin(total, axis=1)
+        first, last = start[:, 0], end[:, 0]
+        split[first, last] = middle[first, best]
+        cost[first, last] = total[first, best] + (chord_m2[first, last] if span < count - 1 else 0.0)
+    if not np.isfinite(cost[0, -1]):
+        return None
+    return _unfolded(split)
+
+
+def skin_points_m(corners_m: FloatArray, count: int) -> FloatArray:
+    """Points on the smallest skin over a loop: drawn by area, and the centres of its widest gaps.
+
+    Args:
+        corners_m: (L, 3) of the loop; beyond 256, the skin is a fan from their mean.
+        count: how many to draw.
+
+    Returns:
+        (count + K, 3); the corners themselves where the loop has no area.
+    """
+    skin = least_area(corners_m) if len(corners_m) <= MOST_VERTICES else None
+    if skin is None:
+        around = np.arange(len(corners_m))
+        skin = np.stack([around, np.roll(around, -1), np.full(len(around), len(around))], axis=1)
+        corners_m = np.concatenate([corners_m, corners_m.mean(axis=0, keepdims=True)])
+    if not triangle_areas_m2(corners_m, skin).sum() > 0.0:
+        return corners_m
+    drawn_m = sample_surface(corners_m, skin, count, np.random.default_rng(0))
+    return np.concatenate([drawn_m, _circumcenters_m(*corners_m[skin].swapaxes(0, 1))])
+
+
+def _circumcenters_m(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """(K, 3) circumcentres of those of (F, 3) triangles that contain theirs."""
+    sides_m2 = np.stack([np.sum((p - q) ** 2, axis=1) for p, q in ((b, c), (c, a), (a, b))], axis=1)
+    weights = sides_m2 * (sides_m2.sum(axis=1, keepdims=True) - 2.0 * sides_m2)
+    inside = np.all(weights >= 0.0, axis=1) & np.any(weights > 0.0, axis=1)
+    weights = weights[inside] / weights[inside].sum(axis=1, keepdims=True)
+    return np.einsum("fk,kfi->fi", weights, np.stack([a, b, c])[:, inside])
+
+
+def _unfolded(split: IntArray) -> IntArray:
+    """The triangles of the pieces that the whole polygon was split into."""
+    pieces, triangles = [(0, len(split) - 1)], []
+    while pieces:
+        start, end = pieces.pop()
+        if end - start > 1:
+            middle = int(split[start, end])
+            triangles.append((start, middle, end))
+            pieces += [(start, middle), (middle, end)]
+    return np.array(triangles)
+
+
+def _patch(vertices_m: FloatArray, loop: IntArray, edges: set[int]) -> IntArray | None:
+    """(L - 2, 3) triangles that close a loop; None if it must stay open.
+
+    Args:
+        vertices_m: (V, 3).
+        loop: (L,) vertex indices in the direction of the mesh's own edges.
+        edges: V * start + end of every directed edge of the mesh.
+    """
+    polygon = loop[::-1].astype(np.int64)
+    if not 3 <= len(polygon) <= MOST_VERTICES:
+        return None
+    taken = _taken(polygon[:, None], polygon[None], len(vertices_m), edges)
+    step = np.arange(len(polygon)), np.roll(np.arange(len(polygon)), -1)
+    if np.any(taken[step]) or not np.all(taken.T[step]):
+        return None  # a trail that does not close, where triangles disagree in their orientation
+    triangles = least_area(vertices_m[polygon], ~(taken | taken.T))
+    return None if triangles is None else polygon[triangles]
+
+
+def _taken(start: IntArray, end: IntArray, count: int, edges: set[int]) -> BoolArray:
+    """Whether the mesh has the directed edge, for all pairs."""
+    keys = start * count + end
+    return np.array([key in edges for key in keys.ravel().tolist()]).reshape(keys.shape)

@@ -1,0 +1,162 @@
+"""The loops at which a mesh ends, one by one: holes, and the rims around its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from pipeline.surface.boundary import (
+    LONGEST_HOLE_M,
+    boundary_loops,
+    connected_parts,
+    edges_and_faces,
+    loop_measures,
+)
+from pipeline.types import BoolArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """One closed loop of edges with one face each."""
+
+    loop: IntArray
+    """(L,) vertex indices, the first not repeated; a hole's are clockwise seen from outside."""
+    length_m: float
+    area_m2: float
+    """Of the fan of triangles from the loop's first vertex."""
+    center_m: FloatArray
+    """(3,) mean of the loop's edges by their length."""
+    rim: bool
+    """True where the surface ends: the longest loop of a connected part, or one of 1 m or more."""
+    island: bool = False
+    """True for another loop that runs around a piece, which hangs on its part by a point: nothing is to be
+    closed inside it."""
+
+
+def find_holes(vertices_m: FloatArray, triangles: IntArray) -> tuple[Hole, ...]:
+    """All boundary loops of a mesh: the holes, the largest area first, then the rims, the longest first.
+
+    The areas of those that are no rim add up to ``hole_area_m2``.
+
+    Args:
+        vertices_m: (V, 3).
+        triangles: (F, 3).
+    """
+    loops = boundary_loops(triangles)
+    if not loops:
+        return ()
+    lengths_m, areas_m2 = loop_measures(vertices_m, loops)
+    parts = connected_parts(edges_and_faces(triangles)[0], len(vertices_m))
+    rims = _rims(lengths_m, parts[[loop[0] for loop in loops]])
+    edges, first = _edges_of(loops)
+    islands = _run_around(vertices_m, triangles, edges, first) & ~rims
+    centers_m = _centers_m(vertices_m[edges], first)
+    order = np.lexsort((np.where(rims, -lengths_m, -areas_m2), rims))
+    return tuple(
+        Hole(
+            loops[index],
+            float(lengths_m[index]),
+            float(areas_m2[index]),
+            centers_m[index],
+            bool(rims[index]),
+            bool(islands[index]),
+        )
+        for index in order
+    )
+
+
+def _edges_of(loops: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
+    """(E, 2) edges of all loops, and (L,) where each loop's begin."""
+    sizes = np.array([len(loop) for loop in loops])
+    first = np.cumsum(sizes) - sizes
+    starts = np.concatenate(loops)
+    following = np.arange(len(starts)) + 1
+    following[first + sizes - 1] = first
+    return np.stack([starts, starts[following]], axis=1), first
+
+
+def _rims(lengths_m: FloatArray, part: IntArray) -> BoolArray:
+    """(L,) True for loops that are no holes, as ``hole_area_m2`` tells them apart."""
+    order = np.lexsort((lengths_m, part))
+    rims = lengths_m >= LONGEST_HOLE_M
+    rims[order[np.append(part[order][1:] != part[order][:-1], True)]] = True
+    return rims
+
+
+def _run_around(vertices_m: FloatArray, triangles: IntArray, edges: IntArray, first: IntArray) -> BoolArray:
+    """(L,) True for loops that run anticlockwise about the mean normal of the triangles along them."""
+    apex_m = np.repeat(vertices_m[edges[first, 0]], np.diff(first, append=len(edges)), axis=0)
+    starts_m, ends_m = vertices_m[edges].swapaxes(0, 1)
+    enclosed = np.add.reduceat(np.cross(starts_m - apex_m, ends_m - apex_m), first, axis=0)
+    face = half_edges(triangles, edges) // 3
+    a, b, c = vertices_m[triangles[face]].swapaxes(0, 1)
+    normals = np.cross(b - a, c - a) * (face >= 0)[:, None]
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    return np.sum(enclosed * np.add.reduceat(normals, first, axis=0), axis=1) > 0.0
+
+
+def half_edges(triangles: IntArray, edges: IntArray) -> IntArray:
+    """(E,) where each directed edge is in a mesh: 3 t + k leads from corner k of triangle t to the next.
+
+    Args:
+        triangles: (F, 3).
+        edges: (E, 2) vertex indices.
+
+    Returns:
+        -1 for an edge that no triangle has in this direction.
+    """
+    if not len(triangles):
+        return np.full(len(edges), -1)
+    count = int(max(triangles.max(), edges.max(initial=0))) + 1
+    keys = (triangles.astype(np.int64) * count + np.roll(triangles, -1, axis=1)).ravel()
+    wanted = edges.astype(np.int64) @ [count, 1]
+    order = np.argsort(keys)
+    found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(order) - 1)]
+    return np.where(keys[found] == wanted, found, -1)
+
+
+def is_closed(triangles: IntArray, added: BoolArray, loop: IntArray) -> bool:
+    """Whether new triangles closed a loop without a remainder.
+
+    Every edge of the loop must have its second triangle; and of the patches of new triangles that hang
+    together by edges, those at the loop must have no edge with one face.
+
+    Args:
+        triangles: (F, 3) of the mesh with the new ones.
+        added: (F,) True for the new ones.
+        loop: (L, 2) edges, directed as in the old triangles along them.
+    """
+    back = half_edges(triangles, loop[:, ::-1])
+    if np.any(back < 0):
+        return False
+    reverse = np.stack([np.roll(triangles, -1, axis=1).ravel(), triangles.ravel()], axis=1)
+    twin = half_edges(triangles, reverse) // 3
+    face = np.arange(len(twin)) // 3
+    joined = (twin >= 0) & added[face] & added[twin]
+    graph = coo_matrix((np.ones(joined.sum()), (face[joined], twin[joined])), 2 * (len(added),))
+    patch = connected_components(graph, directed=False)[1]
+    at_loop = np.unique(patch[back // 3][added[back // 3]])
+    return not np.any((twin < 0) & added[face] & np.isin(patch[face], at_loop))
+
+
+def beyond_m(vertices_m: FloatArray, triangles: IntArray, edges: IntArray, distance_m: float) -> FloatArray:
+    """(E, 3) points at a distance from (E, 2) directed edges, in their triangles' planes but outside them."""
+    half = half_edges(triangles, edges)
+    opposite_m = vertices_m[triangles[half // 3, (half % 3 + 2) % 3]]
+    a, b = vertices_m[edges].swapaxes(0, 1)
+    along = (b - a) / np.maximum(np.linalg.norm(b - a, axis=1, keepdims=True), 1e-12)
+    out = a - opposite_m
+    out -= np.sum(out * along, axis=1, keepdims=True) * along
+    out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
+    return 0.5 * (a + b) + distance_m * out
+
+
+def _centers_m(ends_m: FloatArray, first: IntArray) -> FloatArray:
+    """(L, 3) means of the loops' (E, 2, 3) edges by their length."""
+    weights = np.maximum(np.linalg.norm(ends_m[:, 1] - ends_m[:, 0], axis=1), 1e-12)
+    sums = np.add.reduceat(ends_m.mean(axis=1) * weights[:, None], first, axis=0)
+    return sums / np.add.reduceat(weights, first)[:, None]

@@ -1,0 +1,194 @@
+"""What the cameras' pixel rays meet: a surface that was measured, one that was inferred, or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.geometry import apply, inverse, pixel_rays, project, undistorted_rays
+from pipeline.open3d_runtime import o3d
+from pipeline.surface.rays import Camera, first_hits, tensor, triangle_scene
+from pipeline.types import BoolArray, FloatArray, IntArray, PointSource, SurfaceResult
+
+_FOLDED = 1e-3
+"""A pixel whose ray misses its point by more than this (z = 1) is an artefact of the distortion."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What one camera knows of its pixels."""
+
+    camera: Camera
+    sensor_valid: BoolArray
+    """(H, W) True where the sensor measured a depth."""
+    inferred_valid: BoolArray | None
+    """(H, W) True where the network's depth is known; None if it was not asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class RayParts:
+    """Shares of all pixel rays; they add up to 1, and all are NaN without a view."""
+
+    on_sensor: float
+    """Rays that meet a triangle of the sensor's points."""
+    on_inferred: float
+    """Rays that meet a triangle most of whose corners were inferred."""
+    missed_measured: float
+    """Rays that meet nothing though the sensor measured there."""
+    missed_inferred: float
+    """Rays that meet nothing where only the network knows a depth."""
+    missed_unknown: float
+    """Rays that meet nothing where nobody knows a depth."""
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What all cameras together know of some places; NaN without views."""
+
+    outside_share: float
+    """Share of the places that are in no camera's image."""
+    hidden_share: float
+    """Share of the places that are in images, but behind the surface in all of them."""
+    past_share: float
+    """Share of the places past which a camera sees the surface farther away."""
+    sensor_share: float
+    """Share of the pixels, in all cameras that see the places, where the sensor measured."""
+    inferred_share: float
+    """Share of those where only the network's depth is known."""
+    unknown_share: float
+    """Share of those where neither is."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Sight:
+    """How one camera sees some points beside a surface."""
+
+    in_image: BoolArray
+    """(N,)."""
+    hidden: BoolArray
+    """(N,) True where the surface stands before the point."""
+    past: BoolArray
+    """(N,) True where the camera looks past the point onto a surface farther away."""
+    pixels: IntArray
+    """(N, 2) u, v of the nearest pixel; (0, 0) outside the image."""
+
+
+def ray_parts(surface: SurfaceResult, views: Sequence[View]) -> RayParts:
+    """Sort the pixel rays of all views by what they meet, and those that meet nothing by who knows more.
+
+    Raises:
+        InputError: a mask that does not have its camera's image size.
+    """
+    if not views:
+        return RayParts(*5 * [float("nan")])
+    scene = triangle_scene(surface.vertices_m, surface.triangles)
+    inferred = _inferred_triangles(surface)
+    counts = np.zeros(5)
+    for view in views:
+        sensor, network = _known_pixels(view)
+        triangle = _first_triangles(scene, view.camera)
+        hit = triangle < len(inferred)
+        on_inferred = np.zeros(hit.shape, dtype=bool)
+        on_inferred[hit] = inferred[triangle[hit]]
+        counts += [
+            np.count_nonzero(part)
+            for part in (
+                hit & ~on_inferred,
+                on_inferred,
+                ~hit & sensor,
+                ~hit & ~sensor & network,
+                ~hit & ~sensor & ~network,
+            )
+        ]
+    return RayParts(*(counts / counts.sum()).tolist())
+
+
+def known_there(points_m: FloatArray, surface: SurfaceResult, views: Sequence[View], slack_m: float) -> Known:
+    """What cameras know of (N, 3) places in or beside a surface.
+
+    Args:
+        points_m: (N, 3).
+        surface: what may stand before them or behind them.
+        views: of all cameras.
+        slack_m: what the surface does within this distance of a place does not count.
+
+    Raises:
+        InputError: a mask that does not have its camera's image size.
+    """
+    if not views:
+        return Known(*6 * [float("nan")])
+    scene = triangle_scene(surface.vertices_m, surface.triangles)
+    in_image, visible, past = np.zeros((3, len(points_m)), dtype=bool)
+    counts = np.zeros(3)
+    for view in views:
+        seen = _sight(points_m, scene, view.camera, slack_m)
+        in_image |= seen.in_image
+        visible |= seen.in_image & ~seen.hidden
+        past |= seen.past
+        sensor, network = _known_pixels(view)
+        u, v = np.unique(seen.pixels[seen.in_image & ~seen.hidden], axis=0).T
+        measured = sensor[v, u]
+        inferred = network[v, u] & ~measured
+        counts += [measured.sum(), inferred.sum(), np.sum(~measured & ~inferred)]
+    shares = counts / counts.sum() if counts.any() else np.full(3, np.nan)
+    outside, hidden = ~in_image, in_image & ~visible
+    return Known(float(outside.mean()), float(hidden.mean()), float(past.mean()), *shares.tolist())
+
+
+def _known_pixels(view: View) -> tuple[BoolArray, BoolArray]:
+    """(H, W) where the sensor measured, and where the network's depth is known.
+
+    Raises:
+        InputError: a mask that does not have the camera's image size.
+    """
+    intrinsics = view.camera.intrinsics
+    size = (intrinsics.height_px, intrinsics.width_px)
+    network = np.zeros(size, dtype=bool) if view.inferred_valid is None else view.inferred_valid
+    for mask in (view.sensor_valid, network):
+        if mask.shape != size:
+            raise InputError(
+                f"A mask of known pixels has the shape {mask.shape} and the camera's image {size}; "
+                "take the depth image of that camera"
+            )
+    return view.sensor_valid, network
+
+
+def _sight(
+    points_m: FloatArray, scene: o3d.t.geometry.RaycastingScene, camera: Camera, slack_m: float
+) -> _Sight:
+    """How a camera sees (N, 3) points; what the surface does within ``slack_m`` of them does not count."""
+    in_camera_m = apply(inverse(camera.T_world_camera), points_m)
+    in_image = in_camera_m[:, 2] > slack_m
+    pixels = np.zeros((len(points_m), 2), dtype=np.int64)
+    uv = project(camera.intrinsics, in_camera_m[in_image])
+    size_px = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
+    inside = np.all((uv > -0.5) & (uv < size_px - 0.5), axis=1)
+    rays = undistorted_rays(camera.intrinsics, uv[inside])
+    wanted = in_camera_m[in_image][inside]
+    inside[inside] = np.all(np.abs(rays - wanted / wanted[:, 2:]) < _FOLDED, axis=1)
+    pixels[np.flatnonzero(in_image)[inside]] = np.rint(uv[inside])
+    in_image[in_image] = inside
+    eye_m = camera.T_world_camera[:3, 3]
+    sight_m = points_m - eye_m
+    distance_m = np.maximum(np.linalg.norm(sight_m, axis=1), 1e-9)
+    hit_m = first_hits(scene, np.broadcast_to(eye_m, sight_m.shape), sight_m / distance_m[:, None])
+    past = np.isfinite(hit_m) & (hit_m > distance_m + slack_m)
+    return _Sight(in_image, in_image & (hit_m < distance_m - slack_m), in_image & past, pixels)
+
+
+def _inferred_triangles(surface: SurfaceResult) -> BoolArray:
+    """(F,) True where two or three of the corners were inferred."""
+    if surface.source is None:
+        return np.zeros(len(surface.triangles), dtype=bool)
+    return np.sum(surface.source[surface.triangles] == PointSource.INFERRED, axis=1) >= 2
+
+
+def _first_triangles(scene: o3d.t.geometry.RaycastingScene, camera: Camera) -> IntArray:
+    """(H, W) triangle that each pixel's ray meets first; a number beyond all triangles for none."""
+    directions = pixel_rays(camera.intrinsics) @ camera.T_world_camera[:3, :3].T
+    origins_m = np.broadcast_to(camera.T_world_camera[:3, 3], directions.shape)
+    rays = np.concatenate([origins_m, directions], axis=-1)
+    return scene.cast_rays(tensor(rays, np.float32))["primitive_ids"].numpy()

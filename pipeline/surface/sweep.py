@@ -1,0 +1,99 @@
+"""What the ball radius does: the same cloud rolled over by one ball after another, each alone."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.surface.boundary import boundary_loops, hole_area_m2
+from pipeline.surface.pivoting import compile_all, roll
+from pipeline.surface.quality import no_hit_ray_share
+from pipeline.surface.rays import Camera
+from pipeline.surface.truth import compare_with_truth
+from pipeline.types import PointCloud, RigTruth
+
+STEPS = 12
+NARROWEST, WIDEST = 0.5, 6.0
+"""Ends of a sweep, in mean nearest-neighbour distances r_F."""
+
+
+@dataclass(frozen=True, slots=True)
+class SweepPoint:
+    """The surface that one ball leaves."""
+
+    radius_m: float
+    triangles: int
+    unused_share: float
+    """Share of the points that no triangle uses."""
+    hole_area_m2: float
+    """Of the loops shorter than 1 m, without the outer loop of each part (SPEC 5)."""
+    no_hit_ray_share: float
+    """Share of the cameras' pixel rays that miss the surface; NaN without cameras."""
+    accuracy_1cm: float
+    """Share of the surface within 1 cm of the truth; NaN without truth or without a triangle."""
+    f_score_5cm: float
+    """NaN without truth or without a triangle."""
+    elapsed_s: float
+    """Of the ball alone."""
+
+
+def sweep_radii_m(r_F_m: float, others_m: Iterable[float] = ()) -> tuple[float, ...]:
+    """Twelve radii from r_F / 2 to 6 r_F in equal ratios, and others beside them, ascending.
+
+    Raises:
+        InputError: r_F is not positive.
+    """
+    if not (np.isfinite(r_F_m) and r_F_m > 0.0):
+        raise InputError(f"The point spacing r_F is {r_F_m} m, so no ball fits it; check the cloud")
+    steps_m = np.geomspace(NARROWEST * r_F_m, WIDEST * r_F_m, STEPS)
+    return tuple(np.unique([*steps_m, *others_m]).tolist())
+
+
+def iterate_sweep(
+    cloud: PointCloud,
+    radii_m: Sequence[float],
+    cameras: Sequence[Camera] = (),
+    truth: RigTruth | None = None,
+) -> Generator[SweepPoint]:
+    """Roll each ball alone over the cloud, one for each step.
+
+    Args:
+        cloud: points with normals towards the outside.
+        radii_m: in the order in which they are rolled.
+        cameras: whose rays look for the surface; with a truth, one for each of the truth's.
+        truth: what the surface is compared with.
+
+    Raises:
+        InputError: fewer than three points, no normals, a radius that is not positive, or a truth
+            without cameras.
+    """
+    if truth is not None and not cameras:
+        raise InputError("The truth is placed by the cameras and there are none; give the rig's cameras")
+    compile_all()  # or the first ball's time would hold it
+    for radius_m in radii_m:
+        yield _sweep_point(cloud, float(radius_m), cameras, truth)
+
+
+def _sweep_point(
+    cloud: PointCloud, radius_m: float, cameras: Sequence[Camera], truth: RigTruth | None
+) -> SweepPoint:
+    started = time.perf_counter()
+    triangles = roll(cloud.points_m, cloud.normals, (radius_m,)).triangles
+    elapsed_s = time.perf_counter() - started
+    measures = {"accuracy_1cm": float("nan"), "f_score_5cm": float("nan")}
+    if truth is not None and len(triangles):
+        measures = compare_with_truth(cloud.points_m, triangles, truth, cameras)
+    return SweepPoint(
+        radius_m=radius_m,
+        triangles=len(triangles),
+        unused_share=1.0 - len(np.unique(triangles)) / len(cloud),
+        hole_area_m2=hole_area_m2(cloud.points_m, triangles, boundary_loops(triangles)),
+        no_hit_ray_share=no_hit_ray_share(cloud.points_m, triangles, cameras),
+        accuracy_1cm=measures["accuracy_1cm"],
+        f_score_5cm=measures["f_score_5cm"],
+        elapsed_s=elapsed_s,
+    )

@@ -1,0 +1,157 @@
+"""The holes of a surface as the computing process tells of them."""
+
+import io
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from app.drawing.colors import HOLE
+from app.jobs.chain import ball_clouds, cameras_of, placed, prepared, rig_of, rolled
+from app.jobs.holes import explain_job, fill_job, hole_views, parts_of, views_of
+from app.jobs.store import Store
+from app.state import Source, Spec
+from pipeline.config import PipelineConfig
+from pipeline.errors import InputError
+from pipeline.surface.boundary import boundary_loops
+from pipeline.surface.hole_reasons import explain_hole
+from pipeline.surface.holes import find_holes
+
+CONFIG = PipelineConfig()
+SPEC = Spec(
+    Source(scene="box-on-table"), config=replace(CONFIG, surface=replace(CONFIG.surface, max_points=8_000))
+)
+LONGEST_CM = 60.0
+
+
+def end(job):
+    """What a job answers."""
+    while True:
+        try:
+            next(job)
+        except StopIteration as stop:
+            return stop.value
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    return Store(str(tmp_path_factory.mktemp("store")))
+
+
+@pytest.fixture(scope="module")
+def rig(store):
+    return end(rig_of(store, SPEC))
+
+
+@pytest.fixture(scope="module")
+def balls(store):
+    return end(rolled(store, SPEC))
+
+
+@pytest.fixture(scope="module")
+def holes(balls):
+    return {"after": hole_views(balls.after), "before": hole_views(balls.before)}
+
+
+@pytest.fixture(scope="module")
+def filled(store):
+    return end(fill_job(store, SPEC, LONGEST_CM))
+
+
+def polygon_length_m(loop_m):
+    return np.linalg.norm(loop_m - np.roll(loop_m, -1, axis=0), axis=1).sum()
+
+
+@pytest.mark.parametrize("which", ["after", "before"])
+def test_every_boundary_loop_is_a_hole_or_a_rim(balls, holes, which):
+    surface, views = getattr(balls, which), holes[which]
+    loops = boundary_loops(surface.triangles)
+    assert len(views) == len(loops) > 3
+    assert sum(len(view.loop_m) for view in views) == sum(map(len, loops))
+    for view in views:
+        assert view.loop_m.dtype == np.float32
+        assert view.length_m == pytest.approx(polygon_length_m(view.loop_m), rel=1e-4)
+        assert np.all(view.center_m >= view.loop_m.min(axis=0) - 1e-5)
+        assert np.all(view.center_m <= view.loop_m.max(axis=0) + 1e-5)
+    areas_m2 = [view.area_m2 for view in views if not view.rim]
+    assert areas_m2 == sorted(areas_m2, reverse=True)
+    assert sum(areas_m2) == pytest.approx(surface.quality.hole_area_m2)
+    rims = [view.rim for view in views]
+    assert rims == sorted(rims)
+    assert rims[-1]
+
+
+def test_views_say_what_each_registered_camera_knows(store, rig):
+    work, places = end(prepared(store, SPEC)), end(placed(store, SPEC))
+    views = views_of(rig, work.nodes, places)
+    assert len(views) == len(rig.frames)
+    for view, camera, frame, node in zip(views, cameras_of(rig, places), rig.frames, work.nodes, strict=True):
+        np.testing.assert_array_equal(view.camera.T_world_camera, camera.T_world_camera)
+        np.testing.assert_array_equal(view.sensor_valid, np.isfinite(frame.depth.z_m))
+        np.testing.assert_array_equal(view.inferred_valid, np.isfinite(node.alignment.depth.z_m))
+
+
+@pytest.mark.parametrize("which", ["after", "before"])
+def test_the_parts_of_all_rays_add_up_and_agree_with_the_no_hit_share(store, balls, which):
+    surface = getattr(balls, which)
+    parts = end(parts_of(store, SPEC, surface))
+    missed = parts.missed_measured + parts.missed_inferred + parts.missed_unknown
+    assert missed == pytest.approx(surface.quality.no_hit_ray_share, abs=1e-9)
+    assert parts.on_sensor + parts.on_inferred + missed == pytest.approx(1.0)
+    assert (parts.on_inferred == 0.0) == (which == "before")
+
+
+@pytest.mark.parametrize(("which", "index"), [("after", 0), ("after", 3), ("before", 0), ("before", -1)])
+def test_a_hole_is_explained_by_its_own_surface_cloud_and_cameras(store, rig, balls, which, index):
+    surface = getattr(balls, which)
+    holes = find_holes(surface.vertices_m, surface.triangles)
+    index %= len(holes)
+    clouds = end(ball_clouds(store, SPEC))
+    views = views_of(rig, end(prepared(store, SPEC)).nodes, end(placed(store, SPEC)))
+    cloud = {"after": clouds.fused, "before": clouds.sensor}[which]
+    expected = asdict(explain_hole(holes[index], surface, cloud, views))
+    answer = asdict(end(explain_job(store, SPEC, which, index)))
+    np.testing.assert_equal(answer, {"which": which, "index": index} | expected)
+
+
+def test_an_explanation_is_remembered(store, monkeypatch):
+    first = end(explain_job(store, SPEC, "after", 1))
+    monkeypatch.setattr("app.jobs.holes.explain_hole", None)
+    assert end(explain_job(store, SPEC, "after", 1)) == first
+
+
+@pytest.mark.parametrize("index", [-1, 100_000])
+def test_a_hole_that_is_not_there_is_one_sentence(store, index):
+    with pytest.raises(InputError, match=f"There is no hole {index + 1} on the surface before fusion"):
+        end(explain_job(store, SPEC, "before", index))
+
+
+def test_filling_closes_the_small_holes_and_leaves_the_rims(balls, holes, filled):
+    small = [hole for hole in holes["after"] if not hole.rim and hole.length_m <= LONGEST_CM / 100.0]
+    assert 0 < filled.holes <= len(small)
+    assert filled.mesh.triangles > len(balls.after.triangles)
+    assert filled.mesh.vertices == len(balls.after.vertices_m)
+    before, after = balls.after.quality, filled.mesh.quality
+    assert after.area_m2 == pytest.approx(before.area_m2 + filled.area_m2)
+    assert after.hole_area_m2 < before.hole_area_m2
+    assert after.no_hit_ray_share < before.no_hit_ray_share
+    assert after.unused_points == before.unused_points
+    assert len(filled.mesh.rims_m) < sum(len(hole.loop_m) for hole in holes["after"])
+    assert filled.mesh.truth is not None
+
+
+def test_what_is_invented_is_drawn_in_its_own_colour_and_nothing_else(filled):
+    mesh = trimesh.load(io.BytesIO(filled.mesh.glb), file_type="glb", force="mesh", process=False)
+    assert len(mesh.faces) == filled.mesh.triangles
+    marked = np.all(mesh.visual.vertex_colors[mesh.faces][:, :, :3] == HOLE, axis=2)
+    np.testing.assert_array_equal(marked.any(axis=1), marked.all(axis=1))
+    areas_m2 = mesh.area_faces[marked.all(axis=1)]
+    assert areas_m2.sum() == pytest.approx(filled.area_m2, rel=1e-3)
+
+
+def test_filling_nothing_changes_nothing(store, balls):
+    view = end(fill_job(store, SPEC, 0.1))
+    assert (view.holes, view.area_m2) == (0, 0.0)
+    assert view.mesh.triangles == len(balls.after.triangles)
+    assert view.mesh.quality == balls.after.quality

@@ -1,0 +1,265 @@
+"""The lesson about ball radii: what a stop sets, bad settings, and whether what it says is true."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from app.surfacelesson import SurfaceLook, surface_lesson
+from app.surfacewords import BEFORE, BOTH, POISSON
+from pipeline.config import PRESETS, SurfaceConfig
+from pipeline.depth import DepthNetwork
+from pipeline.errors import InputError
+from pipeline.reconstruct import NodeClouds, merged_clouds, prepare_node, register_nodes
+from pipeline.scenes import load_demo
+from pipeline.surface import Camera, compare_with_truth, radii, reconstruct_surface, spacing
+from pipeline.surface.quality import no_hit_ray_share
+from pipeline.surface.ray_parts import View, ray_parts
+from pipeline.surface.truth import distances_to_truth_m
+from pipeline.surface.yardsticks import poisson_surface
+from pipeline.types import FloatArray, PointCloud, PointSource, Rig, SurfaceResult
+
+pytestmark = pytest.mark.xdist_group("surface lesson")  # one worker makes the shared clouds once
+CONFIG = PRESETS["packetmesh"]
+
+
+def lesson(tmp_path, text):
+    path = tmp_path / "lesson.md"
+    path.write_text(text)
+    return surface_lesson(path)
+
+
+def test_the_lesson_that_ships_has_ten_stops_that_ask_and_answer():
+    shipped = surface_lesson()
+    assert shipped.title == "Which ball radius?"
+    assert len(shipped.stops) == len({stop.title for stop in shipped.stops}) == 10
+    assert len({stop.look for stop in shipped.stops}) == 10
+    for stop in shipped.stops:
+        assert stop.text.count("*Question:*") == stop.text.count("*Answer:*") == 1
+        assert "set:" not in stop.text
+
+
+def test_a_stop_sets_what_it_names_and_leaves_the_rest_as_the_screen_begins(tmp_path):
+    bare, full = lesson(
+        tmp_path,
+        "# A\n## One\nx\n## Two\nset: show = before fusion\nset: radii = 1.5 r_F\nset: colours = source\n"
+        "set: rims = off\nset: smoothing = 0\nset: points = 8,000\nset: watch = close up\n"
+        "set: hole = largest\nx",
+    ).stops
+    begin = SurfaceConfig()
+    assert (bare.look.rule, bare.look.smoothing_passes, bare.look.max_points) == (
+        begin.radius_rule,
+        begin.smoothing_passes,
+        begin.max_points,
+    )
+    assert bare.look == SurfaceLook()
+    assert full.look == SurfaceLook(BEFORE, "manual", 1.5, "source", False, 0, 8000, "close up", True)
+
+
+def test_a_rule_after_a_radius_forgets_the_radius(tmp_path):
+    (stop,) = lesson(tmp_path, "# A\n## One\nset: radii = 2 r_F\nset: radii = thesis\nx").stops
+    assert stop.look == SurfaceLook(rule="thesis")
+
+
+def test_all_that_can_be_shown_has_a_short_name(tmp_path):
+    names = ("side by side", "Poisson", "alpha shape", "after fusion")
+    stops = lesson(tmp_path, "# A\n" + "".join(f"## {x}\nset: show = {x}\nx\n" for x in names)).stops
+    assert [stop.look.shown.startswith(name) for stop, name in zip(stops, names, strict=True)] == 4 * [True]
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("radius = 2", "cannot set radius = 2: try one of show, radii, colours"),
+        ("show = both", "try one of after fusion, before fusion, side by side, Poisson, alpha shape"),
+        ("radii = manual", "try one of thesis+, thesis or such as '1.5 r_F'"),
+        ("radii = 0 r_F", "above 0 and at most 20 r_F"),
+        ("radii = 30 r_F", "above 0 and at most 20 r_F"),
+        ("radii = 20 mm", "such as '1.5 r_F'"),
+        ("colours = truth", "try one of the camera's colours, source, distance to the truth, normal"),
+        ("rims = red", "try one of on, off"),
+        ("smoothing = 6", "try a whole number from 0 to 5"),
+        ("smoothing = -1", "try a whole number from 0 to 5"),
+        ("points = 100", "try a whole number from 2,000 to 60,000"),
+        ("watch = fast", "try one of off, close up, whole"),
+        ("hole = 3", "try one of largest, none"),
+    ],
+)
+def test_a_bad_setting_is_one_sentence(tmp_path, setting, sentence):
+    with pytest.raises(InputError) as error:
+        lesson(tmp_path, f"# A\n## One\nset: {setting}\nx")
+    assert str(error.value).startswith("The lesson lesson.md, section 'One', cannot set ")
+    assert sentence in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@dataclass(frozen=True)
+class Room:
+    """The living room, up to what the ball rolls over."""
+
+    rig: Rig
+    nodes: tuple[NodeClouds, ...]
+    poses: tuple[FloatArray, ...]
+    sensor: PointCloud
+    fused: PointCloud
+    r_F_m: float
+    sigma_D_m: float
+
+    @property
+    def cameras(self) -> list[Camera]:
+        return [Camera(f.intrinsics, pose) for f, pose in zip(self.rig.frames, self.poses, strict=True)]
+
+    def roll(self, look: SurfaceLook, cloud: PointCloud) -> SurfaceResult:
+        """The radii are those of the fused cloud, as on the screen."""
+        if look.radius_in_r_F is not None:
+            wanted_m = (look.radius_in_r_F * self.r_F_m,)
+        else:
+            wanted_m = radii(SurfaceConfig(look.rule), self.r_F_m, self.sigma_D_m)
+        return reconstruct_surface(cloud, wanted_m, self.cameras)
+
+    def truth(self, surface: SurfaceResult) -> dict[str, float]:
+        return compare_with_truth(surface.vertices_m, surface.triangles, self.rig.truth, self.cameras)
+
+
+def clouds(rig, nodes, poses, passes):
+    config = replace(CONFIG, surface=replace(CONFIG.surface, smoothing_passes=passes))
+    sensor, fused = merged_clouds(nodes, rig.frames, poses, config)
+    return Room(rig, nodes, poses, sensor, fused, *spacing(fused.points_m))
+
+
+@pytest.fixture(scope="module")
+def room():
+    rig = load_demo("living-room")
+    network = DepthNetwork(CONFIG.depth.model)
+    nodes = tuple(prepare_node(frame, CONFIG, network) for frame in rig.frames)
+    return clouds(rig, nodes, register_nodes(rig.frames, nodes, CONFIG)[1], CONFIG.surface.smoothing_passes)
+
+
+@pytest.fixture(scope="module")
+def four_balls(room):
+    """After fusion, with the radii that the screen begins with."""
+    return room.roll(SurfaceLook(), room.fused)
+
+
+def stop_named(title):
+    (stop,) = (stop for stop in surface_lesson().stops if stop.title == title)
+    return stop.look, " ".join(stop.text.split())
+
+
+def percent(share):
+    return f"{100.0 * share:.0f} %"
+
+
+def missed(surface):
+    return surface.quality.no_hit_ray_share
+
+
+def unused(surface, cloud):
+    return surface.quality.unused_points / len(cloud)
+
+
+def test_too_small_a_ball_uses_fewer_than_one_point_in_ten(room):
+    look, text = stop_named("Too small a ball")
+    assert unused(room.roll(look, room.fused), room.fused) > 0.9
+    assert "**fewer than one point in ten**" in text
+    assert f"already need {1.0 / np.sqrt(3.0):.2f} r_F" in text
+    assert f"ball is {2.0 * look.radius_in_r_F:.1f} r_F wide" in text
+
+
+def test_r_F_uses_half_of_the_points_and_covers_a_tenth_and_the_thesis_closes_the_rest(room):
+    look, text = stop_named("A ball of r_F")
+    least = room.roll(look, room.fused)
+    assert 0.4 < unused(least, room.fused) < 0.5
+    assert 0.85 < missed(least) < 0.9
+    assert "More than half of the points" in text
+    assert "**nearly nine in ten**" in text
+    look, text = stop_named("The thesis's radii")
+    thesis = room.roll(look, room.fused)
+    largest_m = room.r_F_m + room.sigma_D_m
+    alone = reconstruct_surface(room.fused, (largest_m,), room.cameras)
+    assert f"from {percent(missed(least))} to **{percent(missed(thesis))}**" in text
+    assert f"{1000 * largest_m:.0f} mm here" in text
+    assert f"alone it leaves {percent(missed(alone))}" in text
+
+
+def test_too_large_a_ball_loses_rays_points_and_truth(room, four_balls):
+    look, text = stop_named("Too large a ball")
+    large = room.roll(look, room.fused)
+    assert f"leave {percent(missed(four_balls))} of the rays without surface" in text
+    assert f"this one {percent(missed(large))}" in text
+    assert 0.34 < unused(large, room.fused) < 0.4
+    score, best = (room.truth(surface)["f_score_5cm"] for surface in (large, four_balls))
+    assert f"*F-score* is {percent(score)} instead of {percent(best)}" in text
+    radius_m = look.radius_in_r_F * room.r_F_m
+    assert f"rests {100 * radius_m:.0f} cm away" in text
+    assert f"cuts off up to {100 * radius_m / np.sqrt(2.0):.0f} cm" in text
+
+
+def test_one_ball_after_the_other_leaves_fewer_points_than_the_largest_alone(room, four_balls):
+    text = stop_named("One ball after the other")[1]
+    largest_m = four_balls.radii_m[-1]
+    alone = reconstruct_surface(room.fused, (largest_m,), room.cameras)
+    assert percent(missed(alone)) == percent(missed(four_balls))
+    assert f"Drag the radius to {1000 * largest_m:.0f} mm" in text
+    assert f"As few rays miss, {percent(missed(alone))}" in text
+    assert f"leaves {percent(unused(alone, room.fused))} of the points unused" in text
+    assert f"the four together leave {percent(unused(four_balls, room.fused))}" in text
+
+
+def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, four_balls):
+    look, text = stop_named("Why holes stay: noise")
+    noisy = clouds(room.rig, room.nodes, room.poses, look.smoothing_passes)
+    torn = noisy.roll(look, noisy.fused)
+    assert 1.9 < missed(torn) / missed(four_balls) < 2.4
+    assert f"**Twice as many rays miss** ({percent(missed(torn))})" in text
+    assert 2.7 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 3.5
+    old_normals = room.roll(look, replace(room.fused, normals=noisy.fused.normals))
+    new_normals = noisy.roll(look, replace(noisy.fused, normals=room.fused.normals))
+    assert f"old normals close as well ({percent(missed(old_normals))})" in text
+    assert f"smoothed normals do not ({percent(missed(new_normals))})" in text
+
+
+def test_no_ball_closes_before_fusion_what_the_sensor_did_not_see(room, four_balls):
+    look, text = stop_named("Which holes no ball can close")
+    assert look.shown == BOTH
+    before = room.roll(look, room.sensor)
+    sentence = (
+        f"left **{percent(missed(before))}** of the rays miss, on the right **{percent(missed(four_balls))}**"
+    )
+    assert sentence in text
+    views = [
+        View(camera, frame.depth.valid, node.alignment.depth.valid)
+        for camera, frame, node in zip(room.cameras, room.rig.frames, room.nodes, strict=True)
+    ]
+    parts = ray_parts(before, views)
+    assert 0.75 < (parts.missed_inferred + parts.missed_unknown) / missed(before) < 0.85
+    singles = (SurfaceLook(rule="manual", radius_in_r_F=factor) for factor in (2.0, 4.0, 6.0, 8.0))
+    best = min(missed(room.roll(single, room.sensor)) for single in singles)
+    assert f"even the best radius leaves {percent(best)}" in text
+
+
+def test_what_is_guessed_is_a_quarter_and_half_of_it_is_off(room, four_balls):
+    text = stop_named("Measured or guessed?")[1]
+    guessed = four_balls.source == PointSource.INFERRED
+    a, b, c = four_balls.vertices_m[four_balls.triangles].swapaxes(0, 1)
+    area_m2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    share = area_m2[guessed[four_balls.triangles].any(axis=1)].sum() / area_m2.sum()
+    assert 0.22 < guessed.mean() < 0.28
+    assert 0.3 < share < 0.37
+    near = distances_to_truth_m(four_balls.vertices_m, room.rig.truth, room.cameras) <= 0.05
+    assert near[~guessed].mean() > 0.999
+    assert 0.45 < near[guessed].mean() < 0.55
+    before, after = (
+        room.truth(surface)["f_score_5cm"] for surface in (room.roll(SurfaceLook(), room.sensor), four_balls)
+    )
+    assert f"F-score falls from {percent(before)} to {percent(after)}" in text
+
+
+def test_poisson_closes_nearly_everything_and_is_no_better(room, four_balls):
+    look, text = stop_named("Is no hole at all better?")
+    assert look.shown == POISSON
+    poisson = poisson_surface(room.fused, room.r_F_m)
+    assert no_hit_ray_share(poisson.vertices_m, poisson.triangles, room.cameras) < 0.001
+    theirs, ours = room.truth(poisson), room.truth(four_balls)
+    assert f"F-score is {percent(theirs['f_score_5cm'])}, the ball's {percent(ours['f_score_5cm'])}" in text
+    assert theirs["accuracy_1cm"] < ours["accuracy_1cm"] - 0.03

@@ -1,0 +1,267 @@
+"""The radius advice in the app: jobs, figures, sentence and folder."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import viser
+
+from app.jobs.chain import ball_clouds
+from app.jobs.records import SpacingView
+from app.jobs.store import Store
+from app.jobs.sweep import suggest_job, sweep_job
+from app.jobs.sweep_records import SuggestionRow, SweepRow, SweepView
+from app.panels.surface.advice import STOP, STOPPED, SWEEP, WAITING, AdviceFolder, suggestions_html
+from app.plots.spacing import ADVISED, OF_THESIS, USED, spacing_figure
+from app.plots.sweep import POINTS, sweep_figure, sweep_sentence
+from app.state import Source, Spec
+from pipeline.config import PipelineConfig, SurfaceConfig
+from pipeline.progress import Progress
+
+SPEC = Spec(Source(scene="box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))
+NAN = float("nan")
+ROWS = (
+    SuggestionRow("finest", 0.0246, 0.49, "Wide enough for 50% of the surface; rolled, it closes 49%."),
+    SuggestionRow("even", 0.0312, 0.88, "Wide enough for 90% of the surface; rolled, it closes 88%."),
+)
+
+
+def run(job):
+    """All that a job says, and what it answers."""
+    said = []
+    while True:
+        try:
+            said.append(next(job))
+        except StopIteration as stop:
+            return said, stop.value
+
+
+def row(radius_mm, no_hit, accuracy=NAN, triangles=100):
+    return SweepRow(radius_mm / 1000, triangles, 0.1, 0.2, no_hit, accuracy, accuracy, 0.01)
+
+
+def swept(*rows):
+    return SweepView(rows, 0.010, 0.005, len(rows))
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    return Store(str(tmp_path_factory.mktemp("store")))
+
+
+@pytest.fixture(scope="module")
+def sweep(store):
+    return run(sweep_job(store, SPEC))
+
+
+def test_the_sweep_grows_ball_by_ball_and_ends_complete(sweep):
+    said, view = sweep
+    partial = [one for one in said if isinstance(one, SweepView)]
+    assert [len(one.points) for one in partial] == list(range(1, view.planned + 1))
+    assert [one.done for one in partial] == [False] * (view.planned - 1) + [True]
+    assert all(one.points == view.points[: len(one.points)] for one in partial)
+    assert partial[-1] == view
+    rolling = [one.fraction for one in said if isinstance(one, Progress) and one.stage.startswith("a ball")]
+    assert rolling == sorted(rolling)
+    assert len(rolling) == view.planned
+
+
+def test_the_sweep_reaches_from_half_the_spacing_to_six_and_holds_the_advice(store, sweep):
+    view = sweep[1]
+    radii_m = [one.radius_m for one in view.points]
+    assert radii_m == sorted(radii_m)
+    assert (radii_m[0], radii_m[-1]) == pytest.approx((view.r_F_m / 2, 6 * view.r_F_m))
+    _, advice = run(suggest_job(store, SPEC))
+    assert {one.radius_m for one in advice} <= set(radii_m)
+    assert len(radii_m) == 12 + len(advice)
+
+
+def test_larger_balls_leave_fewer_rays_until_they_no_longer_fit(sweep):
+    points = sweep[1].points
+    missed = [one.no_hit_ray_share for one in points]
+    best = int(np.argmin(missed))
+    assert missed[: best + 1] == sorted(missed[: best + 1], reverse=True)
+    assert missed[0] > 0.9
+    assert missed[best] < 0.5
+    for one in points:
+        assert 0.0 <= one.unused_share <= 1.0
+        assert math.isnan(one.accuracy_1cm) == (one.triangles == 0)
+
+
+def test_the_advice_is_for_the_cloud_after_fusion_and_is_kept(store):
+    _, advice = run(suggest_job(store, SPEC))
+    _, clouds = run(ball_clouds(store, SPEC))
+    assert [one.name for one in advice] == ["finest", "even", "widest"]
+    assert [one.radius_m for one in advice] == sorted(one.radius_m for one in advice)
+    assert all(clouds.spacing.r_F_m / 2 < one.radius_m < 20 * clouds.spacing.r_F_m for one in advice)
+    assert all(0.0 < one.share <= 1.0 for one in advice)
+    again, same = run(suggest_job(store, SPEC))
+    assert same == advice
+    assert again == []
+
+
+def test_the_radii_of_the_spec_do_not_matter_to_a_sweep(store, sweep):
+    surface = replace(SPEC.config.surface, radius_rule="manual", radii_m=(0.5,))
+    said, view = run(sweep_job(store, replace(SPEC, config=replace(SPEC.config, surface=surface))))
+    assert said == []
+    np.testing.assert_equal(view, sweep[1])
+
+
+def test_the_sentence_finds_where_the_rays_level_off_and_what_accuracy_does():
+    view = swept(row(5, 1.0, NAN, 0), row(10, 0.60, 0.97), row(28, 0.205, 0.93), row(60, 0.20, 0.88))
+    assert sweep_sentence(view) == (
+        "From 28 mm on, larger balls close less than 1% more of the rays (20.5% miss); "
+        "accuracy within 1 cm falls from 93 to 88 % up to 60 mm."
+    )
+    assert "rises from 80 to 88 %" in sweep_sentence(swept(row(28, 0.2, 0.80), row(60, 0.2, 0.88)))
+    assert "stays at 88 %" in sweep_sentence(swept(row(28, 0.2, 0.881), row(60, 0.2, 0.884)))
+
+
+def test_the_sentence_says_when_the_widest_balls_miss_more_again():
+    said = sweep_sentence(swept(row(10, 0.60), row(28, 0.20), row(60, 0.30)))
+    assert said == (
+        "From 28 mm on, larger balls close less than 1% more of the rays (20.0% miss); "
+        "the widest, 60 mm, misses 30.0% again."
+    )
+
+
+def test_the_sentence_without_any_triangle():
+    assert sweep_sentence(swept(row(5, 1.0, NAN, 0))) == "No ball of the sweep leaves a triangle."
+
+
+def test_the_sweep_figure_shows_all_four_curves_in_the_units_it_names(sweep):
+    view = sweep[1]
+    traces = {trace.hovertemplate: trace for trace in sweep_figure(view).data}
+    found = {
+        unit: next(trace for hover, trace in traces.items() if unit in hover)
+        for unit in ("% of rays miss", "% of the surface within 1 cm", "triangles", "ms for the ball")
+    }
+    for trace in found.values():
+        np.testing.assert_allclose(trace.x, [1000 * one.radius_m for one in view.points])
+    values = {unit: np.array(trace.y, float) for unit, trace in found.items()}
+    np.testing.assert_allclose(values["% of rays miss"], [100 * one.no_hit_ray_share for one in view.points])
+    np.testing.assert_allclose(
+        values["% of the surface within 1 cm"], [100 * one.accuracy_1cm for one in view.points]
+    )
+    np.testing.assert_allclose(values["triangles"], [one.triangles for one in view.points])
+    np.testing.assert_allclose(values["ms for the ball"], [1000 * one.elapsed_s for one in view.points])
+
+
+def test_without_truth_there_is_no_accuracy_curve():
+    figure = sweep_figure(swept(row(10, 0.6), row(28, 0.2)))
+    assert len(figure.data) == 3
+
+
+def test_the_sweep_figure_marks_the_spacing_inside_its_axis():
+    figure = sweep_figure(swept(row(5, 1.0, NAN, 0)))
+    assert [shape.x0 for shape in figure.layout.shapes] == pytest.approx([10.0, 15.0])
+    places = [note.x for note in figure.layout.annotations]
+    assert places == pytest.approx(np.log10([10.0, 15.0]).tolist())
+    low, high = figure.layout.xaxis.range
+    assert low < math.log10(5.0) < max(places) < math.log10(60.0) < high
+    assert [note.xanchor for note in figure.layout.annotations] == ["right", "left"]
+    assert len(sweep_figure(None).data) == 0
+
+
+def test_the_histogram_tells_the_radii_of_the_thesis_the_advice_and_those_in_use_apart():
+    view = SpacingView(0.010, 0.004, np.linspace(0.0, 0.03, 31), np.arange(30), 100, 200)
+    figure = spacing_figure(view, (0.013,), (0.012, 0.02, 0.03))
+    marks = {trace.name: trace for trace in figure.data if trace.type == "scatter"}
+    assert set(marks) == {USED, ADVISED, OF_THESIS}
+    np.testing.assert_allclose(marks[OF_THESIS].x, [10.0, 11.0, 12.0, 14.0])
+    np.testing.assert_allclose(marks[USED].x, [13.0])
+    np.testing.assert_allclose(marks[ADVISED].x, [12.0, 20.0, 30.0])
+    assert len({trace.y[0] for trace in marks.values()}) == 3
+    assert len({trace.marker.symbol for trace in marks.values()}) == 3
+    assert len({trace.marker.color for trace in marks.values()}) == 3
+    assert [shape.x0 for shape in figure.layout.shapes] == pytest.approx([10.0, 14.0])
+    assert [note.xanchor for note in figure.layout.annotations] == ["right", "left"]
+    assert figure.layout.yaxis.domain[1] < figure.layout.yaxis2.domain[0]
+    assert len(spacing_figure(None).data) == 0
+
+
+@pytest.fixture(scope="module")
+def server():
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def folder(server):
+    """The folder, and what it called."""
+    calls = []
+    folder = AdviceFolder(
+        server.gui,
+        lambda function, *arguments: function(*arguments),
+        lambda handle, action: handle.on_update(lambda _: action()),
+        lambda key: calls.append(key),
+        lambda radius_m: calls.append(radius_m),
+    )
+    yield folder, calls
+    server.gui.reset()
+
+
+def press(handle, value):
+    """As a person does it; viser calls the handle's actions."""
+    handle.value = value
+
+
+def test_a_suggestion_is_taken_with_its_button(folder):
+    folder, calls = folder
+    assert not folder._take.visible
+    folder.suggest(ROWS)
+    assert folder._take.visible
+    assert tuple(folder._take.options) == ("finest", "even")
+    for one in (ROWS[1], ROWS[0], ROWS[0]):
+        press(folder._take, one.name)
+    assert calls == [0.0312, 0.0246, 0.0246]
+    for said in ("finest", "24.6 mm", "49 %", "even", "31.2 mm", "88 %", ROWS[0].sentence):
+        assert said in folder._table.content
+    folder.forget()
+    press(folder._take, "even")
+    assert len(calls) == 3
+    assert not folder._take.visible
+
+
+def test_without_a_suggestion_the_folder_says_why(folder):
+    folder, _ = folder
+    folder.suggest(())
+    assert not folder._take.visible
+    assert "No point has neighbours on all sides" in folder._table.content
+    assert suggestions_html(()) == folder._table.content
+
+
+def test_the_sweep_is_asked_for_followed_and_stopped(folder):
+    folder, calls = folder
+    view = swept(row(10, 0.6), row(28, 0.2, 0.93), row(60, 0.2, 0.88))
+    press(folder._keys, SWEEP)
+    assert folder._status.content == WAITING
+    folder.load(replace(view, points=view.points[:2]))
+    assert folder._status.content == "2 of 3 balls have rolled."
+    assert len(folder._plot.figure.data[0].x) == 2
+    folder.load(view)
+    assert folder._status.content == sweep_sentence(view)
+    assert len(folder._plot.figure.data[0].x) == 3
+    press(folder._keys, SWEEP)
+    assert not folder._plot.visible
+    folder.load(replace(view, points=view.points[:1]))
+    press(folder._keys, STOP)
+    folder.load(None)
+    assert folder._status.content == STOPPED
+    assert folder._plot.visible
+    assert calls == [SWEEP, SWEEP, STOP]
+
+
+def test_the_lower_plot_can_be_chosen(folder):
+    folder, _ = folder
+    folder.load(swept(row(10, 0.6), row(28, 0.2)))
+    np.testing.assert_allclose(folder._plot.figure.data[1].y, [100, 100])
+    folder._below.value = POINTS
+    np.testing.assert_allclose(folder._plot.figure.data[1].y, [10, 10])
+    np.testing.assert_allclose(folder._plot.figure.data[2].y, [0.2, 0.2])
+    folder.forget()
+    assert not folder._below.visible
+    folder.load(None)
+    assert folder._status.content == "Stopped."

@@ -1,0 +1,288 @@
+"""The walk of the ball on the Surface screen: the record, what is drawn of it, and its player."""
+
+import contextlib
+import pickle
+import threading
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import viser
+
+from app.drawing.rolling import RollingDrawing, pieces
+from app.jobs.store import Store
+from app.jobs.walk import PATCH_POINTS, PLACES, walk_job, walk_over
+from app.jobs.walk_records import WalkWish
+from app.panels.surface.rolling import CLOSE_UP, WHOLE, RollingFolder, said
+from app.state import Source, Spec
+from app.surfacewords import BEFORE
+from pipeline.errors import ReconstructionError
+from pipeline.surface.boundary import edges_and_faces
+from pipeline.surface.pivoting import roll
+from tests.pipeline.surface.shapes import perforated_plane
+
+RADII_M = (0.016, 0.03)
+SPEC = Spec(Source(scene="box-on-table"))
+
+
+def end(job):
+    """What a job answers."""
+    while True:
+        try:
+            next(job)
+        except StopIteration as stop:
+            return stop.value
+
+
+@pytest.fixture(scope="module")
+def cloud():
+    return perforated_plane(1.0, 0.02, 0.1)
+
+
+@pytest.fixture(scope="module")
+def close_up(cloud):
+    return end(walk_over(cloud, RADII_M, WalkWish("after", True, None)))
+
+
+@pytest.fixture(scope="module")
+def whole(cloud):
+    return end(walk_over(cloud, RADII_M, WalkWish("before", False, None)))
+
+
+@pytest.fixture(scope="module")
+def server():
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+def test_a_close_up_is_a_patch_at_the_hole_in_which_every_pivot_is_a_step(close_up):
+    assert len(close_up.points_m) == PATCH_POINTS
+    assert np.linalg.norm(close_up.center_m) < 0.3
+    counts = np.diff(close_up.step_ends, prepend=0)
+    assert [close_up.happenings[step] for step in np.flatnonzero(counts == 0)] == ["end", "end"]
+    assert counts.max() == 1
+    assert close_up.happenings[0] == "seed"
+    assert close_up.places == PLACES
+    np.testing.assert_allclose(close_up.outward, [0.0, 0.0, 1.0], atol=1e-6)
+
+
+def test_between_two_rests_the_ball_touches_the_edge_it_turns_about(close_up):
+    turning = [step for step in range(close_up.steps) if close_up.pivot(step) is not None]
+    assert len(turning) == close_up.happenings.count("join") + close_up.happenings.count("glue") > 500
+    ends_m = close_up.points_m[np.stack([close_up.pivot(step) for step in turning])]
+    distances_m = np.linalg.norm(close_up.places_m[turning][:, :, None] - ends_m[:, None], axis=3)
+    radius_m = np.array(RADII_M)[close_up.step_radius[turning]]
+    np.testing.assert_allclose(distances_m, np.broadcast_to(radius_m[:, None, None], distances_m.shape), 1e-4)
+    corners_m = close_up.points_m[close_up.triangles[close_up.step_ends[turning] - 1]]
+    rest_m = np.linalg.norm(corners_m - close_up.places_m[turning, -1][:, None], axis=2)
+    np.testing.assert_allclose(rest_m, np.broadcast_to(radius_m[:, None], rest_m.shape), 1e-4)
+
+
+def test_all_points_take_some_150_to_200_steps_and_make_the_same_surface(whole, cloud):
+    assert 150 <= whole.steps <= 200
+    np.testing.assert_array_equal(whole.triangles, roll(cloud.points_m, cloud.normals, RADII_M).triangles)
+    assert whole.happenings == ()
+    assert whole.places == 1
+    assert whole.pivot(3) is None
+
+
+@pytest.mark.parametrize("name", ["close_up", "whole"])
+def test_front_and_dead_edges_are_together_the_rims_of_the_mesh(name, request):
+    view = request.getfixturevalue(name)
+    fronts = []
+    for done in range(view.steps + 1):
+        front, dead = view.open_edges(done)
+        edges, faces = edges_and_faces(view.triangles[: view.count(done)])
+        rims = sorted(map(tuple, edges[faces == 1].tolist()))
+        assert sorted(tuple(sorted(edge)) for edge in [*front.tolist(), *dead.tolist()]) == rims
+        fronts.append(len(front))
+    assert fronts[0] == fronts[-1] == 0
+    assert max(fronts) > 10
+
+
+def test_the_job_remembers_its_walk_and_looks_where_it_is_told(tmp_path):
+    store = Store(str(tmp_path))
+    view = end(walk_job(store, SPEC, WalkWish("after", True, None)))
+    assert view is end(walk_job(store, SPEC, WalkWish("after", True, None)))
+    assert len(pickle.dumps(view)) < 300_000
+    corner_m = tuple(view.points_m[0].tolist())
+    other = end(walk_job(store, SPEC, WalkWish("after", True, corner_m)))
+    assert np.linalg.norm(other.center_m - corner_m) < other.reach_m
+    sensor = end(walk_job(store, SPEC, WalkWish("before", False, None)))
+    assert sensor.wish.which == "before"
+    assert len(pickle.dumps(sensor)) < 5_000_000
+
+
+def test_a_ball_that_falls_through_is_told(cloud):
+    with pytest.raises(ReconstructionError, match="try a larger radius"):
+        end(walk_over(cloud, (0.001,), WalkWish("after", False, None)))
+
+
+# What is drawn.
+
+
+def drawn_triangles(server, below, view):
+    """(F, 3, 3) corners of all triangles that are visible, in order."""
+    handles = server.scene._handle_from_node_name
+    shown = [
+        handle.vertices[handle.faces]
+        for name in (*(f"piece{index}" for index in range(len(pieces(view)[0]))), "newest")
+        if (handle := handles[f"{below}/{name}"]).visible
+    ]
+    return np.concatenate([np.empty((0, 3, 3)), *shown])
+
+
+@pytest.mark.parametrize("name", ["close_up", "whole"])
+def test_any_step_can_be_shown_after_any_other(server, name, request):
+    view, below = request.getfixturevalue(name), f"/{name}"
+    drawing = RollingDrawing(server.scene, below, view)
+    handles = server.scene._handle_from_node_name
+    for done in [0, view.steps, 1, *np.random.default_rng(0).integers(0, view.steps + 1, 25).tolist(), 0]:
+        drawing.show(done, 0)
+        expected_m = view.points_m[view.triangles[: view.count(done)]]
+        np.testing.assert_array_equal(drawn_triangles(server, below, view), expected_m)
+        for lines, ends in zip(("front", "dead"), view.open_edges(done), strict=True):
+            handle = handles[f"{below}/{lines}"]
+            assert handle.visible == bool(len(ends))
+            if len(ends):
+                np.testing.assert_array_equal(handle.points, view.points_m[ends])
+        ball = handles[f"{below}/ball"]
+        np.testing.assert_allclose(ball.position, view.places_m[max(done - 1, 0), -1])
+        assert ball.radius == view.radii_m[view.step_radius[max(done - 1, 0)]]
+
+
+def test_on_its_way_the_ball_shows_the_edge_it_turns_about(server, close_up):
+    drawing = RollingDrawing(server.scene, "/way", close_up)
+    step = close_up.happenings.index("join")
+    drawing.show(step, 4)
+    handles = server.scene._handle_from_node_name
+    np.testing.assert_allclose(handles["/way/ball"].position, close_up.places_m[step, 3])
+    np.testing.assert_array_equal(handles["/way/pivot"].points[0], close_up.points_m[close_up.pivot(step)])
+    drawing.show(step, 0)
+    assert not handles["/way/pivot"].visible
+
+
+def test_pieces_are_about_a_hundred_and_of_one_ball_each(close_up, whole):
+    for view in (close_up, whole):
+        ends, balls = pieces(view)
+        assert 90 <= len(ends) <= 103
+        assert ends[-1] == len(view.triangles)
+        for start, last, ball in zip(np.append(0, ends[:-1]), ends, balls, strict=True):
+            steps = np.searchsorted(view.step_ends, [start, last - 1], side="right")
+            assert view.step_radius[steps].tolist() == [ball, ball]
+
+
+# The folder.
+
+
+class Room:
+    """A folder in a control panel nobody sees, with what happened to it."""
+
+    def __init__(self, server):
+        self.wishes = []
+        self.actions = {}
+        self.lock = threading.RLock()
+        self.scene = server.scene
+        before = set(server.gui._gui_input_handle_from_uuid)
+        self.folder = RollingFolder(
+            server.gui,
+            server.scene,
+            self.post,
+            lambda handle, action: self.actions.update({handle.label: action}),
+            contextlib.nullcontext,
+            self.wishes.append,
+        )
+        inputs = server.gui._gui_input_handle_from_uuid
+        self.inputs = {handle.label: handle for key, handle in inputs.items() if key not in before}
+
+    def post(self, function, *arguments):
+        """One thing after the other, as on a session's thread."""
+        with self.lock:
+            function(*arguments)
+
+    def press(self, label, value):
+        """As a click on a button of a group."""
+        for callback in self.inputs[label]._impl.update_cb:
+            callback(SimpleNamespace(target=SimpleNamespace(value=value)))
+
+    def set(self, label, value):
+        """As a change by a person."""
+        self.inputs[label].value = value
+        self.post(self.actions[label])
+
+    @property
+    def drawn(self):
+        return [name for name in self.scene._handle_from_node_name if name.startswith("/surface/rolling/")]
+
+
+@pytest.fixture
+def room(server):
+    room = Room(server)
+    yield room
+    room.folder.forget()
+    room.folder.close()
+
+
+def test_wishes_are_what_is_chosen_and_change_while_somebody_watches(room, close_up):
+    room.set("Cloud", BEFORE)
+    assert room.wishes == []
+    room.press("Ball", "Roll")
+    room.set("Watch", WHOLE)
+    assert room.wishes == [WalkWish("before", True, None), WalkWish("before", False, None)]
+    room.folder.load(close_up)
+    assert room.folder.showing
+    assert (room.inputs["Watch"].value, room.inputs["Cloud"].value) == (CLOSE_UP, "after fusion")
+    room.set("Cloud", BEFORE)
+    assert room.wishes[-1] == WalkWish("before", True, None)
+    room.press("Ball", "Close")
+    assert room.wishes[-1] is None
+    assert not room.folder.showing
+    assert room.drawn == []
+    room.set("Watch", WHOLE)
+    assert room.wishes[-1] is None
+
+
+def test_the_player_steps_scrubs_and_plays(room, close_up):
+    assert not room.inputs["Player"].visible
+    room.folder.load(close_up)
+    assert room.inputs["Player"].visible
+    assert room.inputs["Step"].max == close_up.steps
+    room.press("Player", "Step")
+    room.press("Player", "Step")
+    assert room.inputs["Step"].value == 2
+    room.press("Player", "Step back")
+    assert room.inputs["Step"].value == 1
+    room.set("Step", 200)
+    assert room.folder._said.content == said(close_up, 200)
+    room.set("Speed (1/s)", 60.0)
+    room.press("Player", "Play")
+    time.sleep(0.5)
+    room.press("Player", "Pause")
+    played = room.inputs["Step"].value
+    assert played > 205
+    time.sleep(0.2)
+    assert room.inputs["Step"].value == played
+
+
+def test_a_close_up_has_a_focus_and_the_whole_has_none(room, close_up, whole):
+    assert room.folder.focus is None
+    room.folder.load(close_up)
+    center_m, distance_m = room.folder.focus
+    np.testing.assert_array_equal(center_m, close_up.center_m)
+    assert distance_m > close_up.reach_m
+    room.folder.load(whole)
+    assert room.folder.focus is None
+    assert all("/walk2" in name for name in room.drawn)
+    room.folder.load(None)
+    assert not room.folder.showing
+
+
+def test_the_line_tells_step_triangles_front_radius_and_what_happened(close_up, whole):
+    line = said(close_up, 1)
+    assert line.startswith(f"**Step 1 of {close_up.steps}** · 1 triangles · front 3 edges · 0 found nothing")
+    assert line.endswith("ball 16.0 mm (1 of 2) · **put down on three points**")
+    assert "ball 30.0 mm (2 of 2) · **no edge is left to turn about**" in said(close_up, close_up.steps)
+    assert said(whole, whole.steps).endswith("ball 30.0 mm (2 of 2)")
+    assert said(close_up, 0).endswith("front 0 edges · 0 found nothing · ball 16.0 mm (1 of 2)")
