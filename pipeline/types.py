@@ -223,7 +223,7 @@ class SurfaceQuality:
     """Connected components of the graph of edges with exactly one face."""
     boundary_length_m: float
     hole_area_m2: float
-    """Fan-triangulated area of loops shorter than 1 m, without each component's outer loop."""
+    """Fan-triangulated area of loops shorter than 1 m, without those that run around a piece."""
     non_manifold_edges: int
     """Edges with more than two faces."""
     components: int

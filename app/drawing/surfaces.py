@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
 import viser
 
-from app.drawing.colors import LOSS
 from app.jobs.records import MeshView, PaintedMesh
 from pipeline.types import FloatArray
 
@@ -16,9 +14,9 @@ class SurfaceDrawing:
     def __init__(self, scene: viser.SceneApi, below: str, label: str) -> None:
         self._scene, self._below, self._label = scene, below, label
         self._meshes: list[viser.GlbHandle] = []
+        self._rims: list[viser.GlbHandle] = []
         self._made = 0
-        self._loops: viser.LineSegmentsHandle | None = None
-        self._loops_shown = True
+        self._rims_shown = True
         self._frame = scene.add_frame(below, show_axes=False)
 
     def draw(self, view: MeshView | PaintedMesh) -> None:
@@ -28,44 +26,39 @@ class SurfaceDrawing:
         surface does not blink while the radius is dragged.
         """
         self._made += 1
-        if view.glb:
-            self._meshes.append(self._scene.add_glb(f"{self._below}/mesh-{self._made}", view.glb))
-        else:
-            self.drop_old(keep=0)
-        if self._loops is not None:
-            self._loops.remove()
-        self._loops = None
-        if len(view.rims_m):
-            self._loops = self._scene.add_line_segments(
-                f"{self._below}/loops",
-                view.rims_m,
-                np.array(LOSS),
-                thickness=1.5,
-                thickness_units="screen",
-                visible=self._loops_shown,
-            )
+        for kind, glb, handles in (("mesh", view.glb, self._meshes), ("rims", view.rims_glb, self._rims)):
+            _shorten(handles, 1 if glb else 0)
+            if glb:
+                handles.append(self._add(f"{kind}-{self._made}", glb, kind == "mesh" or self._rims_shown))
 
-    def drop_old(self, keep: int = 1) -> None:
-        """Remove all meshes but the last."""
-        while len(self._meshes) > keep:
-            self._meshes.pop(0).remove()
+    def drop_old(self) -> None:
+        """Remove all but what was drawn last."""
+        for handles in (self._meshes, self._rims):
+            _shorten(handles, 1)
 
     def clear(self) -> None:
         """Draw nothing."""
-        self.drop_old(keep=0)
-        if self._loops is not None:
-            self._loops.remove()
-        self._loops = None
+        for handles in (self._meshes, self._rims):
+            _shorten(handles, 0)
 
-    def show(self, visible: bool, loops: bool, offset_m: FloatArray, top_m: FloatArray | None) -> None:
+    def show(self, visible: bool, rims: bool, offset_m: FloatArray, top_m: FloatArray | None) -> None:
         """Whether and where to show it; a label at ``top_m`` tells two apart."""
         self._frame.visible = visible
         self._frame.position = offset_m
-        self._loops_shown = loops
-        if self._loops is not None:
-            self._loops.visible = loops
+        self._rims_shown = rims
+        for handle in self._rims:
+            handle.visible = rims
         name = f"{self._below}/label"
         if top_m is not None:
             self._scene.add_label(name, self._label, position=top_m, anchor="bottom-center")
         elif self._scene.get_handle_by_name(name) is not None:
             self._scene.remove_by_name(name)
+
+    def _add(self, name: str, glb: bytes, visible: bool) -> viser.GlbHandle:
+        return self._scene.add_glb(f"{self._below}/{name}", glb, cast_shadow=False, visible=visible)
+
+
+def _shorten(handles: list[viser.GlbHandle], most: int) -> None:
+    """Remove the first ones."""
+    while len(handles) > most:
+        handles.pop(0).remove()

@@ -25,7 +25,7 @@ from app.jobs.chain import (
     rig_of,
     rolled,
 )
-from app.jobs.meshes import glb_bytes
+from app.jobs.meshes import surface_glb
 from app.jobs.store import Store
 from app.reports.reconstruction import write_reconstruction_report
 from app.state import Spec
@@ -118,7 +118,7 @@ def _page(balls: RolledBalls) -> str:
             extent_m = float(np.ptp(balls.after.vertices_m, axis=0).max())
             server.initial_camera.position = middle_m + extent_m * np.array([-0.4, -0.9, 0.6])
             server.initial_camera.look_at = middle_m
-            server.scene.add_glb("/surface", glb_bytes(balls.after, balls.after.colors))
+            server.scene.add_glb("/surface", surface_glb(balls.after, balls.after.colors, photographed=True))
             return server.scene.as_html()
         finally:
             server.stop()

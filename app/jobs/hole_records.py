@@ -20,7 +20,7 @@ class HoleView:
     center_m: FloatArray
     """(3,)."""
     rim: bool
-    """Whether the surface ends there instead of having a hole."""
+    """Whether the surface, or a piece that hangs on it by a point, ends there instead of having a hole."""
 
 
 @dataclass(frozen=True, slots=True)

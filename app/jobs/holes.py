@@ -20,7 +20,7 @@ from app.jobs.chain import (
     rolled,
 )
 from app.jobs.hole_records import ExplainView, FilledView, HoleView, PartsView
-from app.jobs.meshes import glb_bytes, mesh_view
+from app.jobs.meshes import mesh_view, surface_glb
 from app.jobs.records import Which
 from app.jobs.store import Store
 from app.state import Spec
@@ -43,7 +43,7 @@ def hole_views(surface: SurfaceResult) -> tuple[HoleView, ...]:
             length_m=hole.length_m,
             area_m2=hole.area_m2,
             center_m=hole.center_m,
-            rim=hole.rim,
+            rim=not hole.open,
         )
         for hole in find_holes(surface.vertices_m, surface.triangles)
     )
@@ -142,4 +142,5 @@ def _marked_glb(filled: Filled) -> bytes:
         triangles=np.concatenate([surface.triangles[~filled.filled], own]),
         normals=None if normals is None else np.concatenate([normals, normals[corners]]),
     )
-    return glb_bytes(marked, np.concatenate([known, np.tile(np.array(HOLE, np.uint8), (len(corners), 1))]))
+    invented = np.tile(np.array(HOLE, np.uint8), (len(corners), 1))
+    return surface_glb(marked, np.concatenate([known, invented]), photographed=True)

@@ -3,38 +3,58 @@
 from __future__ import annotations
 
 import numpy as np
-import trimesh
-from trimesh.visual.color import ColorVisuals
 
+from app.drawing.colors import LOSS, NEUTRAL
+from app.jobs.glb import lines_glb, mesh_glb
 from app.jobs.records import MeshView
 from pipeline.types import ByteArray, FloatArray, SurfaceResult
+
+DARKEST = {True: 0.75, False: 0.45}
+"""How dark a surface gets that turns from the light: the camera's own colours have shadows already."""
 
 
 def mesh_view(surface: SurfaceResult, truth: dict[str, float] | None) -> MeshView:
     """A surface with the rims of its holes, ready to be sent."""
     return MeshView(
-        glb=glb_bytes(surface, surface.colors),
+        glb=surface_glb(surface, surface.colors, photographed=True),
         quality=surface.quality,
-        rims_m=rim_segments_m(surface),
+        rims_glb=lines_glb(rim_segments_m(surface), LOSS),
         vertices=len(surface.vertices_m),
         triangles=len(surface.triangles),
         truth=truth,
     )
 
 
-def glb_bytes(surface: SurfaceResult, colors: ByteArray | None) -> bytes:
-    """The mesh with (V, 3) vertex colours as binary glTF; empty if it has no triangle.
+def surface_glb(surface: SurfaceResult, colors: ByteArray | None, photographed: bool) -> bytes:
+    """The mesh with (V, 3) vertex colours and light on it, as binary glTF; empty if it has no triangle.
 
-    Without normals in it the browser would shade every triangle flat.
+    Args:
+        surface: grey without colours.
+        colors: sRGB.
+        photographed: whether the colours are a camera's, which have light and shadow in them.
     """
     if not len(surface.triangles):
         return b""
-    mesh = trimesh.Trimesh(
-        surface.vertices_m, surface.triangles, vertex_normals=surface.normals, process=False
-    )
-    if colors is not None:
-        mesh.visual = ColorVisuals(mesh, vertex_colors=colors)
-    return mesh.export(file_type="glb", include_normals=True)
+    if colors is None:
+        colors, photographed = np.tile(np.array(NEUTRAL, np.uint8), (len(surface.vertices_m), 1)), False
+    normals = vertex_normals(surface)
+    light = normals.mean(axis=0)  # from where the cameras stand
+    light[2] += 0.4  # and from above
+    light /= max(float(np.linalg.norm(light)), 1e-9)
+    darkest = DARKEST[photographed]
+    shade = darkest + (1.0 - darkest) * np.clip(0.5 + 0.5 * (normals @ light), 0.0, 1.0)
+    return mesh_glb(surface.vertices_m, surface.triangles, (colors * shade[:, None]).astype(np.uint8))
+
+
+def vertex_normals(surface: SurfaceResult) -> FloatArray:
+    """(V, 3) those of the points or, where a surface has none, of the triangles around each vertex."""
+    if surface.normals is not None:
+        return surface.normals
+    a, b, c = surface.vertices_m[surface.triangles].swapaxes(0, 1)
+    normals = np.zeros_like(surface.vertices_m)
+    for corner in range(3):
+        np.add.at(normals, surface.triangles[:, corner], np.cross(b - a, c - a))
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
 def rim_segments_m(surface: SurfaceResult) -> FloatArray:

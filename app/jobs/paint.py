@@ -7,7 +7,7 @@ from collections.abc import Generator
 
 import numpy as np
 
-from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET
+from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET
 from app.jobs.chain import (
     RolledBalls,
     ball_clouds,
@@ -18,7 +18,8 @@ from app.jobs.chain import (
     rolled,
     rolled_over,
 )
-from app.jobs.meshes import glb_bytes, rim_segments_m
+from app.jobs.glb import lines_glb
+from app.jobs.meshes import rim_segments_m, surface_glb
 from app.jobs.records import PaintedMesh, PaintedView, PaintWish, Which
 from app.jobs.store import Store
 from app.state import Spec
@@ -51,7 +52,7 @@ def paint_job(
     return PaintedView(
         wish,
         {
-            name: _painted(surface, wish.coloring, rig, cameras)
+            name: _painted(surface, wish, rig, cameras)
             for name, surface in surfaces.items()
             if surface is not None and name in wish.which
         },
@@ -79,9 +80,12 @@ def _thinned(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, 
     return (yield from store.remember(("quick", *cloud_key(spec)), thin))
 
 
-def _painted(surface: SurfaceResult, coloring: Coloring, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
-    colors = vertex_colors(surface, coloring, rig, cameras)
-    return PaintedMesh(glb_bytes(surface, colors), rim_segments_m(surface), len(surface.triangles))
+def _painted(surface: SurfaceResult, wish: PaintWish, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
+    """The rims come when the radius rests: in software, drawing them takes as long as all triangles."""
+    colors = vertex_colors(surface, wish.coloring, rig, cameras)
+    glb = surface_glb(surface, colors, photographed=wish.coloring == "color")
+    rims_glb = b"" if wish.radius_m is not None else lines_glb(rim_segments_m(surface), LOSS)
+    return PaintedMesh(glb, rims_glb, len(surface.triangles))
 
 
 def vertex_colors(

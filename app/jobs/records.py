@@ -271,8 +271,8 @@ class MeshView:
 
     glb: bytes
     quality: SurfaceQuality
-    rims_m: FloatArray
-    """(E, 2, 3) float32 segments of all edges with one triangle only."""
+    rims_glb: bytes
+    """All edges with one triangle only, as lines; empty without any."""
     vertices: int
     triangles: int
     truth: dict[str, float] | None
@@ -308,8 +308,7 @@ class PaintedMesh:
     """One surface to draw."""
 
     glb: bytes
-    rims_m: FloatArray
-    """(E, 2, 3) float32."""
+    rims_glb: bytes
     triangles: int
 
 

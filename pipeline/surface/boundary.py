@@ -43,19 +43,6 @@ def connected_parts(edges: IntArray, vertices: int) -> IntArray:
     return connected_components(graph, directed=False)[1]
 
 
-def hole_area_m2(vertices_m: FloatArray, triangles: IntArray, loops: Sequence[IntArray]) -> float:
-    """Area of the loops shorter than 1 m, without the longest loop of each connected part of the mesh."""
-    if not loops:
-        return 0.0
-    lengths_m, areas_m2 = loop_measures(vertices_m, loops)
-    parts = connected_parts(edges_and_faces(triangles)[0], len(vertices_m))
-    part = parts[[loop[0] for loop in loops]]
-    order = np.lexsort((lengths_m, part))
-    hole = lengths_m < LONGEST_HOLE_M
-    hole[order[np.append(part[order][1:] != part[order][:-1], True)]] = False
-    return float(areas_m2[hole].sum())
-
-
 def loop_measures(vertices_m: FloatArray, loops: Sequence[IntArray]) -> tuple[FloatArray, FloatArray]:
     """(L,) lengths in m and (L,) areas in square metres of closed loops.
 

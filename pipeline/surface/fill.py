@@ -60,7 +60,7 @@ def fill_holes(surface: SurfaceResult, longest_m: float) -> Filled:
     patches: list[IntArray] = []
     left = 0
     for hole in find_holes(surface.vertices_m, surface.triangles):
-        if hole.rim or hole.island or hole.length_m > longest_m:
+        if not hole.open or hole.length_m > longest_m:
             continue
         patch = _patch(surface.vertices_m, hole.loop, edges)
         if patch is None:

@@ -36,11 +36,16 @@ class Hole:
     """True for another loop that runs around a piece, which hangs on its part by a point: nothing is to be
     closed inside it."""
 
+    @property
+    def open(self) -> bool:
+        """Whether it is a hole in the surface: neither rim nor island."""
+        return not (self.rim or self.island)
+
 
 def find_holes(vertices_m: FloatArray, triangles: IntArray) -> tuple[Hole, ...]:
-    """All boundary loops of a mesh: the holes, the largest area first, then the rims, the longest first.
+    """All boundary loops of a mesh: holes, the largest first, then rims and islands, the longest first.
 
-    The areas of those that are no rim add up to ``hole_area_m2``.
+    Those that are open add up to ``open_area_m2``.
 
     Args:
         vertices_m: (V, 3).
@@ -55,7 +60,8 @@ def find_holes(vertices_m: FloatArray, triangles: IntArray) -> tuple[Hole, ...]:
     edges, first = _edges_of(loops)
     islands = _run_around(vertices_m, triangles, edges, first) & ~rims
     centers_m = _centers_m(vertices_m[edges], first)
-    order = np.lexsort((np.where(rims, -lengths_m, -areas_m2), rims))
+    ends = rims | islands
+    order = np.lexsort((np.where(ends, -lengths_m, -areas_m2), ends))
     return tuple(
         Hole(
             loops[index],
@@ -69,6 +75,11 @@ def find_holes(vertices_m: FloatArray, triangles: IntArray) -> tuple[Hole, ...]:
     )
 
 
+def open_area_m2(vertices_m: FloatArray, triangles: IntArray) -> float:
+    """Area of all holes of a mesh, without rims and islands."""
+    return sum((hole.area_m2 for hole in find_holes(vertices_m, triangles) if hole.open), 0.0)
+
+
 def _edges_of(loops: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
     """(E, 2) edges of all loops, and (L,) where each loop's begin."""
     sizes = np.array([len(loop) for loop in loops])
@@ -80,7 +91,7 @@ def _edges_of(loops: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
 
 
 def _rims(lengths_m: FloatArray, part: IntArray) -> BoolArray:
-    """(L,) True for loops that are no holes, as ``hole_area_m2`` tells them apart."""
+    """(L,) True for loops that are no holes, longest of their part or 1 m and longer."""
     order = np.lexsort((lengths_m, part))
     rims = lengths_m >= LONGEST_HOLE_M
     rims[order[np.append(part[order][1:] != part[order][:-1], True)]] = True

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.surface.boundary import boundary_loops, connected_parts, edges_and_faces, hole_area_m2
+from pipeline.surface.boundary import connected_parts, edges_and_faces
+from pipeline.surface.holes import open_area_m2
 from pipeline.surface.rays import Camera, hit_depths, triangle_areas_m2
 from pipeline.types import FloatArray, IntArray, SurfaceQuality
 
@@ -30,7 +31,7 @@ def measure_quality(
         no_hit_ray_share=no_hit_ray_share(vertices_m, triangles, cameras),
         boundary_loops=len(np.unique(rim_parts)),
         boundary_length_m=float(np.linalg.norm(vertices_m[rim[:, 0]] - vertices_m[rim[:, 1]], axis=1).sum()),
-        hole_area_m2=hole_area_m2(vertices_m, triangles, boundary_loops(triangles)),
+        hole_area_m2=open_area_m2(vertices_m, triangles),
         non_manifold_edges=int((faces > 2).sum()),
         components=len(np.unique(connected_parts(edges, len(vertices_m)))),
         area_m2=float(triangle_areas_m2(vertices_m, triangles).sum()),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.errors import InputError
-from pipeline.surface.boundary import boundary_loops, hole_area_m2
+from pipeline.surface.holes import open_area_m2
 from pipeline.surface.pivoting import compile_all, roll
 from pipeline.surface.quality import no_hit_ray_share
 from pipeline.surface.rays import Camera
@@ -91,7 +91,7 @@ def _sweep_point(
         radius_m=radius_m,
         triangles=len(triangles),
         unused_share=1.0 - len(np.unique(triangles)) / len(cloud),
-        hole_area_m2=hole_area_m2(cloud.points_m, triangles, boundary_loops(triangles)),
+        hole_area_m2=open_area_m2(cloud.points_m, triangles),
         no_hit_ray_share=no_hit_ray_share(cloud.points_m, triangles, cameras),
         accuracy_1cm=measures["accuracy_1cm"],
         f_score_5cm=measures["f_score_5cm"],

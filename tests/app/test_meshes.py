@@ -1,11 +1,17 @@
 """Surfaces as the browser gets them."""
 
 import io
+import sys
+from pathlib import Path
 
 import numpy as np
 import trimesh
 
-from app.jobs.meshes import glb_bytes, mesh_view, rim_segments_m
+sys.path.insert(0, str(Path(__file__).parent))
+from gltf import arrays, srgb
+
+from app.jobs.glb import lines_glb, mesh_glb
+from app.jobs.meshes import DARKEST, mesh_view, rim_segments_m, surface_glb, vertex_normals
 from pipeline.types import SurfaceQuality, SurfaceResult
 
 QUALITY = SurfaceQuality(0.0, 0, 0.0, 0.0, 0, 0, 0.0, 0)
@@ -31,14 +37,39 @@ def test_the_rim_of_an_open_box_is_its_opening():
 def test_the_mesh_survives_the_way_to_the_browser():
     sphere = trimesh.creation.icosphere()
     colors = np.random.default_rng(0).integers(0, 255, (len(sphere.vertices), 3), dtype=np.uint8)
-    read = trimesh.load(io.BytesIO(glb_bytes(surface(sphere, colors), colors)), file_type="glb", force="mesh")
-    assert np.allclose(read.vertices, sphere.vertices, atol=1e-6)
-    assert np.array_equal(read.faces, sphere.faces)
-    assert np.array_equal(read.visual.vertex_colors[:, :3], colors)
+    glb = mesh_glb(np.asarray(sphere.vertices), np.asarray(sphere.faces), colors)
+    mode, read = arrays(glb)
+    assert mode == 4
+    assert np.allclose(read["POSITION"], sphere.vertices, atol=1e-6)
+    assert np.array_equal(read["indices"], sphere.faces)
+    assert np.array_equal(np.rint(255 * srgb(read["COLOR_0"][:, :3])), colors)
+    assert len(trimesh.load(io.BytesIO(glb), file_type="glb", force="mesh").faces) == len(sphere.faces)
+
+
+def test_light_comes_from_above_and_darkens_no_photograph_by_much():
+    sphere = trimesh.creation.icosphere()
+    white = np.full((len(sphere.vertices), 3), 255, np.uint8)
+    for photographed, darkest in DARKEST.items():
+        shade = srgb(arrays(surface_glb(surface(sphere, white), white, photographed))[1]["COLOR_0"][:, 0])
+        assert np.isclose(shade.min(), darkest, atol=0.01)
+        assert np.isclose(shade.max(), 1.0, atol=0.01)
+        assert sphere.vertices[np.argmax(shade), 2] > 0.95
+
+
+def test_normals_of_a_surface_without_points_normals_are_those_of_its_triangles():
+    sphere = trimesh.creation.icosphere(subdivisions=4)
+    normals = vertex_normals(surface(sphere))
+    assert np.sum(normals * sphere.vertices, axis=1).min() > 0.999
+
+
+def test_lines_survive_the_way_to_the_browser():
+    segments_m = np.random.default_rng(0).uniform(-1, 1, (7, 2, 3)).astype(np.float32)
+    mode, read = arrays(lines_glb(segments_m, (213, 40, 30)))
+    assert mode == 1
+    assert np.array_equal(read["POSITION"].reshape(-1, 2, 3), segments_m)
 
 
 def test_a_surface_without_triangles_is_empty():
     empty = SurfaceResult(np.empty((0, 3)), np.empty((0, 3), np.int32), None, (0.1,), QUALITY)
     view = mesh_view(empty, None)
-    assert view.glb == b""
-    assert len(view.rims_m) == 0
+    assert view.glb == view.rims_glb == b""

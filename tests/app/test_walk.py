@@ -269,9 +269,11 @@ def test_the_player_steps_scrubs_and_plays(room, close_up):
 def test_a_close_up_has_a_focus_and_the_whole_has_none(room, close_up, whole):
     assert room.folder.focus is None
     room.folder.load(close_up)
-    center_m, distance_m = room.folder.focus
+    center_m, stand_m = room.folder.focus
     np.testing.assert_array_equal(center_m, close_up.center_m)
-    assert distance_m > close_up.reach_m
+    away_m = stand_m - center_m
+    assert np.linalg.norm(away_m) > close_up.reach_m
+    assert away_m @ close_up.outward == pytest.approx(np.linalg.norm(away_m))
     room.folder.load(whole)
     assert room.folder.focus is None
     assert all("/walk2" in name for name in room.drawn)

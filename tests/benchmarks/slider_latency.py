@@ -123,7 +123,9 @@ def main() -> None:
     moves = len({move["at"] for move in log["moved"]})
     print(f"{moves} moves, {len(shown)} meshes sent, {len(waits)} seen on the screen, {len(times)} frames")
     print(f"move to mesh: median {np.median(waits):.3f} s, 95th percentile {np.percentile(waits, 95):.3f} s")
-    print(f"mesh to next mesh: median {np.median(gaps):.3f} s, 95th percentile {np.percentile(gaps, 95):.3f} s")
+    print(
+        f"mesh to next mesh: median {np.median(gaps):.3f} s, 95th percentile {np.percentile(gaps, 95):.3f} s"
+    )
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import numpy as np
 from app.controls import Controls
 from app.delay import Delay
 from app.drawing.cameras import look_closely, stage_of
+from app.echo import Echo
 from app.jobs.hole_records import ExplainView, FilledView
 from app.jobs.records import MeshView, PaintedView, PaintWish, SceneView, Which
 from app.jobs.surface_records import SurfaceView
@@ -51,6 +52,8 @@ class SurfacePanel(Panel):
         gui, session = self.gui, self.session
         self._view: SurfaceView | None = None
         self._settle = Delay(QUIET_S, lambda: session.post(self._settled))
+        self._next: PaintWish | None = None
+        self._rolling_quickly = False
         self._yardsticks: dict[str, YardstickView] = {}
         self._look: SurfaceLook | None = None
         self._by_click = False
@@ -85,7 +88,7 @@ class SurfacePanel(Panel):
         self._table = gui.add_html("")
         self._histogram = gui.add_plotly(spacing_figure(None), aspect=0.62, config={"displayModeBar": False})
         self._build_folders()
-        self._stage = SurfaceStage(self.scene, session.post)
+        self._stage = SurfaceStage(self.scene)
         self.scene.on_click()(lambda event: session.post(self._clicked, event))
 
     def _build_folders(self) -> None:
@@ -99,6 +102,7 @@ class SurfacePanel(Panel):
             self._controls = Controls(
                 gui, ADVANCED, session.spec.config, lambda change: session.post(session.edit, change)
             )
+            self._echo = Echo(gui, session.post, self._standing)
 
     @property
     def wide(self) -> bool:
@@ -109,8 +113,8 @@ class SurfacePanel(Panel):
         """End the timers."""
         if hasattr(self, "_settle"):
             self._settle.cancel()
-            self._stage.close()
             self._rolling.close()
+            self._echo.close()
 
     def on_spec(self, spec: Spec) -> None:
         """Show the settings that are wanted; what was made with others goes."""
@@ -144,12 +148,28 @@ class SurfacePanel(Panel):
         if self._shown.value in YARDSTICKS:
             self._shown.value = AFTER
             self._arrange()
-        if self.session.results.view("fuse") is not None:
-            wish = PaintWish(self._stage.which, COLORINGS[self._coloring.value], self._radius.value / 1000.0)
+        self._next = PaintWish(
+            self._stage.which, COLORINGS[self._coloring.value], self._radius.value / 1000.0
+        )
+        self._roll_next()
+
+    def _standing(self) -> None:
+        """The newest mesh stands on the screen: take the one before it away, and go on."""
+        with self.session.target.atomic():
+            self._stage.drop_old()
+        self._roll_next()
+
+    def _roll_next(self) -> None:
+        """Roll the newest radius as soon as the one before it stands on the screen."""
+        ready = self.session.results.view("fuse") is not None
+        if ready and self._next is not None and not self._rolling_quickly and not self._echo.waiting:
+            self._rolling_quickly = True
+            wish, self._next = self._next, None
             self._ask(wish)
 
     def _settled(self) -> None:
         session = self.session
+        self._next = None
         session.edit(with_rule("manual", self._radius.value))
         if self._view is not None and session.results.fresh("surface", session.spec):
             self._take(self._view)
@@ -176,6 +196,7 @@ class SurfacePanel(Panel):
                 self._stage.draw("after", view.after)
                 if view.before is not None:
                     self._stage.draw("before", view.before)
+                self._echo.ask()
             if self.session.spec.config.surface.radius_rule != "manual":
                 self._fit_slider(view)
                 self._radius.value = round(2000.0 * view.radii_m[-1]) / 2.0
@@ -210,6 +231,7 @@ class SurfacePanel(Panel):
 
     def _painted(self, view: PaintedView | None) -> None:
         """Draw it, unless something else is wanted by now."""
+        self._rolling_quickly = False
         if view is None:
             return
         quick = view.wish.radius_m is not None
@@ -220,14 +242,17 @@ class SurfacePanel(Panel):
                 self._stage.draw(which, mesh)
             if quick:
                 self._quick.content = quick_line(view)
+            self._echo.ask()
 
     def _picked_shown(self) -> None:
         """Show another surface; that of a yardstick is made first."""
         session, label = self.session, self._shown.value
         name = YARDSTICKS.get(label)
+        self._quick.content = ""
         if name is None or self._view is None:
             self._load_holes()
         elif label in self._yardsticks:
+            self._quick.content = note_html(self._yardsticks[label])
             self._stage.draw_yardstick(self._yardsticks[label].mesh)
         else:
             key = session.spec
@@ -254,7 +279,6 @@ class SurfacePanel(Panel):
 
     def _picked_coloring(self) -> None:
         self._legend.content = legend_html(COLORINGS[self._coloring.value], self._has_truth())
-        self._legend.visible = bool(self._legend.content)
         if self._view is not None:
             self._take(self._view)
 
@@ -268,6 +292,9 @@ class SurfacePanel(Panel):
             self._stage.shown = self._shown.value
             place = None if scene is None else stage_of(scene.nodes)
             self._stage.arrange(place, bool(self._loops.value), self._rolling.showing)
+            yardstick = self._shown.value in YARDSTICKS
+            self._coloring.disabled = yardstick  # its vertices are no points with a source
+            self._legend.visible = bool(self._legend.content) and not yardstick
         self.session.frame_view()
 
     # The folders.

@@ -2,41 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import viser
 
-from app.delay import Delay
 from app.drawing.cameras import Stage
 from app.drawing.surfaces import SurfaceDrawing
 from app.jobs.records import MeshView, PaintedMesh, Which
 from app.surfacewords import AFTER, BEFORE, BOTH, YARDSTICKS
 from pipeline.types import FloatArray
 
-BLEND_S = 0.25
-"""How long a mesh stays beside its successor."""
-
 
 class SurfaceStage:
     """The surfaces after and before fusion, and a yardstick's, of which some are shown."""
 
-    def __init__(self, scene: viser.SceneApi, post: Callable[..., None]) -> None:
-        """Draw below "/surface"; ``post`` runs a function on the session's thread."""
+    def __init__(self, scene: viser.SceneApi) -> None:
+        """Draw below "/surface"."""
         self._drawings: dict[Which, SurfaceDrawing] = {
             "after": SurfaceDrawing(scene, "/surface/after", AFTER),
             "before": SurfaceDrawing(scene, "/surface/before", BEFORE),
         }
         self._drawn: dict[Which, MeshView | PaintedMesh] = {}
         self._yardstick = SurfaceDrawing(scene, "/surface/yardstick", "yardstick")
-        self._blend = Delay(BLEND_S, lambda: post(self._drop_old))
         self.shown = AFTER
         """One of ``app.surfacewords.SHOWN``."""
         self._offset_m: FloatArray = np.zeros(3)
-
-    def close(self) -> None:
-        """End the timer."""
-        self._blend.cancel()
 
     @property
     def which(self) -> tuple[Which, ...]:
@@ -54,7 +43,6 @@ class SurfaceStage:
         if which not in self._drawn or self._drawn[which].glb != mesh.glb:
             self._drawings[which].draw(mesh)
             self._drawn[which] = mesh
-            self._blend.restart()
 
     def draw_yardstick(self, mesh: MeshView | None) -> None:
         """Draw a yardstick's surface, or none."""
@@ -79,6 +67,7 @@ class SurfaceStage:
             drawing.show(visible, loops, self.offset_m(which), top_m)
         self._yardstick.show(yardstick and not hidden, loops, np.zeros(3), None)
 
-    def _drop_old(self) -> None:
+    def drop_old(self) -> None:
+        """Take away what a newer mesh has replaced, once that one stands on the screen."""
         for drawing in self._drawings.values():
             drawing.drop_old()

@@ -73,7 +73,7 @@ def test_a_piece_that_hangs_on_by_a_point_is_an_island():
     vertices_m, triangles = grid_mesh(4, 4, frozenset({(x, y) for x in range(4) for y in range(4)} - {
         (0, 0), (0, 1), (1, 0), (1, 1), (2, 2)
     }))  # fmt: skip
-    island, rim = find_holes(0.1 * vertices_m, triangles)
+    rim, island = find_holes(0.1 * vertices_m, triangles)
     assert (island.rim, island.island, rim.rim, rim.island) == (False, True, True, False)
     assert island.area_m2 == pytest.approx(0.01)
 
