@@ -14,7 +14,7 @@ from pipeline.errors import InputError
 from pipeline.progress import Progress
 from pipeline.surface import radii
 from pipeline.surface.pivoting import roll
-from pipeline.surface.walk import Kind, Walk, ball_on_arc, iterate_walk, nearest_rows, rim_near_middle
+from pipeline.surface.walk import Kind, Walk, ball_on_arc, hole_on_flat_ground, iterate_walk, nearest_rows
 from pipeline.types import FloatArray, PointCloud
 
 PATCH_POINTS = 550
@@ -57,7 +57,8 @@ def _center_m(cloud: PointCloud, radii_m: tuple[float, ...], wish: WalkWish) -> 
     if wish.center_m is not None:
         return np.array(wish.center_m)
     triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
-    return rim_near_middle(cloud.points_m, triangles, radii_m[-1])
+    assert cloud.normals is not None  # or the ball would not have rolled
+    return hole_on_flat_ground(cloud.points_m, cloud.normals, triangles, PATCH_POINTS)
 
 
 def _view_of(cloud: PointCloud, walk: Walk, wish: WalkWish) -> WalkView:

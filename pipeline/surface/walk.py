@@ -11,13 +11,14 @@ from scipy.spatial import cKDTree
 
 from pipeline.errors import InputError, ReconstructionError
 from pipeline.progress import Progress
-from pipeline.surface.boundary import LONGEST_HOLE_M, boundary_loops, loop_measures
+from pipeline.surface.holes import find_holes
 from pipeline.surface.pivoting import BallPivotBatch, iterate_roll
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 _NO_TURN_RAD = 1e-3
 """A ball that turned back by less than this met its next point at once, but for rounding."""
 _REPORTED = 0.02
+_PLACES_TRIED = 100
 
 
 class Kind(IntEnum):
@@ -124,27 +125,28 @@ def nearest_rows(points_m: FloatArray, center_m: FloatArray, count: int) -> IntA
     return np.sort(np.atleast_1d(rows))
 
 
-def rim_near_middle(points_m: FloatArray, triangles: IntArray, radius_m: float) -> FloatArray:
-    """(3,) a place where surface and hole meet: the rim's vertex nearest to the middle of the cloud.
+def hole_on_flat_ground(
+    points_m: FloatArray, normals: FloatArray, triangles: IntArray, count: int
+) -> FloatArray:
+    """(3,) a place where surface and hole meet and the points around lie as flat as possible.
 
-    Of the rims, those of holes through which a ball of this radius falls are preferred; without any rim,
-    every vertex counts.
+    Args:
+        points_m: (N, 3).
+        normals: (N, 3).
+        triangles: (F, 3) of the surface.
+        count: points around it that are to be watched; flat is where their normals agree.
 
     Raises:
         InputError: there is no triangle.
     """
     if not len(triangles):
         raise InputError("There is no surface to look at; try a larger ball radius")
-    loops = boundary_loops(triangles)
-    if loops:
-        lengths_m, _ = loop_measures(points_m, loops)
-        holes = (lengths_m >= 2.0 * np.pi * radius_m) & (lengths_m < LONGEST_HOLE_M)
-        chosen = np.flatnonzero(holes) if holes.any() else np.arange(len(loops))
-        vertices = np.concatenate([loops[index] for index in chosen])
-    else:
-        vertices = np.unique(triangles)
-    distances_m = np.linalg.norm(points_m[vertices] - np.median(points_m, axis=0), axis=1)
-    return points_m[vertices[np.argmin(distances_m)]]
+    holes = [hole.loop[0] for hole in find_holes(points_m, triangles) if hole.open]
+    candidates = np.array(holes) if holes else np.unique(triangles)
+    candidates = candidates[:: -(-len(candidates) // _PLACES_TRIED)]
+    around = cKDTree(points_m).query(points_m[candidates], k=min(count, len(points_m)))[1]
+    agreement = np.linalg.norm(normals[around].mean(axis=1), axis=1)
+    return points_m[candidates[np.argmax(agreement)]]
 
 
 def _walk_of(

@@ -123,7 +123,7 @@ class SurfacePanel(Panel):
         self._yardsticks = {}
         if self._shown.value in YARDSTICKS:
             self._shown.value = AFTER
-        self._rolling.forget()
+        self._close_walk()
         self._arrange()
 
     def on_view(self, step: Step, view: Any) -> None:
@@ -352,11 +352,18 @@ class SurfacePanel(Panel):
         session = self.session
         if wish is None:
             session.cancel_side_job()
+            self._close_walk()
             self._arrange()
-            session.frame_view(anew=True)
         elif session.results.view("fuse") is not None:
             spec = session.spec
             session.side_job("walk", session.store, spec, wish, on_end=lambda view: self._walked(spec, view))
+
+    def _close_walk(self) -> None:
+        """Take the walk away, and stand back again after a close-up."""
+        near = self._rolling.focus is not None
+        self._rolling.forget()
+        if near:
+            self.session.frame_view(anew=True)
 
     def _walked(self, spec: Spec, view: WalkView | None) -> None:
         if spec != self.session.spec:
@@ -365,6 +372,8 @@ class SurfacePanel(Panel):
         self._arrange()
         if self._rolling.focus is not None:
             look_closely(self.session.clients(), *self._rolling.focus)
+        else:
+            self.session.frame_view(anew=True)
 
     # The lesson.
 
@@ -375,7 +384,7 @@ class SurfacePanel(Panel):
             self._shown.value = look.shown
             self._coloring.value = next(name for name, key in COLORINGS.items() if key == look.coloring)
             self._loops.value = look.rims
-            self._rolling.forget()
+            self._close_walk()
             self._picked_coloring()
         self._look = look
         rule: RadiusRule = "thesis+" if look.rule == "manual" else look.rule

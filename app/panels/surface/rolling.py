@@ -134,7 +134,7 @@ class RollingFolder:
         self._wish()
 
     def load(self, view: WalkView | None) -> None:
-        """Show a walk from its start; None did not come."""
+        """Play a walk from its start; None did not come."""
         self.forget()
         if view is None:
             self._said.content = "Stopped."
@@ -150,6 +150,7 @@ class RollingFolder:
             self._hurry()
             self._arrange()
             self._timeline.reset(view.steps * self._places + 1)
+        self._act(self._timeline.play)
 
     def forget(self) -> None:
         """Take the walk away; its cloud or radii are no longer those of the screen."""
@@ -180,8 +181,8 @@ class RollingFolder:
         if button == ROLL:
             self._wish()
         else:
-            self.forget()
             self._on_wish(None)
+            self.forget()
 
     def _chose(self) -> None:
         """Another choice takes effect at once while somebody watches, or waits."""

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from pipeline.errors import InputError, ReconstructionError
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import iterate_roll, roll
-from pipeline.surface.walk import Kind, ball_on_arc, iterate_walk, nearest_rows, rim_near_middle
+from pipeline.surface.walk import Kind, ball_on_arc, hole_on_flat_ground, iterate_walk, nearest_rows
 from tests.pipeline.surface.shapes import perforated_plane, sphere
 
 SETTINGS = settings(max_examples=25, deadline=None, derandomize=True)
@@ -151,7 +151,7 @@ def test_a_ball_that_falls_through_everywhere_is_told():
 def test_the_place_to_look_at_is_on_the_rim_of_a_hole():
     cloud = perforated_plane(1.0, 0.02, 0.1)
     triangles = roll(cloud.points_m, cloud.normals, (0.02,)).triangles
-    center_m = rim_near_middle(cloud.points_m, triangles, 0.02)
+    center_m = hole_on_flat_ground(cloud.points_m, cloud.normals, triangles, 300)
     assert 0.1 < np.linalg.norm(center_m) < 0.13
     rows = nearest_rows(cloud.points_m, center_m, 300)
     assert len(rows) == 300
@@ -163,8 +163,10 @@ def test_the_place_to_look_at_is_on_the_rim_of_a_hole():
 def test_without_a_hole_the_place_to_look_at_is_on_the_surface():
     cloud = sphere(300)
     triangles = roll(cloud.points_m, cloud.normals, (0.3,)).triangles
-    assert np.linalg.norm(rim_near_middle(cloud.points_m, triangles, 0.3)) == pytest.approx(1.0)
+    assert np.linalg.norm(hole_on_flat_ground(cloud.points_m, cloud.normals, triangles, 50)) == pytest.approx(
+        1.0
+    )
     with pytest.raises(InputError, match="no surface to look at"):
-        rim_near_middle(cloud.points_m, triangles[:0], 0.3)
+        hole_on_flat_ground(cloud.points_m, cloud.normals, triangles[:0], 50)
     with pytest.raises(InputError, match="place to look at is"):
         nearest_rows(cloud.points_m, np.full(3, np.nan), 10)
