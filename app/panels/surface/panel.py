@@ -8,9 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from app.controls import Controls
-from app.delay import Delay
 from app.drawing.cameras import look_closely, stage_of
-from app.echo import Echo
 from app.jobs.hole_records import ExplainView, FilledView
 from app.jobs.records import MeshView, PaintedView, PaintWish, SceneView, Which
 from app.jobs.surface_records import SurfaceView
@@ -21,8 +19,9 @@ from app.panel import Panel
 from app.panels.surface.advice import SWEEP, AdviceFolder
 from app.panels.surface.holes import HolesFolder
 from app.panels.surface.numbers import WAIT, note_html, quality_table, quick_line
+from app.panels.surface.quick import QuickLook
 from app.panels.surface.rolling import RollingFolder
-from app.panels.surface.settings import ADVANCED, with_rule
+from app.panels.surface.settings import ADVANCED, slider_range_mm, with_rule
 from app.panels.surface.stage import SurfaceStage
 from app.plots.legend import legend_html
 from app.plots.spacing import spacing_figure
@@ -36,8 +35,6 @@ Too small, and it falls through between the points; too large, and it skips deta
 of holes. Drag the radius, and compare before and after fusion. Go on with **Export**."""
 NAMES = {rule: name for name, rule in RULES.items()}
 LEAST_MM, MOST_MM = 1.0, 120.0
-QUIET_S = 0.4
-"""When the radius has not moved for so long, the whole chain runs with it."""
 
 
 class SurfacePanel(Panel):
@@ -51,9 +48,6 @@ class SurfacePanel(Panel):
         """Radius, rule, what to draw; histogram and quality."""
         gui, session = self.gui, self.session
         self._view: SurfaceView | None = None
-        self._settle = Delay(QUIET_S, lambda: session.post(self._settled))
-        self._next: PaintWish | None = None
-        self._rolling_quickly = False
         self._yardsticks: dict[str, YardstickView] = {}
         self._look: SurfaceLook | None = None
         self._by_click = False
@@ -102,7 +96,7 @@ class SurfacePanel(Panel):
             self._controls = Controls(
                 gui, ADVANCED, session.spec.config, lambda change: session.post(session.edit, change)
             )
-            self._echo = Echo(gui, session.post, self._standing)
+            self._look_quickly = QuickLook(gui, session, self._painted, self._drop_old, self._rested)
 
     @property
     def wide(self) -> bool:
@@ -111,10 +105,9 @@ class SurfacePanel(Panel):
 
     def close(self) -> None:
         """End the timers."""
-        if hasattr(self, "_settle"):
-            self._settle.cancel()
+        if hasattr(self, "_look_quickly"):
+            self._look_quickly.close()
             self._rolling.close()
-            self._echo.close()
 
     def on_spec(self, spec: Spec) -> None:
         """Show the settings that are wanted; what was made with others goes."""
@@ -137,39 +130,25 @@ class SurfacePanel(Panel):
     def on_partial(self, view: SurfaceView) -> None:
         """Draw what is there; while the radius is dragged, only remember it."""
         self._view = view
-        if not self._settle.pending:
+        if not self._look_quickly.moving:
             self._take(view)
 
     # The radius.
 
     def _dragged(self) -> None:
         """Show this ball's surface at once, and compute everything when the slider rests."""
-        self._settle.restart()
         if self._shown.value in YARDSTICKS:
             self._shown.value = AFTER
             self._arrange()
-        self._next = PaintWish(
-            self._stage.which, COLORINGS[self._coloring.value], self._radius.value / 1000.0
-        )
-        self._roll_next()
+        coloring = COLORINGS[self._coloring.value]
+        self._look_quickly.want(PaintWish(self._stage.which, coloring, self._radius.value / 1000.0))
 
-    def _standing(self) -> None:
-        """The newest mesh stands on the screen: take the one before it away, and go on."""
+    def _drop_old(self) -> None:
         with self.session.target.atomic():
             self._stage.drop_old()
-        self._roll_next()
 
-    def _roll_next(self) -> None:
-        """Roll the newest radius as soon as the one before it stands on the screen."""
-        ready = self.session.results.view("fuse") is not None
-        if ready and self._next is not None and not self._rolling_quickly and not self._echo.waiting:
-            self._rolling_quickly = True
-            wish, self._next = self._next, None
-            self._ask(wish)
-
-    def _settled(self) -> None:
+    def _rested(self) -> None:
         session = self.session
-        self._next = None
         session.edit(with_rule("manual", self._radius.value))
         if self._view is not None and session.results.fresh("surface", session.spec):
             self._take(self._view)
@@ -181,12 +160,6 @@ class SurfacePanel(Panel):
     def _picked_rule(self) -> None:
         self.session.edit(with_rule(RULES[self._rule.value], self._radius.value))
 
-    def _fit_slider(self, view: SurfaceView) -> None:
-        """Let the slider reach from half the spacing of the points to balls that are clearly too large."""
-        self._radius.min = max(0.5, float(np.floor(500.0 * view.spacing.r_F_m)))
-        widest_m = 1.5 * (view.spacing.r_F_m + 4.0 * view.spacing.sigma_D_m)
-        self._radius.max = float(np.ceil(1000.0 * max(view.radii_m[-1], widest_m, 6.5 * view.spacing.r_F_m)))
-
     # What is drawn.
 
     def _take(self, view: SurfaceView) -> None:
@@ -196,9 +169,9 @@ class SurfacePanel(Panel):
                 self._stage.draw("after", view.after)
                 if view.before is not None:
                     self._stage.draw("before", view.before)
-                self._echo.ask()
+                self._look_quickly.sent()
             if self.session.spec.config.surface.radius_rule != "manual":
-                self._fit_slider(view)
+                self._radius.min, self._radius.max = slider_range_mm(view.spacing, view.radii_m)
                 self._radius.value = round(2000.0 * view.radii_m[-1]) / 2.0
             self._tell_numbers()
             self._quick.content = ""
@@ -223,26 +196,23 @@ class SurfacePanel(Panel):
         """Have the surfaces of the settings in the colours chosen."""
         coloring = COLORINGS[self._coloring.value]
         if coloring != "color" and self.session.results.view("fuse") is not None:
-            self._ask(PaintWish(("after", "before"), coloring))
-
-    def _ask(self, wish: PaintWish) -> None:
-        session = self.session
-        session.quick_job("paint", session.store, session.spec, wish, on_end=self._painted)
+            session = self.session
+            wish = PaintWish(("after", "before"), coloring)
+            session.quick_job("paint", session.store, session.spec, wish, on_end=self._painted)
 
     def _painted(self, view: PaintedView | None) -> None:
         """Draw it, unless something else is wanted by now."""
-        self._rolling_quickly = False
         if view is None:
             return
         quick = view.wish.radius_m is not None
-        if quick != self._settle.pending or view.wish.coloring != COLORINGS[self._coloring.value]:
+        if quick != self._look_quickly.moving or view.wish.coloring != COLORINGS[self._coloring.value]:
             return
         with self.session.target.atomic():
             for which, mesh in view.meshes.items():
                 self._stage.draw(which, mesh)
             if quick:
                 self._quick.content = quick_line(view)
-            self._echo.ask()
+            self._look_quickly.sent()
 
     def _picked_shown(self) -> None:
         """Show another surface; that of a yardstick is made first."""

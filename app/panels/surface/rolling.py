@@ -34,7 +34,7 @@ SPEEDS = {True: 2.0, False: 8.0}
 """Steps a second at first, of a close-up and of the whole."""
 FASTEST_ARC = 6.0
 """With more steps a second the ball jumps from rest to rest."""
-AWAY = 2.2
+AWAY = 1.8
 """How far to stand from a close-up, over its reach."""
 
 

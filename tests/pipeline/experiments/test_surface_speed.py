@@ -112,18 +112,18 @@ def test_the_case_takes_its_numbers_from_the_four_balls(monkeypatch):
         )
 
     monkeypatch.setattr(surface_speed, "run_alone", alone)
-    monkeypatch.setattr(surface_speed, "room_cloud", lambda points: terrain(100))
+    monkeypatch.setattr(surface_speed, "room_cloud", lambda points, smoothed=True: terrain(100))
     monkeypatch.setattr(surface_speed, "MANY_POINTS", 400)
     monkeypatch.setattr(surface_speed, "available_programs", lambda: BOTH)
     runs = list(measure_speed(many=400))
     assert [(run.program, run.balls) for run in runs[:2]] == [(OURS, "r_F"), ("open3d", "r_F")]
-    assert len(runs) == 2 * 5 + 2
-    assert [run.points for run in runs] == [100] * 10 + [400] * 2
+    assert len(runs) == 2 * 7 + 2
+    assert [run.points for run in runs] == [100] * 14 + [400] * 2
     record = CASES["surface"]().record()
     assert record["ours_s"] == 4.0
     assert record["peers"] == {"open3d": 8.0}
     assert record["ratio"] == 0.5
-    assert len(record["runs"]) == 12
+    assert len(record["runs"]) == 16
     json.dumps(record, allow_nan=False)
 
 

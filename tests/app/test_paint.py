@@ -1,0 +1,117 @@
+"""Surfaces in colours, and quick looks at a radius, as the computing process makes them."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from gltf import arrays
+
+from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET
+from app.jobs.chain import ball_clouds, cameras_of, placed, rig_of, rolled
+from app.jobs.paint import QUICK_POINTS, paint_job, vertex_colors
+from app.jobs.records import PaintWish
+from app.jobs.store import Store
+from app.plots.legend import legend_html
+from app.state import Source, Spec
+from app.surfacewords import COLORINGS
+from pipeline.config import PipelineConfig
+from pipeline.surface import distances_to_truth_m
+from pipeline.types import PointSource
+
+CONFIG = PipelineConfig()
+
+
+def spec_of(points):
+    surface = replace(CONFIG.surface, max_points=points)
+    return Spec(Source(scene="box-on-table"), config=replace(CONFIG, surface=surface))
+
+
+SPEC = spec_of(8_000)
+
+
+def end(job):
+    """What a job answers."""
+    while True:
+        try:
+            next(job)
+        except StopIteration as stop:
+            return stop.value
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    return Store(str(tmp_path_factory.mktemp("store")))
+
+
+@pytest.fixture(scope="module")
+def made(store):
+    """Rig, cameras and the surface after fusion."""
+    rig, places = end(rig_of(store, SPEC)), end(placed(store, SPEC))
+    return rig, cameras_of(rig, places), end(rolled(store, SPEC)).after
+
+
+def test_the_settings_own_surfaces_are_painted_whole_with_their_rims(store, made):
+    view = end(paint_job(store, SPEC, PaintWish(("after", "before"), "source")))
+    assert set(view.meshes) == {"after", "before"}
+    assert view.points == view.all_points
+    assert view.meshes["after"].triangles == len(made[2].triangles)
+    assert all(mesh.rims_glb for mesh in view.meshes.values())
+
+
+def test_a_quick_look_rolls_one_ball_over_what_is_shown_alone(store):
+    clouds = end(ball_clouds(store, SPEC))
+    small, large = (
+        end(paint_job(store, SPEC, PaintWish(("before",), "color", factor * clouds.spacing.r_F_m)))
+        for factor in (0.6, 2.0)
+    )
+    assert set(small.meshes) == {"before"}
+    assert small.points == small.all_points == len(clouds.sensor)
+    assert 0 < small.meshes["before"].triangles < 0.3 * large.meshes["before"].triangles
+    assert not large.meshes["before"].rims_glb
+    none = end(paint_job(store, SPEC, PaintWish(("after",), "color", 1e-4)))
+    assert (none.meshes["after"].glb, none.meshes["after"].triangles) == (b"", 0)
+
+
+def test_a_quick_look_at_a_large_cloud_thins_it(store):
+    spec = spec_of(60_000)
+    view = end(paint_job(store, spec, PaintWish(("after",), "color", 0.02)))
+    assert view.all_points > 1.2 * QUICK_POINTS
+    assert view.points == pytest.approx(QUICK_POINTS, rel=0.15)
+    _, read = arrays(view.meshes["after"].glb)
+    assert len(read["POSITION"]) <= view.points
+
+
+def test_colours_say_what_their_names_say(made):
+    rig, cameras, surface = made
+    assert vertex_colors(surface, "color", rig, cameras) is surface.colors
+    guessed = surface.source == PointSource.INFERRED
+    assert 0.0 < guessed.mean() < 1.0
+    colors = vertex_colors(surface, "source", rig, cameras)
+    assert np.all(colors[guessed] == INFERRED)
+    assert np.all(colors[~guessed] == TARGET)
+    colors = vertex_colors(surface, "normal", rig, cameras)
+    assert np.allclose(colors / 127.5 - 1.0, surface.normals, atol=0.005)
+    colors = vertex_colors(surface, "distance", rig, cameras)
+    far = distances_to_truth_m(surface.vertices_m, rig.truth, cameras) >= MOST_DISTANCE_M
+    assert far.any()
+    assert np.all(colors[far] == DISTANCE_STOPS[-1])
+    assert not np.any(np.all(colors[~far] == DISTANCE_STOPS[-1], axis=1))
+
+
+def test_what_is_not_known_is_grey(made):
+    rig, cameras, surface = made
+    bare = replace(surface, source=None, normals=None)
+    for coloring in ("source", "normal"):
+        assert np.all(vertex_colors(bare, coloring, rig, cameras) == NEUTRAL)
+    assert np.all(vertex_colors(surface, "distance", replace(rig, truth=None), cameras) == NEUTRAL)
+
+
+def test_every_colouring_but_the_cameras_has_a_legend():
+    for coloring in COLORINGS.values():
+        assert bool(legend_html(coloring, True)) == (coloring != "color")
+    assert "10 cm or more" in legend_html("distance", True)
+    assert "not known" in legend_html("distance", False)

@@ -1,0 +1,129 @@
+"""Quick looks: one at a time, always the newest, none faster than the browser answers."""
+
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from app.delay import Delay
+from app.jobs.records import PaintedView, PaintWish
+from app.panels.surface import quick
+from app.panels.surface.quick import QuickLook
+
+
+class Browser:
+    """Stands for session and browser: keeps what is asked of both, and answers when told to."""
+
+    def __init__(self):
+        self.jobs, self.presses, self.questions = [], [], SimpleNamespace(content="")
+        self.store = self.spec = None
+        self.results = SimpleNamespace(view=lambda step: step)
+
+    def post(self, function, *arguments):
+        function(*arguments)
+
+    def quick_job(self, job, store, spec, wish, on_end):
+        self.jobs.append((wish, on_end))
+
+    def add_html(self, _):
+        return self.questions
+
+    def add_button(self, _):
+        return SimpleNamespace(on_click=self.presses.append)
+
+    def answer(self):
+        self.presses[0](None)
+
+    def finish(self):
+        wish, on_end = self.jobs[-1]
+        on_end(PaintedView(wish, {}, 1, 1, 0.0))
+
+
+def wish(radius_m):
+    return PaintWish(("after",), "color", radius_m)
+
+
+@pytest.fixture
+def scene(monkeypatch):
+    monkeypatch.setattr(quick, "QUIET_S", 30.0)
+    browser, seen = Browser(), []
+
+    def draw(view):
+        seen.append(view.wish.radius_m)
+        look.sent()
+
+    look = QuickLook(browser, browser, draw, lambda: seen.append("drawn"), lambda: seen.append("rest"))
+    yield browser, look, seen
+    look.close()
+
+
+def test_while_one_rolls_the_newest_of_many_waits(scene):
+    browser, look, seen = scene
+    for radius_m in (0.01, 0.02, 0.03):
+        look.want(wish(radius_m))
+    assert [asked.radius_m for asked, _ in browser.jobs] == [0.01]
+    browser.finish()
+    assert seen == [0.01]
+    assert len(browser.jobs) == 1
+    browser.answer()
+    assert seen == [0.01, "drawn"]
+    assert [asked.radius_m for asked, _ in browser.jobs] == [0.01, 0.03]
+
+
+def test_nothing_is_rolled_while_the_browser_draws(scene):
+    browser, look, _ = scene
+    look.want(wish(0.01))
+    browser.finish()
+    look.want(wish(0.02))
+    assert len(browser.jobs) == 1
+    browser.answer()
+    assert len(browser.jobs) == 2
+
+
+def test_a_browser_that_does_not_answer_is_not_waited_for_for_ever(scene):
+    browser, look, seen = scene
+    look.want(wish(0.01))
+    browser.finish()
+    look.want(wish(0.02))
+    for _ in range(40):
+        time.sleep(0.1)
+        if "drawn" in seen:
+            break
+    assert [asked.radius_m for asked, _ in browser.jobs] == [0.01, 0.02]
+    browser.answer()
+    assert seen.count("drawn") == 1
+
+
+def test_a_job_that_fails_does_not_stop_the_next(scene):
+    browser, look, seen = scene
+    look.want(wish(0.01))
+    look.want(wish(0.02))
+    browser.jobs[0][1](None)
+    assert [asked.radius_m for asked, _ in browser.jobs] == [0.01, 0.02]
+    assert seen == []
+
+
+def test_before_the_nodes_are_placed_nothing_is_rolled(scene):
+    browser, look, _ = scene
+    browser.results = SimpleNamespace(view=lambda step: None)
+    look.want(wish(0.01))
+    assert browser.jobs == []
+    assert look.moving
+
+
+def test_a_delay_comes_once_after_the_last_restart_and_not_when_cancelled():
+    came = []
+    delay = Delay(0.15, lambda: came.append(time.monotonic()))
+    for _ in range(3):
+        delay.restart()
+        last = time.monotonic()
+        time.sleep(0.05)
+        assert delay.pending
+    time.sleep(0.4)
+    assert len(came) == 1
+    assert came[0] - last >= 0.14
+    assert not delay.pending
+    delay.restart()
+    delay.cancel()
+    time.sleep(0.3)
+    assert len(came) == 1

@@ -1,0 +1,158 @@
+"""The Surface screen as somebody who tunes a ball radius uses it, in a real browser."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from app.surfacewords import BOTH, COLORINGS, POISSON
+from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, slider
+
+SOURCE = next(name for name, coloring in COLORINGS.items() if coloring == "source")
+
+
+@pytest.fixture
+def surface(page):
+    """The Surface step with everything computed, as a fresh session has it."""
+    page.reload()
+    go(page, "Surface")
+    page.get_by_role("row", name="No-hit rays").wait_for()
+    page.get_by_text("Up to date").wait_for()
+    return page
+
+
+def unfold(page, folder):
+    page.get_by_text(folder, exact=True).last.click()
+    page.wait_for_timeout(400)
+
+
+def pick(page, label, option):
+    page.get_by_label(label, exact=True).first.click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
+def press(page, name):
+    page.get_by_role("button", name=name, exact=True).last.click()
+
+
+def numbers(page, row):
+    text = page.get_by_role("row", name=row).inner_text().replace(",", "")
+    return [float(value) for value in re.findall(r"\d+(?:\.\d+)?", text)]
+
+
+def test_a_dragged_radius_is_shown_at_once_and_measured_when_it_rests(surface):
+    before, triangles = canvas(surface), numbers(surface, "Triangles")
+    handle = slider(surface, "Radius (mm)")
+    handle.focus()
+    quick = surface.get_by_text(re.compile(r"triangles over [\d,]+ points"))
+    for _ in range(25):
+        handle.press("ArrowLeft")
+    quick.wait_for()
+    assert numbers(surface, "Triangles") == triangles
+    expect(quick).to_have_count(0, timeout=60_000)
+    surface.get_by_text("Up to date").wait_for()
+    assert numbers(surface, "Triangles") != triangles
+    assert changed_from(surface, before)
+
+
+def test_side_by_side_and_colours_by_source_tell_what_was_guessed(surface):
+    alone = canvas(surface)
+    pick(surface, "Show", BOTH)
+    surface.get_by_text("before fusion (sensor only)").first.wait_for()
+    assert changed_from(surface, alone)
+    both = canvas(surface)
+    pick(surface, "Colours", SOURCE)
+    surface.get_by_text("inferred by the network").wait_for()
+    assert changed_from(surface, both)
+
+
+def test_poisson_is_a_yardstick_in_the_same_table(surface):
+    ball = canvas(surface)
+    assert len(numbers(surface, "No-hit rays")) == 2
+    pick(surface, "Show", POISSON)
+    surface.get_by_text("Screened Poisson reconstruction").wait_for()
+    before, after, poisson = numbers(surface, "No-hit rays")
+    assert poisson < after < before
+    assert differing(canvas(surface), ball) > ALIKE
+
+
+def test_a_hole_is_chosen_from_the_list_and_explained(surface):
+    unfold(surface, "Holes")
+    surface.get_by_text(re.compile("All pixel rays:")).wait_for()
+    press(surface, "Next")
+    surface.get_by_text("What to try:").wait_for()
+    assert surface.get_by_text(re.compile(r"^(Gap|Normals|No points|Outside view)\.")).count()
+
+
+def test_a_clicked_hole_says_why_it_is_there(surface):
+    picture = surface.locator("canvas").first.bounding_box()
+    told = surface.locator(".mantine-Notification-root")
+    for row in range(3, 9):
+        for column in range(3, 9):
+            spot = (picture["width"] * column / 12, picture["height"] * row / 12)
+            surface.mouse.click(picture["x"] + spot[0], picture["y"] + spot[1])
+            surface.wait_for_timeout(150)
+            if told.filter(has_text=re.compile("mm|cm|camera|view")).count():
+                return
+    raise AssertionError("no click met a hole")
+
+
+def test_small_holes_are_filled_on_demand_and_given_back(surface):
+    unfold(surface, "Holes")
+    open_ = canvas(surface)
+    handle = slider(surface, "Fill small holes")
+    handle.focus()
+    for _ in range(8):
+        handle.press("ArrowRight")
+    surface.get_by_text(re.compile(r"holes? filled")).wait_for()
+    assert changed_from(surface, open_)
+    handle.press("Home")
+    surface.get_by_text("Filling is off").wait_for()
+
+
+def test_the_ball_rolls_steps_back_and_leaves(surface):
+    meshed = canvas(surface)
+    unfold(surface, "Watch the ball roll")
+    press(surface, "Roll")
+    said = surface.get_by_text(re.compile(r"Step \d+ of \d+"))
+    said.wait_for()
+    surface.wait_for_timeout(3000)
+    press(surface, "Pause")
+    surface.wait_for_timeout(500)
+    step = int(re.search(r"Step (\d+)", said.inner_text())[1])
+    assert step >= 2
+    assert differing(canvas(surface), meshed) > ALIKE
+    press(surface, "Step back")
+    surface.get_by_text(re.compile(rf"Step {step - 1} of")).wait_for()
+    press(surface, "Close")
+    expect(said).to_have_count(0)
+    assert differing(canvas(surface, still=6), meshed) <= ALIKE
+
+
+def test_the_points_suggest_radii_and_one_can_be_taken(surface):
+    unfold(surface, "Which radius?")
+    radius_mm = numbers(surface, "even")[0]
+    press(surface, "even")
+    expect(surface.get_by_label("Radii").first).to_have_value("one radius (slider)")
+    surface.get_by_text(f"Ball radii: {radius_mm:.1f} mm").wait_for()
+
+
+def test_the_sweep_plots_every_radius_and_says_what_it_means(surface):
+    unfold(surface, "Which radius?")
+    press(surface, "Sweep the radius")
+    surface.get_by_text(re.compile(r"[1-9]\d* of \d+ balls have rolled")).wait_for()
+    surface.get_by_text(re.compile(r"larger balls close|the widest")).wait_for(timeout=120_000)
+
+
+def test_the_lesson_sets_the_controls(surface):
+    unfold(surface, "Lesson: Which ball radius?")
+    press(surface, "Next")
+    surface.get_by_text("What the ball does").last.wait_for()
+    surface.get_by_text(re.compile(r"radius|ball \d+\.\d mm")).first.wait_for()
+    for _ in range(7):
+        press(surface, "Next")
+    surface.get_by_text("Which holes no ball can close").last.wait_for()
+    expect(surface.get_by_label("Show", exact=True).first).to_have_value(BOTH)
+    surface.get_by_text("Up to date").wait_for()
