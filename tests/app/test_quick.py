@@ -17,7 +17,7 @@ class Browser:
     def __init__(self):
         self.jobs, self.presses, self.questions = [], [], SimpleNamespace(content="")
         self.store = self.spec = None
-        self.results = SimpleNamespace(view=lambda step: step)
+        self.results = SimpleNamespace(fresh=lambda step, spec: True)
 
     def post(self, function, *arguments):
         function(*arguments)
@@ -105,7 +105,7 @@ def test_a_job_that_fails_does_not_stop_the_next(scene):
 
 def test_before_the_nodes_are_placed_nothing_is_rolled(scene):
     browser, look, _ = scene
-    browser.results = SimpleNamespace(view=lambda step: None)
+    browser.results = SimpleNamespace(fresh=lambda step, spec: False)
     look.want(wish(0.01))
     assert browser.jobs == []
     assert look.moving

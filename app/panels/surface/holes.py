@@ -143,18 +143,27 @@ class HolesFolder:
 
     def filled(self, view: FilledView | None) -> None:
         """Say what filling made of the surface; None if nobody could fill it."""
-        if self._fill.value == 0.0:
+        if not self.filling:
             self._filled.content = FILL_OFF
         else:
             self._filled.content = UNFILLED if view is None else filled_sentence(view)
+
+    @property
+    def filling(self) -> bool:
+        """Whether small holes are to be filled."""
+        return self._fill.value > 0.0
+
+    def unfill(self) -> None:
+        """The surface is drawn anew, without what was filled."""
+        self._fill.value = 0.0
+        self.filled(None)
 
     def forget(self) -> None:
         """The surfaces are gone."""
         self._holes, self._which, self._alone = {}, None, None
         self._choose(None)
         self.parts(None)
-        self._fill.value = 0.0
-        self.filled(None)
+        self.unfill()
 
     def _listed(self) -> None:
         names = self._names()

@@ -34,7 +34,6 @@ TEXT = """**What you see.** A ball rolls over the points and leaves a triangle w
 Too small, and it falls through between the points; too large, and it skips detail. Red lines are the rims
 of holes. Drag the radius, and compare before and after fusion. Go on with **Export**."""
 NAMES = {rule: name for name, rule in RULES.items()}
-LEAST_MM, MOST_MM = 1.0, 120.0
 
 
 class SurfacePanel(Panel):
@@ -51,10 +50,11 @@ class SurfacePanel(Panel):
         self._yardsticks: dict[str, YardstickView] = {}
         self._look: SurfaceLook | None = None
         self._by_click = False
+        self._thinning: tuple[int, int] | None = None
         gui.add_markdown(TEXT)
         self._lesson = LessonFolder(gui, surface_lesson(), session.post, self.when_changed, self._take_look)
         self._radius = gui.add_slider(
-            "Radius (mm)", LEAST_MM, MOST_MM, 0.5, 20.0, hint="Radius of the ball; drag to roll it anew."
+            "Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint="Radius of the ball; drag to roll it anew."
         )
         self.when_changed(self._radius, self._dragged)
         self._rule = gui.add_dropdown(
@@ -113,6 +113,10 @@ class SurfacePanel(Panel):
         """Show the settings that are wanted; what was made with others goes."""
         self._controls.write(spec.config)
         self._rule.value = NAMES[spec.config.surface.radius_rule]
+        thinning = (spec.config.surface.max_points, spec.config.surface.smoothing_passes)
+        if thinning != self._thinning:
+            self._advice.forget()
+        self._thinning = thinning
         self._yardsticks = {}
         if self._shown.value in YARDSTICKS:
             self._shown.value = AFTER
@@ -248,6 +252,7 @@ class SurfacePanel(Panel):
         self._arrange()
 
     def _picked_coloring(self) -> None:
+        self._holes.unfill()
         self._legend.content = legend_html(COLORINGS[self._coloring.value], self._has_truth())
         if self._view is not None:
             self._take(self._view)
@@ -295,13 +300,16 @@ class SurfacePanel(Panel):
 
     def _explain(self, which: Which, index: int) -> None:
         session = self.session
-        session.quick_job("explain", session.store, session.spec, which, index, on_end=self._explained)
+        if session.results.fresh("surface", session.spec):
+            session.quick_job("explain", session.store, session.spec, which, index, on_end=self._explained)
+        else:
+            self._explained(None)  # the holes listed are of a surface that is being made anew
 
     def _explained(self, answer: ExplainView | None) -> None:
         self._holes.tell(answer)
         if answer is not None and self._by_click:
-            self._by_click = False
             self.session.notify(answer.reason.capitalize(), f"{answer.sentence} {answer.remedy}", "blue")
+        self._by_click = False
 
     def _fill(self, longest_m: float | None) -> None:
         session = self.session
@@ -313,8 +321,9 @@ class SurfacePanel(Panel):
     def _filled(self, view: FilledView | None) -> None:
         with self.session.target.atomic():
             self._holes.filled(view)
-            if view is not None:
+            if view is not None and self._holes.filling:
                 self._stage.draw("after", view.mesh)
+                self._look_quickly.sent()
             elif self._view is not None:
                 self._take(self._view)
 

@@ -66,7 +66,7 @@ class QuickLook:
 
     def _go_on(self) -> None:
         session, wish = self._session, self._next
-        ready = session.results.view("fuse") is not None
+        ready = session.results.fresh("fuse", session.spec)
         if ready and wish is not None and not self._rolling and not self._echo.waiting:
             self._rolling, self._next = True, None
             session.quick_job("paint", session.store, session.spec, wish, on_end=self._came)
