@@ -96,10 +96,12 @@ def test_colours_say_what_their_names_say(made):
     colors = vertex_colors(surface, "normal", rig, cameras)
     assert np.allclose(colors / 127.5 - 1.0, surface.normals, atol=0.005)
     colors = vertex_colors(surface, "distance", rig, cameras)
-    far = distances_to_truth_m(surface.vertices_m, rig.truth, cameras) >= MOST_DISTANCE_M
-    assert far.any()
-    assert np.all(colors[far] == DISTANCE_STOPS[-1])
-    assert not np.any(np.all(colors[~far] == DISTANCE_STOPS[-1], axis=1))
+    distance_m = distances_to_truth_m(surface.vertices_m, rig.truth, cameras)
+    brightest = np.all(colors == DISTANCE_STOPS[-1], axis=1)
+    assert brightest.any()
+    assert np.all(brightest[distance_m >= MOST_DISTANCE_M])
+    assert not np.any(brightest[distance_m < 0.99 * MOST_DISTANCE_M])
+    assert np.all(colors[distance_m < 1e-4] == DISTANCE_STOPS[0])
 
 
 def test_what_is_not_known_is_grey(made):
