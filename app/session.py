@@ -63,6 +63,7 @@ class Session:
         self._running: Step | None = None
         self._submitted: tuple[Any, ...] | None = None
         self._wide = False
+        self._shape = 0.0
         self._closed = False
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="session")
         self._panels = [panel(self) for panel in panels]
@@ -253,13 +254,20 @@ class Session:
         self._say()
 
     def frame_view(self, anew: bool = False) -> None:
-        """Turn the view to the scene when it is new, or when one thing becomes two or two become one."""
+        """Turn the view to the scene: a new one, two instead of one, or another shape of the window."""
         below = self._current.drawn_below
         wide = any(panel.wide for panel in self._panels if panel.drawn_below == below)
         scene = self.results.view("scene")
-        if scene is not None and (anew or wide != self._wide):
+        shape = self._window()
+        if scene is not None and (anew or wide != self._wide or shape != self._shape):
             look(self.clients(), stage_of(scene.nodes), wide)
-            self._wide = wide
+            self._wide, self._shape = wide, shape
+
+    def _window(self) -> float:
+        """Width over height of the picture, roughly; that of a shared session is nobody's own."""
+        if isinstance(self.target, viser.ViserServer):
+            return 1.0
+        return round(self.target.camera.aspect, 1)
 
     def _act(self, action: str) -> None:
         if action == "Cancel":
