@@ -27,7 +27,11 @@ class Stepper:
         self._labels = self._titles
         self._style = gui.add_html("")
         self._buttons = gui.add_button_group("Steps", self._labels)
-        self._buttons.on_click(lambda event: on_pick(self._titles[self._labels.index(event.target.value)]))
+        self._buttons.on_click(lambda event: on_pick(self._title_of(event.target.value)))
+
+    def _title_of(self, label: str) -> str:
+        """The step of a label, whatever its mark: it may have changed since the click."""
+        return next(title for title in self._titles if label.split(" ")[0] == title)
 
     def show(self, current: str, statuses: Mapping[str, StepStatus]) -> None:
         """Mark the current step and the state of all."""

@@ -159,8 +159,8 @@ def test_the_lesson_sets_the_controls(surface):
     press(surface, "Next")
     surface.get_by_text("(1 of 10)").wait_for()
     expect(surface.get_by_label("Radii").first).to_have_value("one radius (slider)")
-    for _ in range(7):
+    for stop in range(2, 9):
         press(surface, "Next")
-    surface.get_by_text("(8 of 10)").wait_for()
+        surface.get_by_text(f"({stop} of 10)").wait_for()
     expect(surface.get_by_label("Show", exact=True).first).to_have_value(BOTH)
     surface.get_by_text("Up to date").wait_for()
