@@ -1,44 +1,26 @@
 """The holes of a surface as the computing process tells of them."""
 
-import sys
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from gltf import arrays, srgb
-
 from app.jobs.chain import ball_clouds, cameras_of, placed, prepared, rig_of, rolled
 from app.jobs.holes import explain_job, fill_job, hole_views, parts_of, views_of
-from app.jobs.store import Store
 from app.state import Source, Spec
 from pipeline.config import PipelineConfig
 from pipeline.errors import InputError
 from pipeline.surface.boundary import boundary_loops
 from pipeline.surface.hole_reasons import explain_hole
 from pipeline.surface.holes import find_holes
+from tests.app.answers import end
+from tests.app.gltf import arrays, srgb
 
 CONFIG = PipelineConfig()
 SPEC = Spec(
     Source(scene="box-on-table"), config=replace(CONFIG, surface=replace(CONFIG.surface, max_points=8_000))
 )
 LONGEST_CM = 60.0
-
-
-def end(job):
-    """What a job answers."""
-    while True:
-        try:
-            next(job)
-        except StopIteration as stop:
-            return stop.value
-
-
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    return Store(str(tmp_path_factory.mktemp("store")))
 
 
 @pytest.fixture(scope="module")

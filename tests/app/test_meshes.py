@@ -1,18 +1,14 @@
 """Surfaces as the browser gets them."""
 
 import io
-import sys
-from pathlib import Path
 
 import numpy as np
 import trimesh
 
-sys.path.insert(0, str(Path(__file__).parent))
-from gltf import arrays, srgb
-
 from app.jobs.glb import lines_glb, mesh_glb
 from app.jobs.meshes import DARKEST, mesh_view, rim_segments_m, surface_glb, vertex_normals
 from pipeline.types import SurfaceQuality, SurfaceResult
+from tests.app.gltf import arrays, srgb
 
 QUALITY = SurfaceQuality(0.0, 0, 0.0, 0.0, 0, 0, 0.0, 0)
 

@@ -1,26 +1,22 @@
 """Surfaces in colours, and quick looks at a radius, as the computing process makes them."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-from gltf import arrays
 
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET
 from app.jobs.chain import ball_clouds, cameras_of, placed, rig_of, rolled
 from app.jobs.paint import QUICK_POINTS, paint_job, vertex_colors
 from app.jobs.records import PaintWish
-from app.jobs.store import Store
 from app.plots.legend import legend_html
 from app.state import Source, Spec
 from app.surfacewords import COLORINGS
 from pipeline.config import PipelineConfig
 from pipeline.surface import distances_to_truth_m
 from pipeline.types import PointSource
+from tests.app.answers import end
+from tests.app.gltf import arrays
 
 CONFIG = PipelineConfig()
 
@@ -31,20 +27,6 @@ def spec_of(points):
 
 
 SPEC = spec_of(8_000)
-
-
-def end(job):
-    """What a job answers."""
-    while True:
-        try:
-            next(job)
-        except StopIteration as stop:
-            return stop.value
-
-
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    return Store(str(tmp_path_factory.mktemp("store")))
 
 
 @pytest.fixture(scope="module")

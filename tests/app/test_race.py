@@ -13,23 +13,10 @@ from app.jobs.store import Store
 from app.state import Source, Spec
 from pipeline.config import PipelineConfig
 from pipeline.errors import InputError
+from tests.app.answers import end
 
 SPEC = Spec(Source(scene="box-on-table"))
 SLIGHT = Race(start=Start.towards(3.0, 6.0, seed=0))
-
-
-def end(job):
-    """What a job answers."""
-    while True:
-        try:
-            next(job)
-        except StopIteration as stop:
-            return stop.value
-
-
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    return Store(str(tmp_path_factory.mktemp("store")))
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ import viser
 
 from app.jobs.chain import ball_clouds
 from app.jobs.records import SpacingView
-from app.jobs.store import Store
 from app.jobs.sweep import suggest_job, sweep_job
 from app.jobs.sweep_records import SuggestionRow, SweepRow, SweepView
 from app.panels.surface.advice import STOP, STOPPED, SWEEP, WAITING, AdviceFolder, suggestions_html
@@ -43,11 +42,6 @@ def row(radius_mm, no_hit, accuracy=NAN, triangles=100):
 
 def swept(*rows):
     return SweepView(rows, 0.010, 0.005, len(rows))
-
-
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    return Store(str(tmp_path_factory.mktemp("store")))
 
 
 @pytest.fixture(scope="module")

@@ -20,19 +20,11 @@ from app.surfacewords import BEFORE
 from pipeline.errors import ReconstructionError
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import roll
+from tests.app.answers import end
 from tests.pipeline.surface.shapes import perforated_plane
 
 RADII_M = (0.016, 0.03)
 SPEC = Spec(Source(scene="box-on-table"))
-
-
-def end(job):
-    """What a job answers."""
-    while True:
-        try:
-            next(job)
-        except StopIteration as stop:
-            return stop.value
 
 
 @pytest.fixture(scope="module")

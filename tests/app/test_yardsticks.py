@@ -1,37 +1,18 @@
 """Yardsticks as the computing process makes them."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from gltf import arrays
-
 from app.jobs.chain import ball_clouds
-from app.jobs.store import Store
 from app.jobs.yardsticks import yardstick_job
 from app.state import Source, Spec
 from pipeline.errors import InputError
 from pipeline.settings import with_settings
 from pipeline.surface import radii
+from tests.app.answers import end
+from tests.app.gltf import arrays
 
 SPEC = Spec(Source(scene="box-on-table"))
-
-
-def end(job):
-    """What a job answers."""
-    while True:
-        try:
-            next(job)
-        except StopIteration as stop:
-            return stop.value
-
-
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    return Store(str(tmp_path_factory.mktemp("store")))
 
 
 @pytest.fixture(scope="module")
