@@ -172,6 +172,6 @@ def _dress(server: viser.ViserServer) -> None:
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(PANEL_WIDTH_PX)
     server.scene.set_up_direction("+z")
-    server.scene.configure_default_lights(cast_shadow=False)  # drawing them is most of a frame in software
+    server.scene.configure_default_lights(cast_shadow=False)  # costly to draw in software
     server.scene.set_background_image(np.full((4, 4, 3), BACKGROUND, np.uint8), format="png")
     setattr(server, "request_share_url", lambda *_, **__: None)  # noqa: B010

@@ -1,7 +1,7 @@
 """Meshes and lines as binary glTF that a browser draws quickly, even without a graphics card.
 
 Everything is unlit: the light is put into the vertex colours beforehand. viser's own lighting and its
-ribbon lines take a software renderer five and ten times longer than the triangles themselves.
+ribbon lines are what a software renderer would spend most of a frame on.
 """
 
 from __future__ import annotations

@@ -81,7 +81,7 @@ def _thinned(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, 
 
 
 def _painted(surface: SurfaceResult, wish: PaintWish, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
-    """The rims come when the radius rests: in software, drawing them takes as long as all triangles."""
+    """The rims come when the radius rests: lines are costly to draw in software."""
     colors = vertex_colors(surface, wish.coloring, rig, cameras)
     glb = surface_glb(surface, colors, photographed=wish.coloring == "color")
     rims_glb = b"" if wish.radius_m is not None else lines_glb(rim_segments_m(surface), LOSS)

@@ -82,7 +82,6 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene", default="living-room")
-    parser.add_argument("--points", type=int, default=20_000, help="points the ball rolls over")
     parser.add_argument("--stops", type=int, default=80)
     parser.add_argument("--pause-ms", type=int, default=60)
     options = parser.parse_args()
@@ -93,10 +92,12 @@ def main() -> None:
     from app.server import build_server
 
     shown: list[tuple[float, int]] = []
+    rolls_s: list[float] = []
     painted = SurfacePanel._painted
 
     def noted(panel: SurfacePanel, view: PaintedView) -> None:
         shown.append((1000.0 * (view.wish.radius_m or 0.0), view.meshes["after"].triangles))
+        rolls_s.append(view.roll_s)
         painted(panel, view)
 
     SurfacePanel._painted = noted
@@ -112,8 +113,6 @@ def main() -> None:
         log = drag(page, options.stops, options.pause_ms)
         waits = latencies_s(log, [(round(mm, 3), n) for mm, n in shown])
         times = [drawn["at"] / 1000.0 for drawn in log["drawn"]]
-        page.wait_for_timeout(3000)
-        page.screenshot(path="/tmp/slider.png")
         browser.close()
     app.stop()
     first = {}
@@ -122,6 +121,7 @@ def main() -> None:
     gaps = np.diff(sorted(first.values()))
     moves = len({move["at"] for move in log["moved"]})
     print(f"{moves} moves, {len(shown)} meshes sent, {len(waits)} seen on the screen, {len(times)} frames")
+    print(f"of it the ball alone: median {np.median(rolls_s):.3f} s")
     print(f"move to mesh: median {np.median(waits):.3f} s, 95th percentile {np.percentile(waits, 95):.3f} s")
     print(
         f"mesh to next mesh: median {np.median(gaps):.3f} s, 95th percentile {np.percentile(gaps, 95):.3f} s"
