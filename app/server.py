@@ -16,10 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
 import viser
 
-from app.drawing.colors import BACKGROUND, BRAND
+from app.drawing.colors import BRAND
 from app.jobs.entry import warm_up
 from app.jobs.store import Store
 from app.panels import PANELS
@@ -173,5 +172,4 @@ def _dress(server: viser.ViserServer) -> None:
     server.gui.main_panel.set_width(PANEL_WIDTH_PX)
     server.scene.set_up_direction("+z")
     server.scene.configure_default_lights(cast_shadow=False)  # costly to draw in software
-    server.scene.set_background_image(np.full((4, 4, 3), BACKGROUND, np.uint8), format="png")
     setattr(server, "request_share_url", lambda *_, **__: None)  # noqa: B010

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import viser
 
-from app.drawing.colors import BRAND, DELIVERED, LOSS, css
+from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, css
 from app.state import StepStatus
 
 MARKS: dict[StepStatus, str] = {"fresh": "✓", "stale": "↻", "running": "…", "failed": "✗", "missing": "·"}
@@ -49,6 +49,7 @@ def _style(current: int, statuses: Sequence[StepStatus | None]) -> str:
     row = "div:has(> .packetmesh-steps) + div"
     rules = [
         f"{row} > div > div:first-child {{ display: none; }}",
+        f"canvas[data-engine] {{ background: {css(BACKGROUND)} }}",
         f"{row} button {{ height: 2.2em; padding: 0 0.5em; font-size: 13px; }}",
     ]
     for index, status in enumerate(statuses):

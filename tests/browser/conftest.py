@@ -68,7 +68,7 @@ def tab(browser, app):
     context = browser.new_context(viewport={"width": 900, "height": 640}, accept_downloads=True)
     page = context.new_page()
     page.set_default_timeout(60_000)
-    page.goto(app.url)
+    page.goto(f"{app.url}?fixedDpr=1")
     yield page
     context.close()
 
