@@ -8,15 +8,13 @@ import viser
 
 from app.delay import Delay
 
-LABEL = "drawn"
 PATIENCE_S = 1.0
 """Without an answer for so long, for want of a browser perhaps, it is taken as given."""
 _ANSWER = (
-    "const button = [...document.querySelectorAll('button')].find(b => b.textContent === this.dataset.label);"
-    "button.style.display = 'none';"
-    "requestAnimationFrame(() => requestAnimationFrame(() => button.click()))"
+    "const key = new KeyboardEvent('keydown', {key: 'Insert', ctrlKey: true, altKey: true, shiftKey: true});"
+    "requestAnimationFrame(() => requestAnimationFrame(() => document.documentElement.dispatchEvent(key)))"
 )
-"""Presses the hidden button two frames later, as HTML cannot talk to the server by itself."""
+"""Presses a key two frames later, as HTML cannot talk to the server by itself."""
 
 
 class Echo:
@@ -24,10 +22,14 @@ class Echo:
 
     A hand can move a slider faster than a slow browser draws. Without an answer to wait for, what is
     sent would queue up there and the picture would lag farther and farther behind the hand.
+
+    The answer is a command, not a button: of all that is pressed and moved in the panel within 50 ms,
+    viser sends only the last, so that a button would get lost beside a slider, and now and then the
+    slider beside the button.
     """
 
     def __init__(self, gui: viser.GuiApi, post: Callable[..., None], on_answer: Callable[[], None]) -> None:
-        """Add the hidden parts, best in a folder that is closed.
+        """Add the hidden parts.
 
         Args:
             gui: where to add them.
@@ -38,7 +40,8 @@ class Echo:
         self._asked = 0
         self.waiting = False
         self._html = gui.add_html("")
-        gui.add_button(LABEL).on_click(lambda _: post(self._answered))
+        command = gui.add_command("Say that all is drawn", hotkey="insert", modifier="cmd/ctrl+alt+shift")
+        command.on_trigger(lambda _: post(self._answered))
         self._patience = Delay(PATIENCE_S, lambda: post(self._answered))
 
     def ask(self) -> None:
@@ -46,8 +49,7 @@ class Echo:
         self._asked += 1
         self.waiting = True
         self._html.content = (
-            f'<img alt="" style="display: none" src="data:," data-label="{LABEL}" '
-            f'data-asked="{self._asked}" onerror="{_ANSWER}">'
+            f'<img alt="" style="display: none" src="data:," data-asked="{self._asked}" onerror="{_ANSWER}">'
         )
         self._patience.restart()
 

@@ -28,8 +28,8 @@ class Browser:
     def add_html(self, _):
         return self.questions
 
-    def add_button(self, _):
-        return SimpleNamespace(on_click=self.presses.append)
+    def add_command(self, _, hotkey, modifier):
+        return SimpleNamespace(on_trigger=self.presses.append)
 
     def answer(self):
         self.presses[0](None)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
+from app import echo
 from app.surfacewords import BOTH, COLORINGS, POISSON
 from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, slider
 
@@ -91,6 +92,31 @@ def test_a_hole_is_chosen_from_the_list_and_explained(surface):
     press(surface, "Next")
     surface.get_by_text("What to try:").wait_for()
     assert surface.get_by_text(re.compile(r"^(Gap|Normals|No points|Outside view)\.")).count()
+
+
+def test_no_answer_is_lost_beside_a_fast_hand(browser, app, monkeypatch):
+    monkeypatch.setattr(echo, "PATIENCE_S", 600.0)
+    asked, ask = [], echo.Echo.ask
+    monkeypatch.setattr(echo.Echo, "ask", lambda self: (asked.append(self), ask(self)))
+    context = browser.new_context(viewport={"width": 900, "height": 640})
+    page = context.new_page()
+    page.goto(f"{app.url}?fixedDpr=1")
+    go(page, "Surface")
+    page.get_by_text("Up to date").wait_for(timeout=60_000)
+    handle = slider(page, "Radius (mm)").bounding_box()
+    x, y = handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for turn in np.linspace(0.0, 4.0 * np.pi, 200):
+        page.mouse.move(x + 40.0 * np.sin(turn), y)
+    page.mouse.up()
+    for _ in range(50):
+        if not asked[-1].waiting:
+            break
+        page.wait_for_timeout(200)
+    context.close()
+    assert len(asked) > 20
+    assert not asked[-1].waiting
 
 
 def test_a_clicked_hole_says_why_it_is_there(surface):
