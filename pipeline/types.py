@@ -233,7 +233,7 @@ class SurfaceQuality:
 
 
 @dataclass(frozen=True, slots=True)
-class SurfaceResult:
+class Surface:
     """A triangle mesh grown from a point cloud."""
 
     vertices_m: FloatArray
@@ -244,8 +244,14 @@ class SurfaceResult:
     """(V, 3) RGB."""
     radii_m: tuple[float, ...]
     """Ball radii used, ascending; none for a surface that no ball made."""
-    quality: SurfaceQuality
     normals: FloatArray | None = None
     """(V, 3) of the points that the vertices were."""
     source: ByteArray | None = None
     """(V,) ``PointSource`` of those points."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceResult(Surface):
+    """A mesh and its measures."""
+
+    quality: SurfaceQuality

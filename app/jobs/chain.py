@@ -7,7 +7,7 @@ import hashlib
 import time
 from collections import OrderedDict
 from collections.abc import Generator, Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -27,8 +27,8 @@ from pipeline.reconstruct import (
     register_nodes,
 )
 from pipeline.scenes import load_demo
-from pipeline.surface import Camera, compare_with_truth, measure_quality, radii, reconstruct_surface, spacing
-from pipeline.types import ByteArray, DepthMap, FloatArray, PointCloud, Rig, SurfaceQuality, SurfaceResult
+from pipeline.surface import Camera, compare_with_truth, measured, radii, roll_over, spacing
+from pipeline.types import ByteArray, DepthMap, FloatArray, PointCloud, Rig, Surface, SurfaceResult
 
 HISTOGRAM_BINS = 60
 REMEMBERED_INFERENCES = 12
@@ -180,29 +180,26 @@ def rolled(store: Store, spec: Spec) -> Generator[Progress | RolledBalls, None, 
         started = time.perf_counter()
         after = rolled_over(clouds.fused, radii_m)
         elapsed_s = time.perf_counter() - started
-        yield RolledBalls(radii_m, after, None, elapsed_s)
+        yield RolledBalls(radii_m, measured(after, (), len(clouds.fused)), None, elapsed_s)
         yield Progress("rolling the ball over the sensor cloud", 0.5)
         before = rolled_over(clouds.sensor, radii_m)
         yield Progress("counting the rays that miss", 0.7)
-        after, before = (
-            replace(
-                surface,
-                quality=measure_quality(surface.vertices_m, surface.triangles, cameras, len(cloud)),
-            )
-            for surface, cloud in ((after, clouds.fused), (before, clouds.sensor))
+        return RolledBalls(
+            radii_m,
+            measured(after, cameras, len(clouds.fused)),
+            measured(before, cameras, len(clouds.sensor)),
+            elapsed_s,
         )
-        return RolledBalls(radii_m, after, before, elapsed_s)
 
     return (yield from store.remember(spec.key("surface"), roll))
 
 
-def rolled_over(cloud: PointCloud, radii_m: tuple[float, ...]) -> SurfaceResult:
+def rolled_over(cloud: PointCloud, radii_m: tuple[float, ...]) -> Surface:
     """The surface of a cloud; without a triangle if the ball falls through everywhere."""
     try:
-        return reconstruct_surface(cloud, radii_m)
+        return roll_over(cloud, radii_m)
     except ReconstructionError:
-        nothing = SurfaceQuality(1.0, 0, 0.0, 0.0, 0, 0, 0.0, len(cloud))
-        return SurfaceResult(np.empty((0, 3)), np.empty((0, 3), np.int32), None, radii_m, nothing)
+        return Surface(np.empty((0, 3)), np.empty((0, 3), np.int32), None, radii_m)
 
 
 def cameras_of(rig: Rig, places: PlacedNodes) -> list[Camera]:

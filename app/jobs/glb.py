@@ -29,7 +29,7 @@ def mesh_glb(vertices_m: FloatArray, triangles: IntArray, colors: ByteArray) -> 
         _TRIANGLES,
         {"POSITION": vertices_m.astype("<f4"), "COLOR_0": rgba},
         (1.0, 1.0, 1.0),
-        triangles.astype("<u4").reshape(-1),
+        triangles.astype("<u2" if len(vertices_m) < 65535 else "<u4").reshape(-1),
     )
 
 
@@ -47,9 +47,10 @@ def _glb(
     linear_rgb: tuple[float, float, float],
     indices: np.ndarray | None = None,
 ) -> bytes:
-    """One primitive of one material; all arrays have rows of a multiple of four bytes."""
+    """One primitive of one material."""
     arrays = list(attributes.values()) + ([] if indices is None else [indices])
-    starts = np.cumsum([0, *(array.nbytes for array in arrays)]).tolist()
+    blocks = [array.tobytes() + bytes(-array.nbytes % 4) for array in arrays]
+    starts = np.cumsum([0, *map(len, blocks)]).tolist()
     primitive: dict[str, Any] = {
         "attributes": {name: row for row, name in enumerate(attributes)},
         "mode": mode,
@@ -77,7 +78,7 @@ def _glb(
     text = json.dumps(head).encode()
     text += b" " * (-len(text) % 4)
     body = struct.pack("<I4s", len(text), b"JSON") + text
-    body += struct.pack("<I4s", starts[-1], b"BIN\0") + b"".join(array.tobytes() for array in arrays)
+    body += struct.pack("<I4s", starts[-1], b"BIN\0") + b"".join(blocks)
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
@@ -88,7 +89,7 @@ def _accessor(row: int, array: np.ndarray) -> dict[str, Any]:
         "count": len(array),
     }
     accessor["type"] = "SCALAR" if array.ndim == 1 else f"VEC{array.shape[1]}"
-    if array.dtype.str == "<u2":
+    if array.dtype.str == "<u2" and array.ndim == 2:
         accessor["normalized"] = True
     if array.ndim == 2 and array.shape[1] == 3:
         accessor["min"], accessor["max"] = array.min(axis=0).tolist(), array.max(axis=0).tolist()

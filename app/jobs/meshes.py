@@ -7,7 +7,7 @@ import numpy as np
 from app.drawing.colors import LOSS, NEUTRAL
 from app.jobs.glb import lines_glb, mesh_glb
 from app.jobs.records import MeshView
-from pipeline.types import ByteArray, FloatArray, SurfaceResult
+from pipeline.types import ByteArray, FloatArray, Surface, SurfaceResult
 
 DARKEST = {True: 0.75, False: 0.45}
 """How dark a surface gets that turns from the light: the camera's own colours have shadows already."""
@@ -25,7 +25,7 @@ def mesh_view(surface: SurfaceResult, truth: dict[str, float] | None) -> MeshVie
     )
 
 
-def surface_glb(surface: SurfaceResult, colors: ByteArray | None, photographed: bool) -> bytes:
+def surface_glb(surface: Surface, colors: ByteArray | None, photographed: bool) -> bytes:
     """The mesh with (V, 3) vertex colours and light on it, as binary glTF; empty if it has no triangle.
 
     Args:
@@ -46,7 +46,7 @@ def surface_glb(surface: SurfaceResult, colors: ByteArray | None, photographed: 
     return mesh_glb(surface.vertices_m, surface.triangles, (colors * shade[:, None]).astype(np.uint8))
 
 
-def vertex_normals(surface: SurfaceResult) -> FloatArray:
+def vertex_normals(surface: Surface) -> FloatArray:
     """(V, 3) those of the points or, where a surface has none, of the triangles around each vertex."""
     if surface.normals is not None:
         return surface.normals
@@ -57,7 +57,7 @@ def vertex_normals(surface: SurfaceResult) -> FloatArray:
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
-def rim_segments_m(surface: SurfaceResult) -> FloatArray:
+def rim_segments_m(surface: Surface) -> FloatArray:
     """(E, 2, 3) float32: the edges that have one triangle only."""
     edges = np.sort(surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
     keys, triangles = np.unique(edges[:, 0] << 32 | edges[:, 1], return_counts=True)

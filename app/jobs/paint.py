@@ -26,7 +26,7 @@ from app.state import Spec
 from app.surfacewords import Coloring
 from pipeline.progress import Progress
 from pipeline.surface import Camera, distances_to_truth_m, voxel_average, voxel_for_count
-from pipeline.types import ByteArray, PointCloud, PointSource, Rig, SurfaceResult
+from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
 QUICK_POINTS = 20_000
 """A larger cloud is thinned to about so many points for a quick look."""
@@ -42,7 +42,7 @@ def paint_job(
     if wish.radius_m is None:
         balls = yield from rolled(store, spec)
         thin, roll_s = whole, balls.elapsed_s
-        surfaces: dict[Which, SurfaceResult | None] = {"after": balls.after, "before": balls.before}
+        surfaces: dict[Which, Surface | None] = {"after": balls.after, "before": balls.before}
     else:
         thin = yield from _thinned(store, spec)
         started = time.perf_counter()
@@ -80,7 +80,7 @@ def _thinned(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, 
     return (yield from store.remember(("quick", *cloud_key(spec)), thin))
 
 
-def _painted(surface: SurfaceResult, wish: PaintWish, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
+def _painted(surface: Surface, wish: PaintWish, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
     """The rims come when the radius rests: lines are costly to draw in software."""
     colors = vertex_colors(surface, wish.coloring, rig, cameras)
     glb = surface_glb(surface, colors, photographed=wish.coloring == "color")
@@ -88,9 +88,7 @@ def _painted(surface: SurfaceResult, wish: PaintWish, rig: Rig, cameras: list[Ca
     return PaintedMesh(glb, rims_glb, len(surface.triangles))
 
 
-def vertex_colors(
-    surface: SurfaceResult, coloring: Coloring, rig: Rig, cameras: list[Camera]
-) -> ByteArray | None:
+def vertex_colors(surface: Surface, coloring: Coloring, rig: Rig, cameras: list[Camera]) -> ByteArray | None:
     """(V, 3) RGB; grey where it is not known what the colour would say."""
     count = len(surface.vertices_m)
     if not count or coloring == "color":

@@ -1,9 +1,9 @@
 """From an oriented cloud to a triangle mesh and its measures (SPEC 5)."""
 
-from pipeline.surface.ball_pivoting import reconstruct_surface
+from pipeline.surface.ball_pivoting import reconstruct_surface, roll_over
 from pipeline.surface.boundary import boundary_loops
 from pipeline.surface.normals import estimate_normals
-from pipeline.surface.quality import measure_quality
+from pipeline.surface.quality import measure_quality, measured
 from pipeline.surface.radii import nearest_distances_m, radii, spacing
 from pipeline.surface.rays import Camera, hit_depth
 from pipeline.surface.smooth import smooth
@@ -18,9 +18,11 @@ __all__ = [
     "estimate_normals",
     "hit_depth",
     "measure_quality",
+    "measured",
     "nearest_distances_m",
     "radii",
     "reconstruct_surface",
+    "roll_over",
     "smooth",
     "spacing",
     "voxel_average",

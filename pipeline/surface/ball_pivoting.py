@@ -8,21 +8,34 @@ import numpy as np
 
 from pipeline.errors import InputError, ReconstructionError
 from pipeline.surface.pivoting import roll
-from pipeline.surface.quality import measure_quality
+from pipeline.surface.quality import measured
 from pipeline.surface.radii import spacing
 from pipeline.surface.rays import Camera
-from pipeline.types import PointCloud, SurfaceResult
+from pipeline.types import PointCloud, Surface, SurfaceResult
 
 
 def reconstruct_surface(
     cloud: PointCloud, radii_m: Sequence[float], cameras: Sequence[Camera] = ()
 ) -> SurfaceResult:
-    """Roll balls over an oriented cloud, the smallest first; its points become the vertices.
+    """``roll_over`` and measure what came out.
 
     Args:
         cloud: points with normals towards the outside.
         radii_m: ball radii.
         cameras: whose rays measure the share without a surface; NaN without any.
+
+    Raises:
+        InputError, ReconstructionError: see ``roll_over``.
+    """
+    return measured(roll_over(cloud, radii_m), cameras, len(cloud))
+
+
+def roll_over(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
+    """Roll balls over an oriented cloud, the smallest first; its points become the vertices.
+
+    Args:
+        cloud: points with normals towards the outside.
+        radii_m: ball radii.
 
     Raises:
         InputError: fewer than three points, no normals, or a radius that is not positive.
@@ -42,12 +55,11 @@ def reconstruct_surface(
         raise ReconstructionError(_why_nothing(cloud, radii_m[-1]))
     used, corners = np.unique(triangles, return_inverse=True)
     kept, triangles = cloud.select(used), corners.reshape(-1, 3).astype(np.int32)
-    return SurfaceResult(
+    return Surface(
         vertices_m=kept.points_m,
         triangles=triangles,
         colors=kept.colors,
         radii_m=radii_m,
-        quality=measure_quality(kept.points_m, triangles, cameras, len(cloud)),
         normals=kept.normals,
         source=kept.source,
     )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
 
 from pipeline.surface.boundary import connected_parts, edges_and_faces
 from pipeline.surface.holes import open_area_m2
 from pipeline.surface.rays import Camera, hit_depths, triangle_areas_m2
-from pipeline.types import FloatArray, IntArray, SurfaceQuality
+from pipeline.types import FloatArray, IntArray, Surface, SurfaceQuality, SurfaceResult
 
 
 def measure_quality(
@@ -37,6 +38,13 @@ def measure_quality(
         area_m2=float(triangle_areas_m2(vertices_m, triangles).sum()),
         unused_points=n_input_points - len(vertices_m),
     )
+
+
+def measured(surface: Surface, cameras: Sequence[Camera], n_input_points: int) -> SurfaceResult:
+    """A surface with all its measures; the arguments are those of ``measure_quality``."""
+    quality = measure_quality(surface.vertices_m, surface.triangles, cameras, n_input_points)
+    parts = {part.name: getattr(surface, part.name) for part in fields(Surface)}
+    return SurfaceResult(**parts, quality=quality)
 
 
 def no_hit_ray_share(vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> float:

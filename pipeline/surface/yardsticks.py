@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 
 from pipeline.errors import InputError, ReconstructionError
 from pipeline.open3d_runtime import o3d
-from pipeline.surface.quality import measure_quality
-from pipeline.types import FloatArray, IntArray, PointCloud, SurfaceResult
+from pipeline.surface.quality import measured
+from pipeline.types import FloatArray, IntArray, PointCloud, Surface, SurfaceResult
 
 CUBE_SCALE = 1.1
 """Edge of Poisson's cube over the widest side of the cloud."""
@@ -116,12 +116,5 @@ def _open3d_cloud(cloud: PointCloud) -> o3d.geometry.PointCloud:
 def _surface(columns: PointCloud, vertices_m: FloatArray, corners: IntArray, points: int) -> SurfaceResult:
     """The result whose vertices have the columns of a cloud with as many rows."""
     triangles = corners.reshape(-1, 3).astype(np.int32)
-    return SurfaceResult(
-        vertices_m=vertices_m,
-        triangles=triangles,
-        colors=columns.colors,
-        radii_m=(),
-        quality=measure_quality(vertices_m, triangles, (), points),
-        normals=columns.normals,
-        source=columns.source,
-    )
+    surface = Surface(vertices_m, triangles, columns.colors, (), columns.normals, columns.source)
+    return measured(surface, (), points)

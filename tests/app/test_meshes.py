@@ -14,7 +14,9 @@ QUALITY = SurfaceQuality(0.0, 0, 0.0, 0.0, 0, 0, 0.0, 0)
 
 
 def surface(mesh, colors=None):
-    return SurfaceResult(np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32), colors, (0.1,), QUALITY)
+    return SurfaceResult(
+        np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32), colors, (0.1,), quality=QUALITY
+    )
 
 
 def test_a_closed_surface_has_no_rim():
@@ -66,6 +68,6 @@ def test_lines_survive_the_way_to_the_browser():
 
 
 def test_a_surface_without_triangles_is_empty():
-    empty = SurfaceResult(np.empty((0, 3)), np.empty((0, 3), np.int32), None, (0.1,), QUALITY)
+    empty = SurfaceResult(np.empty((0, 3)), np.empty((0, 3), np.int32), None, (0.1,), quality=QUALITY)
     view = mesh_view(empty, None)
     assert view.glb == view.rims_glb == b""

@@ -19,7 +19,7 @@ def half_wall(color=(200, 100, 50)) -> SurfaceResult:
     vertices_m = np.array([[-2.0, -2, 1], [0, -2, 1], [0, 2, 1], [-2, 2, 1]])
     triangles = np.array([[0, 2, 1], [0, 3, 2]], np.int32)
     quality = measure_quality(vertices_m, triangles, [CAMERA], 4)
-    return SurfaceResult(vertices_m, triangles, np.tile(np.uint8(color), (4, 1)), (0.1,), quality)
+    return SurfaceResult(vertices_m, triangles, np.tile(np.uint8(color), (4, 1)), (0.1,), quality=quality)
 
 
 def test_rays_that_hit_nothing_are_magenta_and_only_they():

@@ -2,16 +2,24 @@
 
 ``python tests/benchmarks/slider_latency.py`` opens the app in Chromium, lets a hand drag the radius to and
 fro, and times each radius from the message that carries it to the first frame that draws a mesh which was
-not there before. Prints the median and the 95th percentile.
+not there before. Prints the median and the 95th percentile, for the machine's OpenGL driver (Mesa's
+software one where there is no graphics card) and for SwiftShader, Chromium's own without a driver.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
+from playwright.sync_api import sync_playwright
+
+from app.jobs.records import PaintedView
+from app.panels.surface import SurfacePanel
+from app.server import build_server
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "browser"))
 
@@ -37,6 +45,14 @@ WATCH = """
     }
   };
 })();
+"""
+
+
+RENDERER = """
+(() => {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  return gl.getParameter(gl.getExtension("WEBGL_debug_renderer_info").UNMASKED_RENDERER_WEBGL);
+})()
 """
 
 
@@ -78,54 +94,76 @@ def latencies_s(log: dict, shown: list[tuple[float, int]]) -> list[float]:
     return waits
 
 
+def between_meshes_s(log: dict) -> np.ndarray:
+    """Seconds from one mesh to the next on the screen."""
+    frames = [{drawn["indices"] for drawn in group} for _, group in groupby(log["drawn"], itemgetter("at"))]
+    times = [at for at, _ in groupby(log["drawn"], itemgetter("at"))]
+    new = [at for at, before, now in zip(times[1:], frames, frames[1:], strict=False) if now - before]
+    return np.diff(new) / 1000.0
+
+
+class Watched:
+    """The app, with every surface that it sends while the radius is dragged written down."""
+
+    def __init__(self, scene: str) -> None:
+        self.shown: list[tuple[float, int]] = []
+        self.rolls_s: list[float] = []
+        painted = SurfacePanel._painted
+
+        def noted(panel: SurfacePanel, view: PaintedView) -> None:
+            self.shown.append(
+                (round(1000.0 * (view.wish.radius_m or 0.0), 3), view.meshes["after"].triangles)
+            )
+            self.rolls_s.append(view.roll_s)
+            painted(panel, view)
+
+        SurfacePanel._painted = noted
+        self.app = build_server(scene, port=0)
+
+
+def measure(playwright, watched: Watched, angle: str, stops: int, pause_ms: int) -> None:
+    """Drag in one Chromium and print what came of it."""
+    arguments = [f"--use-angle={angle}" if "use-angle" in one else one for one in ARGUMENTS]
+    browser = playwright.chromium.launch(
+        executable_path=chromium_path(), args=[*arguments, "--ignore-gpu-blocklist"]
+    )
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.add_init_script(WATCH)
+    page.goto(watched.app.url)
+    go(page, "Surface")
+    page.get_by_text("Up to date").wait_for(timeout=120_000)
+    page.wait_for_timeout(3000)
+    watched.shown.clear()
+    watched.rolls_s.clear()
+    log = drag(page, stops, pause_ms)
+    renderer = page.evaluate(RENDERER)
+    browser.close()
+    waits, gaps = latencies_s(log, watched.shown), between_meshes_s(log)
+    moves = len({move["at"] for move in log["moved"]})
+    print(f"{angle}: {renderer}")
+    print(f"  {moves} moves, {len(watched.shown)} meshes sent, {len(waits)} seen, {len(log['drawn'])} frames")
+    print(f"  the ball alone: median {np.median(watched.rolls_s):.3f} s")
+    for name, times_s in (("move to mesh", waits), ("mesh to next mesh", gaps)):
+        print(
+            f"  {name}: median {np.median(times_s):.3f} s, 95th percentile {np.percentile(times_s, 95):.3f} s"
+        )
+
+
 def main() -> None:
-    """Measure and print."""
+    """Measure with each renderer and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene", default="living-room")
-    parser.add_argument("--stops", type=int, default=80)
-    parser.add_argument("--pause-ms", type=int, default=60)
-    options = parser.parse_args()
-    from playwright.sync_api import sync_playwright
-
-    from app.jobs.records import PaintedView
-    from app.panels.surface import SurfacePanel
-    from app.server import build_server
-
-    shown: list[tuple[float, int]] = []
-    rolls_s: list[float] = []
-    painted = SurfacePanel._painted
-
-    def noted(panel: SurfacePanel, view: PaintedView) -> None:
-        shown.append((1000.0 * (view.wish.radius_m or 0.0), view.meshes["after"].triangles))
-        rolls_s.append(view.roll_s)
-        painted(panel, view)
-
-    SurfacePanel._painted = noted
-    app = build_server(options.scene, port=0)
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium_path(), args=ARGUMENTS)
-        page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.add_init_script(WATCH)
-        page.goto(app.url)
-        go(page, "Surface")
-        page.get_by_text("Up to date").wait_for(timeout=120_000)
-        page.wait_for_timeout(3000)
-        log = drag(page, options.stops, options.pause_ms)
-        waits = latencies_s(log, [(round(mm, 3), n) for mm, n in shown])
-        times = [drawn["at"] / 1000.0 for drawn in log["drawn"]]
-        browser.close()
-    app.stop()
-    first = {}
-    for drawn in log["drawn"]:
-        first.setdefault(drawn["indices"], drawn["at"] / 1000.0)
-    gaps = np.diff(sorted(first.values()))
-    moves = len({move["at"] for move in log["moved"]})
-    print(f"{moves} moves, {len(shown)} meshes sent, {len(waits)} seen on the screen, {len(times)} frames")
-    print(f"of it the ball alone: median {np.median(rolls_s):.3f} s")
-    print(f"move to mesh: median {np.median(waits):.3f} s, 95th percentile {np.percentile(waits, 95):.3f} s")
-    print(
-        f"mesh to next mesh: median {np.median(gaps):.3f} s, 95th percentile {np.percentile(gaps, 95):.3f} s"
+    parser.add_argument("--stops", type=int, default=300)
+    parser.add_argument("--pause-ms", type=int, default=10)
+    parser.add_argument(
+        "--angle", nargs="+", default=["gl-egl", "swiftshader"], help="what Chromium draws with (--use-angle)"
     )
+    options = parser.parse_args()
+    watched = Watched(options.scene)
+    with sync_playwright() as playwright:
+        for angle in options.angle:
+            measure(playwright, watched, angle, options.stops, options.pause_ms)
+    watched.app.stop()
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ HOLE_M = 0.08
 
 def as_surface(vertices_m, triangles):
     quality = measure_quality(vertices_m, triangles, [], len(vertices_m) + 7)
-    return SurfaceResult(vertices_m, triangles, None, (0.1,), quality)
+    return SurfaceResult(vertices_m, triangles, None, (0.1,), quality=quality)
 
 
 def euler(surface):

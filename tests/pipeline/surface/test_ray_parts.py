@@ -25,7 +25,7 @@ def surface_of(*meshes, source=None):
     firsts = np.cumsum([0] + [len(mesh[0]) for mesh in meshes[:-1]])
     triangles = np.concatenate([mesh[1] + first for mesh, first in zip(meshes, firsts, strict=True)])
     quality = measure_quality(vertices_m, triangles, [], len(vertices_m))
-    return SurfaceResult(vertices_m, triangles, None, (0.05,), quality, source=source)
+    return SurfaceResult(vertices_m, triangles, None, (0.05,), quality=quality, source=source)
 
 
 def half_plane(column_px):
