@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -12,14 +13,21 @@ import numpy as np
 from pipeline.geometry import scaled
 from pipeline.types import ByteArray, FloatArray
 
+if TYPE_CHECKING:
+    from pipeline.depth.training.furniture import Catalogue
+
 WIDTH_PX, HEIGHT_PX = 320, 240
 ROOMS_PER_SHARD = 10
 VIEWS_PER_ROOM = 5
+FOCAL_PX = 262.5
+"""Focal length of the images in shards, a Kinect's at half size."""
 FIRST_SEED = {"train": 0, "validation": 1_000_000, "test": 2_000_000}
 """Room seeds count up from here; no room is in two splits."""
 
 
-def render_shards(folder: Path, split: str, first_shard: int, last_shard: int) -> Iterator[Path]:
+def render_shards(
+    folder: Path, split: str, first_shard: int, last_shard: int, catalogue: Catalogue | None = None
+) -> Iterator[Path]:
     """Render shards [first, last) of ten rooms each; ready ones are kept. Yields each one's RGB file.
 
     A shard is ``<split>_<number>_rgb.npy`` (N, 240, 320, 3) uint8 and ``..._depth.npy`` (N, 240, 320)
@@ -31,24 +39,48 @@ def render_shards(folder: Path, split: str, first_shard: int, last_shard: int) -
         if not rgb_file.exists():
             first = FIRST_SEED[split] + shard * ROOMS_PER_SHARD
             seeds = range(first, first + ROOMS_PER_SHARD)
-            colors, depths = zip(*(view for seed in seeds for view in room_views(seed)), strict=True)
+            colors, depths = zip(
+                *(view for seed in seeds for view in room_views(seed, catalogue)), strict=True
+            )
             save_array(rgb_file.with_name(rgb_file.name.replace("rgb", "depth")), np.stack(depths))
             save_array(rgb_file, np.stack(colors))
         yield rgb_file
 
 
-def room_views(seed: int) -> Iterator[tuple[ByteArray, FloatArray]]:
-    """Five views of one furnished room, at the training size."""
+def room_views(seed: int, catalogue: Catalogue | None = None) -> Iterator[tuple[ByteArray, FloatArray]]:
+    """Five views of one furnished room, at the training size.
+
+    Args:
+        seed: of the room and its views.
+        catalogue: furnishes the room; without it, procedural pieces do. Its views differ in focal length;
+            as in ``zoom``, their depth is then what the training camera would measure for the same image:
+            true depth times 262.5 px / focal length (canonical cameras, Yin et al. 2023).
+    """
     from pipeline.scenes.render import Renderer
     from pipeline.scenes.rooms import random_room
     from pipeline.scenes.viewpoints import random_views
 
+    if catalogue is not None:
+        yield from _varied_views(seed, catalogue)
+        return
     scene, rng = random_room(seed), np.random.default_rng(seed)
     renderer = Renderer(scene, threads=1)
     intrinsics = scaled(scene.intrinsics, WIDTH_PX / scene.intrinsics.width_px)
     for T_world_camera in random_views(scene, rng, VIEWS_PER_ROOM, renderer):
         view = renderer.view(intrinsics, T_world_camera, "fast", rng)
         yield view.rgb, view.z_m.astype(np.float16)
+
+
+def _varied_views(seed: int, catalogue: Catalogue) -> Iterator[tuple[ByteArray, FloatArray]]:
+    from pipeline.depth.training.vantage import views
+    from pipeline.depth.training.varied_rooms import varied_room
+    from pipeline.scenes.render import Renderer
+
+    scene, rng = varied_room(seed, catalogue), np.random.default_rng(seed)
+    renderer = Renderer(scene, threads=1)
+    for T_world_camera, intrinsics in views(seed, scene, VIEWS_PER_ROOM, renderer, WIDTH_PX):
+        view = renderer.view(intrinsics, T_world_camera, "fast", rng)
+        yield view.rgb, (view.z_m * (FOCAL_PX / intrinsics.fx_px)).astype(np.float16)
 
 
 def save_array(file: Path, array: np.ndarray) -> None:

@@ -12,7 +12,8 @@ from pipeline.config import AlignmentMode
 from pipeline.depth.alignment import align_depth
 from pipeline.depth.inference import DepthNetwork
 from pipeline.depth.metrics import depth_errors
-from pipeline.depth.training.dataset import FIRST_SEED
+from pipeline.depth.preprocessing import WIDTH_PX
+from pipeline.geometry import scaled
 from pipeline.io.rigs import load_frame
 from pipeline.scenes import DEMO_SCENES, load_demo
 from pipeline.scenes.render import Renderer
@@ -21,6 +22,8 @@ from pipeline.scenes.sensor import sense_depth
 from pipeline.scenes.viewpoints import random_views
 from pipeline.types import ByteArray, DepthMap, FloatArray
 
+FIRST_TEST_ROOM = 2_000_000
+"""Seed from which on no room is trained on."""
 MODES: tuple[AlignmentMode, ...] = ("none", "median", "affine_depth", "affine_inverse", "local")
 BLOCK_PX = 32
 SHOWN = ("abs_rel", "rmse_m", "rmse_log", "delta_1", "silog")
@@ -48,7 +51,9 @@ def evaluate(model: Path | None, real: Path | None, rooms: int) -> Iterator[str]
     network = DepthNetwork(model)
     yield "| images | depth | aligned by | AbsRel | in holes | RMSE m | RMSE log | delta 1 | SILog |"
     yield "|---|---|---|---|---|---|---|---|---|"
-    yield from rows(f"{rooms} held-out rooms", list(held_out_rooms(rooms)), network)
+    seeds = range(FIRST_TEST_ROOM, FIRST_TEST_ROOM + rooms)
+    examples = list(held_out_rooms(seeds, views=1))
+    yield from rows(f"{rooms} held-out rooms", examples, network)
     for name in DEMO_SCENES:
         yield from rows(f"demo {name}", list(demo(name)), network)
     for folder in sorted(real.iterdir()) if real else ():
@@ -79,14 +84,20 @@ def row(start: str, examples: list[Example], inferred: list[DepthMap], mode: Ali
     return f"{start} " + " | ".join(f"{value:.3f}" for value in shown) + " |"
 
 
-def held_out_rooms(count: int) -> Iterator[Example]:
-    """One 640 x 480 view each of rooms of the test split, with simulated sensor depth."""
-    for seed in range(FIRST_SEED["test"], FIRST_SEED["test"] + count):
+def held_out_rooms(seeds: range, views: int) -> Iterator[Example]:
+    """``views`` views at the network's size of each room, with simulated sensor depth.
+
+    Args:
+        seeds: the rooms; those of the test split count up from ``FIRST_TEST_ROOM``.
+        views: of each room, one after the other.
+    """
+    for seed in seeds:
         scene, rng = random_room(seed), np.random.default_rng(seed)
         renderer = Renderer(scene)
-        (T_world_camera,) = random_views(scene, rng, 1, renderer)
-        view = renderer.view(scene.intrinsics, T_world_camera, "fast", rng)
-        yield Example(view.rgb, sense_depth(view, scene.intrinsics, rng), view.z_m)
+        intrinsics = scaled(scene.intrinsics, WIDTH_PX / scene.intrinsics.width_px)
+        for T_world_camera in random_views(scene, rng, views, renderer):
+            view = renderer.view(intrinsics, T_world_camera, "fast", rng)
+            yield Example(view.rgb, sense_depth(view, intrinsics, rng), view.z_m)
 
 
 def demo(name: str) -> Iterator[Example]:

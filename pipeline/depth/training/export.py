@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -20,27 +22,66 @@ from onnxruntime.quantization import (
 from onnxruntime.quantization.shape_inference import quant_pre_process
 from torch import Tensor, nn
 
+from pipeline.depth.conventions import Convention, metadata_of
 from pipeline.depth.metrics import depth_errors
-from pipeline.depth.preprocessing import PADDED_HEIGHT_PX, WIDTH_PX, normalised_input, unpad
+from pipeline.depth.preprocessing import (
+    HEIGHT_PX,
+    MEAN,
+    PADDED_HEIGHT_PX,
+    STANDARD_DEVIATION,
+    WIDTH_PX,
+    padded,
+    unpad,
+)
 from pipeline.depth.training.dataset import Shards
+from pipeline.depth.training.initial import LICENCES
 from pipeline.depth.training.network import DepthResNet, depth_from_logit
+from pipeline.errors import InputError
+from pipeline.types import ByteArray, FloatArray
 
 OPSET = 17
 CALIBRATION_IMAGES = 100
 COMPARED_IMAGES = 60
-FLOAT_LAYERS = ("/encoder/stem/", "/decoder/reduce.4/", "/decoder/join.4/", "/decoder/heads.3/")
-"""Layers that stay in floating point: the first convolution, the last decoder level and the head."""
+CONVENTION = Convention(
+    "metric",
+    WIDTH_PX,
+    PADDED_HEIGHT_PX,
+    scale=1.0,
+    normalised_inside=True,
+    resize="fit",
+    fit_px=(WIDTH_PX, HEIGHT_PX),
+)
+"""What an exported file takes and gives: 8-bit values as they are, metres."""
+INTEGER_LAYERS = ("/encoder/pool/", "/encoder/stages.", "/decoder/")
+FLOAT_LAYERS = ("/decoder/reduce.4/", "/decoder/join.4/", "/decoder/heads.3/")
+"""All else stays in floating point too: the input and the first convolution, and from the head's logit on to
+depth, which 8 bits would cut into 256 steps."""
+FACTS = ("seed", "width", "initial", "loss", "step", "images_seen", "elapsed_s", "learning_rate")
+"""What a file repeats of its training."""
+
+
+class Normalise(nn.Module):
+    """RGB in 0 to 255 to what the encoder takes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.tensor(255.0 * MEAN)[None, :, None, None])
+        self.register_buffer("deviation", torch.tensor(255.0 * STANDARD_DEVIATION)[None, :, None, None])
+
+    def forward(self, rgb: Tensor) -> Tensor:
+        return (rgb - self.mean) / self.deviation
 
 
 class FullResolution(nn.Module):
-    """The network with its finest head only."""
+    """The network with its finest head only, for RGB (N, 3, H, W) in 0 to 255."""
 
     def __init__(self, network: DepthResNet) -> None:
         super().__init__()
+        self.normalise = Normalise()
         self.encoder, self.decoder = network.encoder, network.decoder
 
     def forward(self, rgb: Tensor) -> Tensor:
-        return depth_from_logit(self.decoder(self.encoder(rgb))[-1])
+        return depth_from_logit(self.decoder(self.encoder(self.normalise(rgb)))[-1])
 
 
 class CalibrationImages(CalibrationDataReader):
@@ -57,66 +98,113 @@ class CalibrationImages(CalibrationDataReader):
 def inputs(shards: Shards, count: int) -> Iterator[np.ndarray]:
     """Network inputs of evenly chosen images."""
     for row in np.linspace(0, len(shards) - 1, count).astype(int):
-        yield normalised_input(shards[row][0])
+        yield network_input(shards[row][0])
+
+
+def network_input(rgb: ByteArray) -> FloatArray:
+    """(240, 320, 3) uint8 to (1, 3, 256, 320) float32, 0 to 255."""
+    image = padded(rgb, WIDTH_PX, PADDED_HEIGHT_PX).astype(np.float32)
+    return np.ascontiguousarray(image.transpose(2, 0, 1)[None])
 
 
 def export(checkpoint: Path, data: Path, out: Path) -> dict[str, float]:
-    """Write ``out`` (8 bit) and ``out`` with suffix ``.float.onnx``; returns both AbsRel on validation rooms.
+    """Write ``out`` (8 bit) and ``out`` with suffix ``.float.onnx``; returns errors on validation rooms.
 
     Args:
         checkpoint: ``last.pt`` of a training run.
         data: folder of shards; training images calibrate, validation images compare.
         out: the ONNX file to write.
+
+    Raises:
+        InputError: there is no such checkpoint.
     """
+    if not checkpoint.is_file():
+        raise InputError(f"There is no checkpoint at {checkpoint}: name the last.pt of a training run.")
     saved = torch.load(checkpoint, weights_only=True, map_location="cpu")
-    network = DepthResNet().eval()
+    network = DepthResNet(saved["config"]["width"]).eval()
     network.load_state_dict(saved["model"])
-    float_file, prepared = out.with_suffix(".float.onnx"), out.with_suffix(".prepared.onnx")
-    example = torch.zeros(1, 3, PADDED_HEIGHT_PX, WIDTH_PX)
+    float_file = out.with_suffix(".float.onnx")
+    write_float(network, float_file)
+    training = Shards(data, "train")
+    quantise(float_file, out, training)
+    validation = Shards(data, "validation")
+    errors = mean_errors(out, validation)
+    errors["float_abs_rel"] = mean_errors(float_file, validation)["abs_rel"]
+    facts = saved["config"] | saved["state"]
+    for file in (float_file, out):
+        describe(file, {name: facts[name] for name in FACTS}, errors, described_data(training))
+    return errors
+
+
+def write_float(network: DepthResNet, file: Path) -> None:
+    """The network as ONNX in 32-bit floating point."""
     torch.onnx.export(
         FullResolution(network).eval(),
-        (example,),
-        str(float_file),
+        (torch.zeros(1, 3, PADDED_HEIGHT_PX, WIDTH_PX),),
+        str(file),
         input_names=["rgb"],
         output_names=["depth_m"],
         opset_version=OPSET,
         dynamo=False,
     )
+
+
+def quantise(float_file: Path, out: Path, training: Shards) -> None:
+    """The same network with 8-bit weights and activations, ranges from training images."""
+    prepared = out.with_suffix(".prepared.onnx")
     quant_pre_process(str(float_file), str(prepared), skip_symbolic_shape=True)
     nodes = [node.name for node in onnx.load(prepared).graph.node]
     quantize_static(
         str(prepared),
         str(out),
-        CalibrationImages(Shards(data, "train"), CALIBRATION_IMAGES),
+        CalibrationImages(training, CALIBRATION_IMAGES),
         quant_format=QuantFormat.QDQ,
         activation_type=QuantType.QUInt8,
         weight_type=QuantType.QInt8,
         per_channel=True,
         calibrate_method=CalibrationMethod.MinMax,
-        nodes_to_exclude=[name for name in nodes if name.startswith(FLOAT_LAYERS) or not name],
+        nodes_to_exclude=[n for n in nodes if n.startswith(FLOAT_LAYERS) or not n.startswith(INTEGER_LAYERS)],
     )
     prepared.unlink()
-    validation = Shards(data, "validation")
-    errors = {"float_abs_rel": mean_abs_rel(float_file, validation), "abs_rel": mean_abs_rel(out, validation)}
-    describe(out, {**saved["state"], **saved["config"], **errors})
-    return errors
 
 
-def mean_abs_rel(file: Path, shards: Shards) -> float:
-    """Mean AbsRel of an ONNX file over evenly chosen images."""
+def mean_errors(file: Path, shards: Shards) -> dict[str, float]:
+    """Mean errors of an ONNX file over evenly chosen images, as it is and scaled by the median."""
     session = onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
-    errors = []
+    rows: list[dict[str, float]] = []
     for row in np.linspace(0, len(shards) - 1, COMPARED_IMAGES).astype(int):
         rgb, truth_m = shards[row]
-        (depth_m,) = session.run(None, {"rgb": normalised_input(rgb)})
-        errors.append(depth_errors(unpad(depth_m[0, 0]), truth_m).abs_rel)
-    return float(np.mean(errors))
+        (output,) = session.run(None, {"rgb": network_input(rgb)})
+        depth_m = unpad(output[0, 0])
+        known = np.isfinite(truth_m)
+        scale = np.median(truth_m[known]) / np.median(depth_m[known])
+        raw, scaled = depth_errors(depth_m, truth_m), depth_errors(scale * depth_m, truth_m)
+        rows.append(
+            {"abs_rel": raw.abs_rel, "rmse_m": raw.rmse_m, "delta_1": raw.delta_1, "silog": raw.silog}
+            | {"scaled_abs_rel": scaled.abs_rel, "scaled_delta_1": scaled.delta_1}
+        )
+    return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
 
 
-def describe(file: Path, facts: dict[str, object]) -> None:
-    """Write into the file how it was made: seed, steps, images seen, errors on validation rooms."""
+def described_data(training: Shards) -> str:
+    """What the network learned from, by the names of the shards."""
+    kinds = sorted({re.sub(r"_\d+_rgb\.npy$", "", file.name) for file in training.files})
+    return f"{len(training)} images in {len(training.files)} shards ({', '.join(kinds)})"
+
+
+def describe(file: Path, facts: dict[str, Any], errors: dict[str, float], data: str) -> None:
+    """Write into the file what it takes and gives, how it was made, and its errors on validation rooms."""
     model = onnx.load(file)
-    shown = ("seed", "step", "images_seen", "elapsed_s", "learning_rate", "abs_rel", "float_abs_rel")
-    onnx.helper.set_model_props(model, {key: json.dumps(facts[key]) for key in shown})
+    said = {
+        **metadata_of(CONVENTION),
+        "kind": CONVENTION.kind,
+        "normalised_inside": "true",
+        "licence": LICENCES[facts["initial"]],
+        "data": data,
+        "metrics": json.dumps(errors),
+        "abs_rel": str(errors["abs_rel"]),
+        **{name: str(value) for name, value in facts.items()},
+    }
+    onnx.helper.set_model_props(model, said)
     model.producer_name = "PacketMesh"
     onnx.save(model, file)

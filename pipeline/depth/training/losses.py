@@ -2,28 +2,40 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import torch
 from torch import Tensor
 
+Loss = Literal["scale-invariant", "berhu"]
+
 SCALE_INVARIANCE = 0.85
+SMOOTHNESS = 1e-3
+BERHU_SHARE = 0.2
 
 
-def supervised_loss(depths_m: list[Tensor], target_m: Tensor, image: Tensor) -> Tensor:
+def supervised_loss(
+    depths_m: list[Tensor], target_m: Tensor, image: Tensor, kind: Loss = "scale-invariant"
+) -> Tensor:
     """The loss of one batch, a scalar.
 
     Args:
         depths_m: predictions (N, 1, H/s, W/s) at strides s = 1, 2, 4, 8.
         target_m: (N, 1, H, W), NaN where unknown.
         image: (N, 3, H, W) any normalisation; guides the smoothness.
+        kind: what weighs the depth itself; its gradients and smoothness are weighed the same way in both.
     """
     loss = target_m.new_zeros(())
     for level, depth_m in enumerate(depths_m):
         target = target_m[..., :: 2**level, :: 2**level]
         valid = torch.isfinite(target)
         error = torch.where(valid, depth_m.log() - torch.where(valid, target, 1.0).log(), 0.0)
-        loss = loss + scale_invariant(error, valid) / len(depths_m)
-        loss = loss + 0.5 * gradient_error(error, valid)
-    return loss + 1e-3 * smoothness(depths_m[0], image)
+        if kind == "berhu":
+            data = berhu(torch.where(valid, depth_m - torch.where(valid, target, 1.0), 0.0), valid)
+        else:
+            data = scale_invariant(error, valid)
+        loss = loss + data / len(depths_m) + 0.5 * gradient_error(error, valid)
+    return loss + SMOOTHNESS * smoothness(depths_m[0], image)
 
 
 def scale_invariant(error: Tensor, valid: Tensor) -> Tensor:
@@ -32,6 +44,14 @@ def scale_invariant(error: Tensor, valid: Tensor) -> Tensor:
     mean = error.sum(dim=(1, 2, 3)) / count
     mean_square = error.square().sum(dim=(1, 2, 3)) / count
     return 10.0 * (mean_square - SCALE_INVARIANCE * mean.square() + 1e-6).sqrt().mean()
+
+
+def berhu(error_m: Tensor, valid: Tensor) -> Tensor:
+    """Mean of |x|, above c = 0.2 max |x| of (x^2 + c^2) / 2c (Laina et al. 2016)."""
+    size_m = error_m.abs()
+    limit_m = (BERHU_SHARE * size_m.detach().max()).clamp(min=1e-6)
+    cost = torch.where(size_m <= limit_m, size_m, (size_m.square() + limit_m.square()) / (2.0 * limit_m))
+    return cost.sum() / valid.sum().clamp(min=1)
 
 
 def gradient_error(error: Tensor, valid: Tensor) -> Tensor:

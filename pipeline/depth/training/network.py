@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import torch
 from torch import Tensor, nn
 
+Width = Literal["full", "half"]
+
 DEPTH_MIN_M = 0.1
 DEPTH_MAX_M = 10.0
-ENCODER_CHANNELS = (64, 256, 512, 1024, 2048)
+STEM_CHANNELS = 64
+BLOCK_WIDTH = {"full": 64, "half": 32}
+"""Channels inside the bottlenecks of the first stage; every stage doubles them."""
+BLOCKS = (3, 4, 6, 3)
 DECODER_CHANNELS = (16, 32, 64, 128, 256)
 HEAD_LEVELS = (0, 1, 2, 3)
 TYPICAL_ROOM_DEPTH_M = 2.5
@@ -18,16 +23,20 @@ HEAD_GAIN = 0.1
 
 
 class Bottleneck(nn.Module):
-    """1x1, 3x3, 1x1 convolutions with a shortcut (He et al. 2016); the stride is in the 3x3."""
+    """1x1, 3x3, 1x1 convolutions with a shortcut (He et al. 2016).
 
-    def __init__(self, channels_in: int, width: int, stride: int) -> None:
+    The stride is in the 3x3, or, ``early``, in the first 1x1 as in Caffe's ResNets.
+    """
+
+    def __init__(self, channels_in: int, width: int, stride: int, early: bool) -> None:
         super().__init__()
         channels_out = 4 * width
+        first, second = (stride, 1) if early else (1, stride)
         self.residual = nn.Sequential(
-            nn.Conv2d(channels_in, width, 1, bias=False),
+            nn.Conv2d(channels_in, width, 1, first, bias=False),
             nn.BatchNorm2d(width),
             nn.ReLU(inplace=True),
-            nn.Conv2d(width, width, 3, stride, 1, bias=False),
+            nn.Conv2d(width, width, 3, second, 1, bias=False),
             nn.BatchNorm2d(width),
             nn.ReLU(inplace=True),
             nn.Conv2d(width, channels_out, 1, bias=False),
@@ -44,29 +53,47 @@ class Bottleneck(nn.Module):
 
 
 class ResNet50(nn.Module):
-    """The encoder without its classifier; returns the features at strides 2, 4, 8, 16 and 32."""
+    """The encoder without its classifier; returns the features at strides 2, 4, 8, 16 and 32.
 
-    def __init__(self) -> None:
+    At full width it is the usual one. At half width it is the ResNet-50-thin of Yahoo's Open-NSFW (2016):
+    half the channels, strides in the first 1x1, and pooling windows that start at the image's first pixel.
+    """
+
+    def __init__(self, width: Width = "full") -> None:
         super().__init__()
+        thin, inner = width == "half", BLOCK_WIDTH[width]
+        self.register_buffer("offset", torch.zeros(1, 3, 1, 1))
         self.stem = nn.Sequential(
-            nn.Conv2d(3, 64, 7, 2, 3, bias=False), nn.BatchNorm2d(64), nn.ReLU(inplace=True)
+            nn.Conv2d(3, STEM_CHANNELS, 7, 2, 3, bias=False),
+            nn.BatchNorm2d(STEM_CHANNELS),
+            nn.ReLU(inplace=True),
         )
-        self.pool = nn.MaxPool2d(3, 2, 1)
+        self.pool = nn.MaxPool2d(3, 2, 0, ceil_mode=True) if thin else nn.MaxPool2d(3, 2, 1)
         self.stages = nn.ModuleList()
-        channels = 64
-        for blocks, width, stride in ((3, 64, 1), (4, 128, 2), (6, 256, 2), (3, 512, 2)):
-            stage = [Bottleneck(channels, width, stride)]
-            channels = 4 * width
-            stage += [Bottleneck(channels, width, 1) for _ in range(blocks - 1)]
+        channels = STEM_CHANNELS
+        for level, blocks in enumerate(BLOCKS):
+            stage = [Bottleneck(channels, inner << level, 2 if level else 1, early=thin)]
+            channels = 4 * inner << level
+            stage += [Bottleneck(channels, inner << level, 1, early=thin) for _ in range(blocks - 1)]
             self.stages.append(nn.Sequential(*stage))
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        features = [self.stem(x)]
+        """Features of a normalised image (N, 3, H, W), finest first.
+
+        ``offset`` is what the first convolution's zero padding means; subtracting it instead of folding it
+        into a bias keeps the borders exact for weights that were made with another mean.
+        """
+        features = [self.stem(x - self.offset)]
         x = self.pool(features[0])
         for stage in self.stages:
             x = stage(x)
             features.append(x)
         return features
+
+
+def encoder_channels(width: Width) -> tuple[int, ...]:
+    """Channels of the features at strides 2, 4, 8, 16 and 32."""
+    return STEM_CHANNELS, *(4 * BLOCK_WIDTH[width] << level for level in range(len(BLOCKS)))
 
 
 class ReflectPadFunction(torch.autograd.Function):
@@ -75,7 +102,8 @@ class ReflectPadFunction(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor) -> Tensor:
         n, c, h, w = x.shape
-        out = torch.empty((n, c, h + 2, w + 2), dtype=x.dtype, memory_format=torch.channels_last)
+        size = (n, c, h + 2, w + 2)
+        out = torch.empty(size, dtype=x.dtype, device=x.device, memory_format=torch.channels_last)
         out[..., 1:-1, 1:-1] = x
         out[..., 0, 1:-1], out[..., -1, 1:-1] = x[..., 1, :], x[..., -2, :]
         out[..., 0], out[..., -1] = out[..., 2], out[..., -3]
@@ -108,13 +136,13 @@ def conv_elu(channels_in: int, channels_out: int) -> nn.Sequential:
 class Decoder(nn.Module):
     """Five levels of (conv, upsample, join the encoder's skip, conv), heads at strides 8, 4, 2 and 1."""
 
-    def __init__(self) -> None:
+    def __init__(self, encoder: tuple[int, ...]) -> None:
         super().__init__()
         reduce, join, heads = [], [], []
-        channels = ENCODER_CHANNELS[-1]
+        channels = encoder[-1]
         for level in (4, 3, 2, 1, 0):
             width = DECODER_CHANNELS[level]
-            skip = ENCODER_CHANNELS[level - 1] if level else 0
+            skip = encoder[level - 1] if level else 0
             reduce.append(conv_elu(channels, width))
             join.append(conv_elu(width + skip, width))
             if level in HEAD_LEVELS:
@@ -138,10 +166,10 @@ class Decoder(nn.Module):
 class DepthResNet(nn.Module):
     """Normalised RGB (N, 3, H, W) to depth in metres; H and W are multiples of 32."""
 
-    def __init__(self) -> None:
+    def __init__(self, width: Width = "full") -> None:
         super().__init__()
-        self.encoder = ResNet50()
-        self.decoder = Decoder()
+        self.encoder = ResNet50(width)
+        self.decoder = Decoder(encoder_channels(width))
         self.reset()
 
     def reset(self) -> None:

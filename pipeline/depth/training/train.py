@@ -4,26 +4,34 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from itertools import islice
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import numpy as np
 import torch
 from torch import Tensor
+from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from pipeline.depth.metrics import depth_errors
 from pipeline.depth.preprocessing import normalised_input
 from pipeline.depth.training.dataset import Shards, augment
-from pipeline.depth.training.losses import supervised_loss
-from pipeline.depth.training.network import DEPTH_MAX_M, DEPTH_MIN_M, DepthResNet
+from pipeline.depth.training.initial import Initial, initial_network
+from pipeline.depth.training.losses import Loss, supervised_loss
+from pipeline.depth.training.network import DEPTH_MAX_M, DEPTH_MIN_M, DepthResNet, Width
 from pipeline.depth.training.parallel import Team, run_team
+from pipeline.errors import InputError
+
+Precision = Literal["bf16", "fp32"]
 
 CHECKPOINT_EVERY_S = 180.0
 VALIDATION_IMAGES = 48
+MEASURED_BATCHES = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +44,21 @@ class TrainingConfig:
     """Folder of checkpoints and the log."""
     minutes: float = 75.0
     """Wall-clock budget of this and all resumed runs together."""
+    pause_minutes: float = math.inf
+    """This run saves and stops after so long even if the budget is not spent; the next one continues it."""
     learning_rate: float = 4e-4
     """Peak of the one-cycle schedule; it rises for 4 % of the budget and falls by a cosine to zero."""
     gradient_clip: float = 1.0
     seed: int = 0
+    width: Width = "full"
+    initial: Initial = "random"
+    loss: Loss = "scale-invariant"
+    precision: Precision = "bf16"
+    """Of the network's arithmetic; the loss is always fp32."""
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    """``auto`` takes a GPU when there is one."""
     processes: int = 2
-    """They share each batch; one core each."""
+    """They share each batch, one core each; on a GPU one process trains."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +72,15 @@ class Stage:
     batch: int
 
 
-STAGES = (Stage(0.3, (64, 96), 16), Stage(0.65, (128, 160), 8), Stage(math.inf, (256, 320), 8))
+STAGES = {
+    "cpu": (Stage(0.3, (64, 96), 16), Stage(0.65, (128, 160), 8), Stage(math.inf, (256, 320), 8)),
+    "cuda": (Stage(0.25, (128, 160), 64), Stage(math.inf, (256, 320), 32)),
+}
 """Small images first: the layout of rooms is learned from many of them, the detail from fewer large ones."""
+
+
+ALONE = Team(0, 1, torch.empty(0), torch.empty(0), None)
+"""A team of one, which has nobody to wait for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,51 +93,91 @@ class TrainingState:
 
 
 def train(config: TrainingConfig) -> None:
-    """Train until the time budget is spent; continues from ``out/last.pt`` when there is one."""
+    """Train until the time budget is spent; continues from ``out/last.pt`` when there is one.
+
+    Raises:
+        InputError: there are no shards, no GPU where one is asked for, or another network in ``out``.
+    """
+    for split in ("train", "validation"):
+        if not Shards(config.data, split).index:
+            raise InputError(f"There are no {split} shards in {config.data}: render them first.")
     config.out.mkdir(parents=True, exist_ok=True)
-    parameters = sum(p.numel() for p in DepthResNet().parameters())
-    run_team(config.processes, parameters, train_member, config)
+    if not (config.out / "last.pt").exists():
+        start(config)
+    if device_of(config).type == "cuda" or config.processes == 1:
+        train_member(ALONE, config)
+    else:
+        parameters = sum(p.numel() for p in DepthResNet(config.width).parameters())
+        run_team(config.processes, parameters, train_member, config)
+
+
+def device_of(config: TrainingConfig) -> torch.device:
+    """Where the network is trained."""
+    if config.device == "cuda" and not torch.cuda.is_available():
+        raise InputError("Device cuda was asked for, but torch finds no GPU here: use cpu or auto.")
+    return torch.device("cuda" if config.device != "cpu" and torch.cuda.is_available() else "cpu")
+
+
+def start(config: TrainingConfig) -> None:
+    """Write the first checkpoint, of a network that has seen nothing."""
+    torch.manual_seed(config.seed)
+    stage = STAGES["cpu"][-1]
+    samples = endless_samples(config.data, np.random.default_rng(config.seed))
+    images = (collate(list(islice(samples, stage.batch)), stage)[0] for _ in range(MEASURED_BATCHES))
+    model = initial_network(config.initial, config.width, images)
+    save_checkpoint(config, model, optimizer_of(model, config), TrainingState())
 
 
 def train_member(team: Team, config: TrainingConfig) -> None:
     """What every process of the team does with its share of each batch."""
-    torch.manual_seed(config.seed)
-    model = DepthResNet().to(memory_format=torch.channels_last)
-    optimizer = torch.optim.Adam(model.parameters(), lr=config.learning_rate, fused=True)
-    state = resume(config.out / "last.pt", model, optimizer)
-    samples = endless_samples(config.data, np.random.default_rng((config.seed, state.step, team.rank)))
+    device = device_of(config)
+    model = DepthResNet(config.width).to(device, memory_format=torch.channels_last)
+    optimizer = optimizer_of(model, config)
+    state = resume(config, model, optimizer)
     validation = Shards(config.data, "validation")
-    clock = time.monotonic() - state.elapsed_s
-    saved_at_s = state.elapsed_s
-    losses: list[float] = []
-    finished = False
-    while not finished:
+    began_s = saved_at_s = state.elapsed_s
+    clock = time.monotonic() - began_s
+    end_s = min(60.0 * config.minutes, began_s + 60.0 * config.pause_minutes)
+    losses: list[Tensor] = []
+    stage: Stage | None = None
+    batches: Iterator[tuple[Tensor, Tensor]] = iter(())
+    while state.elapsed_s < end_s:
         spent = state.elapsed_s / (60.0 * config.minutes)
-        stage = next(stage for stage in STAGES if spent < stage.until)
-        image, target_m = collate(list(islice(samples, stage.batch // team.size)), stage)
-        losses.append(backward(model, image, target_m))
-        now_s = team.average_gradients(model.parameters(), state.step, time.monotonic() - clock)
+        due = next(stage for stage in STAGES[device.type] if spent < stage.until)
+        if due != stage:
+            stage, batches = due, iter(loader(config, due, team, state.step, device))
+        image, target_m = next(batches)
+        image, target_m = image.to(device, non_blocking=True), target_m.to(device, non_blocking=True)
+        losses.append(backward(model, image, target_m, config))
+        now_s = time.monotonic() - clock
+        if team.size > 1:
+            now_s = team.average_gradients(model.parameters(), state.step, now_s)
         update(model, optimizer, scheduled_rate(config.learning_rate, spent), config.gradient_clip)
         state = TrainingState(state.step + 1, state.images_seen + stage.batch, now_s)
-        finished = now_s >= 60.0 * config.minutes
-        if team.leads and state.step % 20 == 0:
-            log(config.out, state, loss=float(np.mean(losses)))
+        if state.step % 20 == 0:
+            if team.leads:
+                log(config.out, state, loss=float(torch.stack(losses).mean()))
             losses.clear()
-        if team.leads and (finished or now_s - saved_at_s > CHECKPOINT_EVERY_S):
-            log(config.out, state, **validate(model, validation, stage))
+        if team.leads and (now_s >= end_s or now_s - saved_at_s > CHECKPOINT_EVERY_S):
+            log(config.out, state, **validate(model, validation, stage, config.precision))
             save_checkpoint(config, model, optimizer, state)
             saved_at_s = now_s
 
 
-def backward(model: DepthResNet, image: Tensor, target_m: Tensor) -> float:
-    """Leave the gradients of one batch in the model; returns the loss."""
+def optimizer_of(model: DepthResNet, config: TrainingConfig) -> torch.optim.Optimizer:
+    """Adam over the whole network."""
+    return torch.optim.Adam(model.parameters(), lr=config.learning_rate, fused=True)
+
+
+def backward(model: DepthResNet, image: Tensor, target_m: Tensor, config: TrainingConfig) -> Tensor:
+    """Leave the gradients of one batch in the model; returns the loss, apart from its graph."""
     model.train()
-    with torch.autocast("cpu", dtype=torch.bfloat16):
+    with torch.autocast(image.device.type, torch.bfloat16, enabled=config.precision == "bf16"):
         depths_m = model(image)
-    loss = supervised_loss(depths_m, target_m, image)
+    loss = supervised_loss(depths_m, target_m, image, config.loss)
     model.zero_grad(set_to_none=True)
     loss.backward()
-    return loss.item()
+    return loss.detach()
 
 
 def update(model: DepthResNet, optimizer: torch.optim.Optimizer, rate: float, gradient_clip: float) -> None:
@@ -130,6 +194,31 @@ def scheduled_rate(peak: float, spent: float, rise: float = 0.04) -> float:
     if spent < rise:
         return peak * (0.05 + 0.95 * spent / rise)
     return peak * 0.5 * (1.0 + math.cos(math.pi * min(1.0, (spent - rise) / (1.0 - rise))))
+
+
+@dataclass(frozen=True, slots=True)
+class Batches(IterableDataset):
+    """Endless augmented batches of one stage; every worker process draws its own."""
+
+    data: Path
+    stage: Stage
+    images: int
+    seed: tuple[int, ...]
+
+    def __iter__(self) -> Iterator[tuple[Tensor, Tensor]]:
+        worker = get_worker_info()
+        rng = np.random.default_rng((*self.seed, worker.id if worker else 0))
+        samples = endless_samples(self.data, rng)
+        while True:
+            yield collate(list(islice(samples, self.images)), self.stage)
+
+
+def loader(config: TrainingConfig, stage: Stage, team: Team, step: int, device: torch.device) -> DataLoader:
+    """This process's share of the batches of a stage, from worker processes if a GPU waits for them."""
+    on_gpu = device.type == "cuda"
+    batches = Batches(config.data, stage, stage.batch // team.size, (config.seed, step, team.rank))
+    workers = max(1, len(os.sched_getaffinity(0)) - 2) if on_gpu else 0
+    return DataLoader(batches, batch_size=None, num_workers=workers, pin_memory=on_gpu)
 
 
 def endless_samples(data: Path, rng: np.random.Generator) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -155,15 +244,18 @@ def collate(samples: list[tuple[np.ndarray, np.ndarray]], stage: Stage) -> tuple
 
 
 @torch.no_grad()
-def validate(model: DepthResNet, shards: Shards, stage: Stage) -> dict[str, float]:
+def validate(
+    model: DepthResNet, shards: Shards, stage: Stage, precision: Precision = "bf16"
+) -> dict[str, float]:
     """Mean errors over evenly chosen validation images, at the stage's size."""
     model.eval()
+    device = next(model.parameters()).device
     errors = []
     for row in np.linspace(0, len(shards) - 1, VALIDATION_IMAGES).astype(int):
         image, truth_m = collate([shards[row]], stage)
-        with torch.autocast("cpu", dtype=torch.bfloat16):
-            depth_m = model(image)[0]
-        errors.append(depth_errors(depth_m.numpy(), truth_m.numpy()))
+        with torch.autocast(device.type, torch.bfloat16, enabled=precision == "bf16"):
+            depth_m = model(image.to(device))[0]
+        errors.append(depth_errors(depth_m.cpu().numpy(), truth_m.numpy()))
     return {
         f"val_{name}": float(np.mean([getattr(error, name) for error in errors]))
         for name in ("abs_rel", "rmse_m", "delta_1", "silog")
@@ -183,7 +275,7 @@ def save_checkpoint(
 ) -> None:
     """Replace ``out/last.pt`` in one move."""
     temporary = config.out / "last.tmp"
-    plain = asdict(replace(config, data=str(config.data), out=str(config.out)))
+    plain = asdict(replace(config, data=str(config.data), out=str(config.out)))  # type: ignore[arg-type]
     torch.save(
         {
             "model": model.state_dict(),
@@ -196,11 +288,21 @@ def save_checkpoint(
     temporary.rename(config.out / "last.pt")
 
 
-def resume(file: Path, model: DepthResNet, optimizer: torch.optim.Optimizer) -> TrainingState:
-    """Load a checkpoint into the model and optimiser if there is one."""
-    if not file.exists():
-        return TrainingState()
-    checkpoint = torch.load(file, weights_only=True)
+def resume(config: TrainingConfig, model: DepthResNet, optimizer: torch.optim.Optimizer) -> TrainingState:
+    """Load ``out/last.pt`` into the model and the optimiser.
+
+    Raises:
+        InputError: it holds a network of another width or other initial weights.
+    """
+    file = config.out / "last.pt"
+    checkpoint = torch.load(file, weights_only=True, map_location="cpu")
+    for option in ("width", "initial"):
+        saved, asked = checkpoint["config"][option], getattr(config, option)
+        if saved != asked:
+            raise InputError(
+                f"{file} was started with {option} {saved}, not {asked}: continue it with {saved}, "
+                "or train into another folder."
+            )
     model.load_state_dict(checkpoint["model"])
     optimizer.load_state_dict(checkpoint["optimizer"])
     return TrainingState(**checkpoint["state"])
