@@ -6,15 +6,15 @@ With ``--json`` exactly one JSON object goes to stdout; everything else goes to 
 
 from __future__ import annotations
 
-import json
 import logging
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from typing import Annotated, Any, Literal
 
 import tyro
 
-from app.cli_text import answers_table, mesh_lines
+from app.cli_depth import infer_depth
+from app.cli_text import answers_table, mesh_lines, print_json, say, wrong_use
 from pipeline.config import PRESETS
 from pipeline.errors import InputError, PacketMeshError
 from pipeline.settings import load_config, with_settings
@@ -44,7 +44,7 @@ def serve(
     from app.server import serve as serve_app
 
     def announce(url: str) -> None:
-        _say(f"PacketMesh is at {url} (stop with Ctrl-C)")
+        say(f"PacketMesh is at {url} (stop with Ctrl-C)")
 
     serve_app(
         scene=scene,
@@ -99,17 +99,17 @@ def reconstruct(
         except StopIteration as stop:
             result = stop.value
             break
-        _say(f"{progress.fraction:4.0%}  {progress.stage}")
+        say(f"{progress.fraction:4.0%}  {progress.stage}")
     metrics = metrics_of(result, name, preset)
     write_run_folder(result, metrics, out, {"scene": name, "preset": preset})
     write_reconstruction_report(result, metrics, out / "report.html")
     before, after = metrics["surface_before"], metrics["surface_after"]
-    _say(
+    say(
         f"100%  rays without a surface: {before['no_hit_ray_share']:.1%} before fusion, "
         f"{after['no_hit_ray_share']:.1%} after; see {out / 'report.html'}"
     )
     if json:
-        _print_json(metrics)
+        print_json(metrics)
 
 
 def register(
@@ -151,14 +151,14 @@ def register(
     try:
         methods = chosen_methods(method)
     except InputError as error:
-        _wrong_use(str(error))
+        wrong_use(str(error))
     config = config_for(methods, metric=metric, gate_m=gate_m, start=start, with_scale=scale)
     T_init, T_true = (None if path is None else read_pose(path) for path in (init, truth))
     moving, fixed = read_cloud(source), read_cloud(target)
     answers = []
     for answer in run_methods(methods, prepared_pair(moving, fixed, config, voxel_m, T_init, T_true), config):
         answers.append(answer)
-        _say(f"{answer.method}: {answer.stop_reason}")
+        say(f"{answer.method}: {answer.stop_reason}")
     chosen_pose(answers)  # a run without a pose leaves no folder
     writable_folder(out)
     files = {"source": source, "target": target, "init": init, "truth": truth}
@@ -167,7 +167,7 @@ def register(
     write_register_folder(out, answers, moving, config, command, truth is not None)
     metrics = answer_metrics(answers, truth is not None)
     if json:
-        _print_json(metrics)
+        print_json(metrics)
     else:
         print(answers_table(metrics))
 
@@ -196,7 +196,7 @@ def mesh(
     from pipeline.mesh_cloud import MeshOptions, iterate_mesh_file
 
     if radii_m == ():
-        _wrong_use("--radii-m needs at least one radius, or auto")
+        wrong_use("--radii-m needs at least one radius, or auto")
     given_m = None if radii_m == "auto" else radii_m
     options = MeshOptions(given_m, viewpoint, max_points, smoothing_passes)
     steps = iterate_mesh_file(cloud, out, options)
@@ -206,11 +206,11 @@ def mesh(
         except StopIteration as stop:
             report = stop.value
             break
-        _say(f"{progress.fraction:4.0%}  {progress.stage}")
+        say(f"{progress.fraction:4.0%}  {progress.stage}")
     if json:
-        _print_json(report)
+        print_json(report)
     else:
-        _say(mesh_lines(report))
+        say(mesh_lines(report))
 
 
 def reproduce(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
@@ -232,15 +232,15 @@ def reproduce(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None
     names = [name for names in only for name in names.split(",")]
     for event in run_experiments(names, out / "trials"):
         if isinstance(event, Progress):
-            _say(f"{event.fraction:4.0%}  {event.stage}")
+            say(f"{event.fraction:4.0%}  {event.stage}")
             continue
-        _say(f"{event.id}  {event.verdict}: {event.why}")
+        say(f"{event.id}  {event.verdict}: {event.why}")
         verdicts[event.id] = event
     report = {key: verdict.record() for key, verdict in verdicts.items()}
     write_json(out / "reproduce.json", report)
     write_reproduction_report(list(verdicts.values()), out / "reproduce.html")
     if json:
-        _print_json(report)
+        print_json(report)
 
 
 def bench(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
@@ -259,11 +259,11 @@ def bench(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
     results = {}
     for case, result in run_benchmarks(only):
         peers = ", ".join(f"{name} {seconds:.3f} s" for name, seconds in result.peers.items()) or "no peer"
-        _say(f"{case}: {result.ours_s:.3f} s ({peers}), {result.peak_memory_bytes / 1e6:.0f} MB at most")
+        say(f"{case}: {result.ours_s:.3f} s ({peers}), {result.peak_memory_bytes / 1e6:.0f} MB at most")
         results[case] = result.record()
     write_json(out / "bench.json", results)
     if json:
-        _print_json(results)
+        print_json(results)
 
 
 def scenes(json: bool = False) -> None:
@@ -275,7 +275,7 @@ def scenes(json: bool = False) -> None:
     from pipeline.scenes import DEMO_SCENES
 
     if json:
-        _print_json(DEMO_SCENES)
+        print_json(DEMO_SCENES)
         return
     for name, description in DEMO_SCENES.items():
         print(f"{name:<14} {description}")
@@ -291,7 +291,7 @@ def doctor(json: bool = False) -> None:
 
     findings = examine()
     if json:
-        _print_json({finding.name: {"ok": finding.ok, "detail": finding.detail} for finding in findings})
+        print_json({finding.name: {"ok": finding.ok, "detail": finding.detail} for finding in findings})
     else:
         for finding in findings:
             print(f"{'ok ' if finding.ok else 'BAD'} {finding.name:<14} {finding.detail}")
@@ -305,6 +305,7 @@ COMMANDS: dict[str, Any] = {
     "reconstruct": reconstruct,
     "register": register,
     "mesh": mesh,
+    "infer-depth": infer_depth,
     "reproduce": reproduce,
     "bench": bench,
     "scenes": scenes,
@@ -324,10 +325,10 @@ def main(argv: list[str] | None = None) -> None:
             config=(tyro.conf.FlagCreatePairsOff,),
         )
     except PacketMeshError as error:
-        _say(f"packetmesh: {error}")
+        say(f"packetmesh: {error}")
         sys.exit(1)
     except KeyboardInterrupt:
-        _say("packetmesh: stopped")
+        say("packetmesh: stopped")
         sys.exit(130)
 
 
@@ -343,7 +344,7 @@ def _load(
     pair = (color, depth, intrinsics)
     ways = [scene is not None, rig is not None, any(part is not None for part in pair)]
     if sum(ways) != 1:
-        _wrong_use("say what to reconstruct: --scene NAME, --rig DIR, or --color C --depth D --intrinsics K")
+        wrong_use("say what to reconstruct: --scene NAME, --rig DIR, or --color C --depth D --intrinsics K")
     from pipeline.io.rigs import load_frame, load_rig
     from pipeline.scenes import load_demo
     from pipeline.types import Rig
@@ -353,25 +354,10 @@ def _load(
     if rig is not None:
         return str(rig), load_rig(rig)
     if color is None or depth is None or intrinsics is None:
-        _wrong_use("a single pair needs all of --color, --depth and --intrinsics")
+        wrong_use("a single pair needs all of --color, --depth and --intrinsics")
     return f"{color.parent.name}/{color.name}", Rig(
         color.stem, (load_frame(color, depth, intrinsics, depth_scale),)
     )
-
-
-def _wrong_use(sentence: str) -> NoReturn:
-    _say(f"packetmesh: {sentence}")
-    sys.exit(2)
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
-
-
-def _print_json(value: Any) -> None:
-    from pipeline.io.json_file import finite
-
-    print(json.dumps(finite(value), allow_nan=False))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,29 @@
-"""What the command line says of its results, as text."""
+"""What the command line says, as text."""
 
 from __future__ import annotations
 
-from typing import Any
+import json
+import sys
+from typing import Any, NoReturn
+
+
+def say(text: str) -> None:
+    """A line on stderr, which leaves stdout to JSON and tables."""
+    sys.stderr.write(f"{text}\n")
+    sys.stderr.flush()
+
+
+def wrong_use(sentence: str) -> NoReturn:
+    """Say what is wrong with the options and exit with 2."""
+    say(f"packetmesh: {sentence}")
+    sys.exit(2)
+
+
+def print_json(value: Any) -> None:
+    """One strict JSON object on stdout."""
+    from pipeline.io.json_file import finite
+
+    sys.stdout.write(f"{json.dumps(finite(value), allow_nan=False)}\n")
 
 
 def answers_table(metrics: dict[str, dict[str, Any]]) -> str:

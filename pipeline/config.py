@@ -9,6 +9,10 @@ from pipeline.errors import InputError
 
 OutlierMode = Literal["thesis", "depth_normalised", "robust"]
 AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]
+ModelKind = Literal["metric", "relative", "inverse"]
+NetworkPreset = Literal[
+    "packetmesh", "midas-small", "depth-anything-v2-small", "depth-anything-v2-metric", "monodepth2"
+]
 Method = Literal[
     "icp",
     "trimmed-icp",
@@ -63,10 +67,26 @@ class DepthConfig:
 
     model: str | None = None
     """ONNX file of the depth network; None takes the one that ships."""
+    preset: NetworkPreset | None = None
+    """How that network wants its image and what it gives; None takes what the file says of itself."""
+    model_kind: ModelKind | None = None
+    """What the network gives: metres, depth up to scale, or disparity up to scale and shift; None takes
+    what the preset or the file says."""
     crop: bool = False
     """Infer on the thesis's 304 x 228 centre crop instead of the whole image."""
     alignment: AlignmentMode = "local"
     """How inferred depth is made metric against the sensor (SPEC 3.5)."""
+    reach: float = 0.1
+    """How far from measured pixels inferred depth counts, as a share of the image's diagonal."""
+    least_confidence: float = 0.0
+    """Inferred depth that is believed less does not count, 0 to 1."""
+
+    def __post_init__(self) -> None:
+        _above("depth.reach", self.reach, 0.0)
+        if not 0.0 <= self.least_confidence <= 1.0:
+            raise InputError(
+                f"depth.least_confidence is {self.least_confidence}; try a value between 0 and 1"
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline import geometry
 from pipeline.acquisition import FilterResult, back_project, filter_outliers
 from pipeline.config import FusionMode, PipelineConfig
-from pipeline.depth import AlignmentResult, DepthNetwork, align_depth
+from pipeline.depth import AlignmentResult, DepthNetwork, Overrides, Trust, align_depth, judge
 from pipeline.errors import ReconstructionError
 from pipeline.progress import Progress
 from pipeline.registration import fuse, hidden_from, register
@@ -55,7 +55,10 @@ class NodeClouds:
     provider: str
     """The execution provider that ran the network."""
     alignment: AlignmentResult
+    trust: Trust
+    """What of the aligned depth is to be believed in the sensor's holes."""
     inferred: PointCloud
+    """The believed depth, or in ``union`` mode all of it, as in the thesis."""
     inferred_registration: RegistrationResult | None
     fused: PointCloud
 
@@ -131,7 +134,7 @@ def iterate_reconstruction(rig: Rig, config: PipelineConfig) -> Generator[Progre
         started = now
 
     yield Progress("loading the depth network", 0.0)
-    network = DepthNetwork(config.depth.model)
+    network = DepthNetwork(config.depth.model, config.depth.preset, Overrides(config.depth.model_kind))
     done("load network")
     nodes = []
     for index, frame in enumerate(rig.frames):
@@ -165,8 +168,11 @@ def prepare_node(frame: RgbdFrame, config: PipelineConfig, network: DepthNetwork
     filtered = filter_outliers(back_project(frame), config.acquisition, frame.intrinsics.fx_px)
     sensor = filtered.kept
     inferred_depth = network.infer(frame.rgb, crop=config.depth.crop)
-    alignment = align_depth(inferred_depth, frame.depth, config.depth.alignment)
-    inferred = back_project(frame, alignment.depth, PointSource.INFERRED)
+    disparity = network.convention.kind == "inverse"
+    alignment = align_depth(inferred_depth, frame.depth, config.depth.alignment, disparity)
+    trust = judge(alignment, frame.depth, frame.rgb, config.depth.reach, config.depth.least_confidence)
+    believed = trust.depth if config.fusion.mode == "fill" else alignment.depth
+    inferred = back_project(frame, believed, PointSource.INFERRED)
     registration = None
     if config.fusion.register_inferred:
         registration = register(inferred, sensor, config.inferred_registration)
@@ -178,6 +184,7 @@ def prepare_node(frame: RgbdFrame, config: PipelineConfig, network: DepthNetwork
         inferred_depth=inferred_depth,
         provider=network.provider,
         alignment=alignment,
+        trust=trust,
         inferred=inferred,
         inferred_registration=registration,
         fused=fuse(sensor, inferred, config.fusion.mode),

@@ -101,7 +101,7 @@ def _parsed(hint: Any, text: str, key: str) -> Any:
         if text not in typing.get_args(hint):
             raise InputError(f"{key}={text} is not possible; try one of {', '.join(typing.get_args(hint))}")
         return text
-    if isinstance(hint, types.UnionType):
+    if typing.get_origin(hint) in (types.UnionType, typing.Union):
         return None if text == "none" else _parsed(typing.get_args(hint)[0], text, key)
     if hint is bool:
         return _parsed(Literal["true", "false"], text, key) == "true"

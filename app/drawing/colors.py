@@ -17,6 +17,8 @@ NEUTRAL = (120, 130, 140)
 DISTANCE_STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
 """Distances from zero to ``MOST_DISTANCE_M`` and beyond (viridis, dark to light)."""
 MOST_DISTANCE_M = 0.1
+CONFIDENCE_STOPS = DISTANCE_STOPS
+"""Confidence from 0 to 100 %: the surer, the brighter."""
 BRAND = (0, 90, 140)
 """The theme's colour."""
 

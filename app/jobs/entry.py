@@ -7,7 +7,9 @@ from typing import Any
 
 JOBS = {
     "scene": "app.jobs.views:scene_job",
-    "depth": "app.jobs.views:depth_job",
+    "depth": "app.jobs.depth:depth_job",
+    "hide": "app.jobs.depth_hide:hide_job",
+    "network": "app.jobs.depth_network:network_job",
     "fuse": "app.jobs.views:fuse_job",
     "surface": "app.jobs.views:surface_job",
     "paint": "app.jobs.paint:paint_job",

@@ -30,12 +30,24 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
+class ColorBar:
+    """What the colours of a picture mean."""
+
+    stops: tuple[tuple[int, int, int], ...]
+    """RGB at equal steps from the first label to the last."""
+    labels: tuple[str, ...]
+    """With units, at equal steps along the bar."""
+
+
+@dataclass(frozen=True, slots=True)
 class Picture:
     """An image for the panel."""
 
     rgb: ByteArray
     """(H, W, 3)."""
     caption: str
+    bar: ColorBar | None = None
+    """None for a photograph."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,13 +80,35 @@ class SceneView:
 
 
 @dataclass(frozen=True, slots=True)
+class ResidualView:
+    """Aligned minus sensor depth over the pixels where both are known."""
+
+    edges_m: FloatArray
+    """(B + 1,) bins, symmetric about zero."""
+    counts: IntArray
+    """(B,) pixels; the outer bins also hold those beyond them."""
+    median_m: float
+    """This and the RMS: NaN if no pixel is shared."""
+    rms_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrustView:
+    """What is believed of the aligned depth; shares of its pixels where the sensor is blind."""
+
+    kept_share: float
+    """This and the two below: NaN if the sensor is blind nowhere."""
+    flying_share: float
+    out_of_reach_share: float
+
+
+@dataclass(frozen=True, slots=True)
 class DepthNode:
     """One node's depth, sensed and inferred."""
 
     name: str
-    sensor_picture: Picture
-    inferred_picture: Picture
-    difference_picture: Picture
+    pictures: dict[str, Picture]
+    """By the names of ``app.depthwords.PICTURES``, all of one size."""
     sensor: Sample
     inferred: Sample
     outliers: Sample
@@ -82,10 +116,17 @@ class DepthNode:
     """The sensor's points and those inferred points that fusion lets in."""
     filled: Sample
     """Only the inferred points among the fused ones."""
+    inferred_confidence: ByteArray
+    """(N, 3) RGB of the points of ``inferred`` by their confidence."""
+    filled_confidence: ByteArray
+    """(N, 3) RGB of the points of ``filled`` by theirs."""
     alignment_mode: str
+    disparity: bool
+    """Whether the network gives 1/depth."""
     coefficients: dict[str, float]
-    residual_rms_m: float
+    residuals: ResidualView
     inlier_share: float
+    trust: TrustView
     truth_error_m: float | None
     """Median absolute depth error of the filled pixels, where the truth is known."""
     provider: str
@@ -324,6 +365,10 @@ class PaintedView:
     """Of the whole cloud."""
     roll_s: float
     """The ball alone."""
+
+
+SCREEN_POINTS = 60_000
+"""Points of all nodes together that are sent to the screen for one kind of cloud."""
 
 
 def sample(

@@ -19,14 +19,12 @@ from app.jobs.chain import (
 )
 from app.jobs.holes import hole_views, parts_of
 from app.jobs.meshes import mesh_view
-from app.jobs.pictures import depth_picture, depth_range_m, difference_picture
+from app.jobs.pictures import depth_picture, depth_range_m
 from app.jobs.records import (
-    DepthNode,
-    DepthView,
+    SCREEN_POINTS,
     FuseView,
     Picture,
     RegistrationRow,
-    Sample,
     SceneNode,
     SceneView,
     SpacingView,
@@ -41,10 +39,7 @@ from pipeline.acquisition import back_project
 from pipeline.progress import Progress
 from pipeline.reconstruct import NodeClouds, NodeRegistration
 from pipeline.registration import point_error_m
-from pipeline.types import FloatArray, PointCloud, PointSource, RgbdFrame, Rig
-
-SCREEN_POINTS = 60_000
-"""Points of all nodes together that are sent to the screen for one kind of cloud."""
+from pipeline.types import FloatArray, RgbdFrame, Rig
 
 
 def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
@@ -71,64 +66,6 @@ def _scene_node(frame: RgbdFrame, most: int) -> SceneNode:
         nearest_m=range_m[0],
         farthest_m=range_m[1],
     )
-
-
-def depth_job(store: Store, spec: Spec) -> Generator[Progress, None, DepthView]:
-    """Every node's depth, sensed, inferred and fused."""
-    rig = yield from rig_of(store, spec)
-    work = yield from prepared(store, spec)
-    yield Progress("pictures", 0.95)
-    return DepthView(
-        tuple(
-            _depth_node(rig, index, clouds, elapsed_s)
-            for index, (clouds, elapsed_s) in enumerate(zip(work.nodes, work.inference_s, strict=True))
-        )
-    )
-
-
-def _depth_node(rig: Rig, index: int, clouds: NodeClouds, elapsed_s: float | None) -> DepthNode:
-    drawn = SCREEN_POINTS / len(rig.frames) / len(clouds.fused)
-    frame, alignment = rig.frames[index], clouds.alignment
-    range_m = depth_range_m(frame.depth)
-    filled = clouds.fused.select(_inferred_rows(clouds.fused))
-    return DepthNode(
-        name=clouds.name,
-        sensor_picture=depth_picture(frame.depth, range_m, "Sensor depth"),
-        inferred_picture=depth_picture(alignment.depth, range_m, "Inferred depth, made metric"),
-        difference_picture=difference_picture(alignment.depth, frame.depth),
-        sensor=_thinned(clouds.sensor, drawn),
-        inferred=_thinned(clouds.inferred, drawn),
-        outliers=_thinned(replace(clouds.filtered.outliers, colors=None), drawn),
-        fused=_thinned(clouds.fused, drawn),
-        filled=_thinned(filled, drawn),
-        alignment_mode=alignment.mode,
-        coefficients=dict(alignment.coefficients),
-        residual_rms_m=alignment.residual_rms_m,
-        inlier_share=alignment.inliers,
-        truth_error_m=_filled_error_m(rig, index, clouds),
-        provider=clouds.provider,
-        inference_s=elapsed_s,
-    )
-
-
-def _thinned(cloud: PointCloud, share: float) -> Sample:
-    """The same share of every cloud, so that their densities can be compared by eye."""
-    return sample(cloud.points_m, cloud.colors, int(share * len(cloud)) + 1)
-
-
-def _inferred_rows(cloud: PointCloud) -> np.ndarray:
-    if cloud.source is None:
-        return np.zeros(len(cloud), dtype=bool)
-    return cloud.source == PointSource.INFERRED
-
-
-def _filled_error_m(rig: Rig, index: int, clouds: NodeClouds) -> float | None:
-    """Median absolute error of the inferred depth where the sensor has none."""
-    if rig.truth is None:
-        return None
-    error_m = np.abs(clouds.alignment.depth.z_m - rig.truth.depth[index].z_m)
-    error_m = error_m[~rig.frames[index].depth.valid & np.isfinite(error_m)]
-    return float(np.median(error_m)) if len(error_m) else None
 
 
 def fuse_job(store: Store, spec: Spec) -> Generator[Progress, None, FuseView]:

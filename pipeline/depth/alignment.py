@@ -35,10 +35,16 @@ class AlignmentResult:
     """Root mean square of aligned minus sensor depth over the shared pixels; NaN if there are none."""
     inliers: float
     """Share of the shared pixels whose aligned depth is within 5 % of the sensor's, 0 to 1."""
+    disparity: bool = False
+    """Whether the network knows disparity up to scale and shift."""
 
 
 def align_depth(
-    inferred: DepthMap, sensor: DepthMap, mode: AlignmentMode = "local", seed: int = 0
+    inferred: DepthMap,
+    sensor: DepthMap,
+    mode: AlignmentMode = "local",
+    disparity: bool = False,
+    seed: int = 0,
 ) -> AlignmentResult:
     """Map inferred depth to the sensor's metres.
 
@@ -47,6 +53,8 @@ def align_depth(
         sensor: (H, W) metric depth with holes.
         mode: ``none`` takes the network's metres as they are; ``median`` scales; ``affine_depth`` and
             ``affine_inverse`` fit a line robustly; ``local`` adds a smooth correction to the first line.
+        disparity: whether the network knows disparity up to scale and shift, so that ``local`` corrects
+            that line instead of depth's.
         seed: of the random draws that start a fit among many outliers.
 
     Raises:
@@ -65,7 +73,8 @@ def align_depth(
             f"Sensor depth and inferred depth share only {overlap.sum()} pixels, and aligning them takes "
             f"{MIN_OVERLAP_PX}: use a frame with more sensor depth, or alignment none."
         )
-    aligned, coefficients = ALIGNMENTS[mode](z, p, overlap, np.random.default_rng(seed))
+    align = local_inverse if mode == "local" and disparity else ALIGNMENTS[mode]
+    aligned, coefficients = align(z, p, overlap, np.random.default_rng(seed))
     aligned = np.where(positive(aligned), aligned, np.nan)
     shared = positive(aligned) & overlap
     residual_m = aligned[shared] - p[shared]
@@ -75,6 +84,7 @@ def align_depth(
         coefficients,
         float(np.sqrt(np.mean(residual_m**2))) if shared.any() else float("nan"),
         float(np.mean(np.abs(residual_m) < INLIER_SHARE_OF_DEPTH * p[shared])) if shared.any() else 0.0,
+        disparity,
     )
 
 
@@ -117,10 +127,21 @@ def affine_inverse(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.ran
 def local(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
     """The affine fit times exp(C), C the smoothed logarithmic residual: removes low-frequency bias."""
     line, coefficients = affine_depth(z, p, overlap, rng)
+    return corrected(line, p, overlap), coefficients
+
+
+def local_inverse(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
+    """The same from the line between disparities."""
+    line, coefficients = affine_inverse(z, p, overlap, rng)
+    return corrected(line, p, overlap), coefficients
+
+
+def corrected(line: FloatArray, p: FloatArray, overlap: BoolArray) -> FloatArray:
+    """An aligned depth times exp(C)."""
     usable = overlap & positive(line)
-    residual = np.zeros(z.shape, np.float32)
+    residual = np.zeros(line.shape, np.float32)
     residual[usable] = np.clip(np.log(p[usable] / line[usable]), -LOCAL_CLIP, LOCAL_CLIP)
-    return line * np.exp(spread(residual, usable)), coefficients
+    return line * np.exp(spread(residual, usable))
 
 
 def spread(residual: FloatArray, known: BoolArray) -> FloatArray:

@@ -8,39 +8,43 @@ import cv2
 import numpy as np
 import onnxruntime
 
-from pipeline.depth.preprocessing import (
-    CROP_HEIGHT_PX,
-    CROP_WIDTH_PX,
-    HEIGHT_PX,
-    PADDED_HEIGHT_PX,
-    WIDTH_PX,
-    centre_crop,
-    fitted,
-    normalised_input,
-    unpad,
-)
-from pipeline.errors import InputError
-from pipeline.types import ByteArray, DepthMap
+from pipeline.depth.conventions import Convention, Overrides, convention_of
+from pipeline.depth.preprocessing import centre_crop, fitted, free_size, padded, resized, unpad
+from pipeline.depth.signature import signature_of
+from pipeline.errors import InputError, ReconstructionError
+from pipeline.types import ByteArray, DepthMap, FloatArray
 
 SHIPPED_MODEL = Path(__file__).resolve().parents[2] / "assets" / "depth" / "resnet50.onnx"
 PREFERRED_PROVIDERS = ("CUDAExecutionProvider", "CPUExecutionProvider")
-INPUT_SHAPE = [1, 3, PADDED_HEIGHT_PX, WIDTH_PX]
-OUTPUT_SHAPE = [1, 1, PADDED_HEIGHT_PX, WIDTH_PX]
 THREADS = 2
 
 
 class DepthNetwork:
-    """A loaded network; build it once and infer many images, from any thread."""
+    """A loaded network of ours or another's; build it once and infer many images, from any thread."""
 
-    def __init__(self, model_path: str | Path | None = None) -> None:
+    def __init__(
+        self,
+        model_path: str | Path | None = None,
+        preset: str | None = None,
+        overrides: Overrides | None = None,
+    ) -> None:
         """Load the ONNX file; None takes the one that ships.
 
+        Args:
+            model_path: any depth network (``pipeline.depth.conventions``).
+            preset: how it wants its image, a name of ``conventions.PRESETS``; None takes what it says.
+            overrides: what is otherwise than the file or the preset says.
+
         Raises:
-            InputError: the file is missing, is not ONNX, is damaged, or is another kind of network.
+            InputError: the file is missing, is not ONNX, is damaged, is no depth network, or does not
+                say what it expects and neither does the caller.
         """
+        if model_path is None and preset not in (None, "packetmesh"):
+            raise InputError(f"The preset {preset} is for a network of that kind: name its ONNX file as well")
         self.model_path = SHIPPED_MODEL if model_path is None else Path(model_path)
         self._session = open_session(self.model_path)
-        self._input = self._session.get_inputs()[0].name
+        self._signature = signature_of(self._session, str(self.model_path))
+        self.convention = convention_of(self._session, preset, overrides, str(self.model_path))
 
     @property
     def provider(self) -> str:
@@ -49,18 +53,23 @@ class DepthNetwork:
 
     @property
     def description(self) -> dict[str, str]:
-        """What the file says about its own training: seed, images seen, errors on held-out rooms."""
+        """What the file says of itself: how it was trained and its errors, or how it wants its image."""
         return dict(self._session.get_modelmeta().custom_metadata_map)
 
     def infer(self, rgb: ByteArray, crop: bool = False) -> DepthMap:
-        """Relative depth on the pixel grid of ``rgb`` (SPEC 3.2).
+        """Depth on the pixel grid of ``rgb`` (SPEC 3.2): metric if the network gives metres, else relative.
+
+        A network of the kind ``inverse`` gives disparity d up to scale and shift; its depth here is 1/d,
+        which the alignment ``affine_inverse`` makes metric. Where d is zero or negative the network sees
+        nothing near (most clip there) and the depth is NaN.
 
         Args:
             rgb: (H, W, 3) uint8, any size.
-            crop: infer the thesis's 304 x 228 centre crop only; NaN outside of it.
+            crop: infer the thesis's centre crop only, 304 x 228 of 320 x 240; NaN outside of it.
 
         Raises:
-            InputError: ``rgb`` is not an 8-bit colour image.
+            InputError: ``rgb`` is not an 8-bit colour image, or the network does not take it.
+            ReconstructionError: the network gives no positive depth at all.
         """
         if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8 or not rgb.size:
             raise InputError(
@@ -69,17 +78,85 @@ class DepthNetwork:
             )
         window = centre_crop(*rgb.shape[:2]) if crop else (slice(None), slice(None))
         region = rgb[window]
-        limit = (CROP_WIDTH_PX, CROP_HEIGHT_PX) if crop else (WIDTH_PX, HEIGHT_PX)
-        small = fitted(region, *limit)
-        (output,) = self._session.run(None, {self._input: normalised_input(small)})
-        log_depth = np.log(unpad(output[0, 0], *small.shape[:2]))
-        z_m = np.full(rgb.shape[:2], np.nan, np.float32)
-        z_m[window] = np.exp(cv2.resize(log_depth, region.shape[1::-1], interpolation=cv2.INTER_LINEAR))
-        return DepthMap(z_m, kind="relative")
+        image, rows, columns = network_image(region, self.convention, crop)
+        output = self._run(network_input(image, self.convention))
+        whole = cv2.resize(output, image.shape[1::-1]) if output.shape != image.shape[:2] else output
+        z = np.full(rgb.shape[:2], np.nan, np.float32)
+        z[window] = depth_of(unpad(whole, rows, columns), region.shape[1::-1], self.convention)
+        if not np.isfinite(z).any():
+            raise ReconstructionError(
+                f"{self.model_path} gives no positive depth on this image as a network of the kind "
+                f"{self.convention.kind}: try another image, or another kind"
+            )
+        return DepthMap(z, kind="metric" if self.convention.kind == "metric" else "relative")
+
+    def _run(self, tensor: FloatArray) -> FloatArray:
+        """(H, W) float32 output for the input of one image."""
+        signature = self._signature
+        try:
+            (output,) = self._session.run(
+                [signature.output_name], {signature.input_name: tensor.astype(signature.dtype, copy=False)}
+            )
+        except Exception as error:  # onnxruntime raises a dozen unrelated types
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise InputError(
+                f"{self.model_path} fails on an input of {list(tensor.shape)} ({reason}): "
+                "try another input size or preset"
+            ) from error
+        plane = output[..., 0] if output.ndim == 4 and output.shape[-1] == 1 else output
+        if plane.ndim < 2 or plane.size != plane.shape[-1] * plane.shape[-2]:
+            raise InputError(
+                f"{self.model_path} gives {list(output.shape)} where one depth map is needed: "
+                "give another network"
+            )
+        return plane.reshape(plane.shape[-2:]).astype(np.float32, copy=False)
+
+
+def network_image(region: ByteArray, convention: Convention, crop: bool) -> tuple[ByteArray, int, int]:
+    """The image at the network's size, and how many rows and columns of its middle are not padding."""
+    rows, columns = region.shape[:2]
+    width_px, height_px = convention.width_px, convention.height_px
+    if height_px is None:
+        width_px, height_px = free_size(columns, rows, width_px, convention.multiple_px)
+    if convention.height_px is None or convention.resize == "stretch":
+        return resized(region, width_px, height_px), height_px, width_px
+    box = convention.fit_px or (width_px, height_px)
+    if crop:  # a part of the image fills the same part of the box, so that scale does not change
+        rows_of_box, columns_of_box = centre_crop(box[1], box[0])
+        box = columns_of_box.stop - columns_of_box.start, rows_of_box.stop - rows_of_box.start
+    small = fitted(region, *box)
+    return padded(small, width_px, height_px), *small.shape[:2]
+
+
+def network_input(image: ByteArray, convention: Convention) -> FloatArray:
+    """(H, W, 3) uint8 RGB to the network's float32 tensor of one image."""
+    values: FloatArray = image.astype(np.float32) / np.float32(convention.scale)
+    if not convention.normalised_inside:
+        mean, deviation = np.array([convention.mean, convention.deviation], np.float32)
+        values = (values - mean) / deviation
+    if convention.channels == "BGR":
+        values = values[..., ::-1]
+    return np.ascontiguousarray((values if convention.layout == "NHWC" else values.transpose(2, 0, 1))[None])
+
+
+def depth_of(output: FloatArray, size_px: tuple[int, int], convention: Convention) -> FloatArray:
+    """Depth of (width, height) pixels from a network's output, interpolated where noise is even.
+
+    Depth is resized as its logarithm, disparity as it is; what is not positive becomes NaN.
+    """
+    if convention.depth_range_m is not None:
+        near, far = (1.0 / depth_m for depth_m in convention.depth_range_m)
+        output = np.float32(far) + np.float32(near - far) * output
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if convention.gives_disparity:
+            disparity = cv2.resize(output, size_px, interpolation=cv2.INTER_LINEAR)
+            return np.where(disparity > 0.0, 1.0 / disparity, np.float32(np.nan))
+        logarithm = np.where(output > 0.0, np.log(output), np.float32(np.nan))
+        return np.exp(cv2.resize(logarithm, size_px, interpolation=cv2.INTER_LINEAR))
 
 
 def open_session(model_path: Path) -> onnxruntime.InferenceSession:
-    """A session with few, non-spinning threads, checked to be a depth network of ours."""
+    """A session with few, non-spinning threads."""
     if not model_path.is_file():
         raise InputError(f"There is no depth network at {model_path}: name an ONNX file, or none at all.")
     options = onnxruntime.SessionOptions()
@@ -90,15 +167,8 @@ def open_session(model_path: Path) -> onnxruntime.InferenceSession:
     available = onnxruntime.get_available_providers()
     providers = [name for name in PREFERRED_PROVIDERS if name in available]
     try:
-        session = onnxruntime.InferenceSession(str(model_path), options, providers=providers)
+        return onnxruntime.InferenceSession(str(model_path), options, providers=providers)
     except Exception as error:  # onnxruntime raises a dozen unrelated types for damaged files
         raise InputError(
             f"{model_path} is not a readable ONNX network, or is cut short: export or download it again."
         ) from error
-    shapes = [[node.shape for node in nodes] for nodes in (session.get_inputs(), session.get_outputs())]
-    if shapes != [[INPUT_SHAPE], [OUTPUT_SHAPE]]:
-        raise InputError(
-            f"{model_path} maps {shapes[0]} to {shapes[1]}, but a depth network of PacketMesh maps "
-            f"{INPUT_SHAPE} to {OUTPUT_SHAPE}: give one made by pipeline.depth.training export."
-        )
-    return session

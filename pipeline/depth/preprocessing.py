@@ -13,33 +13,64 @@ CROP_WIDTH_PX, CROP_HEIGHT_PX = 304, 228
 """Size the thesis's centre crop is fitted into: 95 % of each side."""
 PADDED_HEIGHT_PX = 256
 """The network's input is 256 x 320: both sides are multiples of its stride 32."""
-MEAN = np.array([0.485, 0.456, 0.406], np.float32)
-STANDARD_DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
+IMAGENET_MEAN = (0.485, 0.456, 0.406)
+IMAGENET_DEVIATION = (0.229, 0.224, 0.225)
+MEAN = np.array(IMAGENET_MEAN, np.float32)
+STANDARD_DEVIATION = np.array(IMAGENET_DEVIATION, np.float32)
+LONGEST_TIMES_SHORTEST = 3.0
+"""Of an input of free size; a longer image loses resolution instead of filling the memory."""
 
 
 def fitted(rgb: ByteArray, width_px: int = WIDTH_PX, height_px: int = HEIGHT_PX) -> ByteArray:
     """The image scaled to fit into (height, width) with its aspect kept; area averaging when it shrinks."""
     rows, columns = rgb.shape[:2]
     scale = min(width_px / columns, height_px / rows)
-    size = max(1, round(columns * scale)), max(1, round(rows * scale))
-    if size == (columns, rows):
+    return resized(rgb, max(1, round(columns * scale)), max(1, round(rows * scale)))
+
+
+def resized(rgb: ByteArray, width_px: int, height_px: int) -> ByteArray:
+    """The image stretched to (height, width); area averaging when it shrinks."""
+    rows, columns = rgb.shape[:2]
+    if (width_px, height_px) == (columns, rows):
         return rgb
-    return cv2.resize(rgb, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    shrinks = width_px * height_px < columns * rows
+    return cv2.resize(
+        rgb, (width_px, height_px), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+    )
+
+
+def free_size(columns: int, rows: int, shortest_px: int, multiple_px: int) -> tuple[int, int]:
+    """Width and height nearest the image's aspect with the shorter side at least ``shortest_px``.
+
+    Both are multiples of ``multiple_px`` (Depth Anything's ``Resize`` with ``lower_bound``), and the
+    longer one is at most three times the shorter.
+    """
+    least = multiple_px * -(-shortest_px // multiple_px)
+    most = multiple_px * int(LONGEST_TIMES_SHORTEST * least / multiple_px)
+    scale = shortest_px / min(columns, rows)
+    width, height = (multiple_px * round(side * scale / multiple_px) for side in (columns, rows))
+    return min(max(width, least), most), min(max(height, least), most)
+
+
+def padded(rgb: ByteArray, width_px: int, height_px: int) -> ByteArray:
+    """The image in the middle of (height, width), reflected outwards."""
+    rows, columns = rgb.shape[:2]
+    top, left = (height_px - rows) // 2, (width_px - columns) // 2
+    return np.pad(
+        rgb, ((top, height_px - rows - top), (left, width_px - columns - left), (0, 0)), mode="reflect"
+    )
 
 
 def normalised_input(rgb: ByteArray) -> FloatArray:
-    """(H, W, 3) uint8, at most 240 x 320, to the network's (1, 3, 256, 320) float32, reflect-padded."""
-    rows, columns = rgb.shape[:2]
-    top, left = (PADDED_HEIGHT_PX - rows) // 2, (WIDTH_PX - columns) // 2
-    padding = ((top, PADDED_HEIGHT_PX - rows - top), (left, WIDTH_PX - columns - left), (0, 0))
-    padded = np.pad(rgb, padding, mode="reflect").astype(np.float32)
-    scaled = (padded / np.float32(255.0) - MEAN) / STANDARD_DEVIATION
+    """(H, W, 3) uint8, at most 240 x 320, to our network's (1, 3, 256, 320) float32, reflect-padded."""
+    image = padded(rgb, WIDTH_PX, PADDED_HEIGHT_PX).astype(np.float32)
+    scaled = (image / np.float32(255.0) - MEAN) / STANDARD_DEVIATION
     return np.ascontiguousarray(scaled.transpose(2, 0, 1)[None])
 
 
 def unpad(padded: FloatArray, rows: int = HEIGHT_PX, columns: int = WIDTH_PX) -> FloatArray:
-    """The (rows, columns) middle of the network's (256, 320) output."""
-    top, left = (PADDED_HEIGHT_PX - rows) // 2, (WIDTH_PX - columns) // 2
+    """The (rows, columns) middle of a network's output."""
+    top, left = (padded.shape[0] - rows) // 2, (padded.shape[1] - columns) // 2
     return padded[top : top + rows, left : left + columns]
 
 

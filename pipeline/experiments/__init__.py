@@ -13,12 +13,13 @@ from typing import Any
 from pipeline.errors import InputError
 from pipeline.experiments import outliers
 from pipeline.experiments.claim import Claim, Verdict
+from pipeline.experiments.depth.claims import CLAIMS as DEPTH_CLAIMS
 from pipeline.experiments.registration.claims import CLAIMS as REGISTRATION_CLAIMS
 from pipeline.experiments.surface import CLAIMS as SURFACE_CLAIMS
 from pipeline.progress import Progress
 
 CLAIMS: dict[str, Claim] = {
-    claim.id: claim for claim in (outliers.C10, *REGISTRATION_CLAIMS, *SURFACE_CLAIMS)
+    claim.id: claim for claim in (outliers.C10, *DEPTH_CLAIMS, *REGISTRATION_CLAIMS, *SURFACE_CLAIMS)
 }
 
 

@@ -8,7 +8,7 @@ from app.panels import depth, fuse, surface
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.errors import InputError
 
-ALL = (*depth.CONTROLS, *depth.ADVANCED, *fuse.ADVANCED, *surface.ADVANCED)
+ALL = (*depth.FIRST, *depth.TRUST, *depth.ADVANCED, *fuse.ADVANCED, *surface.ADVANCED)
 
 
 @pytest.mark.parametrize("control", ALL, ids=lambda control: control.path)
@@ -40,7 +40,7 @@ def test_units_are_converted_both_ways():
 
 
 def test_integers_stay_integers():
-    config = controls.stored(depth.ADVANCED[0], 7.0, PipelineConfig())
+    config = controls.stored(depth.ADVANCED[1], 7.0, PipelineConfig())
     assert type(config.acquisition.outlier_neighbours) is int
 
 

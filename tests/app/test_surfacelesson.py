@@ -187,7 +187,8 @@ def test_too_large_a_ball_loses_rays_points_and_truth(room, four_balls):
     large = room.roll(look, room.fused)
     assert f"leave {percent(missed(four_balls))} of the rays without surface" in text
     assert f"this one {percent(missed(large))}" in text
-    assert 0.34 < unused(large, room.fused) < 0.4
+    assert 0.38 < unused(large, room.fused) < 0.42
+    assert "two in five points stay unused" in text
     score, best = (room.truth(surface)["f_score_5cm"] for surface in (large, four_balls))
     assert f"*F-score* is {percent(score)} instead of {percent(best)}" in text
     radius_m = look.radius_in_r_F * room.r_F_m
@@ -210,9 +211,9 @@ def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, fo
     look, text = stop_named("Why holes stay: noise")
     noisy = clouds(room.rig, room.nodes, room.poses, look.smoothing_passes)
     torn = noisy.roll(look, noisy.fused)
-    assert 1.9 < missed(torn) / missed(four_balls) < 2.4
-    assert f"**Twice as many rays miss** ({percent(missed(torn))})" in text
-    assert 2.25 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 2.75
+    assert 1.4 < missed(torn) / missed(four_balls) < 1.6
+    assert f"**Half as many rays again miss** ({percent(missed(torn))})" in text
+    assert 1.9 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 2.3
     old_normals = room.roll(look, replace(room.fused, normals=noisy.fused.normals))
     new_normals = noisy.roll(look, replace(noisy.fused, normals=room.fused.normals))
     assert f"old normals close as well ({percent(missed(old_normals))})" in text
@@ -238,17 +239,17 @@ def test_no_ball_closes_before_fusion_what_the_sensor_did_not_see(room, four_bal
     assert f"even the best radius leaves {percent(best)}" in text
 
 
-def test_what_is_guessed_is_a_quarter_and_half_of_it_is_off(room, four_balls):
+def test_what_is_guessed_is_a_quarter_and_three_tenths_of_it_is_off(room, four_balls):
     text = stop_named("Measured or guessed?")[1]
     guessed = four_balls.source == PointSource.INFERRED
     a, b, c = four_balls.vertices_m[four_balls.triangles].swapaxes(0, 1)
     area_m2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     share = area_m2[guessed[four_balls.triangles].any(axis=1)].sum() / area_m2.sum()
     assert 0.22 < guessed.mean() < 0.28
-    assert 0.3 < share < 0.37
+    assert 0.36 < share < 0.4
     near = distances_to_truth_m(four_balls.vertices_m, room.rig.truth, room.cameras) <= 0.05
     assert near[~guessed].mean() > 0.999
-    assert 0.45 < near[guessed].mean() < 0.55
+    assert 0.67 < near[guessed].mean() < 0.73
     before, after = (
         room.truth(surface)["f_score_5cm"] for surface in (room.roll(SurfaceLook(), room.sensor), four_balls)
     )
@@ -259,7 +260,7 @@ def test_poisson_closes_nearly_everything_and_is_no_better(room, four_balls):
     look, text = stop_named("Is no hole at all better?")
     assert look.shown == POISSON
     poisson = poisson_surface(room.fused, room.r_F_m)
-    assert no_hit_ray_share(poisson.vertices_m, poisson.triangles, room.cameras) < 0.001
+    assert no_hit_ray_share(poisson.vertices_m, poisson.triangles, room.cameras) < 0.002
     theirs, ours = room.truth(poisson), room.truth(four_balls)
     assert f"F-score is {percent(theirs['f_score_5cm'])}, the ball's {percent(ours['f_score_5cm'])}" in text
     assert theirs["accuracy_1cm"] < ours["accuracy_1cm"] - 0.03

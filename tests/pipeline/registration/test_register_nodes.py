@@ -27,7 +27,7 @@ def rig_of(nodes: int):
         image = np.zeros((240, 320, 3), np.uint8)
         depth = DepthMap(np.ones((240, 320), np.float32))
         frames.append(RgbdFrame(f"node_{index:02d}", image, depth, scene.intrinsics, believed))
-        works.append(NodeClouds(frames[-1].name, cloud, *[None] * 6, fused=cloud))
+        works.append(NodeClouds(frames[-1].name, cloud, *[None] * 7, fused=cloud))
     return scene, frames, works
 
 

@@ -1,0 +1,54 @@
+"""Histogram of aligned minus sensor depth, with its median and its RMS."""
+
+from __future__ import annotations
+
+import plotly.graph_objects as go
+
+from app.drawing.colors import BRAND, LOSS, NEUTRAL, css
+from app.jobs.records import ResidualView
+
+
+def residual_figure(view: ResidualView | None) -> go.Figure:
+    """Bars in centimetres, a line at the median and lines at plus and minus the RMS; None is empty."""
+    figure = go.Figure()
+    figure.update_layout(
+        template="plotly_white",
+        margin={"l": 62, "r": 10, "t": 24, "b": 34},
+        xaxis={"title": "aligned minus sensor depth, cm"},
+        yaxis={"title": "pixels", "nticks": 4},
+        showlegend=False,
+        bargap=0,
+        font={"size": 11},
+    )
+    if view is None:
+        return figure
+    edges_cm = 100.0 * view.edges_m
+    figure.add_bar(
+        x=0.5 * (edges_cm[1:] + edges_cm[:-1]),
+        y=view.counts,
+        width=edges_cm[1] - edges_cm[0],
+        marker_color=css(NEUTRAL),
+        hovertemplate="%{x:.1f} cm: %{y} pixels<extra></extra>",
+    )
+    if view.counts.any():
+        _line(figure, view.median_m, "median", css(LOSS), "center")
+        if view.rms_m <= view.edges_m[-1]:
+            _line(figure, -view.rms_m, "−RMS", css(BRAND), "right")
+            _line(figure, view.rms_m, "+RMS", css(BRAND), "left")
+    return figure
+
+
+def _line(figure: go.Figure, at_m: float, label: str, color: str, side: str) -> None:
+    """A line over the whole height; the labels stand on sides where they do not meet."""
+    x = 100.0 * at_m
+    figure.add_shape(type="line", x0=x, x1=x, y0=0, y1=1, yref="paper", line={"color": color, "width": 1.5})
+    figure.add_annotation(
+        x=x,
+        y=1.0,
+        yref="paper",
+        yanchor="bottom",
+        xanchor=side,
+        text=label,
+        showarrow=False,
+        font={"color": color},
+    )

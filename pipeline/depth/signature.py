@@ -1,0 +1,85 @@
+"""What an ONNX graph maps to what, checked to be one image to one depth map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import prod
+from typing import Any, Literal
+
+from pipeline.errors import InputError
+
+Layout = Literal["NCHW", "NHWC"]
+Shape = list[int | str | None]
+FLOATS = {"tensor(float)": "float32", "tensor(float16)": "float16"}
+ACCEPTED = (
+    "a depth network maps one float image [1, 3, H, W] or [1, H, W, 3] to one depth map [1, 1, H, W], "
+    "[1, H, W, 1], [1, H, W] or [H, W]"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """The image that goes in and the depth that comes out; None where the graph leaves it free."""
+
+    input_name: str
+    output_name: str
+    """Of several depth maps the largest, or the first if their sizes are free."""
+    dtype: str
+    """float32 or float16."""
+    layout: Layout | None
+    width_px: int | None
+    height_px: int | None
+
+
+def signature_of(session: Any, name: str) -> Signature:
+    """The signature of an onnxruntime session, whose network is called ``name`` in errors.
+
+    Raises:
+        InputError: the graph does not map one image to one depth map.
+    """
+    inputs, outputs = session.get_inputs(), session.get_outputs()
+    depths = [output for output in outputs if _is_depth(output.shape)]
+    if len(inputs) != 1 or inputs[0].type not in FLOATS or not _is_image(inputs[0].shape) or not depths:
+        raise InputError(
+            f"{name} maps {_listed(inputs)} to {_listed(outputs)}, but {ACCEPTED}: give another network"
+        )
+    (image,) = inputs
+    layout = _layout(image.shape)
+    rows, columns = image.shape[1:3] if layout == "NHWC" else image.shape[2:4]
+    size = (columns, rows) if layout is not None else (None, None)
+    width_px, height_px = (side if _is_fixed(side) else None for side in size)
+    largest = max(depths, key=lambda output: prod(side for side in output.shape if _is_fixed(side)))
+    return Signature(image.name, largest.name, FLOATS[image.type], layout, width_px, height_px)
+
+
+def _layout(shape: Shape) -> Layout | None:
+    if shape[1] == 3:
+        return "NCHW"
+    return "NHWC" if shape[3] == 3 else None
+
+
+def _is_image(shape: Shape) -> bool:
+    """Rank 4, one image, and three channels where they are fixed."""
+    if len(shape) != 4 or not _may_be(shape[0], 1):
+        return False
+    return _layout(shape) is not None or not (_is_fixed(shape[1]) and _is_fixed(shape[3]))
+
+
+def _is_depth(shape: Shape) -> bool:
+    if len(shape) == 4:
+        return _may_be(shape[0], 1) and (_may_be(shape[1], 1) or _may_be(shape[3], 1))
+    if len(shape) == 2:  # a fixed number beside a free one is a list of classes
+        return 1 not in shape and _is_fixed(shape[0]) == _is_fixed(shape[1])
+    return len(shape) == 3 and _may_be(shape[0], 1)
+
+
+def _may_be(side: int | str | None, value: int) -> bool:
+    return side == value or not _is_fixed(side)
+
+
+def _is_fixed(side: Any) -> bool:
+    return isinstance(side, int)
+
+
+def _listed(nodes: Any) -> str:
+    return ", ".join(f"{node.name} {node.shape} of {node.type}" for node in nodes) or "nothing"

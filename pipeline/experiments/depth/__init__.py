@@ -1,0 +1,1 @@
+"""What depth from one picture can do, measured (SPEC 3)."""

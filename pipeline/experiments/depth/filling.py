@@ -1,0 +1,152 @@
+"""Filling honest holes: real sensor depth is hidden, filled by us and by the obvious peers, and compared."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.config import DepthConfig
+from pipeline.depth import DepthNetwork, align_depth
+from pipeline.depth.trust import judge
+from pipeline.experiments.depth.hidden import hide
+from pipeline.experiments.depth.peers import PEERS
+from pipeline.experiments.depth.scenes import load_real, real_folders
+from pipeline.scenes import DEMO_SCENES, load_demo
+from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
+
+OURS = "packetmesh"
+HIDDEN_SHARE = 0.15
+CLOSE = 0.05
+Filler = Callable[[DepthMap, ByteArray], DepthMap]
+
+
+@dataclass(frozen=True, slots=True)
+class HoleCase:
+    """One image whose holes can be judged."""
+
+    name: str
+    group: str
+    rgb: ByteArray
+    """(H, W, 3)."""
+    sensor: DepthMap
+    """(H, W) what is left to fill from."""
+    hole: BoolArray
+    """(H, W) pixels to be filled and judged."""
+    truth_m: FloatArray
+    """(H, W) what judges there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Filling:
+    """One program's fillings of a group of images."""
+
+    program: str
+    group: str
+    images: int
+    abs_rel: float
+    """Of the hole pixels it filled, all images pooled."""
+    abs_rel_shared: float
+    """Of the hole pixels that every program filled."""
+    close_share: float
+    """Of all hole pixels: filled within 5 % of what judges."""
+    filled_share: float
+    """Of all hole pixels."""
+    median_error_m: float
+    """Of the hole pixels that every program filled."""
+    elapsed_s: float
+    """Median for an image; ours infers, aligns and judges."""
+
+
+def hidden_cases(seed: int = 0) -> Iterator[HoleCase]:
+    """Every demo node and real frame with a part of the sensor's depth hidden, judged by that very depth.
+
+    Demo nodes come a second time with nothing hidden: their sensor's own holes, judged by the truth.
+    """
+    rng = np.random.default_rng(seed)
+    for name in DEMO_SCENES:
+        rig = load_demo(name)
+        assert rig.truth is not None
+        for frame, truth in zip(rig.frames, rig.truth.depth, strict=True):
+            place = f"{name}/{frame.name}"
+            yield hidden_case(place, "demo scenes, hidden", frame.rgb, frame.depth, rng)
+            hole = truth.valid & ~frame.depth.valid
+            yield HoleCase(place, "demo scenes, own holes", frame.rgb, frame.depth, hole, truth.z_m)
+    for folder in real_folders():
+        frame = load_real(folder)
+        yield hidden_case(frame.name, "real frames, hidden", frame.rgb, frame.depth, rng)
+
+
+def hidden_case(name: str, group: str, rgb: ByteArray, depth: DepthMap, rng: np.random.Generator) -> HoleCase:
+    """An image without a part of its sensor depth."""
+    hole = hide(depth, rng, HIDDEN_SHARE)
+    left = DepthMap(np.where(hole, np.float32(np.nan), depth.z_m))
+    return HoleCase(name, group, rgb, left, hole, depth.z_m)
+
+
+def our_filling(network: DepthNetwork, config: DepthConfig | None = None) -> Filler:
+    """Inferred, aligned and trusted depth, as the chain makes it."""
+    config = config or DepthConfig()
+
+    def fill(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
+        aligned = align_depth(network.infer(rgb), sensor, config.alignment)
+        return judge(aligned, sensor, rgb, config.reach, config.least_confidence).depth
+
+    return fill
+
+
+def compare_fillings(cases: Iterator[HoleCase], programs: dict[str, Filler]) -> tuple[Filling, ...]:
+    """Every program over every case, summed up by group; the programs are warmed up on the first."""
+    judged: dict[str, list[FloatArray]] = {}
+    seconds: dict[tuple[str, str], list[float]] = {}
+    for number, case in enumerate(cases):
+        rows = []
+        for name, fill in programs.items():
+            if number == 0:
+                fill(case.sensor, case.rgb)
+            started = time.perf_counter()
+            filled = fill(case.sensor, case.rgb)
+            seconds.setdefault((case.group, name), []).append(time.perf_counter() - started)
+            rows.append(filled.z_m[case.hole])
+        judged.setdefault(case.group, []).append(np.vstack([case.truth_m[case.hole], *rows]))
+    return tuple(
+        filling
+        for group, columns in judged.items()
+        for filling in group_fillings(group, columns, {name: seconds[group, name] for name in programs})
+    )
+
+
+def group_fillings(
+    group: str, columns: list[FloatArray], seconds: dict[str, list[float]]
+) -> Iterator[Filling]:
+    """Each program's measures over the hole pixels of a group.
+
+    Args:
+        group: its name.
+        columns: of every image (1 + programs, N) true depth and fillings, metres, NaN where not filled.
+        seconds: of every program, in the order of the rows, one for each image.
+    """
+    true_m, *fillings = np.hstack(columns).astype(np.float64)
+    shared = np.isfinite(fillings).all(axis=0)
+    for (name, elapsed_s), filled_m in zip(seconds.items(), fillings, strict=True):
+        error_m = np.abs(filled_m - true_m)
+        relative = error_m / true_m
+        yield Filling(
+            name,
+            group,
+            len(columns),
+            float(np.nanmean(relative)),
+            float(relative[shared].mean()),
+            float((relative <= CLOSE).mean()),
+            float(np.isfinite(filled_m).mean()),
+            float(np.median(error_m[shared])),
+            statistics.median(elapsed_s),
+        )
+
+
+def fillings(network: DepthNetwork) -> tuple[Filling, ...]:
+    """Ours and every peer on the demo scenes and the real frames there are, in one run."""
+    return compare_fillings(hidden_cases(), {OURS: our_filling(network), **PEERS})

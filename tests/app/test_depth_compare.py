@@ -1,0 +1,201 @@
+"""The split picture, its captions, and the sensor, residual and confidence pictures it is made of."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import viser
+
+from app.depthwords import PICTURES
+from app.drawing.colors import CONFIDENCE_STOPS, HOLE
+from app.drawing.split import split
+from app.jobs.pictures import (
+    EQUAL,
+    FARTHER,
+    NEARER,
+    UNKNOWN,
+    confidence_colors,
+    confidence_picture,
+    depth_picture,
+    difference_picture,
+)
+from app.jobs.records import ColorBar, Picture, ResidualView
+from app.panels.depth.compare import CompareArea
+from app.plots.colorbar import captions_html
+from app.plots.residuals import residual_figure
+from pipeline.types import DepthMap
+
+RED, BLUE = (200, 10, 20), (5, 60, 190)
+
+
+def plain(color, shape=(4, 20)):
+    return np.full((*shape, 3), color, np.uint8)
+
+
+def depth_of(*z_m):
+    return DepthMap(np.array([z_m], np.float32))
+
+
+@pytest.mark.parametrize(("share", "column"), [(0.25, 5), (0.5, 10), (0.77, 15)])
+def test_left_of_the_line_is_one_picture_and_right_of_it_the_other(share, column):
+    left, right = plain(RED), plain(BLUE)
+    shown = split(left, right, share)
+    assert np.all(shown[:, : column - 1] == RED)
+    assert np.all(shown[:, column + 2 :] == BLUE)
+    assert np.all(shown[:, column] == 255)
+    assert np.all(shown[:, [column - 1, column + 1]] == 0)
+    assert np.all(left == RED)
+    assert np.all(right == BLUE)
+
+
+def test_at_the_ends_there_is_no_line():
+    np.testing.assert_array_equal(split(plain(RED), plain(BLUE), 0.0), plain(BLUE))
+    np.testing.assert_array_equal(split(plain(RED), plain(BLUE), 1.0), plain(RED))
+
+
+@pytest.mark.parametrize("share", [0.05, 0.94])
+def test_the_line_is_whole_beside_the_border(share):
+    shown = split(plain(RED), plain(BLUE), share)
+    assert np.all(shown[:, round(20 * share)] == 255)
+    assert np.all(shown == 0, axis=2).sum() == 4 * 2
+
+
+def test_depth_has_the_colours_of_its_bar_and_holes_are_magenta():
+    picture = depth_picture(depth_of(1.0, 2.0, 3.0, np.nan, 0.5, 9.0), (1.0, 3.0), "Depth")
+    bar = picture.bar
+    assert bar.labels == ("1.00 m", "2.00 m", "3.00 m")
+    row = [tuple(int(value) for value in pixel) for pixel in picture.rgb[0]]
+    assert [row[0], row[1], row[2]] == [bar.stops[0], bar.stops[4], bar.stops[-1]]
+    assert row[3:] == [HOLE, bar.stops[0], bar.stops[-1]]
+
+
+def test_a_difference_is_blue_nearer_white_equal_orange_farther():
+    picture = difference_picture(depth_of(1.7, 2.0, 2.3, 9.0, np.nan), depth_of(*5 * [2.0]))
+    row = picture.rgb[0].tolist()
+    expected = [NEARER, EQUAL, FARTHER, FARTHER, UNKNOWN]
+    np.testing.assert_allclose(row, expected, atol=1)
+    assert picture.bar.labels == ("−30 cm", "0 cm", "+30 cm")
+
+
+def test_confidence_is_bright_where_sure_and_marks_what_is_left_out():
+    confidence = np.array([[0.0, 0.5, 1.0, 1.0, 0.5, np.nan]])
+    flying = np.array([[False, False, False, True, False, False]])
+    far = np.array([[False, False, False, False, True, False]])
+    row = confidence_picture(confidence, flying, far).rgb[0].tolist()
+    middle = CONFIDENCE_STOPS[len(CONFIDENCE_STOPS) // 2]
+    expected = [CONFIDENCE_STOPS[0], middle, CONFIDENCE_STOPS[-1], HOLE, UNKNOWN, UNKNOWN]
+    assert row == [list(color) for color in expected]
+    assert confidence_colors(np.array([np.nan])).tolist() == [list(CONFIDENCE_STOPS[0])]
+
+
+def test_captions_name_both_sides_and_only_what_has_colours_has_a_bar():
+    bar = ColorBar((RED, BLUE), ("0 cm", "7 cm"))
+    told = captions_html(Picture(plain(RED), "A <b>"), Picture(plain(BLUE), "B", bar))
+    assert told.index("A &lt;b&gt;.") < told.index("Right:") < told.index("B.") < told.index("0 cm")
+    assert told.count("linear-gradient(to right, #c80a14, #053cbe)") == told.count("linear-gradient") == 1
+
+
+def test_residuals_have_their_median_and_rms_marked_in_centimetres():
+    view = ResidualView(np.array([-0.2, 0.0, 0.2]), np.array([30, 10]), -0.012, 0.05)
+    figure = residual_figure(view)
+    assert figure.data[0].x.tolist() == pytest.approx([-10.0, 10.0])
+    assert figure.data[0].y.tolist() == [30, 10]
+    marks = {mark.text: mark.x for mark in figure.layout.annotations}
+    assert marks == pytest.approx({"median": -1.2, "−RMS": -5.0, "+RMS": 5.0})
+    empty = ResidualView(view.edges_m, np.zeros(2, int), float("nan"), float("nan"))
+    assert not residual_figure(empty).layout.annotations
+    assert not residual_figure(None).data
+
+
+@pytest.fixture(scope="module")
+def server():
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+class Screen:
+    """The area and what a person can do to it."""
+
+    def __init__(self, server, **keywords):
+        self.actions = {}
+        self.area = CompareArea(
+            server.gui,
+            lambda handle, action: self.actions.__setitem__(handle.label, (handle, action)),
+            ("one", "two", "three"),
+            "one",
+            "two",
+            **keywords,
+        )
+
+    def change(self, label, value):
+        handle, action = self.actions[label]
+        handle.value = value
+        action()
+
+    @property
+    def shown(self):
+        return self.area._image.image
+
+
+PICTURES_OF = {
+    "one": Picture(plain(RED), "First"),
+    "two": Picture(plain(BLUE), "Second", ColorBar((RED, BLUE), ("0 m", "1 m"))),
+    "three": Picture(plain((9, 9, 9)), "Third"),
+}
+
+
+def test_the_area_shows_what_is_chosen_and_moves_the_line(server):
+    screen = Screen(server)
+    screen.area.load(PICTURES_OF)
+    np.testing.assert_array_equal(screen.shown, split(plain(RED), plain(BLUE), 0.5))
+    screen.change("Split (%)", 20.0)
+    np.testing.assert_array_equal(screen.shown, split(plain(RED), plain(BLUE), 0.2))
+    screen.change("Right", "three")
+    np.testing.assert_array_equal(screen.shown, split(plain(RED), plain((9, 9, 9)), 0.2))
+    assert "Third" in screen.area._captions.content
+    assert "Second" not in screen.area._captions.content
+    screen.area.set("two", "one", 1.0)
+    np.testing.assert_array_equal(screen.shown, plain(BLUE))
+
+
+def test_pictures_of_the_same_names_replace_those_before(server):
+    screen = Screen(server)
+    screen.area.load(PICTURES_OF)
+    screen.area.load({**PICTURES_OF, "one": Picture(plain((1, 2, 3)), "New")})
+    assert np.all(screen.shown[:, 0] == (1, 2, 3))
+    assert "New" in screen.area._captions.content
+
+
+def test_a_burst_of_the_same_change_is_drawn_once(server, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("app.panels.depth.compare.split", lambda *a: drawn.append(a) or split(*a))
+    screen = Screen(server)
+    screen.area.load(PICTURES_OF)
+    for _ in range(9):
+        screen.change("Split (%)", 33.0)
+    assert len(drawn) == 2
+
+
+def test_the_area_is_hidden_until_there_is_something(server):
+    screen = Screen(server, visible=False)
+    parts = (screen.area._left, screen.area._image, screen.area._captions)
+    assert not any(part.visible for part in parts)
+    screen.area.load({"two": PICTURES_OF["two"], "three": PICTURES_OF["three"]})
+    assert all(part.visible for part in parts)
+    assert screen.area._left.options == ("two", "three")
+    np.testing.assert_array_equal(screen.shown, split(plain(BLUE), plain(BLUE), 0.5))
+    screen.area.load(None)
+    assert not any(part.visible for part in parts)
+
+
+def test_all_five_pictures_have_names():
+    assert len(set(PICTURES)) == 5
+
+
+def test_the_screen_needs_nothing_heavy():
+    heavy = "{'onnxruntime', 'open3d', 'numba', 'pipeline.surface', 'pipeline.depth'}"
+    script = f"import sys, app.panels.depth; print({heavy} & set(sys.modules))"
+    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == "set()"

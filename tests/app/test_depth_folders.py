@@ -1,0 +1,183 @@
+"""What the folders of the Depth screen ask for and tell: the hidden disc, the network, the numbers."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import viser
+
+from app.depthwords import BLANK, MEASURED, OURS, PEER_NAMES
+from app.jobs.depth_records import FillRow, HiddenView, HideWish, NetworkView, NetworkWish
+from app.jobs.records import Picture
+from app.panels.depth import hide as hide_folder
+from app.panels.depth.hide import HideFolder, fills_table
+from app.panels.depth.network import AS_IT_SAYS, LIMIT_BYTES, SHIPPED, NetworkFolder, network_table
+from app.panels.depth.numbers import LINES, fitted_line
+from app.panels.depth.settings import with_network
+from pipeline.config import DepthConfig, PipelineConfig
+from pipeline.depth.alignment import ALIGNMENTS, align_depth
+from pipeline.errors import InputError
+from pipeline.types import DepthMap
+
+PICTURE = Picture(np.zeros((4, 6, 3), np.uint8), "x")
+NEAREST = PEER_NAMES["nearest"]
+ROWS = (FillRow(OURS, 0.0314, 0.81, 1.0, 0.2), FillRow(NEAREST, float("nan"), 0.0, 0.0, 0.004))
+ANSWER = HiddenView(
+    HideWish(), "node_01", 1234, ROWS, dict.fromkeys((MEASURED, BLANK, OURS, NEAREST), PICTURE)
+)
+
+
+@pytest.fixture(scope="module")
+def server():
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+class Hand:
+    """What a person can do to a folder."""
+
+    def __init__(self):
+        self.actions, self.asked = {}, []
+
+    def post(self, function, *arguments):
+        function(*arguments)
+
+    def changed(self, handle, action):
+        self.actions[handle.label] = (handle, action)
+
+    def change(self, label, value):
+        handle, action = self.actions[label]
+        handle.value = value
+        action()
+
+
+@pytest.fixture
+def hide(server):
+    hand = Hand()
+    return HideFolder(server.gui, hand.post, hand.changed, hand.asked.append), hand
+
+
+def test_the_sliders_say_in_percent_what_is_hidden(hide):
+    folder, hand = hide
+    folder.ask(HideWish(3, 0.25, 0.4, 0.1))
+    assert (folder._x.value, folder._y.value, folder._size.value) == (25, 40, 10)
+    assert hand.asked == [HideWish(0, 0.25, 0.4, 0.1)]
+    assert folder._status.content == hide_folder.WAITING
+
+
+def test_the_answer_is_shown_and_forgotten_with_other_settings(hide):
+    folder, _ = hide
+    folder.load(ANSWER)
+    assert "1,234 measured pixels of node_01" in folder._status.content
+    assert folder._area._image.visible
+    assert (folder._area._left.value, folder._area._right.value) == (BLANK, OURS)
+    folder.forget()
+    assert not folder._area._image.visible
+    assert (folder._status.content, folder._table.content) == ("", "")
+    folder.load(None)
+    assert folder._status.content == hide_folder.SILENT
+
+
+def test_the_table_has_every_way_with_its_errors():
+    told = fills_table(ANSWER)
+    assert all(text in told for text in (OURS, NEAREST, "0.031", "81 %", "100 %", "200 ms", "–", "0 %"))
+
+
+@pytest.fixture
+def network(server, tmp_path):
+    hand = Hand()
+    return NetworkFolder(server.gui, hand.post, hand.changed, tmp_path, hand.asked.append), hand
+
+
+def uploaded(name, content=b"onnx"):
+    return SimpleNamespace(name=name, content=content)
+
+
+def test_a_preset_and_a_kind_are_wished_with_the_file(network):
+    _, hand = network
+    hand.change("Preset", "midas-small")
+    hand.change("Gives", "inverse")
+    hand.change("Preset", AS_IT_SAYS)
+    assert hand.asked == [
+        NetworkWish(None, "midas-small"),
+        NetworkWish(None, "midas-small", "inverse"),
+        NetworkWish(None, None, "inverse"),
+    ]
+
+
+def test_an_upload_is_kept_in_the_folder_listed_and_tried(network, tmp_path):
+    folder, hand = network
+    folder._keep(uploaded("mine.onnx", b"1"))
+    folder._keep(uploaded("../mine.onnx", b"2"))
+    paths = [Path(wish.model) for wish in hand.asked]
+    assert [path.read_bytes() for path in paths] == [b"1", b"2"]
+    assert {path.parent for path in paths} == {tmp_path}
+    assert folder._model.options == (SHIPPED, "mine.onnx", "mine.onnx′")
+    hand.change("Network file", SHIPPED)
+    assert hand.asked[-1] == NetworkWish()
+
+
+def test_a_huge_upload_is_one_sentence_and_not_kept(network, tmp_path):
+    folder, hand = network
+    content = type("Huge", (), {"__len__": lambda self: LIMIT_BYTES + 1})()
+    with pytest.raises(InputError, match=r"big\.onnx has 128 MB; the app takes networks up to 128 MB"):
+        folder._keep(uploaded("big.onnx", content))
+    assert hand.asked == []
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_cannot_be_used_leaves_the_network_before(network):
+    folder, _ = network
+    folder.write(DepthConfig())
+    folder._keep(uploaded("bad.onnx"))
+    assert folder._model.value == "bad.onnx"
+    folder.load(None)
+    assert (folder._model.value, folder._preset.value) == (SHIPPED, AS_IT_SAYS)
+    assert "before is kept" in folder._status.content
+
+
+def test_a_network_from_the_command_line_is_listed_by_its_name(network):
+    folder, _ = network
+    folder.write(DepthConfig(model="/somewhere/other.onnx", preset="monodepth2", model_kind="inverse"))
+    assert (folder._model.value, folder._preset.value, folder._kind.value) == (
+        "other.onnx",
+        "monodepth2",
+        "inverse",
+    )
+
+
+def test_the_network_tells_what_it_is(network):
+    folder, _ = network
+    view = NetworkView(NetworkWish(), "inverse", "CPUExecutionProvider", 0.023, 5_000_000, {"licence": "MIT"})
+    folder.load(view)
+    assert "line of 1/depth" in folder._status.content
+    told = network_table(view)
+    assert all(
+        text in told
+        for text in ("inverse depth", "CPUExecutionProvider", "23 ms", "5.0 MB", "licence", "MIT")
+    )
+
+
+def test_the_edit_takes_the_network_and_nothing_else():
+    config = with_network(NetworkWish("a.onnx", "midas-small", "inverse"))(PipelineConfig())
+    assert config.depth == DepthConfig("a.onnx", "midas-small", "inverse")
+    assert with_network(NetworkWish())(config) == PipelineConfig()
+
+
+def test_the_local_mode_of_disparity_has_another_line():
+    node = SimpleNamespace(alignment_mode="local", disparity=True, coefficients={"a": 0.5, "b": 0.25})
+    assert fitted_line(node) == "1/z′ = (0.500/z +0.250 1/m) / exp C"
+
+
+@pytest.mark.parametrize("mode", list(ALIGNMENTS))
+def test_every_alignment_has_its_line_written_out(mode):
+    z_m = np.linspace(1.0, 4.0, 400, dtype=np.float32).reshape(20, 20)
+    result = align_depth(DepthMap(z_m, "relative"), DepthMap(2.0 * z_m), mode)
+    told = fitted_line(
+        SimpleNamespace(alignment_mode=mode, disparity=False, coefficients=result.coefficients)
+    )
+    assert told == LINES[mode].format(**result.coefficients)
+    assert "2.000" in told or mode in ("none", "affine_inverse")
+    assert "0.500" in told or mode != "affine_inverse"

@@ -1,0 +1,229 @@
+"""What the computing process answers to the Depth screen: pictures, residuals, trust, and the hidden disc."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from app.depthwords import (
+    BLANK,
+    CONFIDENCE,
+    DIFFERENCE,
+    INFERRED,
+    MEASURED,
+    NETWORK_PRESETS,
+    OURS,
+    PEER_NAMES,
+    PHOTO,
+    PICTURES,
+    SENSOR,
+)
+from app.drawing.colors import HOLE
+from app.jobs.chain import prepared, rig_of
+from app.jobs.depth import depth_job, residual_view, trust_view
+from app.jobs.depth_hide import LEAST_HIDDEN_PX, believed, fill_row, hidden_disc, hide_job
+from app.jobs.depth_network import network_job
+from app.jobs.depth_records import HideWish, NetworkWish
+from app.jobs.pictures import UNKNOWN, confidence_colors
+from app.state import Source, Spec
+from pipeline.config import DepthConfig
+from pipeline.depth.conventions import PRESETS
+from pipeline.depth.inference import SHIPPED_MODEL
+from pipeline.depth.trust import judge
+from pipeline.errors import InputError
+from pipeline.experiments.depth.peers import PEERS
+from pipeline.types import DepthMap
+from tests.app.answers import end
+
+SPEC = Spec(Source(scene="box-on-table"))
+FLAT = HideWish(0, 0.15, 0.35, 0.2)
+"""On the wall, where depth is a plane."""
+
+
+@pytest.fixture(scope="module")
+def rig(store):
+    return end(rig_of(store, SPEC))
+
+
+@pytest.fixture(scope="module")
+def view(store):
+    return end(depth_job(store, SPEC))
+
+
+@pytest.fixture(scope="module")
+def hidden(store):
+    return end(hide_job(store, SPEC, FLAT))
+
+
+def colored(picture, color):
+    return np.all(picture.rgb == color, axis=-1)
+
+
+def test_every_node_has_all_five_pictures_of_one_size(rig, view):
+    assert [node.name for node in view.nodes] == [frame.name for frame in rig.frames]
+    for frame, node in zip(rig.frames, view.nodes, strict=True):
+        assert tuple(node.pictures) == PICTURES
+        assert {picture.rgb.shape for picture in node.pictures.values()} == {frame.rgb.shape}
+        np.testing.assert_array_equal(node.pictures[PHOTO].rgb, frame.rgb)
+        assert [name for name, picture in node.pictures.items() if picture.bar is None] == [PHOTO]
+
+
+def test_what_is_unknown_is_marked_in_each_picture(store, rig, view):
+    for frame, clouds, node in zip(rig.frames, end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
+        measured, inferred = frame.depth.valid, clouds.alignment.depth.valid
+        np.testing.assert_array_equal(colored(node.pictures[SENSOR], HOLE), ~measured)
+        np.testing.assert_array_equal(colored(node.pictures[INFERRED], HOLE), ~inferred)
+        np.testing.assert_array_equal(colored(node.pictures[DIFFERENCE], UNKNOWN), ~(measured & inferred))
+        assert not np.any(colored(node.pictures[CONFIDENCE], UNKNOWN) & measured & inferred)
+
+
+def test_wide_images_are_thinned_alike(store, rig, monkeypatch):
+    monkeypatch.setattr("app.jobs.depth.PICTURE_WIDTH_PX", rig.frames[0].rgb.shape[1] // 2)
+    node = end(depth_job(store, SPEC)).nodes[0]
+    assert {picture.rgb.shape for picture in node.pictures.values()} == {rig.frames[0].rgb[::2, ::2].shape}
+    np.testing.assert_array_equal(node.pictures[PHOTO].rgb, rig.frames[0].rgb[::2, ::2])
+
+
+def test_the_confidence_of_every_drawn_point_is_that_of_its_pixel(store, rig, view):
+    config = SPEC.config.depth
+    for frame, clouds, node in zip(rig.frames, end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
+        trust = judge(clouds.alignment, frame.depth, frame.rgb, config.reach, config.least_confidence)
+        rows = {tuple(point): row for row, point in enumerate(clouds.inferred.points_m.astype(np.float32))}
+        for drawn, colors in (
+            (node.inferred, node.inferred_confidence),
+            (node.filled, node.filled_confidence),
+        ):
+            assert len(drawn.points_m) == len(colors) > 0
+            u, v = clouds.inferred.pixels[[rows[tuple(point)] for point in drawn.points_m]].T
+            np.testing.assert_array_equal(colors, confidence_colors(trust.confidence[v, u]))
+
+
+def test_the_residuals_are_those_of_the_alignment(store, view):
+    for clouds, node in zip(end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
+        assert node.residuals.rms_m == pytest.approx(clouds.alignment.residual_rms_m, rel=1e-5)
+        assert abs(node.residuals.median_m) < node.residuals.rms_m
+
+
+def test_a_residual_view_has_known_numbers_and_loses_no_pixel():
+    sensor = DepthMap(np.full((10, 10), 2.0, np.float32))
+    aligned = DepthMap(np.full((10, 10), 2.01, np.float32))
+    aligned.z_m[0, :2] = (1.5, 5.0)
+    sensor.z_m[9] = np.nan
+    residuals = residual_view(aligned, sensor)
+    assert residuals.counts.sum() == 90
+    assert residuals.median_m == pytest.approx(0.01, abs=1e-6)
+    assert residuals.rms_m == pytest.approx(np.sqrt((88 * 0.01**2 + 0.5**2 + 3.0**2) / 90), rel=1e-5)
+    np.testing.assert_allclose(residuals.edges_m, -residuals.edges_m[::-1])
+    assert (residuals.counts[0], residuals.counts[-1]) == (1, 1)
+
+
+def test_nothing_shared_gives_empty_residuals_and_no_trust_to_tell_of():
+    empty = DepthMap(np.full((4, 4), np.nan, np.float32))
+    residuals = residual_view(empty, empty)
+    assert (residuals.counts.sum(), np.isnan(residuals.median_m), np.isnan(residuals.rms_m)) == (
+        0,
+        True,
+        True,
+    )
+    assert np.isnan(trust_view(SimpleNamespace(), np.zeros((4, 4), bool)).kept_share)
+
+
+def test_trust_counts_only_where_the_sensor_is_blind():
+    z_m = np.array([[1.0, np.nan], [2.0, np.nan]], np.float32)
+    flying = np.array([[True, True], [False, False]])
+    trust = SimpleNamespace(depth=DepthMap(z_m), flying=flying, out_of_reach=~flying)
+    shares = trust_view(trust, np.array([[False, True], [True, True]]))
+    assert (shares.kept_share, shares.flying_share, shares.out_of_reach_share) == pytest.approx(
+        (1 / 3, 1 / 3, 2 / 3)
+    )
+
+
+def test_a_disc_is_round_and_holds_measured_pixels_only():
+    z_m = np.ones((60, 80), np.float32)
+    z_m[:, :40] = np.nan
+    disc = hidden_disc(DepthMap(z_m), HideWish(0, 0.5, 0.5, 0.5))
+    assert not disc[:, :40].any()
+    y, x = np.nonzero(disc)
+    assert np.hypot(x - 39.5, y - 29.5).max() <= 20.0
+    assert disc.sum() == pytest.approx(np.pi * 20.0**2 / 2, rel=0.03)
+
+
+@pytest.mark.parametrize("wish", [HideWish(0, 0.1, 0.5, 0.2), HideWish(0, 0.9, 0.5, 0.04)])
+def test_a_disc_without_measured_pixels_is_one_sentence(wish):
+    z_m = np.ones((60, 80), np.float32)
+    z_m[:, :40] = np.nan
+    with pytest.raises(InputError, match=f"the test takes {LEAST_HIDDEN_PX}: move it off the holes"):
+        hidden_disc(DepthMap(z_m), wish)
+
+
+def test_errors_of_a_fill_have_known_values():
+    measured_m = np.array([1.0, 2.0, 4.0, 1.0])
+    row = fill_row("x", np.array([1.04, 2.2, np.nan, 1.0]), measured_m, 0.5)
+    assert (row.abs_rel, row.within_share, row.filled_share) == pytest.approx((0.14 / 3, 0.5, 0.75))
+    nothing = fill_row("x", np.full(4, np.nan), measured_m, 0.5)
+    assert np.isnan(nothing.abs_rel)
+    assert (nothing.within_share, nothing.filled_share) == (0.0, 0.0)
+
+
+def test_the_hidden_disc_is_blank_then_filled_and_nothing_else_changes(rig, hidden):
+    disc = hidden_disc(rig.frames[0].depth, FLAT)
+    assert hidden.hidden_px == disc.sum() > 1000
+    assert hidden.node == rig.frames[0].name
+    names = [OURS, *(PEER_NAMES[name] for name in PEERS)]
+    assert [row.name for row in hidden.rows] == names
+    assert list(hidden.pictures) == [MEASURED, BLANK, *names]
+    before, blank = hidden.pictures[MEASURED], hidden.pictures[BLANK]
+    changed = np.any(before.rgb != blank.rgb, axis=-1)
+    times = round(np.sqrt(changed.sum() / disc.sum()))
+    assert changed.sum() == times**2 * disc.sum()
+    assert np.all(colored(blank, HOLE)[changed])
+    for row in hidden.rows:
+        after = hidden.pictures[row.name]
+        np.testing.assert_array_equal(after.rgb[~changed], before.rgb[~changed])
+        assert colored(after, HOLE)[changed].mean() == pytest.approx(1.0 - row.filled_share)
+
+
+def test_a_flat_wall_comes_back(hidden):
+    errors = {row.name: row for row in hidden.rows}
+    for name in (PEER_NAMES["nearest"], PEER_NAMES["inpaint-telea"]):
+        assert errors[name].filled_share == 1.0
+        assert errors[name].abs_rel < 0.1
+    assert errors[OURS].filled_share > 0.8
+    assert errors[OURS].abs_rel < 0.15
+
+
+def test_a_network_that_knows_the_truth_gives_back_what_was_hidden(rig):
+    frame, truth = rig.frames[0], rig.truth.depth[0]
+    disc = hidden_disc(frame.depth, FLAT)
+    rest = DepthMap(np.where(disc, np.float32(np.nan), frame.depth.z_m))
+    knowing = DepthMap((0.4 * truth.z_m).astype(np.float32), kind="relative")
+    filled = believed(knowing, rest, frame.rgb, replace(DepthConfig(), alignment="affine_depth"))
+    row = fill_row("x", filled.z_m[disc], truth.z_m[disc], 0.0)
+    assert row.abs_rel < 0.005
+    assert row.within_share > 0.95
+
+
+def test_a_node_that_is_not_there_is_one_sentence(store):
+    with pytest.raises(InputError, match="There is no node 7"):
+        end(hide_job(store, SPEC, replace(FLAT, node=7)))
+
+
+def test_the_words_of_the_screen_are_those_of_the_pipeline():
+    assert set(NETWORK_PRESETS) == set(PRESETS)
+    assert set(PEER_NAMES) == set(PEERS)
+
+
+def test_the_network_that_ships_says_what_it_is():
+    view = end(network_job(NetworkWish()))
+    assert (view.wish, view.kind) == (NetworkWish(), "relative")
+    assert view.provider.endswith("ExecutionProvider")
+    assert view.size_bytes == SHIPPED_MODEL.stat().st_size
+    assert 0.0 < view.inference_s < 30.0
+
+
+def test_a_file_that_is_no_network_is_one_sentence(tmp_path):
+    path = tmp_path / "mine.onnx"
+    path.write_bytes(b"not a network")
+    with pytest.raises(InputError, match=r"mine\.onnx is not a readable ONNX network"):
+        end(network_job(NetworkWish(str(path))))

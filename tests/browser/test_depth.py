@@ -1,0 +1,137 @@
+"""The Depth screen as somebody uses it who wants to know how far to believe a picture, in a real browser."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from app.depthwords import COLORINGS, CONFIDENCE, DIFFERENCE, EVERYWHERE, OURS, PEER_NAMES
+from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, slider
+
+BY_CONFIDENCE = next(name for name, coloring in COLORINGS.items() if coloring == "confidence")
+
+
+@pytest.fixture
+def depth(page):
+    """The Depth step with everything computed, as a fresh session has it."""
+    page.reload()
+    go(page, "Depth")
+    page.get_by_role("row", name="Network ran on").wait_for()
+    page.get_by_text("Up to date").wait_for()
+    return page
+
+
+def unfold(page, folder):
+    page.get_by_text(folder, exact=True).last.click()
+    page.wait_for_timeout(400)
+
+
+def visible(page, label):
+    """The input of that label on the step that is shown."""
+    return page.get_by_label(label, exact=True).locator("visible=true").first
+
+
+def pick(page, label, option):
+    visible(page, label).click()
+    page.get_by_role("option", name=option, exact=True).locator("visible=true").click()
+
+
+def press(page, name):
+    page.get_by_role("button", name=name, exact=True).last.click()
+
+
+def picture(page):
+    """The split picture, as it is drawn."""
+    return page.locator("img").locator("visible=true").first.get_attribute("src")
+
+
+def becomes_another(page, before):
+    for _ in range(40):
+        if picture(page) != before:
+            return True
+        page.wait_for_timeout(100)
+    return False
+
+
+def test_the_split_slider_and_the_lists_change_the_picture_and_its_captions(depth):
+    begin = picture(depth)
+    handle = slider(depth, "Split (%)")
+    handle.focus()
+    handle.press("End")
+    assert becomes_another(depth, begin)
+    whole = picture(depth)
+    pick(depth, "Left", DIFFERENCE)
+    depth.get_by_text("+30 cm").wait_for()
+    assert becomes_another(depth, whole)
+    pick(depth, "Right", CONFIDENCE)
+    depth.get_by_text("100 %", exact=True).first.wait_for()
+
+
+def test_the_points_can_have_the_colours_of_their_confidence(depth):
+    unfold(depth, "Advanced")
+    begin = canvas(depth)
+    pick(depth, "Inferred points", EVERYWHERE)
+    assert changed_from(depth, begin)
+    violet = canvas(depth)
+    pick(depth, "Colours", BY_CONFIDENCE)
+    assert changed_from(depth, violet)
+
+
+def test_the_residuals_say_what_was_fitted(depth):
+    unfold(depth, "Residuals of the alignment")
+    depth.get_by_role("row", name="Fitted line").get_by_text("exp C").wait_for()
+    depth.locator(".js-plotly-plot").locator("visible=true").first.wait_for()
+
+
+def test_a_shorter_reach_lets_in_less(depth):
+    unfold(depth, "How far to believe it")
+    row = depth.get_by_role("row", name="Out of reach")
+    row.wait_for()
+    handle = slider(depth, "Reach (% of the diagonal)")
+    handle.focus()
+    handle.press("Home")
+    expect(row).to_have_text(re.compile(r"[1-9]\d\.\d %"), timeout=60_000)
+    depth.get_by_text("Up to date").wait_for()
+
+
+def test_a_hidden_disc_is_filled_in_every_way(depth):
+    unfold(depth, "Hide a region and see it filled")
+    press(depth, "Hide and fill")
+    depth.get_by_text(re.compile(r"[\d,]+ measured pixels of node_00 hidden")).wait_for()
+    for name in (OURS, *PEER_NAMES.values()):
+        depth.get_by_role("row", name=name).wait_for()
+    handle = slider(depth, "Diameter (%)")
+    handle.focus()
+    handle.press("End")
+    press(depth, "Hide and fill")
+    depth.get_by_text("Filling …").wait_for(state="detached")
+    depth.get_by_text(re.compile(r"[\d,]+ measured pixels of node_00 hidden")).wait_for()
+
+
+def test_a_file_that_is_no_network_is_a_sentence_and_changes_nothing(depth):
+    begin = canvas(depth)
+    unfold(depth, "Network")
+    depth.locator("input[type=file]").last.set_input_files(
+        {"name": "mine.onnx", "mimeType": "application/octet-stream", "buffer": b"not a network"}
+    )
+    depth.get_by_text("is not a readable ONNX network").wait_for()
+    depth.get_by_text("The network before is kept.").wait_for()
+    expect(visible(depth, "Network file")).to_have_value("the network that ships")
+    depth.get_by_text("Up to date").wait_for()
+    assert differing(canvas(depth), begin) <= ALIKE
+
+
+def test_the_lesson_sets_the_controls(depth):
+    unfold(depth, "Lesson: Can a picture measure?")
+    for stop in range(1, 8):
+        depth.get_by_role("button", name="Next", exact=True).locator("visible=true").first.click()
+        depth.get_by_text(f"({stop} of 7)").wait_for()
+        if stop == 3:
+            expect(visible(depth, "Alignment")).to_have_value("one scale")
+        if stop == 5:
+            expect(visible(depth, "Right")).to_have_value(CONFIDENCE)
+    unfold(depth, "Hide a region and see it filled")
+    depth.get_by_text(re.compile(r"[\d,]+ measured pixels of node_00 hidden")).wait_for()
+    depth.get_by_text("Up to date").wait_for()
