@@ -137,9 +137,9 @@ def hanging(depth: DepthMap, sensor: DepthMap) -> BoolArray:
     complete_m = np.where(measured, sensor.z_m, depth.z_m)
     half_px = max(1, round(FLYING_WINDOW * np.hypot(*measured.shape)))
     front, back = log_range(complete_m, 2 * half_px + 1)
-    steep = np.subtract(*log_range(complete_m, 3)[::-1]) > FLYING_SLOPE
     log_z = np.log(np.where(positive(depth.z_m), depth.z_m, np.nan))
     with np.errstate(invalid="ignore", over="ignore"):
+        steep = np.subtract(*log_range(complete_m, 3)[::-1]) > FLYING_SLOPE
         margin = FLYING_BETWEEN * (back - front)
         between_them = (back - front > FLYING_STEP) & (log_z > front + margin) & (log_z < back - margin)
     rows, columns = np.nonzero(steep & between_them)
