@@ -102,12 +102,6 @@ def test_a_hidden_disc_is_filled_in_every_way(depth):
     depth.get_by_text(re.compile(r"[\d,]+ measured pixels of node_00 hidden")).wait_for()
     for name in (OURS, *PEER_NAMES.values()):
         depth.get_by_role("row", name=name).wait_for()
-    handle = slider(depth, "Diameter (%)")
-    handle.focus()
-    handle.press("End")
-    press(depth, "Hide and fill")
-    depth.get_by_text("Filling …").wait_for(state="detached")
-    depth.get_by_text(re.compile(r"[\d,]+ measured pixels of node_00 hidden")).wait_for()
 
 
 def test_a_file_that_is_no_network_is_a_sentence_and_changes_nothing(depth):
