@@ -6,6 +6,7 @@ import plotly.graph_objects as go
 
 from app.drawing.colors import BRAND, LOSS, NEUTRAL, css
 from app.jobs.records import ResidualView
+from app.plots.marks import mark
 
 
 def residual_figure(view: ResidualView | None) -> go.Figure:
@@ -31,24 +32,8 @@ def residual_figure(view: ResidualView | None) -> go.Figure:
         hovertemplate="%{x:.1f} cm: %{y} pixels<extra></extra>",
     )
     if view.counts.any():
-        _line(figure, view.median_m, "median", css(LOSS), "center")
+        mark(figure, 100.0 * view.median_m, "median", css(LOSS), "center")
         if view.rms_m <= view.edges_m[-1]:
-            _line(figure, -view.rms_m, "−RMS", css(BRAND), "right")
-            _line(figure, view.rms_m, "+RMS", css(BRAND), "left")
+            mark(figure, -100.0 * view.rms_m, "−RMS", css(BRAND), "right")
+            mark(figure, 100.0 * view.rms_m, "+RMS", css(BRAND), "left")
     return figure
-
-
-def _line(figure: go.Figure, at_m: float, label: str, color: str, side: str) -> None:
-    """A line over the whole height; the labels stand on sides where they do not meet."""
-    x = 100.0 * at_m
-    figure.add_shape(type="line", x0=x, x1=x, y0=0, y1=1, yref="paper", line={"color": color, "width": 1.5})
-    figure.add_annotation(
-        x=x,
-        y=1.0,
-        yref="paper",
-        yanchor="bottom",
-        xanchor=side,
-        text=label,
-        showarrow=False,
-        font={"color": color},
-    )

@@ -8,6 +8,7 @@ import plotly.graph_objects as go
 
 from app.drawing.colors import BRAND, DELIVERED, INFERRED, LOSS, NEUTRAL, SOURCE, css
 from app.jobs.records import SpacingView
+from app.plots.marks import mark
 
 THESIS = {"r<sub>F</sub>": 0.0, "r<sub>F</sub>+¼σ": 0.25, "r<sub>F</sub>+½σ": 0.5, "r<sub>F</sub>+σ": 1.0}
 """The thesis's four radii as multiples of sigma_D above r_F (SPEC 5)."""
@@ -54,8 +55,8 @@ def spacing_figure(
     _marks(figure, OF_THESIS, thesis_m, tuple(THESIS))
     _marks(figure, ADVISED, suggested_m)
     _marks(figure, USED, radii_m)
-    _line(figure, view.r_F_m, "r<sub>F</sub>", css(DELIVERED), "right")
-    _line(figure, view.r_F_m + view.sigma_D_m, "r<sub>F</sub>+σ<sub>D</sub>", css(SOURCE), "left")
+    mark(figure, 1000.0 * view.r_F_m, "r<sub>F</sub>", css(DELIVERED), "right")
+    mark(figure, 1000.0 * (view.r_F_m + view.sigma_D_m), "r<sub>F</sub>+σ<sub>D</sub>", css(SOURCE), "left")
     return figure
 
 
@@ -82,20 +83,4 @@ def _marks(figure: go.Figure, row: str, radii_m: Sequence[float], names: Sequenc
         text=list(names) or [row] * len(radii_m),
         marker={"symbol": MARK_SYMBOLS[row], "size": 8, "color": color},
         hovertemplate="%{text}: %{x:.1f} mm<extra></extra>",
-    )
-
-
-def _line(figure: go.Figure, at_m: float, label: str, color: str, side: str) -> None:
-    """A line over the whole height; its label stands beside its upper end, so that two labels never meet."""
-    x = 1000.0 * at_m
-    figure.add_shape(type="line", x0=x, x1=x, y0=0, y1=1, yref="paper", line={"color": color, "width": 1.5})
-    figure.add_annotation(
-        x=x,
-        y=1.0,
-        yref="paper",
-        yanchor="bottom",
-        xanchor=side,
-        text=label,
-        showarrow=False,
-        font={"color": color},
     )

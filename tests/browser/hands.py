@@ -61,3 +61,17 @@ def changed_from(page, picture):
 def slider(page, label):
     identity = page.locator("label", has_text=label).first.get_attribute("for")
     return page.locator(f'[id="{identity}"] [role=slider]')
+
+
+def unfold(page, folder):
+    page.get_by_text(folder, exact=True).last.click()
+    page.wait_for_timeout(400)
+
+
+def pick(page, label, option):
+    page.get_by_label(label, exact=True).first.click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
+def press(page, name):
+    page.get_by_role("button", name=name, exact=True).last.click()

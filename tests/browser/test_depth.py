@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import expect
 
 from app.depthwords import COLORINGS, CONFIDENCE, DIFFERENCE, EVERYWHERE, OURS, PEER_NAMES
-from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, slider
+from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, press, slider, unfold
 
 BY_CONFIDENCE = next(name for name, coloring in COLORINGS.items() if coloring == "confidence")
 
@@ -23,11 +23,6 @@ def depth(page):
     return page
 
 
-def unfold(page, folder):
-    page.get_by_text(folder, exact=True).last.click()
-    page.wait_for_timeout(400)
-
-
 def visible(page, label):
     """The input of that label on the step that is shown."""
     return page.get_by_label(label, exact=True).locator("visible=true").first
@@ -36,10 +31,6 @@ def visible(page, label):
 def pick(page, label, option):
     visible(page, label).click()
     page.get_by_role("option", name=option, exact=True).locator("visible=true").click()
-
-
-def press(page, name):
-    page.get_by_role("button", name=name, exact=True).last.click()
 
 
 def picture(page):

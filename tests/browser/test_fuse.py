@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.browser.hands import canvas, changed_from, go, slider
+from tests.browser.hands import canvas, changed_from, go, pick, slider, unfold
 
 
 @pytest.fixture
@@ -19,16 +19,6 @@ def fuse(page):
     go(page, "Fuse")
     page.get_by_role("row", name="End error").wait_for()
     return page
-
-
-def unfold(page, folder):
-    page.get_by_text(folder, exact=True).click()
-    page.wait_for_timeout(400)
-
-
-def pick(page, label, option):
-    page.get_by_label(label, exact=True).first.click()
-    page.get_by_role("option", name=option, exact=True).click()
 
 
 def numbers(page, row):

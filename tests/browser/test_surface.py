@@ -11,7 +11,7 @@ from playwright.sync_api import expect
 
 from app import echo
 from app.surfacewords import BOTH, COLORINGS, POISSON
-from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, slider
+from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, pick, press, slider, unfold
 
 SOURCE = next(name for name, coloring in COLORINGS.items() if coloring == "source")
 
@@ -24,20 +24,6 @@ def surface(page):
     page.get_by_role("row", name="No-hit rays").wait_for()
     page.get_by_text("Up to date").wait_for()
     return page
-
-
-def unfold(page, folder):
-    page.get_by_text(folder, exact=True).last.click()
-    page.wait_for_timeout(400)
-
-
-def pick(page, label, option):
-    page.get_by_label(label, exact=True).first.click()
-    page.get_by_role("option", name=option, exact=True).click()
-
-
-def press(page, name):
-    page.get_by_role("button", name=name, exact=True).last.click()
 
 
 def numbers(page, row):
