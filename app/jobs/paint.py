@@ -28,10 +28,6 @@ from pipeline.progress import Progress
 from pipeline.surface import Camera, distances_to_truth_m, voxel_average, voxel_for_count
 from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
-QUICK_POINTS = 20_000
-"""A larger cloud is thinned to about so many points for a quick look."""
-
-
 def paint_job(
     store: Store, spec: Spec, wish: PaintWish
 ) -> Generator[Progress | RolledBalls, None, PaintedView]:
@@ -44,7 +40,7 @@ def paint_job(
         thin, roll_s = whole, balls.elapsed_s
         surfaces: dict[Which, Surface | None] = {"after": balls.after, "before": balls.before}
     else:
-        thin = yield from _thinned(store, spec)
+        thin = yield from _thinned(store, spec, wish.most_points)
         started = time.perf_counter()
         surfaces = {name: rolled_over(thin[name], (wish.radius_m,)) for name in wish.which}
         roll_s = time.perf_counter() - started
@@ -67,17 +63,19 @@ def _clouds(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, P
     return {"after": clouds.fused, "before": clouds.sensor}
 
 
-def _thinned(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, PointCloud]]:
-    """Both clouds with about ``QUICK_POINTS`` points at most."""
+def _thinned(
+    store: Store, spec: Spec, most_points: int
+) -> Generator[Progress, None, dict[Which, PointCloud]]:
+    """Both clouds with about ``most_points`` points at most."""
 
     def thin() -> Generator[Progress, None, dict[Which, PointCloud]]:
         clouds = yield from _clouds(store, spec)
-        if len(clouds["after"]) <= QUICK_POINTS:
+        if len(clouds["after"]) <= most_points:
             return clouds
-        voxel_m = voxel_for_count(clouds["after"].points_m, QUICK_POINTS)
+        voxel_m = voxel_for_count(clouds["after"].points_m, most_points)
         return {name: voxel_average(cloud, voxel_m) for name, cloud in clouds.items()}
 
-    return (yield from store.remember(("quick", *cloud_key(spec)), thin))
+    return (yield from store.remember(("quick", most_points, *cloud_key(spec)), thin))
 
 
 def _painted(surface: Surface, wish: PaintWish, rig: Rig, cameras: list[Camera]) -> PaintedMesh:

@@ -334,6 +334,10 @@ class SpacingView:
     points_after: int
 
 
+QUICK_POINTS = 20_000
+"""Of a quick look, where the browser draws fast enough."""
+
+
 @dataclass(frozen=True, slots=True)
 class PaintWish:
     """Surfaces to draw in certain colours; with a radius, a quick look while the ball is being chosen."""
@@ -342,6 +346,8 @@ class PaintWish:
     coloring: Coloring
     radius_m: float | None = None
     """None takes the surfaces of the settings as they are."""
+    most_points: int = QUICK_POINTS
+    """A larger cloud is thinned to about so many for a quick look."""
 
 
 @dataclass(frozen=True, slots=True)

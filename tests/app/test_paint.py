@@ -7,8 +7,8 @@ import pytest
 
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET
 from app.jobs.chain import ball_clouds, cameras_of, placed, rig_of, rolled
-from app.jobs.paint import QUICK_POINTS, paint_job, vertex_colors
-from app.jobs.records import PaintWish
+from app.jobs.paint import paint_job, vertex_colors
+from app.jobs.records import QUICK_POINTS, PaintWish
 from app.plots.legend import legend_html
 from app.state import Source, Spec
 from app.surfacewords import COLORINGS
@@ -65,6 +65,8 @@ def test_a_quick_look_at_a_large_cloud_thins_it(store):
     assert view.points == pytest.approx(QUICK_POINTS, rel=0.15)
     _, read = arrays(view.meshes["after"].glb)
     assert len(read["POSITION"]) <= view.points
+    fewer = end(paint_job(store, spec, PaintWish(("after",), "color", 0.02, QUICK_POINTS // 4)))
+    assert fewer.points == pytest.approx(QUICK_POINTS // 4, rel=0.15)
 
 
 def test_colours_say_what_their_names_say(made):

@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import pytest
 
 from app.delay import Delay
-from app.jobs.records import PaintedView, PaintWish
+from app.jobs.records import QUICK_POINTS, PaintedView, PaintWish
 from app.panels.surface import quick
+from app.panels.surface.detail import FEWEST_POINTS, LOOKS, SLOW_S, Detail
 from app.panels.surface.quick import QuickLook
 
 
@@ -127,3 +128,44 @@ def test_a_delay_comes_once_after_the_last_restart_and_not_when_cancelled():
     delay.cancel()
     time.sleep(0.3)
     assert len(came) == 1
+
+
+def test_looks_get_coarser_for_a_slow_browser_and_finer_again_for_a_fast_one():
+    detail = Detail()
+    detail.took(0.25)
+    assert detail.points == QUICK_POINTS
+    detail.took(0.3)
+    assert detail.points == QUICK_POINTS // 2
+    for seconds in (0.1, 0.9, 0.9, 0.1):
+        detail.took(seconds)
+    assert detail.points == QUICK_POINTS // 2
+    for _ in range(4 * LOOKS):
+        detail.took(1.0)
+    assert detail.points == FEWEST_POINTS
+    for _ in range(4 * LOOKS):
+        detail.took(0.03)
+    assert detail.points == QUICK_POINTS
+
+
+@pytest.mark.parametrize("seconds_per_point", [1e-6, 1e-5, 1.6e-5, 3e-5])
+def test_the_detail_settles_whatever_the_speed(seconds_per_point):
+    detail, seen = Detail(), []
+    for _ in range(20 * LOOKS):
+        detail.took(detail.points * seconds_per_point)
+        seen.append(detail.points)
+    assert len(set(seen[-10 * LOOKS :])) == 1
+    assert seen[-1] * seconds_per_point <= SLOW_S
+
+
+def test_what_is_asked_for_follows_the_browsers_answers(scene):
+    browser, look, _ = scene
+    for _ in range(LOOKS):
+        look.want(wish(0.01))
+        look._asked_s -= 0.5
+        browser.finish()
+        browser.answer()
+    for _ in range(LOOKS):
+        look.sent()
+        browser.answer()
+    look.want(wish(0.02))
+    assert [asked.most_points for asked, _ in browser.jobs] == [QUICK_POINTS] * LOOKS + [QUICK_POINTS // 2]

@@ -108,6 +108,7 @@ class Watched:
     def __init__(self, scene: str) -> None:
         self.shown: list[tuple[float, int]] = []
         self.rolls_s: list[float] = []
+        self.points: list[int] = []
         painted = SurfacePanel._painted
 
         def noted(panel: SurfacePanel, view: PaintedView) -> None:
@@ -115,6 +116,7 @@ class Watched:
                 (round(1000.0 * (view.wish.radius_m or 0.0), 3), view.meshes["after"].triangles)
             )
             self.rolls_s.append(view.roll_s)
+            self.points.append(view.points)
             painted(panel, view)
 
         SurfacePanel._painted = noted
@@ -135,6 +137,7 @@ def measure(playwright, watched: Watched, angle: str, stops: int, pause_ms: int)
     page.wait_for_timeout(3000)
     watched.shown.clear()
     watched.rolls_s.clear()
+    watched.points.clear()
     log = drag(page, stops, pause_ms)
     renderer = page.evaluate(RENDERER)
     browser.close()
@@ -142,6 +145,8 @@ def measure(playwright, watched: Watched, angle: str, stops: int, pause_ms: int)
     moves = len({move["at"] for move in log["moved"]})
     print(f"{angle}: {renderer}")
     print(f"  {moves} moves, {len(watched.shown)} meshes sent, {len(waits)} seen, {len(log['drawn'])} frames")
+    changes = [f"{count:,} x {len(list(looks))}" for count, looks in groupby(watched.points)]
+    print(f"  points: {', '.join(changes)}")
     print(f"  the ball alone: median {np.median(watched.rolls_s):.3f} s")
     for name, times_s in (("move to mesh", waits), ("mesh to next mesh", gaps)):
         print(

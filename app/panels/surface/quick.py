@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import viser
@@ -10,6 +12,7 @@ import viser
 from app.delay import Delay
 from app.echo import Echo
 from app.jobs.records import PaintedView, PaintWish
+from app.panels.surface.detail import Detail
 
 if TYPE_CHECKING:
     from app.session import Session
@@ -43,6 +46,8 @@ class QuickLook:
         self._echo = Echo(gui, session.post, self._drawn)
         self._next: PaintWish | None = None
         self._rolling = False
+        self._detail = Detail()
+        self._asked_s: float | None = None
 
     @property
     def moving(self) -> bool:
@@ -69,6 +74,8 @@ class QuickLook:
         ready = session.results.fresh("fuse", session.spec)
         if ready and wish is not None and not self._rolling and not self._echo.waiting:
             self._rolling, self._next = True, None
+            self._asked_s = time.monotonic()
+            wish = replace(wish, most_points=self._detail.points)
             session.quick_job("paint", session.store, session.spec, wish, on_end=self._came)
 
     def _came(self, view: PaintedView | None) -> None:
@@ -79,6 +86,9 @@ class QuickLook:
             self._go_on()
 
     def _drawn(self) -> None:
+        if self._asked_s is not None:
+            self._detail.took(time.monotonic() - self._asked_s)
+            self._asked_s = None
         self._on_drawn()
         self._go_on()
 
