@@ -28,6 +28,7 @@ from pipeline.progress import Progress
 from pipeline.surface import Camera, distances_to_truth_m, voxel_average, voxel_for_count
 from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
+
 def paint_job(
     store: Store, spec: Spec, wish: PaintWish
 ) -> Generator[Progress | RolledBalls, None, PaintedView]:
