@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import get_args
 
 from app.depthwords import COLORINGS, DRAWN, HOLES, PHOTO, PICTURES, SENSOR, PointColoring
-from app.jobs.depth_records import HideWish
+from app.jobs.depth_records import Disc, HideWish
 from app.lessons import LESSONS, NUMBER, Lesson, Setting, choice, read_lesson, sets
 from pipeline.config import AlignmentMode, DepthConfig
 
@@ -66,7 +66,7 @@ def _hide(look: DepthLook, text: str) -> DepthLook:
     if found is None or any(float(value) > 100.0 for value in found.groups()):
         raise ValueError("try 'nothing' or such as '20 % wide at 50 % 40 %', from the left and the top")
     size, x, y = (float(value) / 100.0 for value in found.groups())
-    return replace(look, hide=HideWish(0, x, y, size))
+    return replace(look, hide=HideWish(0, (Disc(x, y, size),)))
 
 
 def _short(name: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-from pipeline.config import ModelKind, NetworkPreset
+from pipeline.config import ModelKind, NetworkPreset, Normalisation
 
 PHOTO, SENSOR, INFERRED = "photo", "sensor depth", "inferred depth"
 DIFFERENCE, CONFIDENCE = "difference", "confidence"
@@ -30,3 +30,4 @@ PEER_NAMES = {
 """What the ways to fill without a network are called."""
 NETWORK_PRESETS: tuple[NetworkPreset, ...] = get_args(NetworkPreset)
 NETWORK_KINDS: tuple[ModelKind, ...] = get_args(ModelKind)
+NORMALISATIONS: tuple[Normalisation, ...] = get_args(Normalisation)

@@ -13,6 +13,7 @@ ModelKind = Literal["metric", "relative", "inverse"]
 NetworkPreset = Literal[
     "packetmesh", "midas-small", "depth-anything-v2-small", "depth-anything-v2-metric", "monodepth2"
 ]
+Normalisation = Literal["imagenet", "unit", "bytes"]
 Method = Literal[
     "icp",
     "trimmed-icp",
@@ -72,6 +73,14 @@ class DepthConfig:
     model_kind: ModelKind | None = None
     """What the network gives: metres, depth up to scale, or disparity up to scale and shift; None takes
     what the preset or the file says."""
+    input_width_px: int | None = None
+    """Width of the images that the network gets, where its file leaves it free; None takes what the preset
+    or the file says."""
+    input_height_px: int | None = None
+    """Height of them; it belongs to the width."""
+    normalisation: Normalisation | None = None
+    """What the network's pixel values are: with ImageNet's mean and deviation, from 0 to 1 (unit) or to 255
+    (bytes); None takes what the preset or the file says."""
     crop: bool = False
     """Infer on the thesis's 304 x 228 centre crop instead of the whole image."""
     alignment: AlignmentMode = "local"
@@ -83,6 +92,14 @@ class DepthConfig:
 
     def __post_init__(self) -> None:
         _above("depth.reach", self.reach, 0.0)
+        if (self.input_width_px is None) != (self.input_height_px is None):
+            raise InputError(
+                "Of depth.input_width_px and depth.input_height_px only one is set, to "
+                f"{self.input_width_px or self.input_height_px}; try both, or none"
+            )
+        for key, side_px in (("width", self.input_width_px), ("height", self.input_height_px)):
+            if side_px is not None:
+                _at_least(f"depth.input_{key}_px", side_px, 1)
         if not 0.0 <= self.least_confidence <= 1.0:
             raise InputError(
                 f"depth.least_confidence is {self.least_confidence}; try a value between 0 and 1"

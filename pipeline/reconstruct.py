@@ -134,7 +134,7 @@ def iterate_reconstruction(rig: Rig, config: PipelineConfig) -> Generator[Progre
         started = now
 
     yield Progress("loading the depth network", 0.0)
-    network = DepthNetwork(config.depth.model, config.depth.preset, Overrides(config.depth.model_kind))
+    network = DepthNetwork(config.depth.model, config.depth.preset, Overrides.of(config.depth))
     done("load network")
     nodes = []
     for index, frame in enumerate(rig.frames):

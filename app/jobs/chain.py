@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from app.jobs.records import SpacingView
 from app.jobs.store import Store
 from app.state import Spec
-from pipeline.config import ModelKind
+from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork, Overrides
 from pipeline.errors import InputError, ReconstructionError
 from pipeline.io.rigs import load_frame, load_rig
@@ -38,8 +38,8 @@ REMEMBERED_INFERENCES = 12
 class RememberingNetwork(DepthNetwork):
     """A depth network that does not look twice at the same image."""
 
-    def __init__(self, model: str | None, preset: str | None = None, kind: ModelKind | None = None) -> None:
-        super().__init__(model, preset, Overrides(kind))
+    def __init__(self, model: str | None, preset: str | None, overrides: Overrides) -> None:
+        super().__init__(model, preset, overrides)
         self._seen: OrderedDict[Hashable, DepthMap] = OrderedDict()
         self.elapsed_s: float | None = None
         """Time of the last inference; None if its result was remembered."""
@@ -59,12 +59,14 @@ class RememberingNetwork(DepthNetwork):
         return depth
 
 
+def network_for(config: DepthConfig) -> RememberingNetwork:
+    """The network that the settings name, loaded once in a process."""
+    return _loaded(config.model, config.preset, Overrides.of(config))
+
+
 @functools.lru_cache(maxsize=2)
-def network_for(
-    model: str | None, preset: str | None = None, kind: ModelKind | None = None
-) -> RememberingNetwork:
-    """The network of that file, loaded once in a process."""
-    return RememberingNetwork(model, preset, kind)
+def _loaded(model: str | None, preset: str | None, overrides: Overrides) -> RememberingNetwork:
+    return RememberingNetwork(model, preset, overrides)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +118,7 @@ def prepared(store: Store, spec: Spec) -> Generator[Progress, None, PreparedNode
     def prepare() -> Generator[Progress, None, PreparedNodes]:
         rig = yield from rig_of(store, spec)
         yield Progress("loading the depth network", 0.05)
-        depth = spec.config.depth
-        network = network_for(depth.model, depth.preset, depth.model_kind)
+        network = network_for(spec.config.depth)
         nodes, times = [], []
         for index, frame in enumerate(rig.frames):
             yield Progress(f"depth of {frame.name}", 0.1 + 0.8 * index / len(rig.frames))

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.depthwords import CONFIDENCE, DIFFERENCE, INFERRED, PHOTO, SENSOR
 from app.jobs.chain import prepared, rig_of
+from app.jobs.depth_records import SeenSample
 from app.jobs.pictures import (
     confidence_colors,
     confidence_picture,
@@ -57,7 +58,7 @@ def _depth_node(rig: Rig, index: int, clouds: NodeClouds, elapsed_s: float | Non
     return DepthNode(
         name=clouds.name,
         pictures=_pictures(frame, clouds, trust),
-        sensor=_thinned(clouds.sensor, drawn),
+        sensor=_seen(clouds.sensor, frame, drawn),
         inferred=_thinned(clouds.inferred, drawn),
         outliers=_thinned(replace(clouds.filtered.outliers, colors=None), drawn),
         fused=_thinned(clouds.fused, drawn),
@@ -95,6 +96,16 @@ def _pictures(frame: RgbdFrame, clouds: NodeClouds, trust: Trust) -> dict[str, P
 def _thinned(cloud: PointCloud, share: float) -> Sample:
     """The same share of every cloud, so that their densities can be compared by eye."""
     return sample(cloud.points_m, cloud.colors, int(share * len(cloud)) + 1)
+
+
+def _seen(cloud: PointCloud, frame: RgbdFrame, share: float) -> SeenSample:
+    """As ``_thinned``, with the pixels of the points."""
+    most = min(len(cloud), int(share * len(cloud)) + 1)
+    drawn = cloud.select(np.sort(np.random.default_rng(0).choice(len(cloud), most, replace=False)))
+    assert drawn.pixels is not None
+    height_px, width_px = frame.depth.z_m.shape
+    points_m = drawn.points_m.astype(np.float32)
+    return SeenSample(points_m, drawn.colors, len(cloud), drawn.pixels, width_px, height_px)
 
 
 def _confidence(cloud: PointCloud, trust: Trust, share: float) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.jobs.chain import network_for
 from app.jobs.depth_records import NetworkView, NetworkWish
+from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork
 from pipeline.progress import Progress
 
@@ -20,11 +21,11 @@ def network_job(wish: NetworkWish) -> Generator[Progress, None, NetworkView]:
     """Load a network and infer one image.
 
     Raises:
-        InputError: it is no depth network, or nobody says what kind.
+        InputError: it is no depth network, nobody says what kind, or it does not take the size.
         ReconstructionError: it answers without a depth.
     """
     yield Progress("loading the network", 0.3)
-    network = network_for(wish.model, wish.preset, wish.model_kind)
+    network = network_for(wish.put_into(DepthConfig()))
     yield Progress("asking the network", 0.6)
     started = time.perf_counter()
     DepthNetwork.infer(network, TEST_IMAGE)

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 
-from app.jobs.records import Picture
-from pipeline.config import ModelKind, NetworkPreset
+from app.jobs.records import Picture, Sample
+from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
+from pipeline.types import IntArray
 
 
 @dataclass(frozen=True, slots=True)
-class HideWish:
-    """A disc of one node's sensor depth that is to be hidden and filled again."""
+class SeenSample(Sample):
+    """A thinned cloud whose points know where in the image they were seen."""
 
-    node: int = 0
-    """Index."""
+    pixels: IntArray
+    """(N, 2) column and row."""
+    width_px: int
+    """This and the height: of the image."""
+    height_px: int
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """A round part of an image."""
+
     x_share: float = 0.5
     """Centre, in widths of the image from its left."""
     y_share: float = 0.5
@@ -23,8 +33,17 @@ class HideWish:
 
 
 @dataclass(frozen=True, slots=True)
+class HideWish:
+    """The part of one node's sensor depth that is to be hidden and filled again: all discs together."""
+
+    node: int = 0
+    """Index."""
+    discs: tuple[Disc, ...] = (Disc(),)
+
+
+@dataclass(frozen=True, slots=True)
 class FillRow:
-    """How well one way filled the hidden disc."""
+    """How well one way filled what was hidden."""
 
     name: str
     """One of ``app.depthwords.OURS`` and the names of the peers."""
@@ -48,16 +67,27 @@ class HiddenView:
     """Measured pixels that were hidden."""
     rows: tuple[FillRow, ...]
     pictures: dict[str, Picture]
-    """``MEASURED``, ``BLANK`` and one by every row's name: the disc and what is around it."""
+    """``MEASURED``, ``BLANK`` and one by every row's name: the discs and what is around them."""
 
 
 @dataclass(frozen=True, slots=True)
 class NetworkWish:
-    """The depth network that is to be used: these three fields of ``DepthConfig``."""
+    """The depth network that is to be used: the fields of ``DepthConfig`` by the same names."""
 
     model: str | None = None
     preset: NetworkPreset | None = None
     model_kind: ModelKind | None = None
+    input_width_px: int | None = None
+    input_height_px: int | None = None
+    normalisation: Normalisation | None = None
+
+    def put_into(self, config: DepthConfig) -> DepthConfig:
+        """``config`` with this network.
+
+        Raises:
+            InputError: the size makes no sense.
+        """
+        return replace(config, **asdict(self))
 
 
 @dataclass(frozen=True, slots=True)

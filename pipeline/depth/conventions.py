@@ -27,7 +27,7 @@ from dataclasses import dataclass, fields
 from math import inf
 from typing import Any, Literal, get_args
 
-from pipeline.config import ModelKind, NetworkPreset
+from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
 from pipeline.depth.preprocessing import (
     HEIGHT_PX,
     IMAGENET_DEVIATION,
@@ -40,7 +40,6 @@ from pipeline.errors import InputError
 
 Channels = Literal["RGB", "BGR"]
 Resize = Literal["fit", "stretch"]
-Normalisation = Literal["imagenet", "unit", "bytes"]
 MOST_SIDE_PX = 4096
 """Of an input; more would fill the memory."""
 Values = dict[str, Any]
@@ -91,6 +90,14 @@ class Overrides:
     normalisation: Normalisation | None = None
     """imagenet: mean and deviation of ImageNet; unit: values from 0 to 1; bytes: values from 0 to 255."""
     channels: Channels | None = None
+
+    @staticmethod
+    def of(config: DepthConfig) -> Overrides:
+        """What the settings say."""
+        size_px = None
+        if config.input_width_px is not None and config.input_height_px is not None:
+            size_px = config.input_width_px, config.input_height_px
+        return Overrides(config.model_kind, size_px, config.normalisation)
 
 
 PRESETS: dict[NetworkPreset, Convention] = {
@@ -214,7 +221,19 @@ def _in_graph(values: Values, signature: Signature, size_px: tuple[int, int] | N
             f"{name} takes images of any size and does not say which suits it: name a preset "
             f"({', '.join(PRESETS)}), or a width and height"
         )
+    elif size_px is not None:
+        _divided(size_px, values.get("multiple_px", 1), name)
     return _possible(Convention(**values), name)
+
+
+def _divided(size_px: tuple[int, int], multiple_px: int, name: str) -> None:
+    """Refuses a size that a person gave if the network's strides do not divide it."""
+    if any(side % multiple_px for side in size_px):
+        nearest = tuple(multiple_px * max(1, round(side / multiple_px)) for side in size_px)
+        raise InputError(
+            f"{name} takes images whose sides are multiples of {multiple_px} pixels, not {_by(size_px)}; "
+            f"try {_by(nearest)}"
+        )
 
 
 def _possible(convention: Convention, name: str) -> Convention:

@@ -8,13 +8,14 @@ import pytest
 import viser
 
 from app.depthwords import BLANK, MEASURED, OURS, PEER_NAMES
-from app.jobs.depth_records import FillRow, HiddenView, HideWish, NetworkView, NetworkWish
+from app.jobs.depth_records import Disc, FillRow, HiddenView, HideWish, NetworkView, NetworkWish, SeenSample
 from app.jobs.records import Picture
 from app.panels.depth import hide as hide_folder
-from app.panels.depth.hide import HideFolder, fills_table
+from app.panels.depth.hide import BESIDE, BUTTON, HideFolder, fills_table, painted_line
 from app.panels.depth.network import AS_IT_SAYS, LIMIT_BYTES, SHIPPED, NetworkFolder, network_table
 from app.panels.depth.numbers import LINES, fitted_line
 from app.panels.depth.settings import with_network
+from app.state import Source, Spec
 from pipeline.config import DepthConfig, PipelineConfig
 from pipeline.depth.alignment import ALIGNMENTS, align_depth
 from pipeline.errors import InputError
@@ -53,18 +54,83 @@ class Hand:
         action()
 
 
+WALL = SeenSample(
+    np.array([[-0.4, 0.0, 2.0], [0.0, 0.0, 2.0], [0.4, 0.2, 2.0]], np.float32),
+    None,
+    3,
+    np.array([[10, 20], [40, 20], [70, 30]]),
+    81,
+    41,
+)
+"""Three points two metres before a camera whose image has 81 x 41 pixels."""
+FORWARD = np.array([0.0, 0.0, 1.0])
+
+
 @pytest.fixture
 def hide(server):
     hand = Hand()
-    return HideFolder(server.gui, hand.post, hand.changed, hand.asked.append), hand
+    return HideFolder(server.gui, server.scene, hand.post, hand.changed, hand.asked.append), hand
+
+
+def painted(server):
+    """How many points are drawn as painted; None without a cloud of them."""
+    handle = server.scene.get_handle_by_name("/depth/painted")
+    return None if handle is None else len(handle.points)
 
 
 def test_the_sliders_say_in_percent_what_is_hidden(hide):
     folder, hand = hide
-    folder.ask(HideWish(3, 0.25, 0.4, 0.1))
+    disc = Disc(0.25, 0.4, 0.1)
+    folder.ask(HideWish(3, (Disc(), disc)))
     assert (folder._x.value, folder._y.value, folder._size.value) == (25, 40, 10)
-    assert hand.asked == [HideWish(0, 0.25, 0.4, 0.1)]
+    assert hand.asked == [HideWish(0, (Disc(), disc))]
     assert folder._status.content == hide_folder.WAITING
+    folder._add()
+    assert folder.discs == (Disc(), disc, disc)
+
+
+def test_the_button_hides_the_disc_of_the_sliders_if_nothing_is_painted(hide):
+    folder, hand = hide
+    folder._ask()
+    folder._ask()
+    assert hand.asked == [HideWish(0, (Disc(),)), HideWish(0, (Disc(),))]
+
+
+def test_clicks_with_the_brush_paint_where_the_point_is_seen(hide, server):
+    folder, _ = hide
+    folder.show(WALL, np.eye(4))
+    folder.clicked(np.array([0.4, 0.2, 0.0]), FORWARD)
+    assert folder.discs == ()
+    folder._brush.value, folder._size.value = True, 10.0
+    folder.clicked(np.array([0.4, 0.2, 0.0]), FORWARD)
+    folder.clicked(np.array([-0.4, 0.0, 0.0]), FORWARD)
+    assert folder.discs == (Disc(70 / 80, 30 / 40, 0.1), Disc(10 / 80, 20 / 40, 0.1))
+    assert painted(server) == 2
+    assert folder._status.content == painted_line(folder.discs)
+    folder._undo()
+    assert painted(server) == 1
+    folder.clear()
+    assert painted(server) is None
+    assert folder._status.content == ""
+
+
+def test_a_click_beside_the_cloud_says_so_and_paints_nothing(hide, server):
+    folder, _ = hide
+    folder.show(WALL, np.eye(4))
+    folder._brush.value = True
+    folder.clicked(np.array([0.0, 1.0, 0.0]), FORWARD)
+    assert folder.discs == ()
+    assert folder._status.content == BESIDE
+    assert painted(server) is None
+
+
+def test_another_disc_makes_the_answer_out_of_date(hide):
+    folder, _ = hide
+    folder._add()
+    folder.load(ANSWER)
+    folder._add()
+    assert not folder._area._image.visible
+    assert folder._status.content == f"2 discs painted in magenta. Paint more, or press **{BUTTON}**."
 
 
 def test_the_answer_is_shown_and_forgotten_with_other_settings(hide):
@@ -128,19 +194,38 @@ def test_a_huge_upload_is_one_sentence_and_not_kept(network, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_what_cannot_be_used_leaves_the_network_before(network):
-    folder, _ = network
+def test_what_cannot_be_used_waits_for_what_it_expects_to_be_said(network):
+    folder, hand = network
     folder.write(DepthConfig())
-    folder._keep(uploaded("bad.onnx"))
-    assert folder._model.value == "bad.onnx"
+    folder._keep(uploaded("odd.onnx"))
     folder.load(None)
-    assert (folder._model.value, folder._preset.value) == (SHIPPED, AS_IT_SAYS)
     assert "before is kept" in folder._status.content
+    assert folder._model.value == "odd.onnx"
+    hand.change("Preset", "midas-small")
+    assert hand.asked[-1] == NetworkWish(hand.asked[0].model, "midas-small")
+    folder.write(DepthConfig())
+    assert (folder._model.value, folder._preset.value) == (SHIPPED, AS_IT_SAYS)
+
+
+def test_only_a_foreign_network_can_be_told_its_input(network):
+    folder, hand = network
+    assert not folder._advanced.visible
+    folder._keep(uploaded("odd.onnx"))
+    assert folder._advanced.visible
+    folder._size.value, folder._normalisation.value = (384.0, 256.0), "unit"
+    folder._chosen()
+    assert hand.asked[-1] == NetworkWish(hand.asked[0].model, None, None, 384, 256, "unit")
+    hand.change("Network file", SHIPPED)
+    assert hand.asked[-1] == NetworkWish()
+    assert not folder._advanced.visible
 
 
 def test_a_network_from_the_command_line_is_listed_by_its_name(network):
     folder, _ = network
-    folder.write(DepthConfig(model="/somewhere/other.onnx", preset="monodepth2", model_kind="inverse"))
+    there = DepthConfig("/somewhere/other.onnx", "monodepth2", "inverse", 640, 192, "unit")
+    folder.write(there)
+    assert (folder._size.value, folder._normalisation.value) == ((640.0, 192.0), "unit")
+    assert folder._advanced.visible
     assert (folder._model.value, folder._preset.value, folder._kind.value) == (
         "other.onnx",
         "monodepth2",
@@ -161,8 +246,11 @@ def test_the_network_tells_what_it_is(network):
 
 
 def test_the_edit_takes_the_network_and_nothing_else():
-    config = with_network(NetworkWish("a.onnx", "midas-small", "inverse"))(PipelineConfig())
-    assert config.depth == DepthConfig("a.onnx", "midas-small", "inverse")
+    wish = NetworkWish("a.onnx", "midas-small", "inverse", 384, 256, "unit")
+    config = with_network(wish)(PipelineConfig())
+    assert config.depth == DepthConfig("a.onnx", "midas-small", "inverse", 384, 256, "unit")
+    told = Spec(Source(scene="office"), config=config).command()
+    assert "depth.input_width_px=384 depth.input_height_px=256 depth.normalisation=unit" in told
     assert with_network(NetworkWish())(config) == PipelineConfig()
 
 

@@ -20,11 +20,12 @@ from app.depthwords import (
     SENSOR,
 )
 from app.drawing.colors import HOLE
-from app.jobs.chain import prepared, rig_of
+from app.jobs.chain import network_for, prepared, rig_of
 from app.jobs.depth import depth_job, residual_view, trust_view
-from app.jobs.depth_hide import LEAST_HIDDEN_PX, believed, fill_row, hidden_disc, hide_job
+from app.jobs.depth_discs import window_around
+from app.jobs.depth_hide import LEAST_HIDDEN_PX, believed, fill_row, hidden_pixels, hide_job
 from app.jobs.depth_network import network_job
-from app.jobs.depth_records import HideWish, NetworkWish
+from app.jobs.depth_records import Disc, HideWish, NetworkWish, SeenSample
 from app.jobs.pictures import UNKNOWN, confidence_colors
 from app.state import Source, Spec
 from pipeline.config import DepthConfig
@@ -37,7 +38,7 @@ from pipeline.types import DepthMap
 from tests.app.answers import end
 
 SPEC = Spec(Source(scene="box-on-table"))
-FLAT = HideWish(0, 0.15, 0.35, 0.2)
+FLAT = HideWish(0, (Disc(0.15, 0.35, 0.2),))
 """On the wall, where depth is a plane."""
 
 
@@ -99,6 +100,16 @@ def test_the_confidence_of_every_drawn_point_is_that_of_its_pixel(store, rig, vi
             np.testing.assert_array_equal(colors, confidence_colors(trust.confidence[v, u]))
 
 
+def test_the_drawn_sensor_points_know_their_pixels(rig, view):
+    for frame, node in zip(rig.frames, view.nodes, strict=True):
+        seen = node.sensor
+        assert isinstance(seen, SeenSample)
+        assert (seen.height_px, seen.width_px) == frame.depth.z_m.shape
+        u, v = seen.pixels.T
+        np.testing.assert_allclose(seen.points_m[:, 2], frame.depth.z_m[v, u], rtol=1e-6)
+        np.testing.assert_array_equal(seen.colors, frame.rgb[v, u])
+
+
 def test_the_residuals_are_those_of_the_alignment(store, view):
     for clouds, node in zip(end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
         assert node.residuals.rms_m == pytest.approx(clouds.alignment.residual_rms_m, rel=1e-5)
@@ -142,19 +153,28 @@ def test_trust_counts_only_where_the_sensor_is_blind():
 def test_a_disc_is_round_and_holds_measured_pixels_only():
     z_m = np.ones((60, 80), np.float32)
     z_m[:, :40] = np.nan
-    disc = hidden_disc(DepthMap(z_m), HideWish(0, 0.5, 0.5, 0.5))
+    disc = hidden_pixels(DepthMap(z_m), (Disc(0.5, 0.5, 0.5),))
     assert not disc[:, :40].any()
     y, x = np.nonzero(disc)
     assert np.hypot(x - 39.5, y - 29.5).max() <= 20.0
     assert disc.sum() == pytest.approx(np.pi * 20.0**2 / 2, rel=0.03)
 
 
-@pytest.mark.parametrize("wish", [HideWish(0, 0.1, 0.5, 0.2), HideWish(0, 0.9, 0.5, 0.04)])
-def test_a_disc_without_measured_pixels_is_one_sentence(wish):
+def test_discs_hide_what_any_of_them_covers():
+    depth = DepthMap(np.ones((60, 80), np.float32))
+    left, right = Disc(0.3, 0.5, 0.3), Disc(0.5, 0.5, 0.3)
+    one, other = hidden_pixels(depth, (left,)), hidden_pixels(depth, (right,))
+    assert np.any(one & other)
+    np.testing.assert_array_equal(hidden_pixels(depth, (left, right)), one | other)
+    np.testing.assert_array_equal(hidden_pixels(depth, (right, left, left)), one | other)
+
+
+@pytest.mark.parametrize("disc", [Disc(0.1, 0.5, 0.2), Disc(0.9, 0.5, 0.04)])
+def test_a_disc_without_measured_pixels_is_one_sentence(disc):
     z_m = np.ones((60, 80), np.float32)
     z_m[:, :40] = np.nan
     with pytest.raises(InputError, match=f"the test takes {LEAST_HIDDEN_PX}: move it off the holes"):
-        hidden_disc(DepthMap(z_m), wish)
+        hidden_pixels(DepthMap(z_m), (disc,))
 
 
 def test_errors_of_a_fill_have_known_values():
@@ -167,7 +187,7 @@ def test_errors_of_a_fill_have_known_values():
 
 
 def test_the_hidden_disc_is_blank_then_filled_and_nothing_else_changes(rig, hidden):
-    disc = hidden_disc(rig.frames[0].depth, FLAT)
+    disc = hidden_pixels(rig.frames[0].depth, FLAT.discs)
     assert hidden.hidden_px == disc.sum() > 1000
     assert hidden.node == rig.frames[0].name
     names = [OURS, *(PEER_NAMES[name] for name in PEERS)]
@@ -184,6 +204,21 @@ def test_the_hidden_disc_is_blank_then_filled_and_nothing_else_changes(rig, hidd
         assert colored(after, HOLE)[changed].mean() == pytest.approx(1.0 - row.filled_share)
 
 
+def test_the_pictures_show_the_region_around_all_discs(store, rig):
+    discs = (Disc(0.15, 0.35, 0.1), Disc(0.45, 0.35, 0.1))
+    both = end(hide_job(store, SPEC, HideWish(0, discs)))
+    assert both.hidden_px == hidden_pixels(rig.frames[0].depth, discs).sum()
+    rows, columns = window_around(discs, *rig.frames[0].rgb.shape[1::-1])
+    shown = both.pictures[BLANK].rgb
+    assert shown.shape[1] / shown.shape[0] == pytest.approx(
+        (columns.stop - columns.start) / (rows.stop - rows.start)
+    )
+    hidden = colored(both.pictures[BLANK], HOLE) & ~colored(both.pictures[MEASURED], HOLE)
+    middle = shown.shape[1] // 2
+    assert hidden[:, :middle].any()
+    assert hidden[:, middle:].any()
+
+
 def test_a_flat_wall_comes_back(hidden):
     errors = {row.name: row for row in hidden.rows}
     for name in (PEER_NAMES["nearest"], PEER_NAMES["inpaint-telea"]):
@@ -195,7 +230,7 @@ def test_a_flat_wall_comes_back(hidden):
 
 def test_a_network_that_knows_the_truth_gives_back_what_was_hidden(rig):
     frame, truth = rig.frames[0], rig.truth.depth[0]
-    disc = hidden_disc(frame.depth, FLAT)
+    disc = hidden_pixels(frame.depth, FLAT.discs)
     rest = DepthMap(np.where(disc, np.float32(np.nan), frame.depth.z_m))
     knowing = DepthMap((0.4 * truth.z_m).astype(np.float32), kind="relative")
     filled = believed(knowing, rest, frame.rgb, replace(DepthConfig(), alignment="affine_depth"))
@@ -220,6 +255,33 @@ def test_the_network_that_ships_says_what_it_is():
     assert view.provider.endswith("ExecutionProvider")
     assert view.size_bytes == SHIPPED_MODEL.stat().st_size
     assert 0.0 < view.inference_s < 30.0
+
+
+def test_the_network_wished_is_fed_as_wished(tmp_path):
+    networks = pytest.importorskip("tests.pipeline.depth.networks")
+    file = networks.input_side(tmp_path / "n.onnx", 3)
+    wish = NetworkWish(str(file), None, "metric", 96, 64, "unit")
+    assert end(network_job(wish)).wish == wish
+    convention = network_for(wish.put_into(DepthConfig())).convention
+    assert (convention.width_px, convention.height_px, convention.normalised_inside) == (96, 64, True)
+    assert network_for(replace(wish.put_into(DepthConfig()), reach=0.3)).convention is convention
+
+
+@pytest.mark.parametrize(
+    ("width_px", "height_px", "sentence"),
+    [
+        (300, 256, "multiples of 32 pixels, not 300 x 256; try 288 x 256"),
+        (300, None, "only one is set, to 300; try both"),
+        (-32, 32, "depth.input_width_px is -32; try at least 1"),
+        (8192, 8192, "8192 x 8192 pixels; try 1 to 4096 a side"),
+    ],
+)
+def test_a_bad_input_size_is_one_sentence(tmp_path, width_px, height_px, sentence):
+    networks = pytest.importorskip("tests.pipeline.depth.networks")
+    file = networks.input_side(tmp_path / "n.onnx", 3)
+    with pytest.raises(InputError, match=sentence) as refused:
+        end(network_job(NetworkWish(str(file), "midas-small", None, width_px, height_px)))
+    assert "\n" not in str(refused.value)
 
 
 def test_a_file_that_is_no_network_is_one_sentence(tmp_path):

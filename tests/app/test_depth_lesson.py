@@ -5,8 +5,8 @@ import pytest
 
 from app.depthlesson import DepthLook, depth_lesson
 from app.depthwords import CONFIDENCE, DIFFERENCE, EVERYWHERE, INFERRED, PHOTO, SENSOR
-from app.jobs.depth_hide import hidden_disc
-from app.jobs.depth_records import HideWish
+from app.jobs.depth_hide import hidden_pixels
+from app.jobs.depth_records import Disc, HideWish
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork, align_depth
 from pipeline.depth.trust import distance_to, judge
@@ -41,7 +41,7 @@ def test_a_stop_sets_what_it_names_and_leaves_the_rest_as_the_screen_begins(tmp_
     begin = DepthConfig()
     assert (bare.look.alignment, bare.look.reach) == (begin.alignment, begin.reach)
     assert bare.look == DepthLook()
-    hide = HideWish(0, 0.3, 0.625, 0.2)
+    hide = HideWish(0, (Disc(0.3, 0.625, 0.2),))
     assert full.look == DepthLook(
         DIFFERENCE, CONFIDENCE, 0.3, "median", "confidence", EVERYWHERE, 0.07, 0.4, hide
     )
@@ -125,5 +125,6 @@ def test_what_the_last_stop_hides_was_measured_in_every_scene(scene):
     wish = look_at("Hide what you know").hide
     for frame in load_demo(scene).frames:
         columns = frame.depth.z_m.shape[1]
-        disc_px = np.pi * (0.5 * wish.size_share * columns) ** 2
-        assert hidden_disc(frame.depth, wish).sum() > 0.8 * disc_px
+        (disc,) = wish.discs
+        disc_px = np.pi * (0.5 * disc.size_share * columns) ** 2
+        assert hidden_pixels(frame.depth, wish.discs).sum() > 0.8 * disc_px

@@ -1,6 +1,7 @@
 """The whole Depth screen with real jobs and no browser: what is drawn, what settings do, and the lesson."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import viser
 
 from app.depthlesson import depth_lesson
 from app.depthwords import COLORINGS, EVERYWHERE, HOLES, OURS, UNSEEN
+from app.drawing.brush import painted
 from app.jobs import entry
 from app.jobs.depth_records import NetworkWish
 from app.panels.depth import DepthPanel
@@ -113,6 +115,46 @@ def test_the_network_that_ships_can_be_chosen_as_a_file(session):
     assert session.panel._network._model.value == SHIPPED_MODEL.name
     session.panel._choose_network(NetworkWish())
     assert session.spec.config.depth.model is None
+
+
+def click(session, pixel_row):
+    """A click on one drawn sensor point of the first node, from where its camera stands."""
+    T = session.results.view("scene").nodes[0].T_world_camera
+    point_m = session.results.view("depth").nodes[0].sensor.points_m[pixel_row].astype(float)
+    session.panel._clicked(SimpleNamespace(ray_origin=T[:3, 3], ray_direction=T[:3, :3] @ point_m))
+
+
+def test_clicks_paint_what_is_hidden_and_filled(session):
+    panel, seen = session.panel, session.results.view("depth").nodes[0].sensor
+    rows = [int(np.argmin(np.abs(seen.pixels - middle).sum(axis=1))) for middle in ((120, 150), (480, 120))]
+    panel._hide._brush.value, panel._hide._size.value = True, 12.0
+    for row in rows:
+        click(session, row)
+    centres = np.array([(disc.x_share * 639, disc.y_share * 479) for disc in panel._hide.discs])
+    np.testing.assert_allclose(centres, seen.pixels[rows], atol=6.0)  # a degree is 9 pixels
+    marked = session.scene.get_handle_by_name("/depth/painted")
+    assert len(marked.points) == painted(seen, panel._hide.discs).sum() > 100
+    panel._draw()
+    assert session.scene.get_handle_by_name("/depth/painted") is not None
+    panel._hide._ask()
+    assert "measured pixels of node_00 hidden" in panel._hide._status.content
+    session.scene.get_handle_by_name("/depth").visible = False
+    click(session, rows[0])
+    assert len(panel._hide.discs) == 2
+    session.scene.get_handle_by_name("/depth").visible = True
+    panel._picked_node()
+    assert panel._hide.discs == ()
+    assert session.scene.get_handle_by_name("/depth/painted") is None
+
+
+def test_discs_of_another_scene_are_cleared_and_those_of_other_settings_stay(session):
+    panel, spec = session.panel, session.spec
+    panel._hide._add()
+    panel.on_spec(spec.with_preset("thesis"))
+    assert len(panel._hide.discs) == 1
+    panel.on_spec(replace(spec, source=Source(scene="office")))
+    assert panel._hide.discs == ()
+    panel.on_spec(spec)
 
 
 def test_every_stop_of_the_lesson_sets_the_screen_as_it_says(session):

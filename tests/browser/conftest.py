@@ -36,25 +36,31 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.xdist_group("browser"))
 
 
-@pytest.fixture(scope="module")
-def browser():
-    """Chromium, closed at the end."""
+@pytest.fixture(scope="session")
+def chromium():
+    """Where Chromium is."""
     path = chromium_path()
     if path is None:
         pytest.skip(
             "no Chromium found: install the package 'chromium' or set PACKETMESH_CHROMIUM to its path"
         )
+    return path
+
+
+@pytest.fixture(scope="module")
+def browser(chromium):
+    """Chromium, closed at the end: what drives it keeps an event loop that other tests must not meet."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
         yield browser
         browser.close()
 
 
-@pytest.fixture(scope="module")
-def app(browser):
-    """The app with the smallest demo scene, on a port of its own."""
+@pytest.fixture(scope="session")
+def app(chromium):
+    """The app with the smallest demo scene, on a port of its own; every tab has a session of its own."""
     from app.server import build_server
 
     app = build_server("box-on-table", port=0)

@@ -14,13 +14,13 @@ BY_CONFIDENCE = next(name for name, coloring in COLORINGS.items() if coloring ==
 
 
 @pytest.fixture
-def depth(page):
+def depth(tab):
     """The Depth step with everything computed, as a fresh session has it."""
-    page.reload()
-    go(page, "Depth")
-    page.get_by_role("row", name="Network ran on").wait_for()
-    page.get_by_text("Up to date").wait_for()
-    return page
+    tab.reload()
+    go(tab, "Depth")
+    tab.get_by_role("row", name="Network ran on").wait_for()
+    tab.get_by_text("Up to date").wait_for()
+    return tab
 
 
 def visible(page, label):
@@ -95,6 +95,25 @@ def test_a_hidden_disc_is_filled_in_every_way(depth):
         depth.get_by_role("row", name=name).wait_for()
 
 
+def test_a_click_with_the_brush_paints_points(depth):
+    depth.mouse.move(1, 1)
+    begin = canvas(depth)
+    unfold(depth, "Hide a region and see it filled")
+    visible(depth, "Brush").check()
+    picture = depth.locator("canvas").first.bounding_box()
+    spots = [(0.5, 0.5), (0.4, 0.45), (0.5, 0.4), (0.6, 0.5), (0.45, 0.6)]
+    for x, y in spots:
+        depth.mouse.click(picture["x"] + x * picture["width"], picture["y"] + y * picture["height"])
+        depth.wait_for_timeout(300)
+    depth.get_by_text("painted in magenta").wait_for()
+    assert changed_from(depth, begin)
+    press(depth, "Hide and fill")
+    depth.get_by_text(re.compile(r"[\d,]+ measured pixels of node_00 hidden")).wait_for()
+    press(depth, "Clear")
+    expect(depth.get_by_text("painted in magenta")).to_have_count(0)
+    assert differing(canvas(depth), begin) <= ALIKE
+
+
 def test_a_file_that_is_no_network_is_a_sentence_and_changes_nothing(depth):
     begin = canvas(depth)
     unfold(depth, "Network")
@@ -103,7 +122,7 @@ def test_a_file_that_is_no_network_is_a_sentence_and_changes_nothing(depth):
     )
     depth.get_by_text("is not a readable ONNX network").wait_for()
     depth.get_by_text("The network before is kept.").wait_for()
-    expect(visible(depth, "Network file")).to_have_value("the network that ships")
+    expect(visible(depth, "Network file")).to_have_value("mine.onnx")
     depth.get_by_text("Up to date").wait_for()
     assert differing(canvas(depth), begin) <= ALIKE
 

@@ -12,13 +12,13 @@ from tests.browser.hands import canvas, changed_from, go, pick, slider, unfold
 
 
 @pytest.fixture
-def fuse(page):
+def fuse(tab):
     """The Fuse step with its race done, as a fresh session has it."""
-    page.reload()
-    page.get_by_text("Up to date").wait_for()
-    go(page, "Fuse")
-    page.get_by_role("row", name="End error").wait_for()
-    return page
+    tab.reload()
+    tab.get_by_text("Up to date").wait_for()
+    go(tab, "Fuse")
+    tab.get_by_role("row", name="End error").wait_for()
+    return tab
 
 
 def numbers(page, row):

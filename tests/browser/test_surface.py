@@ -17,13 +17,13 @@ SOURCE = next(name for name, coloring in COLORINGS.items() if coloring == "sourc
 
 
 @pytest.fixture
-def surface(page):
+def surface(tab):
     """The Surface step with everything computed, as a fresh session has it."""
-    page.reload()
-    go(page, "Surface")
-    page.get_by_role("row", name="No-hit rays").wait_for()
-    page.get_by_text("Up to date").wait_for()
-    return page
+    tab.reload()
+    go(tab, "Surface")
+    tab.get_by_role("row", name="No-hit rays").wait_for()
+    tab.get_by_text("Up to date").wait_for()
+    return tab
 
 
 def numbers(page, row):

@@ -8,10 +8,10 @@ from typing import Any
 
 import viser
 
-from app.depthwords import NETWORK_KINDS, NETWORK_PRESETS
+from app.depthwords import NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
 from app.jobs.depth_records import NetworkView, NetworkWish
 from app.tables import Row, number, table
-from pipeline.config import DepthConfig, ModelKind, NetworkPreset
+from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
 from pipeline.errors import InputError
 
 SHIPPED, AS_IT_SAYS = "the network that ships", "as the file says"
@@ -24,6 +24,7 @@ ADVICE: dict[ModelKind, str] = {
     "inverse": "It gives 1/depth: the alignment *scale, shift, local* starts from a line of 1/depth then.",
 }
 TRYING = "Trying the network …"
+KEPT = "The network before is kept. Say what this one expects, or choose another."
 
 
 class NetworkFolder:
@@ -63,14 +64,37 @@ class NetworkFolder:
                 hint="What the network's numbers mean: metric: metres; relative: depth up to a scale; "
                 "inverse: 1/depth up to scale and shift, as MiDaS and Depth Anything have it.",
             )
-            for handle in (self._model, self._preset, self._kind):
+            changed(self._model, self._picked)
+            for handle in (self._preset, self._kind):
                 changed(handle, self._chosen)
             button = gui.add_upload_button(
                 "Add an ONNX file …", icon=viser.Icon.UPLOAD, mime_type=".onnx", hint="At most 128 MB."
             )
             button.on_upload(lambda event: post(self._keep, event.target.value))
+            self._add_input(gui, post)
             self._status = gui.add_markdown("")
             self._table = gui.add_html("")
+
+    def _add_input(self, gui: viser.GuiApi, post: Callable[..., None]) -> None:
+        """What only somebody who knows the network can say, for one that is not ours."""
+        self._advanced = gui.add_folder("Advanced: its input", expand_by_default=False, visible=False)
+        with self._advanced:
+            self._size = gui.add_vector2(
+                "Size (px)",
+                (0.0, 0.0),
+                min=(0.0, 0.0),
+                step=1.0,
+                hint="Width and height of the images it gets, where its file leaves them free; 0 and 0: as "
+                "the file says.",
+            )
+            self._normalisation = gui.add_dropdown(
+                "Pixel values",
+                [AS_IT_SAYS, *NORMALISATIONS],
+                hint="imagenet: with ImageNet's mean and deviation; unit: from 0 to 1; bytes: from 0 to 255.",
+            )
+            gui.add_button("Use this input", icon=viser.Icon.CHECK, hint="Tries the network anew.").on_click(
+                lambda _: post(self._chosen)
+            )
 
     def write(self, config: DepthConfig) -> None:
         """Show the network that is wanted."""
@@ -81,25 +105,39 @@ class NetworkFolder:
         self._model.value = name
         self._preset.value = config.preset or AS_IT_SAYS
         self._kind.value = config.model_kind or AS_IT_SAYS
+        self._size.value = (float(config.input_width_px or 0), float(config.input_height_px or 0))
+        self._normalisation.value = config.normalisation or AS_IT_SAYS
+        self._advanced.visible = config.model is not None
 
     def load(self, view: NetworkView | None) -> None:
-        """Tell of the network that was tried; None was no depth network, and the one before stays."""
+        """Tell of the network that was tried; None could not be used, and the one before stays in use."""
         if view is None:
-            self._status.content = "The network before is kept."
-            self.write(self._config)
+            self._status.content = KEPT
             return
         self._status.content = ADVICE[view.kind]
         self._table.content = network_table(view)
 
+    def _picked(self) -> None:
+        """Another file gets the input that it asks for itself."""
+        self._size.value, self._normalisation.value = (0.0, 0.0), AS_IT_SAYS
+        self._chosen()
+
     def _chosen(self) -> None:
         self._status.content, self._table.content = TRYING, ""
+        model = self._models[self._model.value]
+        self._advanced.visible = model is not None
         presets: dict[str, NetworkPreset] = {preset: preset for preset in NETWORK_PRESETS}
         kinds: dict[str, ModelKind] = {kind: kind for kind in NETWORK_KINDS}
+        normalisations: dict[str, Normalisation] = {name: name for name in NORMALISATIONS}
+        width_px, height_px = (round(side) or None for side in self._size.value)
         self._on_choose(
             NetworkWish(
-                self._models[self._model.value],
+                model,
                 presets.get(self._preset.value),
                 kinds.get(self._kind.value),
+                width_px,
+                height_px,
+                normalisations.get(self._normalisation.value),
             )
         )
 
@@ -112,7 +150,7 @@ class NetworkFolder:
         path = self._folder / f"network_{len(list(self._folder.iterdir())):03d}.onnx"
         path.write_bytes(file.content)
         self._model.value = self._add(Path(file.name).name, str(path))
-        self._chosen()
+        self._picked()
 
     def _add(self, name: str, path: str) -> str:
         """Put a file into the list, under a name of its own."""

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from app.controls import Controls
 from app.depthlesson import DepthLook, depth_lesson
 from app.depthwords import COLORINGS, DRAWN, EVERYWHERE, HOLES, PHOTO, PICTURES, SENSOR
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import INFERRED, LOSS, TARGET
-from app.jobs.depth_records import HiddenView, HideWish, NetworkView, NetworkWish
+from app.jobs.depth_records import HiddenView, HideWish, NetworkView, NetworkWish, SeenSample
 from app.jobs.records import DepthNode, DepthView, Sample, SceneView
 from app.lessonfolder import LessonFolder
 from app.panel import Panel
@@ -42,6 +44,7 @@ class DepthPanel(Panel):
         """Two pictures to compare, alignment, what to draw; numbers of one node; the rest in folders."""
         gui, session = self.gui, self.session
         self._look: DepthLook | None = None
+        self._source = session.spec.source
         gui.add_markdown(TEXT)
         self._lesson = LessonFolder(gui, depth_lesson(), session.post, self.when_changed, self._take_look)
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images and numbers are shown below.")
@@ -66,7 +69,7 @@ class DepthPanel(Panel):
             gui.add_markdown(TRUST_TEXT)
             self._controls.append(self._fields(TRUST))
             self._trust = gui.add_html("")
-        self._hide = HideFolder(gui, session.post, self.when_changed, self._hidden_wish)
+        self._hide = HideFolder(gui, self.scene, session.post, self.when_changed, self._hidden_wish)
         self._network = NetworkFolder(
             gui, session.post, self.when_changed, session.folder, self._choose_network
         )
@@ -80,6 +83,7 @@ class DepthPanel(Panel):
             for handle in (self._drawn, self._rejected):
                 self.when_changed(handle, self._draw)
             self._controls.append(self._fields(ADVANCED))
+        self.scene.on_click()(lambda event: session.post(self._clicked, event))
 
     def _fields(self, fields: Any) -> Controls:
         session = self.session
@@ -92,6 +96,9 @@ class DepthPanel(Panel):
         for controls in self._controls:
             controls.write(spec.config)
         self._network.write(spec.config.depth)
+        if spec.source != self._source:
+            self._source = spec.source
+            self._hide.clear()
         self._hide.forget()
 
     def on_view(self, step: Step, view: Any) -> None:
@@ -124,6 +131,7 @@ class DepthPanel(Panel):
                     add_cloud(self.scene, f"{below}/inferred", points, T, color)
                 if self._rejected.value:
                     add_cloud(self.scene, f"{below}/outliers", node.outliers, T, LOSS)
+            self._show_canvas()
 
     def _inferred(self, node: DepthNode) -> tuple[Sample, tuple[int, int, int] | None] | None:
         """The inferred points to draw, and their one colour; None where they have their own."""
@@ -147,7 +155,8 @@ class DepthPanel(Panel):
         return index, view.nodes[index]
 
     def _picked_node(self) -> None:
-        self._hide.forget()
+        self._hide.clear()
+        self._show_canvas()
         self._show_node()
 
     def _show_node(self) -> None:
@@ -164,6 +173,20 @@ class DepthPanel(Panel):
 
     # The folders.
 
+    def _show_canvas(self) -> None:
+        """Have the brush paint on the chosen node's points."""
+        scene: SceneView | None = self.session.results.view("scene")
+        shown = self._shown()
+        if scene is not None and shown is not None:
+            index, node = shown
+            assert isinstance(node.sensor, SeenSample)
+            self._hide.show(node.sensor, scene.nodes[index].T_world_camera)
+
+    def _clicked(self, event: Any) -> None:
+        frame = self.scene.get_handle_by_name(self.drawn_below)
+        if frame is not None and frame.visible:
+            self._hide.clicked(np.array(event.ray_origin), np.array(event.ray_direction))
+
     def _hidden_wish(self, wish: HideWish) -> None:
         session, spec, shown = self.session, self.session.spec, self._shown()
         if shown is None or not session.results.fresh("depth", spec):
@@ -176,7 +199,9 @@ class DepthPanel(Panel):
 
     def _filled(self, spec: Spec, wish: HideWish, view: HiddenView | None) -> None:
         shown = self._shown()
-        if spec == self.session.spec and shown is not None and shown[0] == wish.node:
+        if spec != self.session.spec or wish.discs != self._hide.discs:
+            return
+        if shown is not None and shown[0] == wish.node:
             with self.session.target.atomic():
                 self._hide.load(view)
 
@@ -198,7 +223,7 @@ class DepthPanel(Panel):
             self._area.set(look.left, look.right, look.split_share)
             self._coloring.value = next(name for name, key in COLORINGS.items() if key == look.coloring)
             self._drawn.value = look.drawn
-            self._hide.forget()
+            self._hide.clear()
         self._look = look
         session.edit(
             lambda config: replace(

@@ -58,7 +58,4 @@ ADVANCED = (
 
 def with_network(wish: NetworkWish) -> Callable[[PipelineConfig], PipelineConfig]:
     """The edit that takes another network."""
-    return lambda config: replace(
-        config,
-        depth=replace(config.depth, model=wish.model, preset=wish.preset, model_kind=wish.model_kind),
-    )
+    return lambda config: replace(config, depth=wish.put_into(config.depth))

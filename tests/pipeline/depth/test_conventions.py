@@ -185,6 +185,39 @@ def test_a_size_flag_sets_an_input_of_free_size(tmp_path):
     np.testing.assert_allclose(network.infer(plain()).z_m, 96.0, rtol=1e-5)
 
 
+def test_settings_feed_the_network_as_flags_do(tmp_path):
+    config = with_settings(
+        PipelineConfig(),
+        [
+            "depth.model_kind=metric",
+            "depth.input_width_px=96",
+            "depth.input_height_px=64",
+            "depth.normalisation=bytes",
+        ],
+    )
+    overrides = Overrides.of(config.depth)
+    assert overrides == Overrides("metric", (96, 64), "bytes")
+    assert Overrides.of(PipelineConfig().depth) == Overrides()
+    network = DepthNetwork(networks.input_side(tmp_path / "n.onnx", 2), None, overrides)
+    np.testing.assert_allclose(network.infer(plain()).z_m, 64.0, rtol=1e-5)
+    assert (network.convention.scale, network.convention.normalised_inside) == (1.0, True)
+
+
+@pytest.mark.parametrize(
+    ("preset", "size_px", "names"),
+    [
+        ("midas-small", (300, 256), "multiples of 32 pixels, not 300 x 256; try 288 x 256"),
+        ("monodepth2", (8, 190), "multiples of 32 pixels, not 8 x 190; try 32 x 192"),
+        ("depth-anything-v2-small", (512, 504), "multiples of 14 pixels, not 512 x 504; try 518 x 504"),
+    ],
+)
+def test_a_size_that_the_strides_do_not_divide_is_refused_with_the_nearest(tmp_path, preset, size_px, names):
+    file = networks.input_side(tmp_path / "n.onnx", 2)
+    with pytest.raises(InputError, match=names) as refused:
+        DepthNetwork(file, preset, Overrides(size_px=size_px))
+    assert "\n" not in str(refused.value)
+
+
 def test_midas_small_is_stretched_normalised_and_inverse(tmp_path):
     file = networks.channel(tmp_path / "n.onnx", 1, (1, 3, 256, 256), plus=SPREAD)
     expected = 1.0 / (normalised(COLOR[1], 1, "imagenet") + SPREAD)
