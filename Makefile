@@ -31,6 +31,7 @@ scenes: $(VENV)/.core  ## render the demo scenes again
 lock: $(VENV)/.uv  ## pin everything anew
 	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 pyproject.toml -o requirements.lock
 	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 pyproject.toml --group dev -o requirements-dev.lock
+	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 pyproject.toml --extra train -o requirements-train.lock
 
 clean:
 	rm -rf $(VENV)

@@ -6,9 +6,13 @@ import argparse
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pipeline.errors import PacketMeshError
+
+if TYPE_CHECKING:
+    from pipeline.depth.training.initial import Initial
+    from pipeline.depth.training.network import Width
 
 
 def main() -> None:
@@ -23,7 +27,7 @@ def main() -> None:
     traced.add_argument("--threads", type=int, default=1)
     add_train_options(steps.add_parser("train", help="train until a time budget is spent"))
     export = steps.add_parser("export", help="write the ONNX file of a checkpoint")
-    export.add_argument("--checkpoint", type=Path, required=True, help="last.pt of a training run")
+    export.add_argument("--checkpoint", type=Path, required=True, help="best.pt or last.pt of a training run")
     export.add_argument("--data", type=Path, required=True)
     export.add_argument("--out", type=Path, required=True)
     evaluation = steps.add_parser("evaluate", help="print a network's errors; needs no torch")
@@ -64,8 +68,12 @@ def add_train_options(training: argparse.ArgumentParser) -> None:
     training.add_argument("--pause-minutes", type=float, default=math.inf, help="save and stop after these")
     training.add_argument("--learning-rate", type=float, default=4e-4)
     training.add_argument("--seed", type=int, default=0)
-    training.add_argument("--width", choices=("full", "half"), default="full")
-    training.add_argument("--initial", choices=("random", "open-nsfw"), default="random")
+    training.add_argument(
+        "--width", choices=("full", "half", "lite0"), help="of the encoder; default: what fits --initial"
+    )
+    training.add_argument(
+        "--initial", choices=("random", "open-nsfw", "efficientnet-lite0"), default="random"
+    )
     training.add_argument("--loss", choices=("scale-invariant", "berhu"), default="scale-invariant")
     training.add_argument("--precision", choices=("bf16", "fp32"), default="bf16")
     training.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
@@ -94,11 +102,12 @@ def run_trace(furniture: Path | None, cache: Path | None, **options: Any) -> Non
         print(file, flush=True)
 
 
-def run_train(**options: object) -> None:
+def run_train(width: Width | None, initial: Initial, **options: object) -> None:
     """Train or continue training."""
+    from pipeline.depth.training.initial import WIDTHS
     from pipeline.depth.training.train import TrainingConfig, train
 
-    train(TrainingConfig(**options))  # type: ignore[arg-type]
+    train(TrainingConfig(width=width or WIDTHS[initial], initial=initial, **options))  # type: ignore[arg-type]
 
 
 def run_export(checkpoint: Path, data: Path, out: Path) -> None:

@@ -35,7 +35,7 @@ from pipeline.depth.preprocessing import (
 )
 from pipeline.depth.training.dataset import Shards
 from pipeline.depth.training.initial import LICENCES
-from pipeline.depth.training.network import DepthResNet, depth_from_logit
+from pipeline.depth.training.network import DepthNet, depth_from_logit
 from pipeline.errors import InputError
 from pipeline.types import ByteArray, FloatArray
 
@@ -75,7 +75,7 @@ class Normalise(nn.Module):
 class FullResolution(nn.Module):
     """The network with its finest head only, for RGB (N, 3, H, W) in 0 to 255."""
 
-    def __init__(self, network: DepthResNet) -> None:
+    def __init__(self, network: DepthNet) -> None:
         super().__init__()
         self.normalise = Normalise()
         self.encoder, self.decoder = network.encoder, network.decoder
@@ -111,7 +111,7 @@ def export(checkpoint: Path, data: Path, out: Path) -> dict[str, float]:
     """Write ``out`` (8 bit) and ``out`` with suffix ``.float.onnx``; returns errors on validation rooms.
 
     Args:
-        checkpoint: ``last.pt`` of a training run.
+        checkpoint: ``best.pt`` or ``last.pt`` of a training run.
         data: folder of shards; training images calibrate, validation images compare.
         out: the ONNX file to write.
 
@@ -119,9 +119,11 @@ def export(checkpoint: Path, data: Path, out: Path) -> dict[str, float]:
         InputError: there is no such checkpoint.
     """
     if not checkpoint.is_file():
-        raise InputError(f"There is no checkpoint at {checkpoint}: name the last.pt of a training run.")
+        raise InputError(
+            f"There is no checkpoint at {checkpoint}: name the best.pt or last.pt of a training run."
+        )
     saved = torch.load(checkpoint, weights_only=True, map_location="cpu")
-    network = DepthResNet(saved["config"]["width"]).eval()
+    network = DepthNet(saved["config"]["width"]).eval()
     network.load_state_dict(saved["model"])
     float_file = out.with_suffix(".float.onnx")
     write_float(network, float_file)
@@ -136,7 +138,7 @@ def export(checkpoint: Path, data: Path, out: Path) -> dict[str, float]:
     return errors
 
 
-def write_float(network: DepthResNet, file: Path) -> None:
+def write_float(network: DepthNet, file: Path) -> None:
     """The network as ONNX in 32-bit floating point."""
     torch.onnx.export(
         FullResolution(network).eval(),

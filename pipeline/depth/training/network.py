@@ -1,13 +1,17 @@
-"""The depth network: a ResNet-50 encoder and a five-level decoder with skips (SPEC 3.2)."""
+"""The depth network: an encoder, usually a ResNet-50, and a five-level decoder with skips (SPEC 3.2)."""
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal
 
 import torch
 from torch import Tensor, nn
 
-Width = Literal["full", "half"]
+from pipeline.depth.training.efficientnet import EfficientNetLite0
+
+Width = Literal["full", "half", "lite0"]
+"""Of the encoder: the ResNet-50 at full or half width, or EfficientNet-Lite0, which has one."""
 
 DEPTH_MIN_M = 0.1
 DEPTH_MAX_M = 10.0
@@ -59,9 +63,10 @@ class ResNet50(nn.Module):
     half the channels, strides in the first 1x1, and pooling windows that start at the image's first pixel.
     """
 
-    def __init__(self, width: Width = "full") -> None:
+    def __init__(self, width: Literal["full", "half"] = "full") -> None:
         super().__init__()
         thin, inner = width == "half", BLOCK_WIDTH[width]
+        self.channels = (STEM_CHANNELS, *(4 * inner << level for level in range(len(BLOCKS))))
         self.register_buffer("offset", torch.zeros(1, 3, 1, 1))
         self.stem = nn.Sequential(
             nn.Conv2d(3, STEM_CHANNELS, 7, 2, 3, bias=False),
@@ -91,9 +96,9 @@ class ResNet50(nn.Module):
         return features
 
 
-def encoder_channels(width: Width) -> tuple[int, ...]:
-    """Channels of the features at strides 2, 4, 8, 16 and 32."""
-    return STEM_CHANNELS, *(4 * BLOCK_WIDTH[width] << level for level in range(len(BLOCKS)))
+def encoder_of(width: Width) -> ResNet50 | EfficientNetLite0:
+    """The encoder of this name; its ``channels`` are those of the features at strides 2, 4, 8, 16 and 32."""
+    return EfficientNetLite0() if width == "lite0" else ResNet50(width)
 
 
 class ReflectPadFunction(torch.autograd.Function):
@@ -163,20 +168,21 @@ class Decoder(nn.Module):
         return logits
 
 
-class DepthResNet(nn.Module):
+class DepthNet(nn.Module):
     """Normalised RGB (N, 3, H, W) to depth in metres; H and W are multiples of 32."""
 
     def __init__(self, width: Width = "full") -> None:
         super().__init__()
-        self.encoder = ResNet50(width)
-        self.decoder = Decoder(encoder_channels(width))
+        self.encoder = encoder_of(width)
+        self.decoder = Decoder(self.encoder.channels)
         self.reset()
 
     def reset(self) -> None:
         """He initialisation; under ELU the variance stays; the heads start near a room's depth."""
         for module in self.encoder.modules():
             if isinstance(module, nn.Conv2d):
-                nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
+                fan_out = module.out_channels * module.weight[0, 0].numel() / module.groups
+                nn.init.normal_(module.weight, std=math.sqrt(2.0 / fan_out))
         for module in self.decoder.modules():
             if isinstance(module, nn.Conv2d):
                 gain = ELU_GAIN if module.out_channels > 1 else HEAD_GAIN

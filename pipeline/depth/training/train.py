@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import os
+import signal
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -23,7 +25,7 @@ from pipeline.depth.preprocessing import normalised_input
 from pipeline.depth.training.dataset import Shards, augment
 from pipeline.depth.training.initial import Initial, initial_network
 from pipeline.depth.training.losses import Loss, supervised_loss
-from pipeline.depth.training.network import DEPTH_MAX_M, DEPTH_MIN_M, DepthResNet, Width
+from pipeline.depth.training.network import DEPTH_MAX_M, DEPTH_MIN_M, DepthNet, Width
 from pipeline.depth.training.parallel import Team, run_team
 from pipeline.errors import InputError
 
@@ -95,6 +97,8 @@ class TrainingState:
 def train(config: TrainingConfig) -> None:
     """Train until the time budget is spent; continues from ``out/last.pt`` when there is one.
 
+    The network with the least validation error at the final input size stays in ``out/best.pt``.
+
     Raises:
         InputError: there are no shards, no GPU where one is asked for, or another network in ``out``.
     """
@@ -102,13 +106,35 @@ def train(config: TrainingConfig) -> None:
         if not Shards(config.data, split).index:
             raise InputError(f"There are no {split} shards in {config.data}: render them first.")
     config.out.mkdir(parents=True, exist_ok=True)
-    if not (config.out / "last.pt").exists():
-        start(config)
-    if device_of(config).type == "cuda" or config.processes == 1:
-        train_member(ALONE, config)
-    else:
-        parameters = sum(p.numel() for p in DepthResNet(config.width).parameters())
-        run_team(config.processes, parameters, train_member, config)
+    with stop_on_signals() as stop:
+        if not (config.out / "last.pt").exists():
+            start(config)
+        if device_of(config).type == "cuda" or config.processes == 1:
+            train_member(ALONE, config, stop)
+        else:
+            parameters = sum(p.numel() for p in DepthNet(config.width).parameters())
+            run_team(config.processes, parameters, train_member, config, stop)
+        if stop:
+            print(f"Stopped as asked; the same command goes on from {config.out / 'last.pt'}.", flush=True)
+
+
+@contextmanager
+def stop_on_signals() -> Iterator[Tensor]:
+    """A shared flag (1,) that turns true at the first SIGINT or SIGTERM; the second one acts as usual."""
+    stop = torch.zeros(1, dtype=torch.bool).share_memory_()
+    usual = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def ask(number: int, _: object) -> None:
+        stop.fill_(True)
+        signal.signal(number, usual[signal.Signals(number)])
+
+    for number in usual:
+        signal.signal(number, ask)
+    try:
+        yield stop
+    finally:
+        for number, handler in usual.items():
+            signal.signal(number, handler)
 
 
 def device_of(config: TrainingConfig) -> torch.device:
@@ -119,7 +145,13 @@ def device_of(config: TrainingConfig) -> torch.device:
 
 
 def start(config: TrainingConfig) -> None:
-    """Write the first checkpoint, of a network that has seen nothing."""
+    """Write the first checkpoint, of a network that has seen nothing.
+
+    Raises:
+        InputError: ``out`` holds the best network of another training.
+    """
+    if (config.out / "best.pt").exists():
+        raise InputError(f"{config.out} holds a best.pt but no last.pt to go on from: use another folder.")
     torch.manual_seed(config.seed)
     stage = STAGES["cpu"][-1]
     samples = endless_samples(config.data, np.random.default_rng(config.seed))
@@ -128,10 +160,10 @@ def start(config: TrainingConfig) -> None:
     save_checkpoint(config, model, optimizer_of(model, config), TrainingState())
 
 
-def train_member(team: Team, config: TrainingConfig) -> None:
-    """What every process of the team does with its share of each batch."""
+def train_member(team: Team, config: TrainingConfig, stop: Tensor) -> None:
+    """What every process of the team does with its share of each batch, until the leader sees ``stop``."""
     device = device_of(config)
-    model = DepthResNet(config.width).to(device, memory_format=torch.channels_last)
+    model = DepthNet(config.width).to(device, memory_format=torch.channels_last)
     optimizer = optimizer_of(model, config)
     state = resume(config, model, optimizer)
     validation = Shards(config.data, "validation")
@@ -141,7 +173,8 @@ def train_member(team: Team, config: TrainingConfig) -> None:
     losses: list[Tensor] = []
     stage: Stage | None = None
     batches: Iterator[tuple[Tensor, Tensor]] = iter(())
-    while state.elapsed_s < end_s:
+    stopping = False
+    while state.elapsed_s < end_s and not stopping:
         spent = state.elapsed_s / (60.0 * config.minutes)
         due = next(stage for stage in STAGES[device.type] if spent < stage.until)
         if due != stage:
@@ -150,26 +183,40 @@ def train_member(team: Team, config: TrainingConfig) -> None:
         image, target_m = image.to(device, non_blocking=True), target_m.to(device, non_blocking=True)
         losses.append(backward(model, image, target_m, config))
         now_s = time.monotonic() - clock
+        if stop:
+            now_s = -now_s  # so the leader tells the team, in the same step, that it was the last one
         if team.size > 1:
             now_s = team.average_gradients(model.parameters(), state.step, now_s)
+        stopping, now_s = now_s < 0.0, abs(now_s)
         update(model, optimizer, scheduled_rate(config.learning_rate, spent), config.gradient_clip)
         state = TrainingState(state.step + 1, state.images_seen + stage.batch, now_s)
         if state.step % 20 == 0:
             if team.leads:
                 log(config.out, state, loss=float(torch.stack(losses).mean()))
             losses.clear()
-        if team.leads and (now_s >= end_s or now_s - saved_at_s > CHECKPOINT_EVERY_S):
-            log(config.out, state, **validate(model, validation, stage, config.precision))
+        if team.leads and (stopping or now_s >= end_s or now_s - saved_at_s > CHECKPOINT_EVERY_S):
+            if not stopping:
+                judge(config, model, validation, stage, state)
             save_checkpoint(config, model, optimizer, state)
             saved_at_s = now_s
 
 
-def optimizer_of(model: DepthResNet, config: TrainingConfig) -> torch.optim.Optimizer:
+def judge(
+    config: TrainingConfig, model: DepthNet, validation: Shards, stage: Stage, state: TrainingState
+) -> None:
+    """Log the validation errors; in the last stage, whose errors alone compare, keep the best network."""
+    errors = validate(model, validation, stage, config.precision)
+    log(config.out, state, **errors)
+    if math.isinf(stage.until):
+        keep_best(config, model, state, errors)
+
+
+def optimizer_of(model: DepthNet, config: TrainingConfig) -> torch.optim.Optimizer:
     """Adam over the whole network."""
     return torch.optim.Adam(model.parameters(), lr=config.learning_rate, fused=True)
 
 
-def backward(model: DepthResNet, image: Tensor, target_m: Tensor, config: TrainingConfig) -> Tensor:
+def backward(model: DepthNet, image: Tensor, target_m: Tensor, config: TrainingConfig) -> Tensor:
     """Leave the gradients of one batch in the model; returns the loss, apart from its graph."""
     model.train()
     with torch.autocast(image.device.type, torch.bfloat16, enabled=config.precision == "bf16"):
@@ -180,7 +227,7 @@ def backward(model: DepthResNet, image: Tensor, target_m: Tensor, config: Traini
     return loss.detach()
 
 
-def update(model: DepthResNet, optimizer: torch.optim.Optimizer, rate: float, gradient_clip: float) -> None:
+def update(model: DepthNet, optimizer: torch.optim.Optimizer, rate: float, gradient_clip: float) -> None:
     """One step along the clipped gradients; none if they are not finite."""
     for group in optimizer.param_groups:
         group["lr"] = rate
@@ -245,7 +292,7 @@ def collate(samples: list[tuple[np.ndarray, np.ndarray]], stage: Stage) -> tuple
 
 @torch.no_grad()
 def validate(
-    model: DepthResNet, shards: Shards, stage: Stage, precision: Precision = "bf16"
+    model: DepthNet, shards: Shards, stage: Stage, precision: Precision = "bf16"
 ) -> dict[str, float]:
     """Mean errors over evenly chosen validation images, at the stage's size."""
     model.eval()
@@ -271,24 +318,32 @@ def log(folder: Path, state: TrainingState, **values: float) -> None:
 
 
 def save_checkpoint(
-    config: TrainingConfig, model: DepthResNet, optimizer: torch.optim.Optimizer, state: TrainingState
+    config: TrainingConfig, model: DepthNet, optimizer: torch.optim.Optimizer, state: TrainingState
 ) -> None:
-    """Replace ``out/last.pt`` in one move."""
-    temporary = config.out / "last.tmp"
+    """Replace ``out/last.pt``."""
+    write(config, "last", model, state, optimizer=optimizer.state_dict())
+
+
+def keep_best(
+    config: TrainingConfig, model: DepthNet, state: TrainingState, errors: dict[str, float]
+) -> None:
+    """Replace ``out/best.pt`` if this network's AbsRel is less than that one's."""
+    file, best = config.out / "best.pt", math.inf
+    if file.exists():
+        best = torch.load(file, weights_only=True, map_location="cpu")["validation"]["val_abs_rel"]
+    if errors["val_abs_rel"] < best:
+        write(config, "best", model, state, validation=errors)
+
+
+def write(config: TrainingConfig, name: str, model: DepthNet, state: TrainingState, **more: object) -> None:
+    """Replace a checkpoint in ``out`` in one move."""
+    temporary = config.out / f"{name}.tmp"
     plain = asdict(replace(config, data=str(config.data), out=str(config.out)))  # type: ignore[arg-type]
-    torch.save(
-        {
-            "model": model.state_dict(),
-            "optimizer": optimizer.state_dict(),
-            "state": asdict(state),
-            "config": plain,
-        },
-        temporary,
-    )
-    temporary.rename(config.out / "last.pt")
+    torch.save({"model": model.state_dict(), "state": asdict(state), "config": plain, **more}, temporary)
+    temporary.rename(config.out / f"{name}.pt")
 
 
-def resume(config: TrainingConfig, model: DepthResNet, optimizer: torch.optim.Optimizer) -> TrainingState:
+def resume(config: TrainingConfig, model: DepthNet, optimizer: torch.optim.Optimizer) -> TrainingState:
     """Load ``out/last.pt`` into the model and the optimiser.
 
     Raises:

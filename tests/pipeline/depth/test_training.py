@@ -15,10 +15,9 @@ from pipeline.depth.training.losses import (  # noqa: E402
     supervised_loss,
 )
 from pipeline.depth.training.network import (  # noqa: E402
-    DepthResNet,
+    DepthNet,
     ReflectPadFunction,
     depth_from_logit,
-    encoder_channels,
 )
 from pipeline.depth.training.train import (  # noqa: E402
     STAGES,
@@ -29,6 +28,7 @@ from pipeline.depth.training.train import (  # noqa: E402
     train,
 )
 from pipeline.errors import InputError  # noqa: E402
+from tests.pipeline.depth.roomfiles import write_rooms  # noqa: E402
 
 
 def _batch() -> tuple[torch.Tensor, torch.Tensor]:
@@ -38,7 +38,7 @@ def _batch() -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def test_the_network_is_a_resnet_50_with_32_million_parameters_and_four_heads():
-    network = DepthResNet()
+    network = DepthNet()
     assert sum(p.numel() for p in network.encoder.parameters()) == 23_508_032
     assert 30e6 < sum(p.numel() for p in network.parameters()) < 35e6
     shapes = [tuple(depth.shape) for depth in network.eval()(torch.zeros(1, 3, 64, 96))]
@@ -46,8 +46,8 @@ def test_the_network_is_a_resnet_50_with_32_million_parameters_and_four_heads():
 
 
 def test_the_half_width_network_has_a_quarter_of_the_encoder_and_the_same_heads():
-    network = DepthResNet("half").eval()
-    assert encoder_channels("half") == (64, 128, 256, 512, 1024)
+    network = DepthNet("half").eval()
+    assert network.encoder.channels == (64, 128, 256, 512, 1024)
     assert 5.8e6 < sum(p.numel() for p in network.encoder.parameters()) < 6.0e6
     image = torch.zeros(1, 3, 64, 96)
     features = network.encoder(image)
@@ -60,7 +60,7 @@ def test_the_half_width_network_strides_in_the_first_convolution_of_a_stage():
     strides = {
         width: [
             convolution.stride[0]
-            for convolution in DepthResNet(width).encoder.stages[1][0].residual
+            for convolution in DepthNet(width).encoder.stages[1][0].residual
             if isinstance(convolution, torch.nn.Conv2d)
         ]
         for width in ("full", "half")
@@ -160,14 +160,7 @@ def test_batches_have_the_size_of_their_stage_and_no_target_in_the_padding(stage
 @pytest.fixture
 def rooms(tmp_path, monkeypatch):
     """A folder with one small shard a split, and stages so small that a step takes a tenth of a second."""
-    rng = np.random.default_rng(0)
-    data = tmp_path / "data"
-    data.mkdir()
-    for split, count in (("train", 8), ("validation", 2)):
-        depth_m = np.repeat(np.linspace(1.0, 4.0, 240, dtype=np.float16)[:, None], 320, axis=1)
-        np.save(data / f"{split}_0000_depth.npy", np.stack([depth_m] * count))
-        rgb = np.stack([depth_m * 60] * 3, axis=-1) + rng.normal(0, 5, (count, 240, 320, 3))
-        np.save(data / f"{split}_0000_rgb.npy", rgb.clip(0, 255).astype(np.uint8))
+    data = write_rooms(tmp_path / "data")
     monkeypatch.setitem(training.STAGES, "cpu", (Stage(0.5, (64, 64), 4), Stage(np.inf, (64, 96), 2)))
     monkeypatch.setattr(training, "VALIDATION_IMAGES", 2)
     monkeypatch.setattr(training, "MEASURED_BATCHES", 1)
@@ -265,7 +258,7 @@ def test_an_exported_network_takes_bytes_says_what_it_is_and_gives_the_checkpoin
     assert said["licence"] == "Apache-2.0"
     assert said["data"] == "8 images in 1 shards (train)"
     rgb = np.load(rooms / "validation_0000_rgb.npy")[0]
-    model = DepthResNet("half").eval()
+    model = DepthNet("half").eval()
     model.load_state_dict(torch.load(config.out / "last.pt", weights_only=True)["model"])
     with torch.no_grad():
         ours_m = model(collate([(rgb, np.ones((240, 320), np.float32))], Stage(1, (256, 320), 1))[0])[0]
