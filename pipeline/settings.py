@@ -3,28 +3,43 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import json
 import math
 import types
 import typing
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.errors import InputError
 
+Config = TypeVar("Config")
+"""Any config: a frozen dataclass whose fields are settings or further configs."""
+
 
 def load_config(preset: str) -> PipelineConfig:
+    """The pipeline's preset of that name, or its config saved in that JSON file.
+
+    Raises:
+        InputError: neither a preset nor a readable config.
+    """
+    return config_named(preset, PRESETS)
+
+
+def config_named(preset: str, presets: Mapping[str, Config]) -> Config:
     """The preset of that name, or the config saved in that JSON file.
 
     Raises:
         InputError: neither a preset nor a readable config.
     """
-    if preset in PRESETS:
-        return PRESETS[preset]
+    if preset in presets:
+        return presets[preset]
     if not preset.endswith(".json"):
-        raise InputError(f"There is no preset '{preset}'; try {' or '.join(PRESETS)}, or a config.json file")
+        near = difflib.get_close_matches(preset, presets, n=1)
+        names = near + [name for name in presets if name not in near]
+        raise InputError(f"There is no preset '{preset}'; try {' or '.join(names)}, or a config.json file")
     try:
         values = json.loads(Path(preset).read_text())
     except (OSError, ValueError) as error:
@@ -34,65 +49,81 @@ def load_config(preset: str) -> PipelineConfig:
     text = values.get("settings") if isinstance(values, dict) else None
     if not isinstance(text, dict):
         raise InputError(f"The config file {preset} has no settings; try the config.json of a finished run")
-    return _replaced(PipelineConfig(), {key: str(value) for key, value in text.items()})
+    defaults = type(next(iter(presets.values())))()
+    return with_settings(defaults, [f"{key}={value}" for key, value in text.items()])
 
 
-def with_settings(config: PipelineConfig, settings: Iterable[str]) -> PipelineConfig:
+def with_settings(config: Config, settings: Iterable[str]) -> Config:
     """``config`` with settings such as ``"depth.alignment=median"`` applied.
 
     Raises:
-        InputError: an unknown key or a value that the key does not take.
+        InputError: an unknown key (the nearest known ones are offered) or a value that the key does not
+            take.
     """
     values = {}
     for setting in settings:
         key, equals, value = setting.partition("=")
         if not equals:
-            raise InputError(
-                f"'{setting}' is not a setting; try key=value, for example depth.alignment=median"
-            )
+            example = next(f"{key}={value}" for key, value in _as_text(config).items() if "." in key)
+            raise InputError(f"'{setting}' is not a setting; try key=value, for example {example}")
         values[key.strip()] = value.strip()
-    return _replaced(config, values)
+    return _replaced(config, values, list(_as_text(config)))
 
 
-def settings(config: PipelineConfig) -> dict[str, str]:
+def settings(config: object) -> dict[str, str]:
     """All settings of ``config`` by dotted key, as text that ``with_settings`` reads back."""
-    return _as_text(dataclasses.asdict(config))
+    return _as_text(config)
 
 
-def differences(config: PipelineConfig, base: PipelineConfig) -> list[str]:
+def differences(config: Config, base: Config) -> list[str]:
     """The settings, as ``key=value``, that turn ``base`` into ``config``."""
     before = settings(base)
     return [f"{key}={value}" for key, value in settings(config).items() if before[key] != value]
 
 
-def _as_text(values: dict[str, Any], prefix: str = "") -> dict[str, str]:
+def _as_text(config: Any, prefix: str = "") -> dict[str, str]:
     text: dict[str, str] = {}
-    for key, value in values.items():
-        if isinstance(value, dict):
-            text |= _as_text(value, f"{prefix}{key}.")
+    for field in dataclasses.fields(config):
+        key, value = prefix + field.name, getattr(config, field.name)
+        if dataclasses.is_dataclass(value):
+            text |= _as_text(value, f"{key}.")
         elif isinstance(value, list | tuple):
-            text[prefix + key] = ",".join(str(item) for item in value)
+            text[key] = ",".join(str(item) for item in value)
         elif isinstance(value, bool) or value is None:
-            text[prefix + key] = str(value).lower()
+            text[key] = str(value).lower()
         else:
-            text[prefix + key] = str(value)
+            text[key] = str(value)
     return text
 
 
-def _replaced(config: Any, values: dict[str, str], prefix: str = "") -> Any:
+def _replaced(config: Any, values: dict[str, str], known: list[str], prefix: str = "") -> Any:
+    """``config`` with ``values`` by keys below ``prefix``; ``known`` are all keys of the whole config."""
     hints = typing.get_type_hints(type(config))
     changes: dict[str, Any] = {}
     for key in {key.partition(".")[0] for key in values}:
-        if key not in hints:
-            raise InputError(f"There is no setting '{prefix}{key}'; known here: {', '.join(sorted(hints))}")
         inner = {k.partition(".")[2]: v for k, v in values.items() if k.partition(".")[0] == key}
+        if key not in hints:
+            raise _unknown(".".join(filter(None, (prefix + key, next(iter(inner))))), known)
         if dataclasses.is_dataclass(hints[key]) != all(inner):
             raise InputError(f"'{prefix}{key}' is not a single setting; try {prefix}{key}.NAME=value")
         if dataclasses.is_dataclass(hints[key]):
-            changes[key] = _replaced(getattr(config, key), inner, f"{prefix}{key}.")
+            changes[key] = _replaced(getattr(config, key), inner, known, f"{prefix}{key}.")
         else:
             changes[key] = _parsed(hints[key], inner[""], prefix + key)
     return dataclasses.replace(config, **changes)
+
+
+def _unknown(key: str, known: list[str]) -> InputError:
+    """What to say of a key that does not exist: the nearest ones, by their whole or their last name."""
+    last = key.rpartition(".")[2]
+    near = [name for name in known if name.rpartition(".")[2] == last]
+    near += [name for name in difflib.get_close_matches(key, known, n=3) if name not in near]
+    if not near:
+        names = difflib.get_close_matches(last, {name.rpartition(".")[2] for name in known}, n=3)
+        near = [name for name in known if name.rpartition(".")[2] in names]
+    if not near:
+        near = [name for name in known if name.partition(".")[0] == key.partition(".")[0]] or known
+    return InputError(f"There is no setting '{key}'; try {' or '.join(near[:6])}")
 
 
 def _parsed(hint: Any, text: str, key: str) -> Any:

@@ -6,10 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from network_sim.config import PRESETS as NETWORKS
+from network_sim.config import NetworkConfig
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.errors import InputError
 from pipeline.io.json_file import write_json
-from pipeline.settings import differences, load_config, settings, with_settings
+from pipeline.settings import config_named, differences, load_config, settings, with_settings
 
 DEFAULT = PipelineConfig()
 
@@ -54,6 +56,9 @@ def test_a_config_has_no_differences_from_itself():
         ("depth=median", "depth.NAME"),
         ("depth.alignment.mode=median", "depth.alignment"),
         ("depth.crop=7", "true, false"),
+        ("depth.input_width_px=320", "only one is set, to 320"),
+        ("depth.input_width_px=wide", "not a number"),
+        ("depth.normalisation=half", "imagenet, unit, bytes"),
         ("node_registration.gate_m=nan", "not finite"),
         ("node_registration.gate_m=-1", "-1.0"),
         ("node_registration.max_iterations=0", "at least 1"),
@@ -88,5 +93,41 @@ def test_a_broken_config_file_is_one_sentence(tmp_path, content):
 
 
 def test_an_unknown_preset_names_the_known_ones():
-    with pytest.raises(InputError, match="packetmesh or thesis"):
+    with pytest.raises(InputError, match="thesis or packetmesh"):
         load_config("thesiss")
+
+
+def test_any_config_takes_settings():
+    config = with_settings(NetworkConfig(), ["mac.rts=true", "scenario=street-grid", "mac.kind=ieee80211b"])
+    assert config.mac.rts
+    assert config.scenario == "street-grid"
+    assert with_settings(NetworkConfig(), differences(config, NetworkConfig())) == config
+
+
+@pytest.mark.parametrize(
+    ("setting", "offered"),
+    [
+        ("mac.rtss=true", "try mac.rts"),
+        ("rts=true", "try mac.rts"),
+        ("nodes.rts=true", "try mac.rts"),
+        ("radoi.range_m=3", "try radio.range_m"),
+        ("intervall_s=3", "nodes.interval_s"),
+        ("nodes.zzz=3", "nodes.count"),
+        ("qqq=3", "scenario"),
+    ],
+)
+def test_an_unknown_setting_offers_the_nearest(setting, offered):
+    with pytest.raises(InputError) as error:
+        with_settings(NetworkConfig(), [setting])
+    assert setting.partition("=")[0] in str(error.value)
+    assert offered in str(error.value)
+
+
+def test_an_unknown_preset_offers_the_nearest_first():
+    with pytest.raises(InputError, match="'steet-grid'; try street-grid or"):
+        config_named("steet-grid", NETWORKS)
+
+
+def test_a_written_network_config_is_a_preset(tmp_path):
+    write_json(tmp_path / "config.json", {"settings": settings(NETWORKS["greenhouse"])})
+    assert config_named(str(tmp_path / "config.json"), NETWORKS) == NETWORKS["greenhouse"]

@@ -1,0 +1,371 @@
+"""One frozen config a part of the network: command line, controls, preset and record in one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from pipeline.errors import InputError
+
+Propagation = Literal["friis", "two-ray", "log-distance"]
+MacKind = Literal["ieee80211b", "ieee802154", "ideal", "serial"]
+Layout = Literal["star", "line", "grid", "random"]
+SchemeName = Literal["baseline", "greedy", "pdc", "pdc-received"]
+Keep = Literal["all", "images", "counters"]
+Scenario = Literal["collection", "street-grid"]
+
+MAX_PAYLOAD_BYTES: dict[MacKind, int] = {"ieee802154": 116, "ieee80211b": 2304}
+"""Largest payload of a frame: 127 B less 11 B of header and check sum, and IEEE 802.11's largest."""
+
+
+def _at_least(key: str, value: float | None, least: float) -> None:
+    if value is not None and not least <= value < math.inf:
+        raise InputError(f"{key} is {value}; try at least {least}")
+
+
+def _above(key: str, value: float | None, bound: float) -> None:
+    if value is not None and not bound < value < math.inf:
+        raise InputError(f"{key} is {value}; try a value above {bound}")
+
+
+def _share(key: str, value: float, least: float = 0.0) -> None:
+    if not least <= value <= 1.0:
+        raise InputError(f"{key} is {value}; try a share between {least} and 1")
+
+
+@dataclass(frozen=True, slots=True)
+class RadioConfig:
+    """Propagation and the thresholds of every receiver (SPEC 6.3)."""
+
+    model: Propagation = "two-ray"
+    """Mean power over distance: free space (friis), the same with a reflection on the ground (two-ray), or
+    a power law (log-distance)."""
+    frequency_hz: float = 2.4e9
+    """Carrier frequency."""
+    tx_power_dbm: float = 15.0
+    """Transmitted power."""
+    antenna_gain: float = 1.0
+    """Gain of each antenna, as a factor."""
+    antenna_height_m: float = 1.5
+    """Height of each antenna; only two-ray uses it."""
+    system_loss: float = 1.0
+    """Loss of cables and filters, as a factor."""
+    path_loss_exponent: float = 3.0
+    """How fast power falls with distance; only log-distance uses it."""
+    reference_m: float = 1.0
+    """Distance up to which log-distance is free space."""
+    shadowing_db: float = 0.0
+    """Standard deviation of each pair's own constant gain or loss."""
+    nakagami_m: float | None = None
+    """Shape of the fading drawn for each frame; 1 is Rayleigh, larger fades less, None is no fading."""
+    range_m: float = 100.0
+    """Nominal range: the receive threshold is the mean power there."""
+    sense_range_m: float = 220.0
+    """Distance up to which a transmission keeps others silent."""
+    capture_db: float = 10.0
+    """How much stronger than all others together a frame has to be to survive their overlap."""
+    noise_dbm: float | None = None
+    """Power of the noise; None receives everything above the threshold without bit errors."""
+
+    def __post_init__(self) -> None:
+        for key in ("frequency_hz", "antenna_gain", "antenna_height_m", "path_loss_exponent", "range_m"):
+            _above(f"radio.{key}", getattr(self, key), 0.0)
+        _above("radio.reference_m", self.reference_m, 0.0)
+        _at_least("radio.system_loss", self.system_loss, 1.0)
+        _at_least("radio.shadowing_db", self.shadowing_db, 0.0)
+        _at_least("radio.nakagami_m", self.nakagami_m, 0.5)
+        _at_least("radio.sense_range_m", self.sense_range_m, self.range_m)
+        _at_least("radio.capture_db", self.capture_db, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class MacConfig:
+    """Who may send when (SPEC 6.1, 6.3)."""
+
+    kind: MacKind = "ieee802154"
+    """Unslotted IEEE 802.15.4, IEEE 802.11b DCF, a link of its own for every node (ideal), or a serial line
+    with ten bits a byte."""
+    rts: bool = False
+    """Ask for the channel before every packet (RTS/CTS); only IEEE 802.11b can."""
+    ack: bool = True
+    """Acknowledge frames and send lost ones again; IEEE 802.11b always does."""
+    link_bps: float = 250e3
+    """Rate of the ideal link or the serial line."""
+
+    def __post_init__(self) -> None:
+        _above("mac.link_bps", self.link_bps, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class NodesConfig:
+    """Camera nodes that stand still and send their images to one sink (SPEC 6.1)."""
+
+    count: int = 3
+    """Camera nodes, without the sink."""
+    layout: Layout = "star"
+    """Where they stand: around the sink, in a line from it, in a square grid with the sink at a corner, or
+    at random in a square with the sink in its middle."""
+    spacing_m: float = 20.0
+    """Distance to the sink (star) or between neighbours (line, grid; on average: random)."""
+    images: int = 1
+    """Images of each node; 0 takes them until the horizon."""
+    interval_s: float = 0.0
+    """Time between captures; 0 takes the next image when the last is delivered or given up."""
+    image_bytes: int = 921_615
+    """Size of a colour image as encoded; a 640 x 480 PPM file by default."""
+    depth_bytes: int = 0
+    """Size of the depth image that goes with it, and follows it as one image's bytes; 0 sends none."""
+    payload_bytes: int = 116
+    """Bytes that a packet hands to the medium access."""
+    header_bytes: int = 0
+    """How many of these are headers above it (fragment, UDP, IP)."""
+    buffer_packets: int = 200
+    """Packets that wait in a node; a relay drops what comes when it is full, a camera fills half of it at
+    most and keeps the rest of its images outside."""
+    retransmit: bool = True
+    """Fragments that were given up are sent again until the sink has the image."""
+    deadline_s: float | None = None
+    """Age at which an image is worthless and given up; None waits until the horizon."""
+    duty_cycle: float = 1.0
+    """Share of each period in which nodes are awake, all at the same time."""
+    duty_period_s: float = 10.0
+    """Length of that period."""
+    failures_per_h: float = 0.0
+    """Mean failures of each node in an hour, at random."""
+    recovery_s: float = 60.0
+    """How long a failed node stays down; its buffer is lost."""
+
+    def __post_init__(self) -> None:
+        _at_least("nodes.count", self.count, 1)
+        for key in ("images", "interval_s", "depth_bytes", "header_bytes", "failures_per_h"):
+            _at_least(f"nodes.{key}", getattr(self, key), 0)
+        for key in ("image_bytes", "payload_bytes", "buffer_packets"):
+            _at_least(f"nodes.{key}", getattr(self, key), 1)
+        for key in ("spacing_m", "deadline_s", "duty_cycle", "duty_period_s", "recovery_s"):
+            _above(f"nodes.{key}", getattr(self, key), 0.0)
+        _share("nodes.duty_cycle", self.duty_cycle)
+        if self.header_bytes >= self.payload_bytes:
+            raise InputError(
+                f"nodes.header_bytes is {self.header_bytes}, which leaves no room for data in a payload of "
+                f"{self.payload_bytes} bytes; try a larger nodes.payload_bytes"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class UplinkConfig:
+    """Cellular hop from the sink to the cloud."""
+
+    rate_bps: float | None = None
+    """Rate; None ends the way at the sink."""
+    latency_s: float = 0.05
+    """Time that a packet travels after it was sent."""
+    loss: float = 0.0
+    """Share of packets that get lost."""
+
+    def __post_init__(self) -> None:
+        _above("uplink.rate_bps", self.rate_bps, 0.0)
+        _at_least("uplink.latency_s", self.latency_s, 0.0)
+        _share("uplink.loss", self.loss)
+
+
+@dataclass(frozen=True, slots=True)
+class SchemeConfig:
+    """Which images of passing vehicles are collected (SPEC 6.2, Table 4.7)."""
+
+    name: SchemeName = "baseline"
+    """Upload everything (baseline), ask for what adds coverage (greedy), or ask for each image with a
+    probability that falls with how many are offered (pdc) or received (pdc-received)."""
+    k: int | None = None
+    """Most images that a request of greedy asks for; None does not limit it."""
+    r_low: float = 3.0
+    """Images of a cell in a control period up to which pdc asks for all."""
+    r_high: float = 8.0
+    """Images of a cell in a control period from which pdc asks only for what covers it once."""
+    validity_s: float = 10.0
+    """How long an image shows its cell (T_v)."""
+    observation_s: float = 600.0
+    """Time over which pdc counts offered images (T_obs)."""
+    control_s: float = 60.0
+    """How often pdc sets its probabilities (S)."""
+    sample_s: float = 2.0
+    """Time between images of a vehicle."""
+    buffer_images: int = 200
+    """Images that a vehicle keeps; the oldest goes first."""
+    image_bytes: int = 1000
+    """Size of an image."""
+    tag_bytes: int = 40
+    """Size of an image's tag in a summary."""
+    id_bytes: int = 8
+    """Size of an image's id in a request."""
+    datagram_bytes: int = 1472
+    """Most bytes of a UDP datagram."""
+    cell_m: float = 100.0
+    """Length of a cell, a piece of road."""
+    directed_cells: bool = True
+    """Whether a piece of road is another cell in the other direction; the numbers that SPEC 6.2 gives
+    without a radio are those of one cell for both."""
+    summary_interval_s: float = 10.0
+    """Least time between two summaries to the same access point."""
+    headers_bytes: int = 28
+    """IP and UDP headers of each datagram."""
+
+    def __post_init__(self) -> None:
+        for key in ("validity_s", "observation_s", "control_s", "sample_s", "cell_m", "summary_interval_s"):
+            _above(f"scheme.{key}", getattr(self, key), 0.0)
+        for key in ("k", "buffer_images", "image_bytes", "tag_bytes", "id_bytes"):
+            _at_least(f"scheme.{key}", getattr(self, key), 1)
+        _at_least("scheme.datagram_bytes", self.datagram_bytes, max(self.tag_bytes, self.id_bytes))
+        _at_least("scheme.headers_bytes", self.headers_bytes, 0)
+        _at_least("scheme.r_low", self.r_low, 0.0)
+        _above("scheme.r_high", self.r_high, self.r_low)
+
+
+@dataclass(frozen=True, slots=True)
+class StreetConfig:
+    """A square grid of streets with access points at the roadside (SPEC 6.2)."""
+
+    vehicles: int = 60
+    """Vehicles with a camera."""
+    blocks: int = 5
+    """Blocks along each side: one less than there are crossings."""
+    block_m: float = 200.0
+    """Side of a block."""
+    speed_mps: float = 10.0
+    """Speed of every vehicle."""
+    access_points: int = 4
+    """Access points, which are the sinks."""
+
+    def __post_init__(self) -> None:
+        for key in ("vehicles", "blocks", "access_points"):
+            _at_least(f"street.{key}", getattr(self, key), 1)
+        _above("street.block_m", self.block_m, 0.0)
+        _above("street.speed_mps", self.speed_mps, 0.0)
+        if self.access_points > (self.blocks + 1) ** 2:
+            raise InputError(
+                f"street.access_points is {self.access_points}, more than there are crossings; "
+                f"try at most {(self.blocks + 1) ** 2}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class EnergyConfig:
+    """Power of each state: a CC2420 radio and a Raspberry Pi 4 (SPEC 6.3)."""
+
+    tx_w: float = 0.0522
+    """Radio while it sends."""
+    rx_w: float = 0.0564
+    """Radio while it receives."""
+    idle_w: float = 0.0564
+    """Radio while it listens."""
+    sleep_w: float = 0.00006
+    """Radio while it sleeps."""
+    platform_w: float = 2.7
+    """The rest of the node while it is awake."""
+    platform_sleep_w: float = 0.1
+    """The rest of the node while it sleeps."""
+    battery_j: float | None = None
+    """Energy of a full battery, for the lifetime; None has no end."""
+
+    def __post_init__(self) -> None:
+        for key in ("tx_w", "rx_w", "idle_w", "sleep_w", "platform_w", "platform_sleep_w"):
+            _at_least(f"energy.{key}", getattr(self, key), 0.0)
+        _above("energy.battery_j", self.battery_j, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class RunConfig:
+    """How long, from which seed, and what is remembered."""
+
+    horizon_s: float = 3600.0
+    """Simulated time at which the run ends, if it has not finished before."""
+    warmup_s: float = 0.0
+    """Time at the start that the metrics leave out."""
+    seed: int = 0
+    """The same seed gives the same trace."""
+    keep: Keep = "all"
+    """Keep every event, those of images only, or counters only."""
+
+    def __post_init__(self) -> None:
+        _above("run.horizon_s", self.horizon_s, 0.0)
+        _at_least("run.warmup_s", self.warmup_s, 0.0)
+        _at_least("run.seed", self.seed, 0)
+        if self.warmup_s >= self.horizon_s:
+            raise InputError(
+                f"run.warmup_s is {self.warmup_s}, which leaves nothing of run.horizon_s {self.horizon_s}; "
+                "try a shorter warm-up"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkConfig:
+    """Everything that a simulation depends on."""
+
+    scenario: Scenario = "collection"
+    """Nodes that stand still around one sink (collection), or vehicles on a street grid (street-grid)."""
+    radio: RadioConfig = field(default_factory=RadioConfig)
+    mac: MacConfig = field(default_factory=MacConfig)
+    nodes: NodesConfig = field(default_factory=NodesConfig)
+    uplink: UplinkConfig = field(default_factory=UplinkConfig)
+    scheme: SchemeConfig = field(default_factory=SchemeConfig)
+    street: StreetConfig = field(default_factory=StreetConfig)
+    energy: EnergyConfig = field(default_factory=EnergyConfig)
+    run: RunConfig = field(default_factory=RunConfig)
+
+    def __post_init__(self) -> None:
+        if self.scenario == "street-grid":
+            key, size_bytes = "scheme.datagram_bytes", self.scheme.datagram_bytes + self.scheme.headers_bytes
+        else:
+            key, size_bytes = "nodes.payload_bytes", self.nodes.payload_bytes
+        most = MAX_PAYLOAD_BYTES.get(self.mac.kind)
+        if most is not None and size_bytes > most:
+            raise InputError(f"{key} makes packets of {size_bytes} bytes, but {self.mac.kind} carries {most}")
+
+
+PRESETS: dict[str, NetworkConfig] = {
+    "thesis-link": NetworkConfig(),
+    "street-grid": NetworkConfig(
+        scenario="street-grid",
+        mac=MacConfig(kind="ieee80211b"),
+        run=RunConfig(horizon_s=18_000.0, warmup_s=1800.0, keep="images"),
+    ),
+    "greenhouse": NetworkConfig(
+        radio=RadioConfig(
+            model="log-distance",
+            tx_power_dbm=0.0,
+            shadowing_db=4.0,
+            nakagami_m=3.0,
+            range_m=40.0,
+            sense_range_m=80.0,
+            noise_dbm=-88.0,
+        ),
+        nodes=NodesConfig(
+            count=12,
+            layout="grid",
+            spacing_m=25.0,
+            images=0,
+            interval_s=300.0,
+            image_bytes=8_000,
+            header_bytes=8,
+            deadline_s=300.0,
+            duty_cycle=0.25,
+        ),
+        run=RunConfig(horizon_s=7200.0),
+    ),
+    "office": NetworkConfig(
+        mac=MacConfig(kind="ieee80211b"),
+        nodes=NodesConfig(
+            spacing_m=8.0,
+            images=0,
+            interval_s=10.0,
+            image_bytes=69_000,  # the office scene's mean as JPEG of quality 90,
+            depth_bytes=183_000,  # and its depth as PNG of 16 bits
+            payload_bytes=1500,
+            header_bytes=36,
+            deadline_s=10.0,
+        ),
+        uplink=UplinkConfig(rate_bps=10e6),
+        run=RunConfig(horizon_s=600.0),
+    ),
+}
+"""What SPEC 6.1 and 6.2 describe, and two more: lossy radio over several hops, and a fast one over one."""

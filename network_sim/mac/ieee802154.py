@@ -1,0 +1,196 @@
+"""Unslotted IEEE 802.15.4 at 2.4 GHz: CSMA/CA with acknowledgement and retries (SPEC 6.1).
+
+A node waits a random number of backoffs, listens (clear channel assessment), turns its radio round and sends.
+It is deaf while it turns round: whoever starts then collides. Nothing is computed per slot: an attempt costs
+one event for backoff and assessment, and one for each part of the exchange.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import simpy
+
+from network_sim.config import NetworkConfig
+from network_sim.mac.records import record_packet
+from network_sim.types import Cause, Delivery, EventKind, Packet
+
+if TYPE_CHECKING:
+    from network_sim.mac.medium import Medium
+    from network_sim.trace import Recorder
+
+SYMBOL_NS = 16_000
+BYTE_NS = 2 * SYMBOL_NS
+BACKOFF_NS = 20 * SYMBOL_NS
+CCA_NS = 8 * SYMBOL_NS
+TURNAROUND_NS = 12 * SYMBOL_NS
+ACK_WAIT_NS = 54 * SYMBOL_NS
+"""From the end of a frame until its sender stops to wait for the end of the acknowledgement."""
+PHY_BYTES = 6
+"""Preamble, start of frame and length."""
+CHECKED_BYTES = 5
+"""Frame control, sequence number and check sum."""
+HEADER_BYTES = CHECKED_BYTES + 6
+"""The same with a network and two short addresses."""
+ACK_BYTES = PHY_BYTES + CHECKED_BYTES
+ACK_NS = ACK_BYTES * BYTE_NS
+MIN_BE = 3
+MAX_BE = 5
+MAX_CSMA_BACKOFFS = 4
+MAX_FRAME_RETRIES = 3
+
+_BLOCK = 4096
+"""Random numbers drawn at once."""
+
+
+def spacing_ns(frame_bytes: int) -> int:
+    """Silence of a sender after a frame of this size without its PHY header (SIFS or LIFS)."""
+    return (12 if frame_bytes <= 18 else 40) * SYMBOL_NS
+
+
+class Ieee802154:
+    """Medium access of all nodes of one channel."""
+
+    def __init__(
+        self,
+        env: simpy.Environment,
+        medium: Medium,
+        config: NetworkConfig,
+        recorder: Recorder,
+        rng: np.random.Generator,
+        up: Callable[[int], bool],
+        receive: Callable[[Packet, int], None],
+    ) -> None:
+        """``up`` tells whether a node is awake; ``receive`` gets each packet once per ``send`` at most."""
+        self._env = env
+        self._medium = medium
+        self._ack = config.mac.ack
+        self._recorder = recorder
+        self._up = up
+        self._receive = receive
+        self._ready_ns: dict[int, int] = {}
+        self._answers: dict[int, tuple[int, int]] = {}
+        """Of each receiver: whose frame it acknowledges, and until when in ns."""
+        self._numbers = _numbers(rng)
+
+    def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
+        """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.
+
+        Returns:
+            ``ok`` is what the sender knows, ``cause`` what happened: without acknowledgements a packet that
+            did not arrive is ``ok`` with a cause; one that was given up although it arrived has ``ACK_LOST``.
+        """
+        arrived = False
+        for attempt in range(1 + (MAX_FRAME_RETRIES if self._ack else 0)):
+            refusal = yield from self._access(packet, sender, receiver)
+            if refusal:
+                return Delivery(False, Cause.ACK_LOST if arrived else refusal, attempt)
+            cause = yield from self._transmit(packet, sender, receiver)
+            if not cause and not arrived:
+                arrived = True
+                self._record(EventKind.DELIVER, packet, sender, receiver, packet.size_bytes)
+                self._receive(packet, receiver)
+            if not self._ack:
+                self._rest(packet, sender)
+                return Delivery(self._up(sender), cause, 1)
+            acknowledged = yield from self._acknowledge(packet, sender, receiver, cause)
+            if acknowledged:
+                self._rest(packet, sender)
+                return Delivery(True, Cause.NONE, attempt + 1)
+        return Delivery(False, Cause.ACK_LOST if arrived else Cause.RETRIES, 1 + MAX_FRAME_RETRIES)
+
+    def _access(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Cause]:
+        """Wait for an idle channel; afterwards the sender has to send at once."""
+        env = self._env
+        wait_ns = max(self._ready_ns.get(sender, 0) - env.now, 0)
+        for busy_looks in range(MAX_CSMA_BACKOFFS + 1):
+            slots = next(self._numbers) & ((1 << min(MIN_BE + busy_looks, MAX_BE)) - 1)
+            yield env.timeout(wait_ns + slots * BACKOFF_NS + CCA_NS)
+            wait_ns = 0
+            if not self._up(sender):
+                return Cause.NODE_DOWN
+            if not self._busy(sender):
+                yield env.timeout(TURNAROUND_NS)
+                return Cause.NONE if self._up(sender) else Cause.NODE_DOWN
+        self._record(EventKind.LOSS, packet, sender, receiver, packet.size_bytes, Cause.CHANNEL)
+        return Cause.CHANNEL
+
+    def _busy(self, node: int) -> bool:
+        """Whether an assessment that ends now finds the channel busy.
+
+        SPEC 6.1 has no vulnerable time but the turnaround: what counts is the end of the assessment, and who
+        heard a frame leaves the gap before its acknowledgement alone.
+        """
+        now_ns = int(self._env.now)
+        if self._medium.busy_between(node, now_ns - 1, now_ns):
+            return True
+        return any(
+            now_ns < until_ns and (node == receiver or self._hears(node, sender))
+            for receiver, (sender, until_ns) in self._answers.items()
+        )
+
+    def _hears(self, node: int, sender: int) -> bool:
+        return self._medium.power_w(sender, node) >= self._medium.radio.cs_threshold_w
+
+    def _transmit(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Cause]:
+        """Put the frame on the air; returns why it did not arrive."""
+        size_bytes = PHY_BYTES + HEADER_BYTES + packet.size_bytes
+        duration_ns = size_bytes * BYTE_NS
+        self._record(EventKind.AIR, packet, sender, receiver, size_bytes, duration_ns=duration_ns)
+        transmission = self._medium.start(sender, duration_ns, receiver, size_bytes, "oqpsk")
+        yield self._env.timeout(duration_ns)
+        cause = self._medium.finish(transmission)
+        if not (self._up(sender) and self._up(receiver)):
+            cause = Cause.NODE_DOWN
+        if cause:
+            self._record(EventKind.LOSS, packet, sender, receiver, packet.size_bytes, cause)
+        return cause
+
+    def _acknowledge(
+        self, packet: Packet, sender: int, receiver: int, cause: Cause
+    ) -> Generator[simpy.Event, Any, bool]:
+        """Answer of the receiver, unless the frame failed for ``cause``; the sender waits for it."""
+        env = self._env
+        if cause:
+            yield env.timeout(ACK_WAIT_NS)
+            return False
+        self._answers[receiver] = (sender, int(env.now) + TURNAROUND_NS + ACK_NS)
+        yield env.timeout(TURNAROUND_NS)
+        heard = False
+        if self._up(receiver):
+            self._record(EventKind.ACK, packet, receiver, sender, ACK_BYTES, duration_ns=ACK_NS)
+            transmission = self._medium.start(receiver, ACK_NS, sender, ACK_BYTES, "oqpsk")
+            yield env.timeout(ACK_NS)
+            failure = self._medium.finish(transmission)
+            heard = not failure and self._up(sender)
+        else:
+            yield env.timeout(ACK_NS)
+        if not heard:
+            self._record(EventKind.LOSS, packet, sender, receiver, packet.size_bytes, Cause.ACK_LOST)
+            yield env.timeout(ACK_WAIT_NS - TURNAROUND_NS - ACK_NS)
+        return heard
+
+    def _rest(self, packet: Packet, sender: int) -> None:
+        """The sender leaves the channel to others for the interframe space."""
+        self._ready_ns[sender] = int(self._env.now) + spacing_ns(HEADER_BYTES + packet.size_bytes)
+
+    def _record(
+        self,
+        kind: EventKind,
+        packet: Packet,
+        node: int,
+        peer: int,
+        size_bytes: int,
+        cause: Cause = Cause.NONE,
+        duration_ns: int = 0,
+    ) -> None:
+        now_ns = int(self._env.now)
+        record_packet(self._recorder, now_ns, kind, packet, node, peer, size_bytes, cause, duration_ns)
+
+
+def _numbers(rng: np.random.Generator) -> Iterator[int]:
+    """Random numbers below 2^MAX_BE; their lowest bits are those of smaller exponents."""
+    while True:
+        yield from rng.integers(0, 1 << MAX_BE, size=_BLOCK).tolist()

@@ -1,0 +1,333 @@
+"""One shared radio channel: who is on the air, who senses it, and which frames survive (SPEC 6.3).
+
+A frame is received when its power reaches the receive threshold, exceeds the largest sum of overlapping
+powers by the capture ratio, and its receiver was not sending meanwhile; the stronger frame survives whichever
+came first. A node senses a frame from the carrier-sense threshold on, without fading. Signals travel in no
+time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import simpy
+from numpy.random import Generator
+
+from network_sim.types import Cause
+
+if TYPE_CHECKING:
+    from network_sim.places import Places
+    from network_sim.radio import Modulation, Radio
+
+MEMORY_NS = 5_000_000
+"""How long the channel remembers an ended transmission: longer than any look back of a medium access."""
+REFRESH_NS = 100_000_000
+"""How often powers between moving nodes are computed anew: a vehicle moves about a metre meanwhile."""
+
+
+class Transmission:
+    """A frame on the air, on its way to one receiver."""
+
+    __slots__ = (
+        "end_ns",
+        "heard",
+        "modulation",
+        "overlaps",
+        "power_w",
+        "receiver",
+        "reserved_ns",
+        "sender",
+        "size_bytes",
+        "start_ns",
+    )
+
+    def __init__(
+        self,
+        sender: int,
+        receiver: int,
+        start_ns: int,
+        end_ns: int,
+        reserved_ns: int,
+        power_w: float,
+        size_bytes: int,
+        modulation: Modulation,
+    ) -> None:
+        self.sender = sender
+        self.receiver = receiver
+        self.start_ns = start_ns
+        self.end_ns = end_ns
+        self.reserved_ns = reserved_ns
+        """Until when it asks others to be silent: its end, or the end of the exchange it belongs to."""
+        self.power_w = power_w
+        """At the receiver, with fading."""
+        self.size_bytes = size_bytes
+        self.modulation = modulation
+        """What ``Radio.error_rate`` is told of the frame."""
+        self.overlaps: list[Transmission] = []
+        """Frames that were on the air at the same time."""
+        self.heard: list[Listener] = []
+        """Listeners that sense it."""
+
+    def largest_w(self, powers_w: list[float]) -> float:
+        """The largest sum of overlapping powers at any instant of this frame.
+
+        Args:
+            powers_w: Of the overlapping frames, in their order, at the place in question.
+        """
+        if len(powers_w) < 2:
+            return sum(powers_w)
+        frames = self.overlaps
+        instants_ns = [max(frame.start_ns, self.start_ns) for frame in frames]
+        return max(
+            sum(
+                power_w
+                for frame, power_w in zip(frames, powers_w, strict=True)
+                if frame.start_ns <= instant_ns < frame.end_ns
+            )
+            for instant_ns in instants_ns
+        )
+
+
+class Listener:
+    """A node that wants to be told when its channel becomes busy and idle."""
+
+    __slots__ = ("busy", "node", "on_busy", "on_idle")
+
+    def __init__(
+        self, node: int, on_busy: Callable[[int], None], on_idle: Callable[[int, bool], None]
+    ) -> None:
+        self.node = node
+        self.on_busy = on_busy
+        self.on_idle = on_idle
+        self.busy = 0
+        """How many transmissions it senses now."""
+
+
+class Medium:
+    """One shared channel."""
+
+    def __init__(self, env: simpy.Environment, radio: Radio, places: Places, rng: Generator) -> None:
+        """An idle channel.
+
+        Args:
+            env: Its clock counts nanoseconds.
+            radio: Powers and thresholds.
+            places: Where the nodes are.
+            rng: Decides on bit errors.
+        """
+        self.env = env
+        self.radio = radio
+        self.places = places
+        self._rng = rng
+        self._active: list[Transmission] = []
+        self._recent: deque[Transmission] = deque()
+        self._listeners: dict[int, Listener] = {}
+        self._rows_w: dict[int, list[float]] = {}
+        self._rows_end_ns: float = math.inf if places.static else 0
+        self._rx_w = radio.rx_threshold_w
+        self._cs_w = radio.cs_threshold_w
+
+    def power_w(self, sender: int, receiver: int) -> float:
+        """What ``receiver`` gets from ``sender``, without fading; nothing if they are the same.
+
+        Between moving nodes it is as of ``REFRESH_NS`` before the last frame, or later.
+        """
+        row_w = self._rows_w.get(sender)
+        if row_w is None:
+            row_w = self._new_row_w(sender)
+        power_w = row_w[receiver]
+        return power_w if power_w >= 0.0 else self._link_power_w(sender, receiver)
+
+    def _new_row_w(self, sender: int) -> list[float]:
+        """Powers at all nodes; negative until somebody asks."""
+        row_w = self._rows_w[sender] = [-1.0] * self.places.count
+        row_w[sender] = 0.0
+        return row_w
+
+    def _link_power_w(self, sender: int, receiver: int) -> float:
+        distance_m = self.places.distance_m(sender, receiver, int(self.env.now))
+        power_w = self._rows_w[sender][receiver] = self.radio.link_power_w(sender, receiver, distance_m)
+        return power_w
+
+    def start(
+        self,
+        sender: int,
+        duration_ns: int,
+        receiver: int,
+        size_bytes: int = 0,
+        modulation: Modulation = "cck",
+        after_ns: int = 0,
+        reserve_ns: int = 0,
+    ) -> Transmission:
+        """Put a frame on the air and tell the listeners that sense it.
+
+        Args:
+            sender: Node.
+            duration_ns: On the air, with its preamble.
+            receiver: Node.
+            size_bytes: Of the frame, and
+            modulation: how it is sent, for bit errors; unused when the radio has no noise.
+            after_ns: It starts so much later, as an answer does; less than any frame lasts.
+            reserve_ns: How long after its end the frame asks everyone who can read it to be silent.
+
+        Returns:
+            What ``finish`` must be given, exactly at its end.
+        """
+        now_ns = int(self.env.now)
+        start_ns = now_ns + after_ns
+        end_ns = start_ns + duration_ns
+        if now_ns >= self._rows_end_ns:
+            self._rows_w.clear()
+            self._rows_end_ns = now_ns + REFRESH_NS
+        power_w = self.radio.faded_w(self.power_w(sender, receiver))
+        frame = Transmission(
+            sender, receiver, start_ns, end_ns, end_ns + reserve_ns, power_w, size_bytes, modulation
+        )
+        for other in self._active:
+            if other.end_ns > start_ns:
+                other.overlaps.append(frame)
+                frame.overlaps.append(other)
+        self._active.append(frame)
+        if self._listeners:
+            self._tell_busy(frame)
+        return frame
+
+    def _tell_busy(self, frame: Transmission) -> None:
+        sender, start_ns, least_w = frame.sender, frame.start_ns, self._cs_w
+        row_w = self._rows_w[sender]
+        for listener in tuple(self._listeners.values()):
+            node = listener.node
+            power_w = row_w[node]
+            if power_w < least_w and (power_w >= 0.0 or self._link_power_w(sender, node) < least_w):
+                continue
+            frame.heard.append(listener)
+            listener.busy += 1
+            if listener.busy == 1:
+                listener.on_busy(start_ns)
+
+    def finish(self, frame: Transmission) -> Cause:
+        """``outcome`` and ``clear`` in one."""
+        cause = self.outcome(frame)
+        self.clear(frame)
+        return cause
+
+    def clear(self, frame: Transmission) -> None:
+        """Take a frame off the air at its end and tell the listeners that sense nothing any more."""
+        self._active.remove(frame)
+        recent, listeners = self._recent, self._listeners
+        recent.append(frame)
+        end_ns = frame.end_ns
+        while recent[0].end_ns < end_ns - MEMORY_NS:
+            recent.popleft()
+        row_w = self._rows_w.get(frame.sender) or self._new_row_w(frame.sender)
+        least_w, alone = self._rx_w, not frame.overlaps
+        for listener in frame.heard:
+            listener.busy -= 1
+            node = listener.node
+            if listener.busy or listeners.get(node) is not listener:
+                continue
+            if alone and row_w[node] >= least_w:
+                listener.on_idle(frame.reserved_ns, False)
+            else:
+                listener.on_idle(*self._read(frame, node))
+
+    def _read(self, frame: Transmission, node: int) -> tuple[int, bool]:
+        """What a node that need not be addressed makes of a frame, without fading and noise.
+
+        Returns:
+            From when the channel is free, and whether the frame was damaged. A node that was sending itself
+            knows of neither a damage nor a reservation.
+        """
+        power_w, overlaps = self.power_w(frame.sender, node), frame.overlaps
+        if overlaps:
+            if any(other.sender == node for other in overlaps):
+                return frame.end_ns, False
+            most_w = power_w / self.radio.capture_ratio
+            powers_w = [self.power_w(other.sender, node) for other in overlaps]
+            if max(powers_w) > most_w or frame.largest_w(powers_w) > most_w:
+                return frame.end_ns, True
+        if power_w < self._rx_w:
+            return frame.end_ns, True
+        return frame.reserved_ns, False
+
+    def outcome(self, frame: Transmission) -> Cause:
+        """What became of a frame that ends now; to be asked once.
+
+        Returns:
+            ``NONE`` if its receiver has it; else ``COLLISION``, ``NOISE`` or ``RANGE``.
+        """
+        radio, receiver, power_w, interference_w = self.radio, frame.receiver, frame.power_w, 0.0
+        if frame.overlaps:
+            if any(other.sender == receiver for other in frame.overlaps):
+                return Cause.COLLISION
+            powers_w = [radio.faded_w(self.power_w(other.sender, receiver)) for other in frame.overlaps]
+            interference_w = frame.largest_w(powers_w)
+        if power_w < self._rx_w:
+            return Cause.RANGE
+        if power_w < radio.capture_ratio * interference_w:
+            return Cause.COLLISION
+        if radio.noise_w is not None:
+            sinr = power_w / (radio.noise_w + interference_w)
+            if self._rng.random() < radio.error_rate(sinr, frame.size_bytes, frame.modulation):
+                return Cause.NOISE
+        return Cause.NONE
+
+    def senses(self, node: int) -> bool:
+        """Whether somebody else's frame is on the air at this node now."""
+        now_ns = int(self.env.now)
+        return any(
+            frame.start_ns <= now_ns < frame.end_ns and self._sensed(frame, node) for frame in self._active
+        )
+
+    def _sensed(self, frame: Transmission, node: int) -> bool:
+        return self.power_w(frame.sender, node) >= self._cs_w
+
+    def busy_between(self, node: int, start_ns: int, end_ns: int) -> bool:
+        """Whether somebody else's frame was on the air at this node in part of a window that ends by now.
+
+        The window may reach back ``MEMORY_NS``.
+        """
+        for frames in (self._active, self._recent):
+            for frame in frames:
+                if frame.start_ns < end_ns and frame.end_ns > start_ns and self._sensed(frame, node):
+                    return True
+        return False
+
+    def last_heard(self, node: int) -> tuple[int, bool]:
+        """From when the channel is free at this node, and whether the last frame was damaged there.
+
+        The same as ``on_idle`` of a listener would have been told.
+
+        Returns:
+            ``-MEMORY_NS`` for the time if nothing was heard for that long.
+        """
+        for frame in reversed(self._recent):
+            if self._sensed(frame, node):
+                return self._read(frame, node)
+        return -MEMORY_NS, False
+
+    def subscribe(
+        self, node: int, on_busy: Callable[[int], None], on_idle: Callable[[int, bool], None]
+    ) -> Listener:
+        """Call back when the channel at this node becomes busy or idle, until ``unsubscribe``.
+
+        Args:
+            node: One listener per node.
+            on_busy: Given the time in ns, which may be ahead by the ``after_ns`` of an answer.
+            on_idle: Given the time from which the channel is free (now, or when the frame's reservation
+                ends), and whether the last frame was received with errors (EIFS).
+        """
+        listener = self._listeners[node] = Listener(node, on_busy, on_idle)
+        now_ns = int(self.env.now)
+        for frame in self._active:
+            if frame.end_ns > now_ns and self._sensed(frame, node):
+                frame.heard.append(listener)
+                listener.busy += 1
+        return listener
+
+    def unsubscribe(self, node: int) -> None:
+        """Call no longer."""
+        self._listeners.pop(node, None)

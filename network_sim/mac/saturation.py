@@ -1,0 +1,125 @@
+"""How much a medium access carries when every node always has a packet, all around one sink.
+
+No buffers and no images: what ``tests`` and claims compare with Bianchi's model and with ns-3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import count
+from typing import Any
+
+import numpy as np
+import simpy
+
+from network_sim.config import NetworkConfig, RunConfig
+from network_sim.counters import Counters
+from network_sim.mac import Mac, make_mac
+from network_sim.mac.dcf import Dcf
+from network_sim.mac.medium import Medium
+from network_sim.places import laid_out
+from network_sim.radio import Radio
+from network_sim.trace import Recorder
+from network_sim.types import Cause, EventKind, Packet, PacketKind, to_ns
+
+WARM_UP = 0.05
+"""Share of the time at the start that is not counted: the nodes start at the same instant."""
+
+
+@dataclass(frozen=True, slots=True)
+class Saturation:
+    """What saturated nodes got."""
+
+    throughput_bps: float
+    """Payload without our headers that reached the sink, of all nodes together."""
+    delivery_ratio: float
+    """Share of packets that reached it before they were given up."""
+    packets: int
+    """Packets that were delivered or given up."""
+    attempts: int
+    """Data frames sent for them."""
+    losses: dict[Cause, int]
+    """Attempts that failed, by cause."""
+    packets_by_node: tuple[int, ...]
+    """How many of each node's packets reached it."""
+
+
+def saturation(
+    config: NetworkConfig, nodes: int, duration_s: float, seed: int, wait_after_loss: bool = True
+) -> Saturation:
+    """Run saturated nodes on a circle around a sink, all within range of one another.
+
+    Args:
+        config: medium access, radio, and of ``nodes`` the payload, its header and the radius of the circle.
+        nodes: how many send.
+        duration_s: simulated time, warm-up included.
+        seed: the same gives the same result.
+        wait_after_loss: False lets IEEE 802.11b go on after a collision as Bianchi's model does.
+
+    Raises:
+        ValueError: another medium access is asked to.
+    """
+    config = replace(
+        config,
+        nodes=replace(config.nodes, count=nodes, layout="star"),
+        run=RunConfig(duration_s, warmup_s=WARM_UP * duration_s, seed=seed, keep="counters"),
+    )
+    horizon_ns = to_ns(duration_s)
+    env = simpy.Environment()
+    rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
+    medium = Medium(env, Radio(config.radio, rngs[1]), laid_out(config.nodes, rngs[0]), rngs[2])
+    recorder = Recorder(config.run.keep, nodes + 1, to_ns(config.run.warmup_s))
+    make: Callable[..., Mac] = partial(make_mac, config.mac.kind)
+    if not wait_after_loss:
+        if config.mac.kind != "ieee80211b":
+            raise ValueError(f"{config.mac.kind} has no EIFS")
+        make = partial(Dcf, wait_after_loss=False)
+    mac = make(env, medium, config, recorder, rngs[3], lambda node: True, lambda packet, node: None)
+    ids = count()
+    tallies = [_Tally() for _ in range(nodes)]
+    for node, tally in enumerate(tallies):
+        env.process(_saturate(env, mac, config, node, ids, tally))
+    env.run(until=horizon_ns)
+    names, roles = tuple(map(str, range(nodes + 1))), (*["node"] * nodes, "sink")
+    trace = recorder.trace(config, names, None, horizon_ns, roles)
+    return _summary(config, trace.counters, tallies)
+
+
+@dataclass(slots=True)
+class _Tally:
+    """Packets of one node after the warm-up."""
+
+    packets: int = 0
+    arrived: int = 0
+
+
+def _summary(config: NetworkConfig, counters: Counters, tallies: list[_Tally]) -> Saturation:
+    """What was counted after the warm-up."""
+    events = counters.count[counters.warmup_minutes :].sum(axis=(0, 2))
+    lost = events[EventKind.LOSS]
+    packets, arrived = (sum(getattr(tally, key) for tally in tallies) for key in ("packets", "arrived"))
+    data_bits = 8 * (config.nodes.payload_bytes - config.nodes.header_bytes)
+    duration_s = config.run.horizon_s - config.run.warmup_s
+    return Saturation(
+        throughput_bps=int(events[EventKind.DELIVER].sum()) * data_bits / duration_s,
+        delivery_ratio=arrived / packets if packets else 0.0,
+        packets=packets,
+        attempts=int(events[EventKind.AIR].sum()),
+        losses={cause: int(lost[cause]) for cause in Cause if lost[cause]},
+        packets_by_node=tuple(tally.arrived for tally in tallies),
+    )
+
+
+def _saturate(
+    env: simpy.Environment, mac: Mac, config: NetworkConfig, node: int, ids: Iterator[int], tally: _Tally
+) -> Generator[simpy.Event, Any, None]:
+    """A node that hands on the next packet as soon as it knows what became of the last."""
+    sink, size_bytes, warmup_ns = config.nodes.count, config.nodes.payload_bytes, to_ns(config.run.warmup_s)
+    while True:
+        packet = Packet(next(ids), PacketKind.IMAGE, node, sink, size_bytes, int(env.now))
+        delivery = yield from mac.send(packet, node, sink)
+        if env.now >= warmup_ns:
+            tally.packets += 1
+            tally.arrived += delivery.cause in (Cause.NONE, Cause.ACK_LOST)

@@ -1,0 +1,238 @@
+"""What a run amounts to: pure functions of its trace, each number with its unit and its definition.
+
+Nearly all come from the counters, so that they are the same whether the log was kept or not. What the data
+cannot say is absent. The warm-up is left out: what happened before it ended does not count, nor do packets
+and images that were created before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from network_sim import energy
+from network_sim.ledger import Outcomes
+from network_sim.states import State
+from network_sim.trace import NetworkTrace
+from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns, to_s
+
+CAMERA_ROLES = ("node", "vehicle")
+"""Those with a camera and a battery; sinks, access points and the cloud have mains."""
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A number and what it means."""
+
+    value: float
+    unit: str
+    """ "1" for a share or a count."""
+    definition: str
+
+
+Rows = Iterator[tuple[str, float, str, str]]
+
+
+def metrics(trace: NetworkTrace) -> dict[str, Metric]:
+    """All metrics that the trace can give, by name; none if the run ended within the warm-up."""
+    if trace.horizon_ns <= to_ns(trace.config.run.warmup_s):
+        return {}
+    groups = (_outcomes, _rates, _losses, _airtime, _queue, _energy, _overheads, _coverage)
+    return {
+        name: Metric(float(value), unit, definition)
+        for group in groups
+        for name, value, unit, definition in group(trace)
+        if np.isfinite(value)
+    }
+
+
+def elapsed_s(trace: NetworkTrace) -> float:
+    """Seconds from the end of the warm-up to the end of the run."""
+    return to_s(trace.horizon_ns - to_ns(trace.config.run.warmup_s))
+
+
+def node_energy(trace: NetworkTrace) -> energy.Energy:
+    """Joules of every node by state, arrays (N,)."""
+    return energy.joules(_times(trace), trace.config.energy)
+
+
+def node_lifetimes_s(trace: NetworkTrace) -> NDArray[np.float64]:
+    """(N,) how long each battery lasts; infinite without one and for what has mains."""
+    lifetimes_s = energy.lifetimes_s(_times(trace), trace.config.energy)
+    return np.where(_cameras(trace), lifetimes_s, np.inf)
+
+
+def node_queues(trace: NetworkTrace) -> NDArray[np.float64]:
+    """(N,) packets in each node's buffer, averaged over time; needs the whole log.
+
+    Raises:
+        ValueError: the log was not kept.
+    """
+    if trace.config.run.keep != "all":
+        raise ValueError("Only a complete log says whose packets waited")
+    events = trace.events.of(EventKind.ENQUEUE, EventKind.DELIVER, EventKind.DROP)
+    sign = np.where(events.kind == EventKind.ENQUEUE, 1, -1)
+    start_ns = to_ns(trace.config.run.warmup_s)
+    left_s = (trace.horizon_ns - np.maximum(events.t_ns, start_ns)) / NS_PER_S
+    sums = np.bincount(events.node, sign * left_s, minlength=len(trace.names))
+    return sums / elapsed_s(trace)
+
+
+def _outcomes(trace: NetworkTrace) -> Rows:
+    """Delivery and delay of images and of their packets."""
+    for noun, outcomes, began in (
+        ("image", trace.counters.images, "taken"),
+        ("packet", trace.counters.packets, "first queued"),
+    ):
+        yield from _outcome(noun, outcomes, began)
+
+
+def _outcome(noun: str, outcomes: Outcomes, began: str) -> Rows:
+    if outcomes.created:
+        share = outcomes.arrived / outcomes.created
+        still = "those still on their way at the end count as not arrived"
+        yield f"{noun}_delivery_ratio", share, "1", f"{noun}s that arrived, of all that were {began}; {still}"
+    delays = outcomes.delays
+    took = f"from when the {noun} was {began} until it arrived"
+    yield f"{noun}_delay_mean", delays.mean_s, "s", f"Mean time {took}"
+    yield f"{noun}_delay_deviation", delays.deviation_s, "s", f"Standard deviation of the time {took}"
+    for name, percent in (("median", 50.0), ("p95", 95.0)):
+        definition = f"Time within which {percent:g} % of those that arrived did, {took}, to 1.2 %"
+        yield f"{noun}_delay_{name}", delays.percentile_s(percent), "s", definition
+
+
+def _rates(trace: NetworkTrace) -> Rows:
+    time_s = elapsed_s(trace)
+    goodput_bps = 8 * _bytes(trace, EventKind.ARRIVE) / time_s
+    throughput_bps = 8 * _bytes(trace, EventKind.RECEIVE, PacketKind.IMAGE) / time_s
+    yield "goodput", goodput_bps, "bit/s", "Bits of complete images at their destination, over time"
+    yield "throughput", throughput_bps, "bit/s", "Bits of image packets at their last node, over time"
+    taken, arrived = (60 * _count(trace, kind) / time_s for kind in (EventKind.CAPTURE, EventKind.ARRIVE))
+    yield "images_taken_per_minute", taken, "1/min", "Images that cameras took"
+    yield "images_per_minute", arrived, "1/min", "Images that arrived complete"
+
+
+def _losses(trace: NetworkTrace) -> Rows:
+    """Frames, packets and images that failed, by cause. Zeros too, so that runs can be averaged."""
+    delivered = _count(trace, EventKind.DELIVER)
+    for kind, name, what in (
+        (EventKind.LOSS, "attempts_lost", "Attempts to send that failed, others may have followed"),
+        (EventKind.DROP, "packets_dropped", "Packets that were given up"),
+        (EventKind.EXPIRE, "images_expired", "Images that were given up or thrown away"),
+    ):
+        yield name, _count(trace, kind), "1", f"{what}, for any cause"
+        counts = _after(trace, trace.counters.count)[:, kind].sum(axis=(0, 1))
+        for cause in tuple(Cause)[1:]:
+            words = cause.name.lower()
+            yield f"{name}_{words}", counts[cause], "1", f"{what}, cause: {words.replace('_', ' ')}"
+        if kind == EventKind.LOSS and delivered:
+            ratio = counts[Cause.COLLISION] / delivered
+            yield "collisions_per_delivery", ratio, "1", "Attempts lost to collisions, per packet and hop"
+
+
+def _airtime(trace: NetworkTrace) -> Rows:
+    sending_s = _states_s(trace)[:, State.SENDING]
+    share = "acknowledgements included, over time; far nodes that send at once can make it exceed 1"
+    yield "airtime_share", sending_s.sum() / elapsed_s(trace), "1", f"Time on the air of all frames, {share}"
+    yield "frames", _count(trace, EventKind.AIR), "1", "Frames sent, retries included, replies not"
+
+
+def _queue(trace: NetworkTrace) -> Rows:
+    """From sums alone: a packet adds the time from when it came to the end, less that from when it left."""
+    counters = trace.counters
+    rest_ns = trace.horizon_ns - counters.edges_ns[1:, None, None, None]
+    weights_s = (counters.until_end_ns + counters.count * rest_ns) / NS_PER_S
+    weights_s[: counters.warmup_minutes] = counters.count[: counters.warmup_minutes] * elapsed_s(trace)
+    came, went, dropped = (
+        weights_s[:, kind].sum() for kind in (EventKind.ENQUEUE, EventKind.DELIVER, EventKind.DROP)
+    )
+    mean = (came - went - dropped) / elapsed_s(trace)
+    yield "queue", mean, "1", "Packets in all buffers together, those being sent included, averaged over time"
+
+
+def _energy(trace: NetworkTrace) -> Rows:
+    spent, cameras = node_energy(trace), _cameras(trace)
+    if not cameras.any():
+        return
+    for name, joules, what in (
+        ("radio_sending", spent.tx_j, "radios that send"),
+        ("radio_receiving", spent.rx_j, "radios that receive what is addressed to them"),
+        ("radio_listening", spent.idle_j, "radios that listen"),
+        ("radio_sleeping", spent.sleep_j, "radios that sleep or have failed"),
+        ("radio", spent.radio_j, "radios in all states"),
+        ("platform_awake", spent.platform_j, "computers and cameras that are awake"),
+        ("platform_sleeping", spent.platform_sleep_j, "computers and cameras that sleep or have failed"),
+        ("total", spent.total_j, "radios, computers and cameras"),
+    ):
+        yield f"energy_{name}", joules[cameras].sum(), "J", f"Energy of {what}, all camera nodes together"
+    total_j = spent.total_j[cameras]
+    yield "energy_per_node", total_j.mean(), "J", "Energy of a camera node, their mean"
+    if arrived := _count(trace, EventKind.ARRIVE):
+        yield "energy_per_image", total_j.sum() / arrived, "J", "Energy of all camera nodes per arrived image"
+    least_s = node_lifetimes_s(trace).min()
+    yield "lifetime", least_s, "s", "Until the first camera node's battery is empty, if all goes on like this"
+
+
+def _overheads(trace: NetworkTrace) -> Rows:
+    for kind in (PacketKind.SUMMARY, PacketKind.REQUEST, PacketKind.STATUS):
+        words = kind.name.lower()
+        per_minute = 60 * _bytes(trace, EventKind.ENQUEUE, kind) / elapsed_s(trace)
+        yield (
+            f"{words}_bytes",
+            per_minute,
+            "B/min",
+            f"Bytes of {words} packets queued, at every hop",
+        )
+
+
+def _coverage(trace: NetworkTrace) -> Rows:
+    """Which pieces of road were seen when; needs the images' events and cells."""
+    taken = trace.events.of(EventKind.CAPTURE)
+    taken = taken.where((taken.peer >= 0) & (taken.t_ns >= to_ns(trace.config.run.warmup_s)))
+    if not len(taken):
+        return
+    window = taken.t_ns // to_ns(trace.config.scheme.validity_s)
+    seen = np.unique(np.stack((taken.peer, window)), axis=1).shape[1]
+    arrived = np.isin(taken.image, trace.events.of(EventKind.ARRIVE).image)
+    covered = np.unique(np.stack((taken.peer, window))[:, arrived], axis=1).shape[1]
+    windows = f"Pairs of a road cell and a span of {trace.config.scheme.validity_s:g} s"
+    yield (
+        "coverage",
+        covered / seen,
+        "1",
+        f"{windows} of which an image arrived, of all that cameras saw",
+    )
+    if arrived.any():
+        share = 1.0 - covered / arrived.sum()
+        yield "redundancy", share, "1", f"Arrived images beyond the first of its kind. {windows} are a kind"
+
+
+def _after(trace: NetworkTrace, sums: NDArray[np.int64]) -> NDArray[np.int64]:
+    return sums[trace.counters.warmup_minutes :]
+
+
+def _count(trace: NetworkTrace, kind: EventKind) -> int:
+    return int(_after(trace, trace.counters.count)[:, kind].sum())
+
+
+def _bytes(trace: NetworkTrace, kind: EventKind, packet_kind: PacketKind | None = None) -> int:
+    sums = _after(trace, trace.counters.size_bytes)[:, kind]
+    return int(sums.sum() if packet_kind is None else sums[:, packet_kind].sum())
+
+
+def _states_s(trace: NetworkTrace) -> NDArray[np.float64]:
+    """(N, S) seconds in each state."""
+    return _after(trace, trace.counters.states_ns).sum(axis=0) / NS_PER_S
+
+
+def _times(trace: NetworkTrace) -> energy.RadioTimes:
+    states_s = _states_s(trace)
+    sent_s, asleep_s, received_s = (states_s[:, s] for s in (State.SENDING, State.ASLEEP, State.RECEIVING))
+    return energy.radio_times(elapsed_s(trace), sent_s, received_s, asleep_s)
+
+
+def _cameras(trace: NetworkTrace) -> NDArray[np.bool_]:
+    return np.isin(trace.roles, CAMERA_ROLES)

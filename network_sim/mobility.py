@@ -1,0 +1,223 @@
+"""Vehicles on a square grid of streets: where they are, which cells they see, when they meet access points.
+
+The scenario is our reconstruction (SPEC 6.2) of Bruno & Nurchis, "Efficient data collection in multimedia
+vehicular sensing platforms" (arXiv 1311.6013). All vehicles drive at one speed and take a turn at random at
+every crossing, never back. So a route is a row of crossings, and every question about it has a formula.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, hypot, sqrt
+
+import numpy as np
+
+from network_sim.config import StreetConfig
+from network_sim.types import NS_PER_S
+from pipeline.errors import InputError
+
+STEPS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+"""Blocks east and north for each heading: east, north, west, south."""
+MAX_CELLS = 2**15
+"""The trace keeps the number of a cell where it keeps that of a node, in 16 bits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Routes:
+    """Where every vehicle goes. A vehicle starts ``start_m`` into its first segment."""
+
+    config: StreetConfig
+    crossings: np.ndarray
+    """(V, S + 1) crossings in order; crossing ``x + y (blocks + 1)`` lies ``x`` blocks east, ``y`` north."""
+    headings: np.ndarray
+    """(V, S) heading from each crossing to the next."""
+    start_m: np.ndarray
+    """(V,)"""
+
+    def segments(self, vehicle: int, t_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Index of the segment, and metres into it, at those times (T,)."""
+        driven_m = self.start_m[vehicle] + self.config.speed_mps / NS_PER_S * t_ns
+        segment = (driven_m / self.config.block_m).astype(np.int64)
+        return segment, driven_m - segment * self.config.block_m
+
+    def cells(self, vehicle: int, t_ns: np.ndarray, cell_m: float, directed: bool = True) -> np.ndarray:
+        """The cell, a number below ``cell_numbers()``, of the vehicle at those times (T,).
+
+        Args:
+            vehicle: Its number.
+            t_ns: Times (T,).
+            cell_m: Length of a cell.
+            directed: Each direction of a street has cells of its own; otherwise both share them.
+        """
+        segment, into_m = self.segments(vehicle, t_ns)
+        crossing, heading = self.crossings[vehicle, segment], self.headings[vehicle, segment]
+        if not directed:  # as if all drove the first two ways
+            back = heading >= len(STEPS) // 2
+            crossing = np.where(back, self.crossings[vehicle, segment + 1], crossing)
+            heading = heading % (len(STEPS) // 2)
+            into_m = np.where(back, self.config.block_m - into_m, into_m)
+        pieces = _pieces(self.config, cell_m)
+        piece = np.minimum((into_m / cell_m).astype(np.int64), pieces - 1)
+        return (crossing * len(STEPS) + heading) * pieces + piece
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A vehicle within range of an access point."""
+
+    access_point: int
+    enter_ns: int
+    leave_ns: int
+
+
+class StreetPlaces:
+    """Vehicles, then access points, wherever they are."""
+
+    static = False
+
+    def __init__(self, routes: Routes, access_points_m: np.ndarray) -> None:
+        """``access_points_m`` is (A, 2)."""
+        config = routes.config
+        self._segments_per_ns = config.speed_mps / config.block_m / NS_PER_S
+        self._start = (routes.start_m / config.block_m).tolist()
+        points_m = crossings_m(config)[routes.crossings]
+        self._x_m: list[list[float]] = points_m[..., 0].tolist()
+        self._y_m: list[list[float]] = points_m[..., 1].tolist()
+        self._vehicles = len(points_m)
+        self._fixed: list[tuple[float, float]] = [(x, y) for x, y in access_points_m.tolist()]
+
+    @property
+    def count(self) -> int:
+        """Vehicles and access points together."""
+        return self._vehicles + len(self._fixed)
+
+    def position_m(self, node: int, now_ns: int) -> tuple[float, float]:
+        """Metres east and north of the south-western crossing."""
+        if node >= self._vehicles:
+            return self._fixed[node - self._vehicles]
+        driven = self._start[node] + self._segments_per_ns * now_ns
+        segment = int(driven)
+        part = driven - segment
+        x_m, y_m = self._x_m[node], self._y_m[node]
+        x0_m, y0_m = x_m[segment], y_m[segment]
+        return x0_m + part * (x_m[segment + 1] - x0_m), y0_m + part * (y_m[segment + 1] - y0_m)
+
+    def distance_m(self, a: int, b: int, now_ns: int) -> float:
+        """Distance of two nodes at that time."""
+        ax_m, ay_m = self.position_m(a, now_ns)
+        bx_m, by_m = self.position_m(b, now_ns)
+        return hypot(ax_m - bx_m, ay_m - by_m)
+
+
+def crossings_m(config: StreetConfig) -> np.ndarray:
+    """Positions (C, 2) of all crossings, C = (blocks + 1)^2."""
+    y, x = np.divmod(np.arange((config.blocks + 1) ** 2), config.blocks + 1)
+    return np.column_stack([x, y]) * config.block_m
+
+
+def access_points_m(config: StreetConfig) -> np.ndarray:
+    """Positions (A, 2) of the access points: at crossings, spread evenly over the grid."""
+    side = ceil(sqrt(config.access_points))
+    even = (np.arange(side) + 0.5) / side * config.blocks
+    # Halves go outwards, so that the pattern stays symmetric and no two points meet.
+    along = np.where(even < config.blocks / 2, np.ceil(even - 0.5), np.floor(even + 0.5))
+    chosen = np.linspace(0, side**2 - 1, config.access_points).round().astype(int)
+    y, x = np.divmod(chosen, side)
+    return np.column_stack([along[x], along[y]]) * config.block_m
+
+
+def cell_numbers(config: StreetConfig, cell_m: float) -> int:
+    """One more than the largest number of a cell; those of streets that would leave the grid stay unused.
+
+    Raises:
+        InputError: more cells than the trace can number.
+    """
+    numbers = (config.blocks + 1) ** 2 * len(STEPS) * _pieces(config, cell_m)
+    if numbers > MAX_CELLS:
+        raise InputError(
+            f"scheme.cell_m is {cell_m}, which divides the streets into {numbers} cells, more than "
+            f"{MAX_CELLS}; try longer cells or fewer blocks"
+        )
+    return numbers
+
+
+def drive(config: StreetConfig, horizon_s: float, rng: np.random.Generator) -> Routes:
+    """Routes that last until the horizon.
+
+    Vehicles start anywhere on the streets. That is also how they are spread at any later time: each way into
+    a crossing is as likely as each way out of it.
+    """
+    side = config.blocks + 1
+    x, y = np.arange(side**2) % side, np.arange(side**2) // side
+    ahead = np.stack([x, y], axis=1)[:, None] + STEPS
+    open_ways = ((ahead >= 0) & (ahead < side)).all(axis=2)
+    turns, turn_counts = _turns(open_ways)
+    count = ceil(horizon_s * config.speed_mps / config.block_m) + 2
+    crossings = np.empty((config.vehicles, count + 1), dtype=np.int64)
+    headings = np.empty((config.vehicles, count), dtype=np.int64)
+    first = np.argwhere(open_ways)[rng.integers(open_ways.sum(), size=config.vehicles)]
+    crossings[:, 0], headings[:, 0] = first.T
+    start_m = rng.random(config.vehicles) * config.block_m
+    jump = STEPS @ (1, side)
+    for i, draw in enumerate(rng.random((count, config.vehicles))):
+        here = crossings[:, i] + jump[headings[:, i]]
+        crossings[:, i + 1] = here
+        if i + 1 < count:
+            choice = (draw * turn_counts[here, headings[:, i]]).astype(np.int64)
+            headings[:, i + 1] = turns[here, headings[:, i], choice]
+    return Routes(config, crossings, headings, start_m)
+
+
+def contacts(routes: Routes, points_m: np.ndarray, range_m: float) -> list[list[Contact]]:
+    """For each vehicle, its times within range of each of the points (A, 2), in order of entering.
+
+    A segment meets the disc around a point in one piece at most; pieces that touch at a crossing are one
+    contact.
+    """
+    start_m = crossings_m(routes.config)[routes.crossings[:, :-1]]
+    ahead = STEPS[routes.headings]
+    found: list[list[Contact]] = [[] for _ in range(len(start_m))]
+    for index, point_m in enumerate(points_m):
+        to_m = point_m - start_m
+        middle_m = (to_m * ahead).sum(axis=2)
+        aside_m = to_m[..., 0] * ahead[..., 1] - to_m[..., 1] * ahead[..., 0]
+        half_m = np.sqrt(np.maximum(range_m**2 - aside_m**2, 0.0))
+        enter_m = np.clip(middle_m - half_m, 0.0, routes.config.block_m)
+        leave_m = np.clip(middle_m + half_m, 0.0, routes.config.block_m)
+        for vehicle, enter_ns, leave_ns in _joined(routes, enter_m, leave_m):
+            found[vehicle].append(Contact(index, enter_ns, leave_ns))
+    return [sorted(each, key=lambda contact: contact.enter_ns) for each in found]
+
+
+def _joined(routes: Routes, enter_m: np.ndarray, leave_m: np.ndarray) -> list[tuple[int, int, int]]:
+    """(vehicle, enter_ns, leave_ns) of pieces (V, S) of segments, where those that touch are one."""
+    config = routes.config
+    inside = leave_m > enter_m
+    goes_on = inside[:, :-1] & inside[:, 1:] & (leave_m[:, :-1] == config.block_m) & (enter_m[:, 1:] == 0.0)
+    none = np.zeros((len(inside), 1), dtype=bool)
+    begins = inside & ~np.hstack([none, goes_on])
+    ends = inside & ~np.hstack([goes_on, none])
+    offset_m = np.arange(inside.shape[1]) * config.block_m - routes.start_m[:, None]
+    ns_per_m = NS_PER_S / config.speed_mps
+    enter_ns = np.maximum(np.ceil((offset_m + enter_m)[begins] * ns_per_m), 0.0).astype(np.int64)
+    leave_ns = np.floor((offset_m + leave_m)[ends] * ns_per_m).astype(np.int64)
+    vehicle = np.nonzero(begins)[0]
+    lasts = leave_ns > enter_ns
+    rows = zip(vehicle[lasts].tolist(), enter_ns[lasts].tolist(), leave_ns[lasts].tolist(), strict=True)
+    return list(rows)
+
+
+def _turns(open_ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Headings (C, 4, 3) to go on with at each crossing for each heading of arrival, and how many (C, 4)."""
+    turns = np.zeros((len(open_ways), 4, 3), dtype=np.int64)
+    counts = np.zeros((len(open_ways), 4), dtype=np.int64)
+    for crossing, ways in enumerate(open_ways):
+        for heading in range(4):
+            onward = [way for way in range(4) if ways[way] and way != (heading + 2) % 4]
+            turns[crossing, heading, : len(onward)] = onward
+            counts[crossing, heading] = len(onward)
+    return turns, counts
+
+
+def _pieces(config: StreetConfig, cell_m: float) -> int:
+    return ceil(config.block_m / cell_m)

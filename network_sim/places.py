@@ -1,0 +1,69 @@
+"""Where the nodes are: the only thing that the medium needs to know of them."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from network_sim.config import NodesConfig
+
+
+class Places(Protocol):
+    """Positions of all nodes at any time."""
+
+    static: bool
+    """Nobody moves: distances may be kept."""
+
+    @property
+    def count(self) -> int:
+        """Nodes, sinks and access points together."""
+
+    def distance_m(self, a: int, b: int, now_ns: int) -> float:
+        """Distance of two nodes."""
+
+
+class FixedPlaces:
+    """Nodes that stand still."""
+
+    static = True
+
+    def __init__(self, positions_m: np.ndarray) -> None:
+        """``positions_m`` is (N, 2)."""
+        self.positions_m = np.asarray(positions_m, dtype=float)
+        between_m = self.positions_m[:, None] - self.positions_m[None]
+        self._distances_m: list[list[float]] = np.hypot(between_m[..., 0], between_m[..., 1]).tolist()
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self._distances_m)
+
+    def distance_m(self, a: int, b: int, now_ns: int) -> float:
+        """Distance of two nodes, the same at any time."""
+        return self._distances_m[a][b]
+
+
+def laid_out(config: NodesConfig, rng: np.random.Generator) -> FixedPlaces:
+    """The nodes, then the sink, as ``config.layout`` wants them.
+
+    Args:
+        config: Count, layout and spacing.
+        rng: Draws the random layout; the others do not use it.
+
+    Returns:
+        Places of ``config.count`` + 1 nodes; the sink is the last and stands at the origin.
+    """
+    count = config.count
+    index = np.arange(count)
+    if config.layout == "star":
+        angle = 2.0 * np.pi * index / count
+        grid = np.column_stack([np.cos(angle), np.sin(angle)])
+    elif config.layout == "line":
+        grid = np.column_stack([index + 1.0, np.zeros(count)])
+    elif config.layout == "grid":
+        side = int(np.ceil(np.sqrt(count + 1)))
+        grid = np.column_stack(np.divmod(index + 1, side)).astype(float)
+    else:
+        grid = (rng.random((count, 2)) - 0.5) * np.sqrt(count + 1)
+    return FixedPlaces(np.vstack([grid * config.spacing_m, np.zeros((1, 2))]))

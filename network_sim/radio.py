@@ -1,0 +1,281 @@
+"""What arrives of a transmission: mean power over distance, shadowing, fading, bit errors (SPEC 6.3).
+
+Powers are in watts and distances in metres, inside as well as in every argument; decibels only in the config.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from network_sim.config import RadioConfig
+
+FloatArray = NDArray[np.float64]
+Power = TypeVar("Power", float, FloatArray)
+Modulation = Literal["dbpsk", "dqpsk", "cck", "oqpsk"]
+"""How bytes are sent: IEEE 802.11b at 1, 2 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
+
+SPEED_OF_LIGHT_MPS = 299_792_458.0
+_ROUNDING = 1e-9  # nodes exactly range_m apart hear each other, however their distance was computed
+_BLOCK = 1024
+
+
+def wavelength_m(frequency_hz: float) -> float:
+    """Wavelength of a carrier in vacuum."""
+    return SPEED_OF_LIGHT_MPS / frequency_hz
+
+
+def crossover_m(antenna_height_m: float, wavelength_m: float) -> float:
+    """Distance ``4 pi h^2 / lambda`` from which the ground reflection takes over (Rappaport 2002, 4.6)."""
+    return 4.0 * math.pi * antenna_height_m**2 / wavelength_m
+
+
+@dataclass(frozen=True, slots=True)
+class PathLoss:
+    """Mean power as one power law near the sender and another one far away."""
+
+    near_w: float
+    """What the near law gives at 1 m."""
+    near_exponent: float
+    far_w: float
+    """What the far law gives at 1 m."""
+    far_exponent: float
+    break_m: float
+    """Where the far law takes over; infinite if it never does."""
+    least_m: float
+    """Nearer than this the power no longer grows: free space would deliver more than was sent."""
+
+    @overload
+    def power_w(self, distance_m: float) -> float: ...
+    @overload
+    def power_w(self, distance_m: FloatArray) -> FloatArray: ...
+    def power_w(self, distance_m: float | FloatArray) -> float | FloatArray:
+        """Mean received power at a distance, or at each of an array of any shape."""
+        if isinstance(distance_m, np.ndarray):
+            distance = np.maximum(distance_m, self.least_m)
+            near = self.near_w * distance**-self.near_exponent
+            return np.where(distance < self.break_m, near, self.far_w * distance**-self.far_exponent)
+        held_m = distance_m if distance_m > self.least_m else self.least_m
+        if held_m < self.break_m:
+            return self.near_w * held_m**-self.near_exponent
+        return self.far_w * held_m**-self.far_exponent
+
+
+def free_space(tx_power_w: float, wavelength_m: float, gain: float = 1.0, loss: float = 1.0) -> PathLoss:
+    """Friis 1946: ``Pr = Pt G^2 lambda^2 / ((4 pi d)^2 L)`` with the gain G of each antenna."""
+    least_m = wavelength_m / (4.0 * math.pi)
+    near_w = tx_power_w * gain**2 * least_m**2 / loss
+    return PathLoss(near_w, 2.0, near_w, 2.0, math.inf, least_m)
+
+
+def ground_reflection(
+    tx_power_w: float, wavelength_m: float, height_m: float, gain: float = 1.0, loss: float = 1.0
+) -> PathLoss:
+    """Two-ray: free space up to the crossover, then ``Pr = Pt G^2 h^4 / (d^4 L)`` (Rappaport 2002, 4.6)."""
+    near = free_space(tx_power_w, wavelength_m, gain, loss)
+    far_w = tx_power_w * gain**2 * height_m**4 / loss
+    return PathLoss(near.near_w, 2.0, far_w, 4.0, crossover_m(height_m, wavelength_m), near.least_m)
+
+
+def power_law(
+    tx_power_w: float,
+    wavelength_m: float,
+    exponent: float,
+    reference_m: float,
+    gain: float = 1.0,
+    loss: float = 1.0,
+) -> PathLoss:
+    """Free space up to ``reference_m``, from there ``(d / reference)^-exponent`` (Rappaport 2002, 4.9)."""
+    near = free_space(tx_power_w, wavelength_m, gain, loss)
+    break_m = max(reference_m, near.least_m)
+    far_w = near.power_w(break_m) * break_m**exponent
+    return PathLoss(near.near_w, 2.0, far_w, exponent, break_m, near.least_m)
+
+
+def friis_w(
+    distance_m: Power, tx_power_w: float, wavelength_m: float, gain: float = 1.0, loss: float = 1.0
+) -> Power:
+    """Power received over free space; see ``free_space``."""
+    return free_space(tx_power_w, wavelength_m, gain, loss).power_w(distance_m)
+
+
+def two_ray_w(
+    distance_m: Power,
+    tx_power_w: float,
+    wavelength_m: float,
+    height_m: float,
+    gain: float = 1.0,
+    loss: float = 1.0,
+) -> Power:
+    """Power received over flat ground; see ``ground_reflection``."""
+    return ground_reflection(tx_power_w, wavelength_m, height_m, gain, loss).power_w(distance_m)
+
+
+def log_distance_w(
+    distance_m: Power,
+    tx_power_w: float,
+    wavelength_m: float,
+    exponent: float,
+    reference_m: float,
+    gain: float = 1.0,
+    loss: float = 1.0,
+) -> Power:
+    """Power received by a power law; see ``power_law``."""
+    return power_law(tx_power_w, wavelength_m, exponent, reference_m, gain, loss).power_w(distance_m)
+
+
+def path_loss(config: RadioConfig) -> PathLoss:
+    """The law that a config names."""
+    tx_power_w, length_m = watts(config.tx_power_dbm), wavelength_m(config.frequency_hz)
+    gain, loss = config.antenna_gain, config.system_loss
+    if config.model == "friis":
+        return free_space(tx_power_w, length_m, gain, loss)
+    if config.model == "two-ray":
+        return ground_reflection(tx_power_w, length_m, config.antenna_height_m, gain, loss)
+    return power_law(tx_power_w, length_m, config.path_loss_exponent, config.reference_m, gain, loss)
+
+
+def watts(power_dbm: float) -> float:
+    """Watts of a power in dBm."""
+    return 1e-3 * ratio(power_dbm)
+
+
+def ratio(decibels: float) -> float:
+    """Factor of a number of decibels."""
+    return 10.0 ** (decibels / 10.0)
+
+
+def dbpsk_bit_error_rate(sinr: float) -> float:
+    """802.11b at 1 Mb/s: ``exp(-Eb/N0) / 2`` (Proakis 2001, 5.2), noise in the 22 MHz of the channel."""
+    return 0.5 * math.exp(-22.0 * sinr)
+
+
+def dqpsk_bit_error_rate(sinr: float) -> float:
+    """802.11b at 2 Mb/s: the asymptote of Proakis 2001, 5.2, that Pei and Henderson 2009 (ns-3) take.
+
+    ``(1 + sqrt 2) / sqrt(8 pi sqrt 2 x) exp(-(2 - sqrt 2) x)`` of ``x = Eb/N0``; at most 1/2.
+    """
+    x = 11.0 * sinr
+    if x <= 0.0:
+        return 0.5
+    root = math.sqrt(2.0)
+    return min(0.5, (1.0 + root) / math.sqrt(8.0 * math.pi * root * x) * math.exp(-(2.0 - root) * x))
+
+
+_CCK_STEP = 0.01
+_CCK_LARGEST = 13.0  # errors are below 1e-16 there
+
+
+@cache
+def _cck_table() -> list[float]:
+    """Log of the error rate of one of 16 biorthogonal signals, over steps of ``sqrt(8 sinr)``.
+
+    With b = sqrt(2 Es/N0) the rate is ``Q(b) + integral from 0 of (1 - (1 - 2 Q(u))^7) phi(u - b) du``
+    (Proakis 2001, 5.2, as what is missing from one).
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(256)
+    u = 11.0 * (nodes + 1.0)
+    q = np.array([0.5 * math.erfc(value / math.sqrt(2.0)) for value in u])
+    wrong = 11.0 * weights * -np.expm1(7.0 * np.log1p(-2.0 * q))
+    b = np.arange(0.0, _CCK_LARGEST + 2 * _CCK_STEP, _CCK_STEP)
+    density = np.exp(-0.5 * (u - b[:, None]) ** 2) / math.sqrt(2.0 * math.pi)
+    tail = np.array([0.5 * math.erfc(value / math.sqrt(2.0)) for value in b])
+    return [float(value) for value in np.log(tail + density @ wrong)]
+
+
+def cck_symbol_error_rate(sinr: float) -> float:
+    """802.11b at 11 Mb/s: error rate of a symbol of 8 bits (Pei and Henderson 2009, as in ns-3).
+
+    One of 256 is sent as two of 16 biorthogonal signals; noise in the 22 MHz of the channel.
+    """
+    place = math.sqrt(8.0 * sinr) / _CCK_STEP
+    table = _cck_table()
+    if place >= len(table) - 1:
+        return 0.0
+    index = int(place)
+    below = table[index]
+    one = math.exp(below + (place - index) * (table[index + 1] - below))
+    return one * (2.0 - one)
+
+
+_OQPSK_TERMS = tuple(((-1) ** k * math.comb(16, k) / 30.0, 20.0 * (1.0 / k - 1.0)) for k in range(2, 17))
+
+
+def oqpsk_bit_error_rate(sinr: float) -> float:
+    """802.15.4 at 2.4 GHz: ``8/15 1/16 sum_k (-1)^k C(16, k) exp(20 sinr (1/k - 1))`` for k from 2 to 16.
+
+    IEEE 802.15.4-2006, E.4.1.8.
+    """
+    return min(0.5, max(0.0, sum(factor * math.exp(power * sinr) for factor, power in _OQPSK_TERMS)))
+
+
+_BIT_ERROR_RATES: dict[Modulation, Callable[[float], float]] = {
+    "dbpsk": dbpsk_bit_error_rate,
+    "dqpsk": dqpsk_bit_error_rate,
+    "oqpsk": oqpsk_bit_error_rate,
+}
+
+
+class Radio:
+    """The radio that every node has: thresholds, the power over each link, errors."""
+
+    def __init__(self, config: RadioConfig, rng: np.random.Generator) -> None:
+        """Draws nothing but the seed of the shadowing, so that it does not depend on who sends first."""
+        law = path_loss(config)
+        self.config = config
+        """What it was made from."""
+        self.mean_power_w = law.power_w
+        """Mean received power at a distance, or at each of an array."""
+        self.rx_threshold_w = law.power_w(config.range_m) * (1.0 - _ROUNDING)
+        """Least power that is received; without shadowing, what arrives at the nominal range."""
+        self.cs_threshold_w = law.power_w(config.sense_range_m) * (1.0 - _ROUNDING)
+        """Least power that makes the channel busy."""
+        self.capture_ratio = ratio(config.capture_db)
+        """Least ratio of a frame's power to the sum of what overlaps it."""
+        self.noise_w = None if config.noise_dbm is None else watts(config.noise_dbm)
+        """Power of the noise; None if there are no bit errors."""
+        self._shadowing_db = config.shadowing_db
+        self._shadowing_seed = int(rng.integers(2**63))
+        self._shadowing: dict[tuple[int, int], float] = {}
+        self._nakagami_m = config.nakagami_m
+        self._rng = rng
+        self._fading: list[float] = []
+
+    def link_power_w(self, sender: int, receiver: int, distance_m: float) -> float:
+        """Mean power over a link with the shadowing of its two nodes, the same in both directions."""
+        power_w = self.mean_power_w(distance_m)
+        if self._shadowing_db == 0.0:
+            return power_w
+        pair = (sender, receiver) if sender < receiver else (receiver, sender)
+        gain = self._shadowing.get(pair)
+        if gain is None:
+            draw = np.random.default_rng((self._shadowing_seed, *pair)).standard_normal()
+            gain = self._shadowing[pair] = ratio(self._shadowing_db * float(draw))
+        return power_w * gain
+
+    def faded_w(self, power_w: float) -> float:
+        """The power of one frame: Nakagami-m fading makes it gamma distributed with mean ``power_w``."""
+        if self._nakagami_m is None:
+            return power_w
+        if not self._fading:
+            shape = self._nakagami_m
+            self._fading = self._rng.gamma(shape, 1.0 / shape, _BLOCK).tolist()
+        return power_w * self._fading.pop()
+
+    def error_rate(self, sinr: float, size_bytes: int, kind: Modulation) -> float:
+        """Probability that at least one bit of a frame is wrong.
+
+        Args:
+            sinr: signal over noise and interference, as a factor.
+            size_bytes: bytes sent with this modulation.
+            kind: how they are sent.
+        """
+        if kind == "cck":
+            return -math.expm1(size_bytes * math.log1p(-cck_symbol_error_rate(sinr)))
+        return -math.expm1(8 * size_bytes * math.log1p(-_BIT_ERROR_RATES[kind](sinr)))

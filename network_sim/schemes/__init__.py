@@ -1,0 +1,42 @@
+"""Which images of passing vehicles are collected: our reconstruction (SPEC 6.2) of three schemes.
+
+They follow Bruno & Nurchis, "Efficient data collection in multimedia vehicular sensing platforms" (arXiv
+1311.6013), of which only the abstract and the first lines could be read.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from network_sim.config import SchemeConfig
+from network_sim.schemes.baseline import Baseline
+from network_sim.schemes.greedy import Greedy
+from network_sim.schemes.pdc import Pdc
+from network_sim.types import to_ns
+
+
+class Scheme(Protocol):
+    """What the collector decides."""
+
+    asks: bool
+    """Images come only on request."""
+
+    def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
+        """Positions of the images to upload, in that order, of those that a summary offers (T,)."""
+
+    def received(self, cell: int, now_ns: int) -> None:
+        """An image has come."""
+
+    def missed(self, cell: int, captured_ns: int) -> None:
+        """An image that was wanted did not come."""
+
+
+def make_scheme(config: SchemeConfig, cells: int, rng: np.random.Generator) -> Scheme:
+    """The scheme of that name for cells numbered below ``cells``; ``rng`` draws the requests of PDC."""
+    if config.name == "baseline":
+        return Baseline()
+    if config.name == "greedy":
+        return Greedy(to_ns(config.validity_s), config.k)
+    return Pdc(config, cells, rng)

@@ -1,0 +1,97 @@
+"""The whole way through one run: from a config to a trace that has been checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+
+import numpy as np
+import simpy
+from simpy.core import StopSimulation
+
+from network_sim.collection import Collection, collection_names
+from network_sim.config import NetworkConfig
+from network_sim.conservation import check
+from network_sim.mac import Mac, make_mac
+from network_sim.mac.medium import Medium
+from network_sim.places import Places
+from network_sim.radio import Radio
+from network_sim.street import start_street
+from network_sim.trace import NetworkTrace, Recorder
+from network_sim.types import Packet, to_ns
+from pipeline.progress import Progress
+
+REPORTS = 100
+"""Reports of progress in a run."""
+
+
+def simulate(config: NetworkConfig) -> NetworkTrace:
+    """The trace of one run; the same config gives the same trace to the byte."""
+    steps = iterate_simulation(config)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            trace: NetworkTrace = stop.value
+            return trace
+
+
+def iterate_simulation(config: NetworkConfig) -> Generator[Progress, None, NetworkTrace]:
+    """The same, with reports on the way.
+
+    Returns:
+        The trace, in which every packet is received, given up or on its way. It ends at the horizon, or when
+        every image of a collection has arrived or was given up.
+
+    Raises:
+        InternalError: the trace contradicts itself.
+    """
+    env, rng = simpy.Environment(), np.random.default_rng(config.run.seed)
+    run = _collect if config.scenario == "collection" else _drive
+    trace = yield from run(env, config, rng)
+    check(trace)
+    return trace
+
+
+def _collect(
+    env: simpy.Environment, config: NetworkConfig, rng: np.random.Generator
+) -> Generator[Progress, None, NetworkTrace]:
+    recorder = _recorder(config, len(collection_names(config)))
+    network = Collection(env, config, recorder, rng)
+    assert network.ended.callbacks is not None
+    network.ended.callbacks.append(StopSimulation.callback)
+    for share in _run(env, config):
+        yield Progress("collection", max(share, network.fraction))
+        if network.ended.triggered:
+            break
+    return recorder.trace(config, network.names, network.positions_m, int(env.now), network.roles)
+
+
+def _drive(
+    env: simpy.Environment, config: NetworkConfig, rng: np.random.Generator
+) -> Generator[Progress, None, NetworkTrace]:
+    street_rng, radio_rng, medium_rng, mac_rng = rng.spawn(4)
+    recorder = _recorder(config, config.street.vehicles + config.street.access_points)
+
+    def mac(places: Places, up: Callable[[int], bool], receive: Callable[[Packet, int], None]) -> Mac:
+        medium = Medium(env, Radio(config.radio, radio_rng), places, medium_rng)
+        return make_mac(config.mac.kind, env, medium, config, recorder, mac_rng, up, receive)
+
+    street = start_street(env, config, recorder, mac, street_rng)
+    for share in _run(env, config):
+        yield Progress("street grid", share)
+    street.finish()
+    return recorder.trace(config, street.names, None, int(env.now), street.roles)
+
+
+def _recorder(config: NetworkConfig, nodes: int) -> Recorder:
+    return Recorder(config.run.keep, nodes, to_ns(config.run.warmup_s))
+
+
+def _run(env: simpy.Environment, config: NetworkConfig) -> Generator[float, None, None]:
+    """Run to the horizon, with a stop after every hundredth of it; yields the share that is done."""
+    horizon_ns = to_ns(config.run.horizon_s)
+    for step in range(1, REPORTS + 1):
+        until_ns = horizon_ns * step // REPORTS
+        if until_ns > env.now:
+            env.run(until=until_ns)
+        yield step / REPORTS
