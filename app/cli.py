@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from app.cli_depth import infer_depth
+from app.cli_simulate import simulate
 from app.cli_text import answers_table, mesh_lines, print_json, say, wrong_use
 from pipeline.config import PRESETS
 from pipeline.errors import InputError, PacketMeshError
@@ -222,7 +223,8 @@ def reproduce(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None
         json: Print the verdicts as one JSON object.
     """
     from app.reports.reproduction import write_reproduction_report
-    from pipeline.experiments import run_experiments
+    from network_sim.experiments.claims import CLAIMS as NETWORK_CLAIMS
+    from pipeline.experiments import CLAIMS, run_experiments
     from pipeline.io.atomic import writable_folder
     from pipeline.io.json_file import write_json
     from pipeline.progress import Progress
@@ -230,7 +232,7 @@ def reproduce(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None
     writable_folder(out)
     verdicts = {}
     names = [name for names in only for name in names.split(",")]
-    for event in run_experiments(names, out / "trials"):
+    for event in run_experiments(names, out / "trials", CLAIMS | NETWORK_CLAIMS):
         if isinstance(event, Progress):
             say(f"{event.fraction:4.0%}  {event.stage}")
             continue
@@ -251,13 +253,14 @@ def bench(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
         only: Cases to run; all without it.
         json: Print the results as one JSON object.
     """
-    from pipeline.experiments.benchmarks import run_benchmarks
+    from network_sim.experiments.benchmarks import CASES as NETWORK_CASES
+    from pipeline.experiments.benchmarks import CASES, run_benchmarks
     from pipeline.io.atomic import writable_folder
     from pipeline.io.json_file import write_json
 
     writable_folder(out)
     results = {}
-    for case, result in run_benchmarks(only):
+    for case, result in run_benchmarks(only, CASES | NETWORK_CASES):
         peers = ", ".join(f"{name} {seconds:.3f} s" for name, seconds in result.peers.items()) or "no peer"
         say(f"{case}: {result.ours_s:.3f} s ({peers}), {result.peak_memory_bytes / 1e6:.0f} MB at most")
         results[case] = result.record()
@@ -306,6 +309,7 @@ COMMANDS: dict[str, Any] = {
     "register": register,
     "mesh": mesh,
     "infer-depth": infer_depth,
+    "simulate": simulate,
     "reproduce": reproduce,
     "bench": bench,
     "scenes": scenes,

@@ -64,6 +64,18 @@ class Panel(ABC):
     def on_show(self) -> None:
         """This became the current step."""
 
+    def on_action(self, action: str) -> None:
+        """A button for all steps was pressed."""
+
+    def look(self) -> bool:
+        """Turn the view to what it draws; False leaves that to the session, which turns it to the scene."""
+        return False
+
+    @property
+    def command(self) -> str:
+        """The command line that computes what it shows."""
+        return self.session.spec.command()
+
     @property
     def wide(self) -> bool:
         """Whether it shows two things side by side."""

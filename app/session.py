@@ -60,6 +60,7 @@ class Session:
         self._chain = LatestWins(pool, self)
         self._side = LatestWins(pool, self)
         self._quick = LatestWins(pool, object())
+        self._apart = LatestWins(pool, object())
         self._running: Step | None = None
         self._submitted: tuple[Any, ...] | None = None
         self._wide = False
@@ -81,8 +82,7 @@ class Session:
     def close(self) -> None:
         """Stop computing and forget everything; the browser is gone."""
         self._closed = True
-        self._chain.cancel()
-        self._side.cancel()
+        self._cancel()
         for panel in self._panels:
             panel.close()
         self._thread.shutdown(wait=False, cancel_futures=True)
@@ -130,6 +130,10 @@ class Session:
         """Run a job of a fraction of a second, even beside one of the chain; of many, the latest."""
         self._run_beside(self._quick, job, arguments, on_end, lambda _: None)
 
+    def apart_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
+        """Run a job that needs nothing of the chain, and so beside it, in place of the one before."""
+        self._run_beside(self._apart, job, arguments, on_end, lambda _: None)
+
     def _run_beside(
         self,
         lane: LatestWins,
@@ -141,7 +145,7 @@ class Session:
         def progressed(value: Any) -> None:
             if not isinstance(value, Progress):
                 on_partial(value)
-            elif lane is self._side:
+            elif lane is not self._quick:
                 self._progressed(None, value)
 
         def ended(outcome: Outcome) -> None:
@@ -161,6 +165,10 @@ class Session:
     def cancel_side_job(self) -> None:
         """End the job beside the chain now."""
         self._side.cancel()
+
+    def _cancel(self) -> None:
+        for lane in (self._chain, self._side, self._apart):
+            lane.cancel()
 
     def advance(self) -> None:
         """Compute the first step that is out of date."""
@@ -255,6 +263,9 @@ class Session:
 
     def frame_view(self, anew: bool = False) -> None:
         """Turn the view to the scene: a new one, two instead of one, or another shape of the window."""
+        if self._current.look():
+            self._shape = 0.0
+            return
         below = self._current.drawn_below
         wide = any(panel.wide for panel in self._panels if panel.drawn_below == below)
         scene = self.results.view("scene")
@@ -270,9 +281,10 @@ class Session:
         return round(self.target.camera.aspect, 1)
 
     def _act(self, action: str) -> None:
+        for panel in self._panels:
+            panel.on_action(action)
         if action == "Cancel":
-            self._chain.cancel()
-            self._side.cancel()
+            self._cancel()
         elif action == "Retry":
             self.results.forgive()
             self.advance()
@@ -284,7 +296,7 @@ class Session:
     def _show_command(self) -> None:
         with self.gui.add_modal("The same from the command line") as modal:
             self.gui.add_markdown("This computes and writes what the app shows now:")
-            self.gui.add_html(command_html(self.spec.command()))
+            self.gui.add_html(command_html(self._current.command))
             self.gui.add_button("Close").on_click(lambda _: modal.close())
 
     def _say(self) -> None:
@@ -302,10 +314,11 @@ class Session:
         elif failure is not None:
             self._status.content = f"**Stopped** · {failure} Change a setting or press Retry."
             self._bar.value = 0.0
-        elif not self._side.busy:
+        elif not self._side.busy and not self._apart.busy:
             self._status.content = "**Up to date**"
             self._bar.value = 100.0
-        self._bar.color = BRAND if self._running is not None or self._side.busy else DELIVERED
+        working = self._running is not None or self._side.busy or self._apart.busy
+        self._bar.color = BRAND if working else DELIVERED
 
     def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
         if self._closed:

@@ -50,7 +50,7 @@ def _style(current: int, statuses: Sequence[StepStatus | None]) -> str:
     rules = [
         f"{row} > div > div:first-child {{ display: none; }}",
         f"canvas[data-engine] {{ background: {css(BACKGROUND)} }}",
-        f"{row} button {{ height: 2.2em; padding: 0 0.5em; font-size: 13px; }}",
+        f"{row} button {{ height: 2.2em; padding: 0 0.3em; font-size: 12px; }}",
     ]
     for index, status in enumerate(statuses):
         color = COLORS[status] if status is not None else css(BRAND)

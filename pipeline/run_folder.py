@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import psutil
-
 from pipeline.io.clouds import write_cloud
 from pipeline.io.json_file import write_json
 from pipeline.io.meshes import write_mesh
+from pipeline.memory import peak_memory_bytes
 from pipeline.reconstruct import NodeRegistration, Reconstruction
 from pipeline.settings import settings
 from pipeline.types import PointCloud, PointSource, SurfaceResult
@@ -115,21 +113,3 @@ def surface_metrics(surface: SurfaceResult) -> dict[str, Any]:
         "vertices": len(surface.vertices_m),
         "triangles": len(surface.triangles),
     } | asdict(surface.quality)
-
-
-def peak_memory_bytes() -> int:
-    """The most memory this process has held at once.
-
-    On Linux from the kernel's own record, because there the resource usage of a new process begins with
-    the memory of the one that started it.
-    """
-    if sys.platform == "win32":
-        return int(psutil.Process().memory_info().peak_wset)
-    record = Path("/proc/self/status")
-    if record.exists():
-        lines = dict(line.split(":", 1) for line in record.read_text().splitlines() if ":" in line)
-        return 1024 * int(lines["VmHWM"].split()[0])
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return int(peak if sys.platform == "darwin" else peak * 1024)

@@ -20,6 +20,7 @@ JOBS = {
     "yardstick": "app.jobs.yardsticks:yardstick_job",
     "race": "app.jobs.race:race_job",
     "capture": "app.jobs.capture:capture_job",
+    "simulate": "app.jobs.network:simulate_job",
     "export": "app.jobs.export:export_job",
 }
 

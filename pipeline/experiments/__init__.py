@@ -6,7 +6,7 @@ A claim that does not come out is reported as not reproduced; that is a result, 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,24 +23,27 @@ CLAIMS: dict[str, Claim] = {
 }
 
 
-def run_experiments(only: Iterable[str] = (), folder: Path | None = None) -> Iterator[Progress | Verdict]:
+def run_experiments(
+    only: Iterable[str] = (), folder: Path | None = None, claims: Mapping[str, Claim] = CLAIMS
+) -> Iterator[Progress | Verdict]:
     """Compute the claims named, or all of them; what takes long reports its progress in between.
 
     Args:
         only: names of claims; empty for all.
         folder: keeps the results of long work, so that an interrupted run goes on where it stopped; None
             keeps nothing.
+        claims: what can be computed, by name; other packages bring claims of their own.
 
     Raises:
         InputError: a name is not a claim.
     """
-    wanted = list(only) or list(CLAIMS)
-    unknown = [name for name in wanted if name not in CLAIMS]
+    wanted = list(only) or list(claims)
+    unknown = [name for name in wanted if name not in claims]
     if unknown:
-        raise InputError(f"There is no claim {', '.join(unknown)}; known are {', '.join(CLAIMS)}")
+        raise InputError(f"There is no claim {', '.join(unknown)}; known are {', '.join(claims)}")
     with tempfile.TemporaryDirectory() as temporary:
         prepared: dict[Any, Any] = {}
-        for claim in (CLAIMS[name] for name in wanted):
+        for claim in (claims[name] for name in wanted):
             if claim.prepare is None:
                 yield claim.judge()
                 continue

@@ -5,45 +5,22 @@ from __future__ import annotations
 import multiprocessing
 import statistics
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from functools import partial
-from typing import Any
 
 from pipeline.errors import InputError
+from pipeline.experiments.benchmark import Benchmark
 
 ROUNDS = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Benchmark:
-    """One case measured, beside its peers in the same run."""
-
-    ours_s: float
-    """Median of the rounds, seconds."""
-    peers: dict[str, float]
-    """Median seconds of other programs on the same input."""
-    peak_memory_bytes: int
-    """Most memory of the measuring process, its libraries included."""
-    peer_memory_bytes: dict[str, int] = field(default_factory=dict)
-    """The same of the peers, where each has a process of its own."""
-    errors_m: dict[str, float] = field(default_factory=dict)
-    """How wrong the answers are, ours and the peers', where the truth is known."""
-    runs: tuple[dict[str, Any], ...] = ()
-    """Every single measurement, with what the case alone measures."""
-
-    def record(self) -> dict[str, Any]:
-        """Plain values; ``ratio`` is our time over the fastest peer's, ``ratios`` over every one's."""
-        ratios = {name: self.ours_s / peer_s for name, peer_s in self.peers.items()}
-        return asdict(self) | {"ratio": max(ratios.values(), default=None), "ratios": ratios}
 
 
 def _chain(nodes: int) -> Benchmark:
     """Reconstruct the first ``nodes`` nodes of the living room, images in memory."""
     from pipeline.config import PRESETS
+    from pipeline.memory import peak_memory_bytes
     from pipeline.reconstruct import reconstruct
-    from pipeline.run_folder import peak_memory_bytes
     from pipeline.scenes import load_demo
     from pipeline.types import Rig
 
@@ -91,7 +68,7 @@ def _depth() -> Benchmark:
     from pipeline.depth import DepthNetwork
     from pipeline.experiments.depth.filling import OURS, fillings
     from pipeline.experiments.depth.speed import network_speed
-    from pipeline.run_folder import peak_memory_bytes
+    from pipeline.memory import peak_memory_bytes
     from pipeline.scenes import load_demo
 
     network = DepthNetwork()
@@ -114,21 +91,23 @@ CASES: dict[str, Callable[[], Benchmark]] = {
 }
 
 
-def run_benchmarks(only: Iterable[str] = ()) -> Iterator[tuple[str, Benchmark]]:
+def run_benchmarks(
+    only: Iterable[str] = (), cases: Mapping[str, Callable[[], Benchmark]] = CASES
+) -> Iterator[tuple[str, Benchmark]]:
     """Measure the cases named, or all.
+
+    Args:
+        only: names of cases; empty for all.
+        cases: what can be measured, by name; each function is sent to a fresh process.
 
     Raises:
         InputError: a name is not a case.
     """
-    wanted = list(only) or list(CASES)
-    unknown = [name for name in wanted if name not in CASES]
+    wanted = list(only) or list(cases)
+    unknown = [name for name in wanted if name not in cases]
     if unknown:
-        raise InputError(f"There is no benchmark '{unknown[0]}'; known are {', '.join(CASES)}")
+        raise InputError(f"There is no benchmark '{unknown[0]}'; known are {', '.join(cases)}")
     context = multiprocessing.get_context("spawn")
     for name in wanted:
         with ProcessPoolExecutor(1, mp_context=context) as process:
-            yield name, process.submit(_measure, name).result()
-
-
-def _measure(name: str) -> Benchmark:
-    return CASES[name]()
+            yield name, process.submit(cases[name]).result()

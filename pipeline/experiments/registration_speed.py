@@ -12,10 +12,10 @@ import numpy as np
 from pipeline.acquisition import back_project
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.memory import peak_memory_bytes
 from pipeline.registration import point_error_m, register_timed
 from pipeline.registration.peers import available_peers, run_peer
 from pipeline.registration.sample import draw
-from pipeline.run_folder import peak_memory_bytes
 from pipeline.scenes import build_demo, sense_depth
 from pipeline.scenes.render import Renderer
 from pipeline.types import FloatArray, PointCloud, RgbdFrame

@@ -18,9 +18,9 @@ import psutil
 
 from pipeline.config import PRESETS
 from pipeline.depth import DepthNetwork
+from pipeline.memory import peak_memory_bytes
 from pipeline.open3d_runtime import o3d
 from pipeline.reconstruct import merged_clouds, prepare_node
-from pipeline.run_folder import peak_memory_bytes
 from pipeline.scenes import load_demo
 from pipeline.surface import measure_quality, smooth, spacing, voxel_average, voxel_for_count
 from pipeline.surface.pivoting import roll

@@ -7,12 +7,13 @@ import re
 import cv2
 import numpy as np
 
-STEPS = ("Scene", "Depth", "Fuse", "Surface", "Export")
+STEPS = ("Scene", "Depth", "Fuse", "Surface", "Network", "Export")
 TEXTS = {
     "Scene": "Each camera node delivers",
     "Depth": "points the sensor measured",
     "Fuse": "move the orange cloud",
     "Surface": "A ball rolls over the points",
+    "Network": "Every moving point is a frame on the air",
     "Export": "Take it along",
 }
 

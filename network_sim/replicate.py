@@ -1,0 +1,98 @@
+"""Runs with independent seeds, 95 % intervals, and sweeps over any setting (SPEC 6.2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import t as student_t
+
+from network_sim.batch import run_batch
+from network_sim.config import NetworkConfig
+from network_sim.metrics import Metric, metrics
+from network_sim.simulate import simulate
+from pipeline.errors import InputError
+from pipeline.progress import Progress
+from pipeline.settings import with_settings
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A metric over independent runs."""
+
+    mean: float
+    ci95: float | None
+    """Half of the 95 % interval, by Student's t; None for a single run."""
+    unit: str
+    definition: str
+    values: tuple[float, ...]
+    """One for each run that has it, in the order of their seeds."""
+
+
+Estimates = Mapping[str, Estimate]
+
+
+def measured(config: NetworkConfig) -> dict[str, Metric]:
+    """The metrics of one run."""
+    return metrics(simulate(config))
+
+
+def replications(config: NetworkConfig, count: int) -> list[NetworkConfig]:
+    """``config`` with the seeds ``run.seed``, ``run.seed + 1``, ...
+
+    Raises:
+        InputError: fewer than one.
+    """
+    if count < 1:
+        raise InputError(f"replications is {count}; try at least 1")
+    return [replace(config, run=replace(config.run, seed=config.run.seed + run)) for run in range(count)]
+
+
+def iterate_runs(
+    configs: Sequence[NetworkConfig], scheduler: str | None = None
+) -> Generator[Progress, None, list[dict[str, Metric]]]:
+    """The metrics of every config, in their order."""
+    answers: dict[int, dict[str, Metric]] = {}
+    for index, answer in run_batch(measured, configs, scheduler):
+        answers[index] = answer
+        yield Progress(f"run {len(answers)} of {len(configs)}", len(answers) / len(configs))
+    return [answers[index] for index in range(len(configs))]
+
+
+def iterate_study(
+    cases: Sequence[NetworkConfig], count: int, scheduler: str | None = None
+) -> Generator[Progress, None, list[Estimates]]:
+    """Estimates for each case from ``count`` replications; all cases share their seeds."""
+    runs = yield from iterate_runs([run for case in cases for run in replications(case, count)], scheduler)
+    return [estimates_of(runs[first : first + count]) for first in range(0, len(runs), count)]
+
+
+def iterate_sweep(
+    config: NetworkConfig, key: str, values: Sequence[str], count: int, scheduler: str | None = None
+) -> Generator[Progress, None, dict[str, Estimates]]:
+    """The same for each value of a setting, such as ``"scheme.k"``."""
+    cases = [with_settings(config, [f"{key}={value}"]) for value in values]
+    return dict(zip(values, (yield from iterate_study(cases, count, scheduler)), strict=True))
+
+
+def estimates_of(runs: Sequence[Mapping[str, Metric]]) -> dict[str, Estimate]:
+    """Every metric that some run has; a run without it (no image arrived, say) does not count for it."""
+    names = dict.fromkeys(name for run in runs for name in run)
+    estimates = {}
+    for name in names:
+        found = [run[name] for run in runs if name in run]
+        values = tuple(float(metric.value) for metric in found)
+        mean, half = t_interval(values)
+        estimates[name] = Estimate(mean, half, found[0].unit, found[0].definition, values)
+    return estimates
+
+
+def t_interval(values: Iterable[float], confidence: float = 0.95) -> tuple[float, float | None]:
+    """Mean and half of its interval by Student's t; no interval for a single value."""
+    numbers = np.fromiter(values, float)
+    if len(numbers) < 2:
+        return float(numbers.mean()), None
+    quantile = float(student_t.ppf(0.5 + 0.5 * confidence, len(numbers) - 1))
+    return float(numbers.mean()), quantile * float(numbers.std(ddof=1)) / math.sqrt(len(numbers))

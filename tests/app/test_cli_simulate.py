@@ -1,0 +1,147 @@
+"""``packetmesh simulate`` as a user meets it."""
+
+import json
+
+import pytest
+
+from app.cli import main
+from network_sim.config import PRESETS
+from network_sim.replicate import measured
+from network_sim.trace_files import read_trace
+from pipeline.settings import settings, with_settings
+
+TINY = ("nodes.image_bytes=2000", "run.horizon_s=10")
+CONFIG = with_settings(PRESETS["thesis-link"], TINY)
+
+
+def run(capsys, *argv: object) -> tuple[int, str, str]:
+    try:
+        main(["simulate", *map(str, argv)])
+        code = 0
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_json_holds_every_metric_with_its_unit_and_definition(capsys):
+    code, out, err = run(capsys, "--json", "--set", *TINY)
+    record = json.loads(out)
+    expected = measured(CONFIG)
+    assert code == 0
+    assert {name: one["mean"] for name, one in record.items()} == {n: m.value for n, m in expected.items()}
+    assert all(one["ci95"] is None and one["unit"] and one["definition"] for one in record.values())
+    assert record["image_delivery_ratio"]["mean"] == 1.0
+    assert "collection" in err
+
+
+def test_the_table_has_a_line_for_every_metric(capsys):
+    code, out, _ = run(capsys, "--set", *TINY)
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()] == list(measured(CONFIG))
+
+
+def test_describe_lists_every_setting_with_unit_and_meaning(capsys):
+    code, out, _ = run(capsys, "--preset", "greenhouse", "--describe", "--json")
+    rows = json.loads(out)
+    assert code == 0
+    assert {key: row["value"] for key, row in rows.items()} == settings(PRESETS["greenhouse"])
+    assert all(row["meaning"] for key, row in rows.items())
+    assert (rows["radio.range_m"]["unit"], rows["radio.nakagami_m"]["unit"]) == ("m", "")
+    code, out, _ = run(capsys, "--describe")
+    assert code == 0
+    assert out.count("\n") == 2 * len(rows)
+
+
+def test_the_same_seed_writes_the_same_trace_and_its_config_repeats_the_run(capsys, tmp_path):
+    folders = [tmp_path / "one", tmp_path / "two", tmp_path / "other"]
+    run(capsys, "--out", folders[0], "--set", *TINY)
+    code, _, _ = run(capsys, "--out", folders[1], "--preset", folders[0] / "config.json")
+    run(capsys, "--out", folders[2], "--set", *TINY, "run.seed=1")
+    assert code == 0
+    for name in ("trace.ndjson", "trace.csv", "trace.json", "metrics.json"):
+        first, again, other = ((folder / name).read_bytes() for folder in folders)
+        assert first == again != other
+    assert read_trace(folders[0]).config == CONFIG
+    assert not list(folders[0].glob(".*"))
+
+
+def test_replications_give_intervals(capsys):
+    code, out, _ = run(capsys, "--replications", 3, "--json", "--set", *TINY)
+    record = json.loads(out)
+    assert code == 0
+    assert record["image_delay_mean"]["ci95"] > 0.0
+    assert record["image_delivery_ratio"]["ci95"] == 0.0
+
+
+def test_a_sweep_has_one_record_for_each_value(capsys, tmp_path):
+    sweep = ("--sweep", "uplink.rate_bps=100000,none", "--out", tmp_path, "--set", *TINY)
+    code, out, _ = run(capsys, *sweep, "--json")
+    record = json.loads(out)
+    assert code == 0
+    assert list(record) == ["uplink.rate_bps=100000", "uplink.rate_bps=none"]
+    slow, fast = (record[key]["image_delay_mean"]["mean"] for key in record)
+    assert slow > fast
+    assert json.loads((tmp_path / "metrics.json").read_text()) == record
+    assert json.loads((tmp_path / "config.json").read_text())["sweep"] == "uplink.rate_bps=100000,none"
+
+
+def test_a_node_without_a_way_to_the_sink_is_named_and_the_run_ends(capsys):
+    far = ("nodes.layout=line", "nodes.spacing_m=150", "nodes.images=0", "nodes.interval_s=1")
+    code, out, err = run(capsys, "--json", "--set", *TINY, *far)
+    assert code == 0
+    assert "node 1, node 2, node 3" in err
+    record = json.loads(out)
+    assert record["images_expired_no_route"]["mean"] == record["images_expired"]["mean"] == 30.0
+
+
+@pytest.mark.parametrize(
+    ("argv", "code", "names"),
+    [
+        (["--preset", "thesis-lnk"], 1, "try thesis-link or"),
+        (["--preset", "/no/such.json"], 1, "/no/such.json"),
+        (["--set", "nodes.cuont=2"], 1, "nodes.count"),
+        (["--set", "count=2"], 1, "nodes.count"),
+        (["--set", "run.horizon_s=0"], 1, "run.horizon_s is 0.0"),
+        (["--set", "mac.link_bps=-5"], 1, "mac.link_bps is -5.0"),
+        (["--set", "street.access_points=0"], 1, "street.access_points is 0"),
+        (["--set", "mac.kind=aloha"], 1, "ieee802154"),
+        (["--replications", "0"], 1, "replications is 0"),
+        (["--sweep", "scheme.k"], 2, "--sweep scheme.k"),
+        (["--sweep", "scheme.kk=1,2"], 1, "scheme.k"),
+        (["--sweep", "scheme.k=1,many"], 1, "many"),
+    ],
+)
+def test_wrong_use_is_one_sentence_and_leaves_nothing_behind(capsys, tmp_path, argv, code, names):
+    out_folder = tmp_path / "out"
+    got, out, err = run(capsys, *argv, "--out", out_folder)
+    assert got == code
+    assert out == ""
+    assert err.startswith("packetmesh: ")
+    assert err.count("\n") == 1
+    assert names in err
+    assert not out_folder.exists() or not list(out_folder.iterdir())
+
+
+def test_a_folder_that_cannot_be_written_is_named_before_anything_runs(capsys, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    code, out, err = run(capsys, "--out", blocked / "out", "--set", *TINY)
+    assert code == 1
+    assert out == ""
+    assert str(blocked) in err
+    assert err.count("\n") == 1
+
+
+def test_a_full_disk_is_one_sentence(capsys, tmp_path, monkeypatch):
+    from network_sim import trace_files
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(trace_files, "_write", full)
+    code, out, err = run(capsys, "--out", tmp_path, "--json", "--set", *TINY)
+    assert code == 1
+    assert out == ""
+    assert "No space left" in err.splitlines()[-1]
+    assert not list(tmp_path.iterdir())

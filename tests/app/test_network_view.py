@@ -1,0 +1,210 @@
+"""What the Network screen makes of a run: pieces, pictures, texts, curves, commands. The trace is by hand."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from app.drawing.network import Flights, ground_of
+from app.jobs.network import simulate_job, view_of
+from app.jobs.network_records import MetricRow, NetworkWish, Series, What
+from app.networkwords import ACCESS, NETWORKS, SCHEMES, ways
+from app.panels.network.numbers import metric_tables, ran, value_text
+from app.plots.gantt import WIDTH_PX, Window, areas, cursor_html, gantt_html, paint, row_px, visible
+from app.plots.networkcurves import polyline
+from network_sim.config import PRESETS, NetworkConfig, RunConfig
+from network_sim.trace import Recorder
+from network_sim.types import Cause, EventKind, PacketKind
+from pipeline.progress import Progress
+from pipeline.settings import with_settings
+from tests.app.answers import end
+
+MS = 1_000_000
+NAMES, ROLES = ("node 1", "node 2", "sink"), ("node", "node", "sink")
+PLACES_M = np.array([[20.0, 0.0], [-20.0, 0.0], [0.0, 0.0]])
+
+
+@pytest.fixture(scope="module")
+def view():
+    """One image of one packet that collides once and then arrives; a second that is dropped."""
+    recorder = Recorder("all", 3)
+    add, image = recorder.add, {"packet": 0, "image": 0, "size_bytes": 100}
+    add(0, EventKind.CAPTURE, 0, image=0, size_bytes=100)
+    add(0, EventKind.ENQUEUE, 0, 2, **image)
+    add(2 * MS, EventKind.AIR, 0, 2, duration_ns=4 * MS, **image)
+    add(3 * MS, EventKind.CAPTURE, 1, image=1, size_bytes=50)
+    add(3 * MS, EventKind.ENQUEUE, 1, 2, packet=1, image=1, size_bytes=50)
+    add(6 * MS, EventKind.LOSS, 0, 2, cause=Cause.COLLISION, **image)
+    add(10 * MS, EventKind.AIR, 0, 2, duration_ns=4 * MS, **image)
+    add(14 * MS, EventKind.DELIVER, 0, 2, **image)
+    add(14 * MS, EventKind.RECEIVE, 0, 2, **image)
+    add(14 * MS, EventKind.ARRIVE, 0, 2, image=0, size_bytes=100)
+    add(14 * MS, EventKind.ACK, 2, 0, packet=0, image=0, size_bytes=11, duration_ns=MS)
+    add(18 * MS, EventKind.LOSS, 1, 2, packet=1, image=1, cause=Cause.CHANNEL)
+    add(18 * MS, EventKind.DROP, 1, 2, packet=1, image=1, size_bytes=50, cause=Cause.CHANNEL)
+    add(19 * MS, EventKind.DOWN, 1, cause=Cause.NODE_DOWN)
+    config = NetworkConfig(run=RunConfig(horizon_s=0.02))
+    return view_of(recorder.trace(config, NAMES, PLACES_M, 20 * MS, ROLES), "by hand", 0.1)
+
+
+def rows(view, what):
+    """Node, start and end in ms, and cause of the pieces of a kind."""
+    some = view.pieces.where(view.pieces.what == what)
+    columns = (some.node, some.start_ns // MS, some.end_ns // MS, some.cause)
+    return list(zip(*(column.tolist() for column in columns), strict=True))
+
+
+def test_pieces_tell_waits_frames_and_why_a_frame_was_not_received(view):
+    assert rows(view, What.WAIT) == [(0, 0, 2, 0), (1, 3, 18, 0)]
+    assert rows(view, What.AIR) == [(0, 2, 6, Cause.COLLISION), (0, 10, 14, Cause.NONE)]
+    assert rows(view, What.ACK) == [(2, 14, 15, 0)]
+    assert rows(view, What.LOSS) == [(0, 6, 6, Cause.COLLISION), (1, 18, 18, Cause.CHANNEL)]
+    assert rows(view, What.DROP) == [(1, 18, 18, Cause.CHANNEL)]
+    assert rows(view, What.DOWN) == [(1, 19, 20, Cause.NODE_DOWN)]
+    assert rows(view, What.CAPTURE) == [(0, 0, 0, 0), (1, 3, 3, 0)]
+    assert rows(view, What.ARRIVE) == [(0, 14, 14, 0)]
+    assert (np.diff(view.pieces.start_ns) >= 0).all()
+
+
+def test_a_lost_frame_says_why_and_which_bytes_under_the_pointer(view):
+    window = Window(0, 20 * MS)
+    texts = [text for *_, text in areas(view, visible(view.pieces, window), window)]
+    assert len(texts) == len(view.pieces)
+    lost = next(text for text in texts if "not received" in text)
+    assert lost == (
+        "node 1 → sink: image packet 0 of image 0 from byte 0, 100 B, on the air 4.000 ms from 0.002000 s; "
+        "not received: collision"
+    )
+    assert any(
+        text.endswith("gave image packet 1 of image 1 from byte 0 up at 0.018000 s: channel busy")
+        for text in texts
+    )
+    page = gantt_html(view, window, "a <run>")
+    assert page.count("<title>") == len(texts)
+    assert "a &lt;run&gt;" in page
+
+
+def test_a_pixel_is_as_strong_as_the_share_of_its_time(view):
+    frames = view.pieces.where(view.pieces.what == What.AIR)
+    whole = paint(frames, 3, Window(0, 20 * MS))
+    row = whole[1].astype(int)
+    assert whole.shape == (3 * row_px(3), WIDTH_PX, 3)
+    on_air = (row == (0, 114, 178)).all(axis=1)
+    assert on_air.sum() == pytest.approx(WIDTH_PX * 8 / 20, abs=2)
+    paper = whole[row_px(3) + 1]
+    assert (paper == paper[0]).all()
+    far = paint(frames, 3, Window(0, 200_000 * MS))[1].astype(int)
+    assert 0 < (far != far[-1]).any(axis=1).sum() <= 2
+
+
+def test_many_events_cost_a_bounded_page(view):
+    rng = np.random.default_rng(0)
+    many = view.pieces.where(rng.integers(len(view.pieces), size=100_000))
+    window = Window(0, 20 * MS)
+    summed = areas(view, many, window)
+    assert len(summed) <= 400
+    counts = [int(text.split("s: ")[1].split(" frames")[0].replace(",", "")) for *_, text in summed]
+    assert sum(counts) == (many.what == What.AIR).sum()
+    failures = [text for *_, text in summed if "failures" in text]
+    assert any("collision" in text for text in failures)
+    assert any("channel busy" in text for text in failures)
+
+
+def test_the_cursor_is_only_there_within_the_window(view):
+    assert "calc(62px + 50.000% - 31.00px)" in cursor_html(view, Window(0, 20 * MS), 10 * MS)
+    assert cursor_html(view, Window(0, 5 * MS), 10 * MS) == ""
+
+
+def test_packets_fly_from_sender_to_receiver_and_losses_are_where_they_happened(view):
+    flights, at = Flights.of(view.pieces), np.column_stack([PLACES_M, np.zeros(3)])
+    places, colors = flights.packets(3 * MS, 0, at)
+    np.testing.assert_allclose(places[:, :2], [[15.0, 0.0]])
+    np.testing.assert_array_equal(colors, [[0, 114, 178]])
+    assert len(flights.packets(7 * MS, 0, at)[0]) == 0
+    slow, _ = flights.packets(7 * MS, 10 * MS, at)
+    np.testing.assert_allclose(slow[:, :2], [[10.0, 0.0]])
+    lost, _ = flights.losses(6 * MS, MS, at)
+    np.testing.assert_allclose(lost[:, :2], [PLACES_M[2]])
+    unsent, _ = flights.losses(18 * MS, MS, at)
+    np.testing.assert_allclose(unsent[:, :2], [PLACES_M[1]])
+    assert len(flights.losses(17 * MS, MS, at)[0]) == 0
+
+
+def test_the_ground_holds_all_ranges_at_one_scale(view):
+    ground = ground_of([view])
+    reach_m = view.config.radio.range_m
+    assert ground.width / ground.scale == pytest.approx(2 * reach_m + 40.0)
+    assert ground.depth / ground.scale == pytest.approx(2 * reach_m)
+    two = ground_of([view, view])
+    assert two.offset(1) - two.offset(0) > two.width
+
+
+def test_curves_agree_with_the_events(view):
+    series = view.series
+    assert np.nansum(series["Throughput"].values) * 0.02 / 60 == pytest.approx(0.8)
+    np.testing.assert_allclose(np.nanmax(series["Delay"].values), 0.014)
+    assert sorted(series["Delivery"].values[np.isfinite(series["Delivery"].values)]) == [0.0, 100.0]
+    energy = view.config.energy
+    sent_s, slept_s, all_s = 0.008, 0.001, 0.04
+    received_s = 0.001
+    expected_j = sent_s * energy.tx_w + slept_s * energy.sleep_w + received_s * energy.rx_w
+    expected_j += (all_s - sent_s - slept_s - received_s) * energy.idle_w
+    assert series["Energy"].values[-1] == pytest.approx(expected_j)
+    line = polyline(
+        np.array([0.0, 1.0, 2.0, 3.0]), Series(np.array([0.0, 1.0, 2.0]), np.array([1.0, np.nan, 3.0]))
+    )
+    np.testing.assert_array_equal(line, [1.0, 2.0, 3.0, np.nan])
+
+
+def test_numbers_have_units_and_definitions(view):
+    first, others = metric_tables([view, view])
+    assert first.count("by hand</th>") == 2
+    assert "Packet delivery ratio" in first
+    assert 'title="' in first
+    assert "Attempts lost channel" in others
+    assert value_text(None) == "–"
+    assert value_text(MetricRow("packet_delay_mean", 0.00137, "s", "")) == "1.37 ms"
+    assert "0.0 s of the network's time" in ran([view])
+    assert all(metric.unit and metric.definition for metric in view.metrics)
+
+
+@pytest.mark.parametrize("preset", NETWORKS)
+def test_every_preset_can_be_run_in_every_way_that_is_offered(preset):
+    config = with_settings(PRESETS[preset], NETWORKS[preset].settings)
+    offered = ways(preset)
+    assert set(offered) <= set(SCHEMES if NETWORKS[preset].schemes else ACCESS)
+    assert with_settings(config, next(iter(offered.values()))) == config
+    assert len({with_settings(config, settings) for settings in offered.values()}) == len(offered)
+    shown_s = config.run.horizon_s - config.run.warmup_s
+    assert 60.0 <= shown_s <= 1800.0
+
+
+def test_two_runs_are_simulated_with_progress_and_remembered(store):
+    config = with_settings(NetworkConfig(), ("nodes.image_bytes=2000", "run.horizon_s=60"))
+    wishes = (NetworkWish("one", config), NetworkWish("other", with_settings(config, ("run.seed=1",))))
+    told = list(simulate_job(store, wishes))
+    assert all(isinstance(progress, Progress) for progress in told)
+    assert {progress.stage for progress in told} == {"simulating one", "simulating other"}
+    fractions = [progress.fraction for progress in told]
+    assert fractions == sorted(fractions)
+    one, other = end(simulate_job(store, wishes))
+    assert (one.label, other.label) == ("one", "other")
+    assert (one.config.run.seed, other.config.run.seed) == (0, 1)
+    assert list(simulate_job(store, wishes[1:])) == []
+    assert {PacketKind(int(kind)) for kind in one.pieces.carries} == {PacketKind.IMAGE}
+
+
+def test_a_run_without_a_log_has_numbers_and_says_that_nothing_is_drawn(store):
+    config = with_settings(NetworkConfig(), ("nodes.image_bytes=2000", "run.keep=counters"))
+    (view,) = end(simulate_job(store, (NetworkWish("counted", config),)))
+    assert len(view.pieces) == 0
+    assert "no event was kept" in ran([view])
+    assert "Image delivery ratio" in metric_tables([view])[0]
+    assert "<img" in gantt_html(view, Window(0, view.end_ns))
+
+
+def test_the_serving_process_needs_no_simulator():
+    code = "import sys, app.server; print([m for m in ('simpy', 'scipy') if m in sys.modules])"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == "[]"
