@@ -19,7 +19,7 @@ from network_sim.places import FixedPlaces, laid_out
 from network_sim.radio import Radio
 from network_sim.routing import Routes, link_success, shortest_paths
 from network_sim.sink import Sink
-from network_sim.types import Cause, EventKind, Packet, to_ns
+from network_sim.types import BEGIN_WITHIN_NS, Cause, EventKind, Packet, to_ns
 
 if TYPE_CHECKING:
     from network_sim.trace import Recorder
@@ -109,8 +109,9 @@ class Collection:
         )
 
     def _camera(self, station: Station) -> Camera:
-        """Cameras that take images at fixed times do so independently of each other."""
-        phase_ns = int(self._rng.integers(max(to_ns(self._config.nodes.interval_s), 1)))
+        """Cameras take images independently of each other."""
+        interval_ns = to_ns(self._config.nodes.interval_s)
+        phase_ns = int(self._rng.integers(interval_ns or BEGIN_WITHIN_NS))
         return Camera(self.shared, station, phase_ns)
 
     @property

@@ -268,7 +268,7 @@ class Radio:
             self._fading = self._rng.gamma(shape, 1.0 / shape, _BLOCK).tolist()
         return power_w * self._fading.pop()
 
-    def error_rate(self, sinr: float, size_bytes: int, kind: Modulation) -> float:
+    def error_rate(self, sinr: float, size_bytes: float, kind: Modulation) -> float:
         """Probability that at least one bit of a frame is wrong.
 
         Args:

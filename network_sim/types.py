@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 NS_PER_S = 1_000_000_000
+BEGIN_WITHIN_NS = 10_000_000
+"""Nodes that send from the start begin at random within this time. An exchange of IEEE 802.15.4 takes whole
+backoff periods: begun at once, all nodes would count on one grid for ever, as if they were synchronised."""
 
 
 def to_ns(seconds: float) -> int:

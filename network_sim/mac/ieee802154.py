@@ -71,8 +71,8 @@ class Ieee802154:
         self._up = up
         self._receive = receive
         self._ready_ns: dict[int, int] = {}
-        self._answers: dict[int, tuple[int, int]] = {}
-        """Of each receiver: whose frame it acknowledges, and until when in ns."""
+        self._answers: dict[int, int] = {}
+        """Until when in ns each receiver acknowledges a frame."""
         self._numbers = _numbers(rng)
 
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
@@ -118,21 +118,12 @@ class Ieee802154:
         return Cause.CHANNEL
 
     def _busy(self, node: int) -> bool:
-        """Whether an assessment that ends now finds the channel busy.
+        """Whether an assessment that ends now finds the channel busy, or the node has to acknowledge.
 
-        SPEC 6.1 has no vulnerable time but the turnaround: what counts is the end of the assessment, and who
-        heard a frame leaves the gap before its acknowledgement alone.
+        What counts is its end (as in ns-3's lr-wpan), so that the turnaround alone is the vulnerable time.
         """
         now_ns = int(self._env.now)
-        if self._medium.busy_between(node, now_ns - 1, now_ns):
-            return True
-        return any(
-            now_ns < until_ns and (node == receiver or self._hears(node, sender))
-            for receiver, (sender, until_ns) in self._answers.items()
-        )
-
-    def _hears(self, node: int, sender: int) -> bool:
-        return self._medium.power_w(sender, node) >= self._medium.radio.cs_threshold_w
+        return now_ns < self._answers.get(node, 0) or self._medium.busy_between(node, now_ns - 1, now_ns)
 
     def _transmit(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Cause]:
         """Put the frame on the air; returns why it did not arrive."""
@@ -156,7 +147,7 @@ class Ieee802154:
         if cause:
             yield env.timeout(ACK_WAIT_NS)
             return False
-        self._answers[receiver] = (sender, int(env.now) + TURNAROUND_NS + ACK_NS)
+        self._answers[receiver] = int(env.now) + TURNAROUND_NS + ACK_NS
         yield env.timeout(TURNAROUND_NS)
         heard = False
         if self._up(receiver):

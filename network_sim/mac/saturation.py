@@ -22,7 +22,7 @@ from network_sim.mac.medium import Medium
 from network_sim.places import laid_out
 from network_sim.radio import Radio
 from network_sim.trace import Recorder
-from network_sim.types import Cause, EventKind, Packet, PacketKind, to_ns
+from network_sim.types import BEGIN_WITHIN_NS, Cause, EventKind, Packet, PacketKind, to_ns
 
 WARM_UP = 0.05
 """Share of the time at the start that is not counted: the nodes start at the same instant."""
@@ -68,7 +68,7 @@ def saturation(
     )
     horizon_ns = to_ns(duration_s)
     env = simpy.Environment()
-    rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
+    rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]
     medium = Medium(env, Radio(config.radio, rngs[1]), laid_out(config.nodes, rngs[0]), rngs[2])
     recorder = Recorder(config.run.keep, nodes + 1, to_ns(config.run.warmup_s))
     make: Callable[..., Mac] = partial(make_mac, config.mac.kind)
@@ -79,8 +79,9 @@ def saturation(
     mac = make(env, medium, config, recorder, rngs[3], lambda node: True, lambda packet, node: None)
     ids = count()
     tallies = [_Tally() for _ in range(nodes)]
+    begin_ns = rngs[4].integers(BEGIN_WITHIN_NS, size=nodes).tolist()
     for node, tally in enumerate(tallies):
-        env.process(_saturate(env, mac, config, node, ids, tally))
+        env.process(_saturate(env, mac, config, node, ids, tally, begin_ns[node]))
     env.run(until=horizon_ns)
     names, roles = tuple(map(str, range(nodes + 1))), (*["node"] * nodes, "sink")
     trace = recorder.trace(config, names, None, horizon_ns, roles)
@@ -113,10 +114,17 @@ def _summary(config: NetworkConfig, counters: Counters, tallies: list[_Tally]) -
 
 
 def _saturate(
-    env: simpy.Environment, mac: Mac, config: NetworkConfig, node: int, ids: Iterator[int], tally: _Tally
+    env: simpy.Environment,
+    mac: Mac,
+    config: NetworkConfig,
+    node: int,
+    ids: Iterator[int],
+    tally: _Tally,
+    begin_ns: int,
 ) -> Generator[simpy.Event, Any, None]:
     """A node that hands on the next packet as soon as it knows what became of the last."""
     sink, size_bytes, warmup_ns = config.nodes.count, config.nodes.payload_bytes, to_ns(config.run.warmup_s)
+    yield env.timeout(begin_ns)
     while True:
         packet = Packet(next(ids), PacketKind.IMAGE, node, sink, size_bytes, int(env.now))
         delivery = yield from mac.send(packet, node, sink)

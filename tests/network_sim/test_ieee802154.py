@@ -160,8 +160,7 @@ def test_a_sender_that_turns_round_is_deaf_and_not_yet_heard(late_ns: int) -> No
     lines = scene.run()
     if late_ns == 0:
         assert lines[EventKind.AIR][:2] == [(FIRST, NODE, Cause.NONE), (FIRST + TURN, OTHER, Cause.NONE)]
-        ends = [(FIRST + FRAME, NODE, Cause.COLLISION), (FIRST + TURN + FRAME, OTHER, Cause.COLLISION)]
-        assert lines[EventKind.LOSS][:2] == ends
+        assert (FIRST + TURN + FRAME, OTHER, Cause.COLLISION) in lines[EventKind.LOSS]
     else:
         assert lines[EventKind.LOSS] == []
         assert lines[EventKind.AIR][1][0] == second_ns + CCA + 15 * SLOT + FIRST
@@ -169,34 +168,37 @@ def test_a_sender_that_turns_round_is_deaf_and_not_yet_heard(late_ns: int) -> No
 
 @pytest.mark.parametrize(
     ("after_frame_ns", "later_ns"),
-    [(10 * US, 3 * SLOT + CCA), (TURN + ACK - CCA, 3 * SLOT + CCA), (TURN + ACK - CCA + 1, 0)],
+    [(10 * US, 0), (TURN + ACK - CCA, 3 * SLOT + CCA), (TURN + ACK - CCA + 1, 0)],
 )
-def test_who_heard_a_frame_lets_its_acknowledgement_pass(after_frame_ns: int, later_ns: int) -> None:
+def test_the_gap_before_an_acknowledgement_is_idle_and_itself_is_busy(
+    after_frame_ns: int, later_ns: int
+) -> None:
     scene = Scene(0, 0, 3)
     asks_ns = FIRST + FRAME + after_frame_ns
     scene.send(NODE)
     scene.send(OTHER, at_ns=asks_ns)
     lines = scene.run()
-    assert lines[EventKind.LOSS] == []
+    assert bool(lines[EventKind.LOSS]) == (after_frame_ns < TURN)
     assert lines[EventKind.AIR][1] == (asks_ns + later_ns + FIRST, OTHER, Cause.NONE)
 
 
 def test_retries_end_after_four_frames() -> None:
-    scene = Scene(*[0] * 8)
-    scene.send(NODE)
-    scene.send(OTHER)
-    lines = scene.run()
+    scene = Scene()
     period = FIRST + FRAME + ACK_WAIT
-    frames = [(turn * period + FIRST, node, Cause.NONE) for turn in range(4) for node in (NODE, OTHER)]
+    frames = [(turn * period + FIRST, NODE, Cause.NONE) for turn in range(4)]
+    for t_ns, _, _ in frames:
+        scene.jam(t_ns - 1, 2)  # the receiver stays with what came first
+    scene.send(NODE)
+    lines = scene.run()
     assert lines[EventKind.AIR] == frames
-    assert lines[EventKind.LOSS] == [(t + FRAME, node, Cause.COLLISION) for t, node, _ in frames]
-    assert scene.deliveries == [(4 * period, Delivery(False, Cause.RETRIES, 4))] * 2
+    assert lines[EventKind.LOSS] == [(t_ns + FRAME, NODE, Cause.COLLISION) for t_ns, _, _ in frames]
+    assert scene.deliveries == [(4 * period, Delivery(False, Cause.RETRIES, 4))]
     assert scene.received == []
 
 
 def test_a_frame_whose_acknowledgement_is_lost_is_sent_again_and_delivered_once() -> None:
     scene = Scene(0, 3)
-    scene.jam(FIRST + FRAME + TURN + ACK - 1, 1)
+    scene.jam(FIRST + FRAME + TURN - 1, 2)
     scene.send(NODE)
     lines = scene.run()
     again = FIRST + FRAME + ACK_WAIT + 3 * SLOT + FIRST
@@ -212,7 +214,7 @@ def test_a_packet_that_arrived_but_was_never_acknowledged_is_told_apart() -> Non
     scene = Scene()
     period = FIRST + FRAME + ACK_WAIT
     for turn in range(4):
-        scene.jam(turn * period + FIRST + FRAME + TURN, 1)
+        scene.jam(turn * period + FIRST + FRAME + TURN - 1, 2)
     scene.send(NODE)
     lines = scene.run()
     assert scene.deliveries == [(4 * period, Delivery(False, Cause.ACK_LOST, 4))]
@@ -249,7 +251,7 @@ def test_a_node_that_is_down_neither_sends_nor_receives() -> None:
 
 def test_without_acknowledgements_the_sender_does_not_know_of_a_loss() -> None:
     scene = Scene(ack=False)
-    scene.jam(FIRST + FRAME - 1, 1)
+    scene.jam(FIRST - 1, 2)
     scene.send(NODE, count=2)
     lines = scene.run()
     again = FIRST + FRAME + LIFS + FIRST
@@ -291,11 +293,12 @@ def test_closed_form_of_the_thesis_link() -> None:
 
 @pytest.mark.parametrize(
     ("count", "kbps", "delivered"),
-    [(1, 135.0, 1.00), (2, 134.5, 0.88), (3, 134.6, 0.75), (4, 133.5, 0.64), (5, 130.8, 0.55)],
+    [(1, 136.1, 1.00), (2, 138.7, 0.88), (3, 140.8, 0.75), (4, 141.1, 0.64), (5, 139.1, 0.55)],
 )
-def test_saturated_nodes_share_the_channel_as_measured(count: int, kbps: float, delivered: float) -> None:
+def test_saturated_nodes_share_the_channel_as_in_ns3(count: int, kbps: float, delivered: float) -> None:
+    """Rates by ns-3 3.44 (tests/benchmarks/ns3_saturation.py), shares of delivered packets by SPEC 6.1."""
     result = saturation(NetworkConfig(), count, 60.0, seed=2)
-    assert result.throughput_bps / 1000 == pytest.approx(kbps, rel=0.05)
+    assert result.throughput_bps / 1000 == pytest.approx(kbps, rel=0.02)
     assert result.delivery_ratio == pytest.approx(delivered, abs=0.05)
     fair = sum(result.packets_by_node) / count
     assert max(result.packets_by_node) < 1.15 * fair

@@ -71,6 +71,28 @@ def test_the_stronger_frame_is_captured_from_ten_decibels_on(far_m: float, first
     assert it.run() == {(0, first): near, (2, 50 - first): Cause.COLLISION}
 
 
+def test_spread_frames_are_lost_when_the_receiver_has_an_earlier_one() -> None:
+    survived = 0
+    for later_us in range(1, 400):
+        it = scene(0, 20, 40)
+        it.medium._rng = np.random.default_rng(later_us)
+        it.frame(0, 4000, 0, 1, size_bytes=125, modulation="oqpsk")
+        it.frame(later_us, 4000, 2, 1, size_bytes=125, modulation="oqpsk")
+        outcomes = it.run()
+        assert outcomes[2, later_us] == Cause.COLLISION
+        survived += outcomes[0, 0] == Cause.NONE
+    # IEEE 802.15.4-2006, E.4.1.8: at 0 dB nearly all of 1000 overlapped bits are right five times of six.
+    assert survived / 399 == pytest.approx(0.84, abs=0.06)
+
+
+def test_a_spread_frame_survives_a_weaker_one_and_not_a_stronger_one() -> None:
+    for x_m, expected in ((60.0, Cause.NONE), (22.0, Cause.COLLISION)):
+        it = scene(0, 20, x_m)
+        it.frame(0, 4000, 0, 1, size_bytes=125, modulation="oqpsk")
+        it.frame(100, 4000, 2, 1, size_bytes=125, modulation="oqpsk")
+        assert it.run()[0, 0] == expected
+
+
 @pytest.mark.parametrize(
     ("second_us", "expected"), [(60, Cause.NONE), (50, Cause.NONE), (49, Cause.COLLISION)]
 )
