@@ -13,15 +13,18 @@ from network_sim.config import NetworkConfig
 from network_sim.conservation import check
 from network_sim.mac import Mac, make_mac
 from network_sim.mac.medium import Medium
+from network_sim.mobility import StreetPlaces
 from network_sim.places import Places
 from network_sim.radio import Radio
-from network_sim.street import start_street
+from network_sim.street import start_street, street_places
 from network_sim.trace import NetworkTrace, Recorder
 from network_sim.types import Packet, to_ns
 from pipeline.progress import Progress
 
 REPORTS = 100
 """Reports of progress in a run."""
+STREET_STREAMS = 4
+"""Independent uses of chance on a street grid; the first is the street's own."""
 
 
 def simulate(config: NetworkConfig) -> NetworkTrace:
@@ -69,7 +72,7 @@ def _collect(
 def _drive(
     env: simpy.Environment, config: NetworkConfig, rng: np.random.Generator
 ) -> Generator[Progress, None, NetworkTrace]:
-    street_rng, radio_rng, medium_rng, mac_rng = rng.spawn(4)
+    street_rng, radio_rng, medium_rng, mac_rng = rng.spawn(STREET_STREAMS)
     recorder = _recorder(config, config.street.vehicles + config.street.access_points)
 
     def mac(places: Places, up: Callable[[int], bool], receive: Callable[[Packet, int], None]) -> Mac:
@@ -81,6 +84,11 @@ def _drive(
         yield Progress("street grid", share)
     street.finish()
     return recorder.trace(config, street.names, None, int(env.now), street.roles)
+
+
+def street_of(config: NetworkConfig) -> StreetPlaces:
+    """Where everybody is at any time in the street-grid run of this config, without running it."""
+    return street_places(config, np.random.default_rng(config.run.seed).spawn(STREET_STREAMS)[0])
 
 
 def _recorder(config: NetworkConfig, nodes: int) -> Recorder:

@@ -56,6 +56,12 @@ def start_street(
     return street
 
 
+def street_places(config: NetworkConfig, rng: np.random.Generator) -> StreetPlaces:
+    """Where everybody is at any time, if ``start_street`` is given such an ``rng``."""
+    routes = drive(config.street, config.run.horizon_s, rng.spawn(3)[0])
+    return StreetPlaces(routes, access_points_m(config.street))
+
+
 class Street:
     """Vehicles 0 to V - 1, access points V to V + A - 1, and the collector that the latter are wired to."""
 

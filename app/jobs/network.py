@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from app.jobs.network_records import MetricRow, NetworkView, NetworkWish, Pieces, Series, What
 from app.jobs.store import Store
 from network_sim.metrics import CAMERA_ROLES, metrics
-from network_sim.mobility import StreetPlaces, access_points_m, drive
-from network_sim.simulate import iterate_simulation
+from network_sim.simulate import iterate_simulation, street_of
 from network_sim.states import State
 from network_sim.trace import Events, NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns
@@ -237,11 +236,7 @@ def _tracks(trace: NetworkTrace) -> tuple[FloatArray, NDArray[np.float32]]:
     if trace.positions_m is not None:
         return np.zeros(1), trace.positions_m[None].astype(np.float32)
     config = trace.config
-    # The same streams as the run's own, so that the same vehicles drive the same ways.
-    street_rng = np.random.default_rng(config.run.seed).spawn(4)[0]
-    places = StreetPlaces(
-        drive(config.street, config.run.horizon_s, street_rng.spawn(3)[0]), access_points_m(config.street)
-    )
+    places = street_of(config)
     track_s = np.arange(config.run.warmup_s, trace.horizon_ns / NS_PER_S + TRACK_S, TRACK_S)
     track_s = np.minimum(track_s, trace.horizon_ns / NS_PER_S)
     tracks_m = np.array(

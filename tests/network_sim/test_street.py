@@ -14,7 +14,7 @@ import pytest
 from network_sim.config import MacConfig, NetworkConfig, RadioConfig, RunConfig, SchemeConfig, StreetConfig
 from network_sim.conservation import balance, check
 from network_sim.metrics import metrics
-from network_sim.simulate import simulate
+from network_sim.simulate import simulate, street_of
 from network_sim.trace import NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns
 
@@ -230,3 +230,15 @@ def test_over_contending_radios_nothing_is_lost_without_a_trace(name: str) -> No
     sums = balance(trace)
     assert sums.received > 0.99 * sums.created
     assert metrics(trace)["coverage"].value > 0.3
+
+
+def test_the_places_of_a_run_are_known_without_running_it() -> None:
+    config = _config("baseline", 6, keep="images", horizon_s=600.0, warmup_s=0.0)
+    places = street_of(config)
+    joined = simulate(config).events.of(EventKind.JOIN, EventKind.LEAVE)
+    joined = joined.where((joined.t_ns > 0) & (joined.t_ns < to_ns(600.0)))
+    assert len(joined) > 10
+    for node, peer, t_ns in zip(
+        joined.node.tolist(), joined.peer.tolist(), joined.t_ns.tolist(), strict=True
+    ):
+        assert places.distance_m(node, peer, t_ns) == pytest.approx(config.radio.range_m, abs=1e-3)
