@@ -7,6 +7,7 @@ With ``--json`` exactly one JSON object goes to stdout; everything else goes to 
 from __future__ import annotations
 
 import logging
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -328,8 +329,12 @@ def main(argv: list[str] | None = None) -> None:
             args=argv,
             config=(tyro.conf.FlagCreatePairsOff,),
         )
+        sys.stdout.flush()
     except PacketMeshError as error:
         say(f"packetmesh: {error}")
+        sys.exit(1)
+    except BrokenPipeError:  # whoever read the output has gone, and wants no more of it
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except KeyboardInterrupt:
         say("packetmesh: stopped")

@@ -17,8 +17,9 @@ def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
     body = (
         "<h1>The thesis, computed anew</h1>"
         f'<p class="lead">{reproduced} of {len(verdicts)} claims reproduced.</p>'
-        '<p class="note">Shares run from 0 to 1, lengths are in metres; intervals are 95 % bootstrap '
-        "intervals of the mean over frames, or of the median over rooms.</p>"
+        '<p class="note">Shares run from 0 to 1, lengths are in metres; intervals are 95 %: by '
+        "bootstrap, of the mean over frames or of the median over rooms, and by Student's t over independent "
+        "runs of the network.</p>"
     )
     write_page(path, "PacketMesh: the thesis, computed anew", body + "".join(map(_section, verdicts)))
 

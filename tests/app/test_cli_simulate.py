@@ -1,6 +1,8 @@
 """``packetmesh simulate`` as a user meets it."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -145,3 +147,10 @@ def test_a_full_disk_is_one_sentence(capsys, tmp_path, monkeypatch):
     assert out == ""
     assert "No space left" in err.splitlines()[-1]
     assert not list(tmp_path.iterdir())
+
+
+def test_a_reader_who_goes_away_is_no_error():
+    command = f"{sys.executable} -m app.cli simulate --describe | head -1"
+    answer = subprocess.run(command, shell=True, capture_output=True, text=True)
+    assert answer.stdout.count("\n") == 1
+    assert answer.stderr == ""
