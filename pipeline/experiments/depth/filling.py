@@ -14,12 +14,13 @@ from pipeline.depth import DepthNetwork, align_depth
 from pipeline.depth.trust import judge
 from pipeline.experiments.depth.hidden import hide
 from pipeline.experiments.depth.peers import PEERS
-from pipeline.experiments.depth.scenes import load_real, real_folders
-from pipeline.scenes import DEMO_SCENES, load_demo
+from pipeline.experiments.depth.scenes import demo_scenes, held_out_scenes, load_real, real_folders
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 OURS = "packetmesh"
 HIDDEN_SHARE = 0.15
+REAL_DRAWS = 10
+"""How often another part of each real frame is hidden: there are few of them."""
 CLOSE = 0.05
 Filler = Callable[[DepthMap, ByteArray], DepthMap]
 
@@ -62,27 +63,27 @@ class Filling:
 
 
 def hidden_cases(seed: int = 0) -> Iterator[HoleCase]:
-    """Every demo node and real frame with a part of the sensor's depth hidden, judged by that very depth.
+    """Every image of rooms, demo scenes and real frames with a part of the sensor's depth hidden.
 
-    Demo nodes come a second time with nothing hidden: their sensor's own holes, judged by the truth.
+    That very depth judges. Where the truth is known the images come a second time with nothing hidden: their
+    sensor's own holes, judged by the truth.
     """
-    rng = np.random.default_rng(seed)
-    for name in DEMO_SCENES:
-        rig = load_demo(name)
-        assert rig.truth is not None
-        for frame, truth in zip(rig.frames, rig.truth.depth, strict=True):
-            place = f"{name}/{frame.name}"
-            yield hidden_case(place, "demo scenes, hidden", frame.rgb, frame.depth, rng)
-            hole = truth.valid & ~frame.depth.valid
-            yield HoleCase(place, "demo scenes, own holes", frame.rgb, frame.depth, hole, truth.z_m)
+    for site in (*held_out_scenes(), *demo_scenes()):
+        for number, example in enumerate(site.examples()):
+            place, sensor = f"{site.name}/{number}", example.sensor
+            yield hidden_case(place, f"{site.group}, hidden", example.rgb, sensor, seed)
+            hole = np.isfinite(example.truth_m) & ~sensor.valid
+            yield HoleCase(place, f"{site.group}, own holes", example.rgb, sensor, hole, example.truth_m)
     for folder in real_folders():
         frame = load_real(folder)
-        yield hidden_case(frame.name, "real frames, hidden", frame.rgb, frame.depth, rng)
+        for draw in range(REAL_DRAWS):
+            place = f"{frame.name}/{draw}"
+            yield hidden_case(place, "real frames, hidden", frame.rgb, frame.depth, seed)
 
 
-def hidden_case(name: str, group: str, rgb: ByteArray, depth: DepthMap, rng: np.random.Generator) -> HoleCase:
-    """An image without a part of its sensor depth."""
-    hole = hide(depth, rng, HIDDEN_SHARE)
+def hidden_case(name: str, group: str, rgb: ByteArray, depth: DepthMap, seed: int) -> HoleCase:
+    """An image without a part of its sensor depth, which part is drawn from the seed and the name."""
+    hole = hide(depth, np.random.default_rng([seed, *name.encode()]), HIDDEN_SHARE)
     left = DepthMap(np.where(hole, np.float32(np.nan), depth.z_m))
     return HoleCase(name, group, rgb, left, hole, depth.z_m)
 
@@ -148,5 +149,5 @@ def group_fillings(
 
 
 def fillings(network: DepthNetwork) -> tuple[Filling, ...]:
-    """Ours and every peer on the demo scenes and the real frames there are, in one run."""
+    """Ours and every peer on held-out rooms, the demo scenes and the real frames there are, in one run."""
     return compare_fillings(hidden_cases(), {OURS: our_filling(network), **PEERS})

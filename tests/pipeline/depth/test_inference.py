@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.depth import DepthNetwork, align_depth, depth_errors
 from pipeline.depth.inference import SHIPPED_MODEL
-from pipeline.depth.preprocessing import centre_crop, fitted, normalised_input, unpad
+from pipeline.depth.preprocessing import centre_crop, fitted, normalised_input, padded, unpad
 from pipeline.errors import InputError
 from pipeline.scenes import DEMO_SCENES, load_demo
 
@@ -51,8 +51,9 @@ def test_the_shipped_network_is_fed_and_read_as_it_was_trained_to_the_bit(networ
     rgb = _image(height_px, width_px)
     small = fitted(rgb)
     session = onnxruntime.InferenceSession(str(SHIPPED_MODEL), providers=[network.provider])
-    (padded,) = session.run(None, {"rgb": normalised_input(small)})
-    logarithm = cv2.resize(np.log(unpad(padded[0, 0], *small.shape[:2])), (width_px, height_px))
+    image = padded(small, 320, 256).astype(np.float32).transpose(2, 0, 1)[None]
+    (answer,) = session.run(None, {"rgb": np.ascontiguousarray(image)})
+    logarithm = cv2.resize(np.log(unpad(answer[0, 0], *small.shape[:2])), (width_px, height_px))
     np.testing.assert_array_equal(network.infer(rgb).z_m, np.exp(logarithm))
 
 

@@ -91,7 +91,7 @@ def test_groups_are_told_apart_and_programs_see_no_hidden_depth():
 
 def test_a_hidden_case_hides_depth_and_nothing_else():
     frame = load_demo("box-on-table").frames[0]
-    hidden = hidden_case("x", "g", frame.rgb, frame.depth, np.random.default_rng(1))
+    hidden = hidden_case("x", "g", frame.rgb, frame.depth, 1)
     assert frame.depth.valid[hidden.hole].all()
     assert hidden.hole.sum() == pytest.approx(HIDDEN_SHARE * frame.depth.valid.sum(), rel=0.2)
     np.testing.assert_array_equal(hidden.sensor.valid, frame.depth.valid & ~hidden.hole)
@@ -99,7 +99,7 @@ def test_a_hidden_case_hides_depth_and_nothing_else():
     np.testing.assert_array_equal(hidden.sensor.z_m[kept], frame.depth.z_m[kept])
 
 
-def test_demo_nodes_come_with_hidden_depth_and_with_their_own_holes():
+def test_rooms_come_with_hidden_depth_and_with_their_own_holes():
     cases = hidden_cases()
     hidden, own = next(cases), next(cases)
     assert hidden.name == own.name
@@ -111,7 +111,7 @@ def test_demo_nodes_come_with_hidden_depth_and_with_their_own_holes():
 
 def test_ours_and_every_peer_fill_a_demo_frame():
     frame = load_demo("box-on-table").frames[1]
-    hidden = hidden_case("x", "g", frame.rgb, frame.depth, np.random.default_rng(1))
+    hidden = hidden_case("x", "g", frame.rgb, frame.depth, 1)
     runs = compare_fillings(iter([hidden]), {OURS: our_filling(DepthNetwork()), **PEERS})
     told = {run.program: run for run in runs}
     assert set(told) == {OURS, *PEERS}
