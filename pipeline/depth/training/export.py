@@ -51,8 +51,8 @@ CONVENTION = Convention(
     resize="fit",
     fit_px=(WIDTH_PX, HEIGHT_PX),
 )
-"""What an exported file takes and gives: 8-bit values as they are, and metres that hold only up to a scale, which
-a picture does not tell."""
+"""What an exported file takes and gives: 8-bit values as they are, and metres that hold only up to a scale,
+which a picture does not tell."""
 INTEGER_LAYERS = ("/encoder/pool/", "/encoder/stages.", "/decoder/")
 FLOAT_LAYERS = ("/decoder/reduce.4/", "/decoder/join.4/", "/decoder/heads.3/")
 """All else stays in floating point too: the input and the first convolution, and from the head's logit on to
