@@ -211,7 +211,7 @@ def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, fo
     look, text = stop_named("Why holes stay: noise")
     noisy = clouds(room.rig, room.nodes, room.poses, look.smoothing_passes)
     torn = noisy.roll(look, noisy.fused)
-    assert 1.4 < missed(torn) / missed(four_balls) < 1.6
+    assert 1.4 < missed(torn) / missed(four_balls) < 1.65
     assert f"**Half as many rays again miss** ({percent(missed(torn))})" in text
     assert 1.9 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 2.3
     old_normals = room.roll(look, replace(room.fused, normals=noisy.fused.normals))
