@@ -16,6 +16,7 @@ from network_sim.places import FixedPlaces
 from network_sim.radio import Radio
 from network_sim.trace import Recorder
 from network_sim.types import Cause, Delivery, EventKind, Packet, PacketKind
+from tests.network_sim.dealt import Dealt
 
 US = 1000
 SLOT = 20 * US
@@ -32,18 +33,6 @@ A, B, C, D, SINK = range(5)
 TOGETHER_M = ((20, 0), (0, 20), (-20, 0), (0, -20), (0, 0))
 HIDDEN_M = ((90, 0), (-90, 0), (0, 50), (0, -50), (0, 0))
 """With a carrier sense of 110 m, A and B sense only the others."""
-
-
-class Dealt(np.random.Generator):
-    """Deals the given backoffs first, then zeros."""
-
-    def __init__(self, *slots: int) -> None:
-        super().__init__(np.random.PCG64(0))
-        self._slots = list(slots)
-
-    def integers(self, *_: Any, size: int = 1, **__: Any) -> np.ndarray:
-        dealt, self._slots = self._slots, []
-        return np.array(dealt + [0] * size)
 
 
 class Scene:

@@ -18,6 +18,7 @@ from network_sim.places import FixedPlaces
 from network_sim.radio import Radio
 from network_sim.trace import Recorder
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet, PacketKind
+from tests.network_sim.dealt import Dealt
 
 US = 1000
 SLOT = 320 * US
@@ -32,18 +33,6 @@ FIRST = CCA + TURN
 """When a node without backoff starts to send."""
 SINK, NODE, OTHER = 0, 1, 2
 AROUND_M = [[0.0, 0.0], [20.0, 0.0], [0.0, 20.0], [-20.0, 0.0], [0.0, -20.0], [14.0, 14.0]]
-
-
-class Dealt(np.random.Generator):
-    """Deals the given backoffs first, then zeros."""
-
-    def __init__(self, *slots: int) -> None:
-        super().__init__(np.random.PCG64(0))
-        self._slots = list(slots)
-
-    def integers(self, *_: Any, size: int = 1, **__: Any) -> np.ndarray:
-        dealt, self._slots = self._slots, []
-        return np.array(dealt + [0] * size)
 
 
 class Scene:
