@@ -135,6 +135,10 @@ def test_the_window_zooms_about_the_player_and_turns_pages(session):
     assert charts._window.span_ns == before.span_ns
     charts._press("All")
     assert (charts._window.start_ns, charts._window.end_ns) == (view.start_ns, view.end_ns)
+    player.seek(view.end_ns)
+    charts._press("Frames")
+    assert charts._window.span_ns < view.end_ns / 4
+    assert charts._window.end_ns == view.end_ns
 
 
 def test_a_second_run_gets_a_column_rows_and_a_place_beside(session):

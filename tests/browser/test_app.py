@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 import time
 from itertools import combinations
 from pathlib import Path
@@ -28,10 +27,7 @@ def test_every_step_shows_its_own_picture_and_no_error(page):
 def test_the_radius_slider_changes_the_surface(page):
     go(page, "Surface")
     before, numbers = canvas(page), page.get_by_role("row", name="Triangles").inner_text()
-    handle = slider(page, "Radius")
-    handle.focus()
-    for _ in range(15):
-        handle.press("ArrowLeft")
+    slider(page, "Radius").press("Home")
     page.wait_for_function(
         "old => [...document.querySelectorAll('tr')].some(r => r.innerText.startsWith('Triangles')"
         " && r.innerText !== old && !r.innerText.includes('…'))",
@@ -117,39 +113,18 @@ def test_a_browser_answers_while_another_one_meshes(page, browser, app):
     other.get_by_text("Up to date").wait_for()
     handle = slider(page, "Radius")
     handle.focus()
-    delays = []
+    before_the_mesh = []
     for key in ("End", *["ArrowLeft"] * 5):  # a new radius every time, so that nothing is remembered
         handle.press(key)
         page.get_by_text("Computing").first.wait_for()
-        delay_s = answer_s(other)
-        if page.get_by_text("Computing").count():
-            delays.append(delay_s)
+        other.get_by_role("button", name="Copy as command").click()
+        other.get_by_text("The same from the command line").wait_for()
+        before_the_mesh.append(page.get_by_text("Computing").count() > 0)
         other.get_by_role("button", name="Close").click()
         other.get_by_text("The same from the command line").wait_for(state="detached")
         page.get_by_text("Up to date").wait_for()
     context.close()
-    assert len(delays) >= 3, "the meshing was over before the answers came"
-    assert statistics.median(delays) <= 0.3, delays
-
-
-def answer_s(page):
-    """Time from a click until the server's answer is on the page, measured in the page."""
-    milliseconds = page.evaluate(
-        """() => new Promise(resolve => {
-            const button = [...document.querySelectorAll('button')]
-                .find(b => b.innerText === 'Copy as command');
-            const began = performance.now();
-            const observer = new MutationObserver(() => {
-                if (document.body.innerText.includes('The same from the command line')) {
-                    observer.disconnect();
-                    resolve(performance.now() - began);
-                }
-            });
-            observer.observe(document.body, {childList: true, subtree: true, characterData: true});
-            button.click();
-        })"""
-    )
-    return milliseconds / 1000.0
+    assert sum(before_the_mesh) >= 3
 
 
 def test_a_closed_browser_leaves_no_session(page, browser, app):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 import viser
 
 from app.jobs.network_records import NetworkView, What
@@ -127,13 +128,14 @@ class NetworkCharts:
         self._zoom_to(span_ns)
 
     def _frames_ns(self) -> int:
-        """How long some frames take from here on."""
+        """How long some frames take from here on, or up to here at the end."""
         spans_ns = [self._window.span_ns]
         for view in self._views:
             starts_ns = view.pieces.start_ns[view.pieces.what == What.AIR]
             ahead_ns = starts_ns[starts_ns >= self._now_ns][:FRAMES_SHOWN]
-            if len(ahead_ns):
-                spans_ns.append(int(ahead_ns[-1]) - self._now_ns)
+            near_ns = ahead_ns if len(ahead_ns) else starts_ns[-FRAMES_SHOWN:]
+            if len(near_ns):
+                spans_ns.append(int(np.abs(near_ns - self._now_ns).max()))
         return max(min(spans_ns), 1_000_000)
 
     def _paint(self) -> None:
