@@ -50,11 +50,11 @@ def test_frames_are_stepped_played_and_scrubbed(network):
 
 def test_the_timeline_tells_causes_and_zooms(network):
     press(network, "All")
-    network.get_by_text(re.compile(r"Window \(\d+ s\)")).wait_for()
+    network.get_by_text(re.compile(r"Span \(\d+ s\)")).wait_for()
     expect(network.get_by_alt_text("timeline")).to_have_count(1)
     expect(network.locator("svg rect title", has_text="collision")).not_to_have_count(0)
     press(network, "Frames")  # the last ones, as the player stands at the end
-    network.get_by_text(re.compile(r"Window \(\d+ ms\)")).wait_for()
+    network.get_by_text(re.compile(r"Span \(\d+ ms\)")).wait_for()
     assert network.locator(".packetmesh-now").count() == 1
 
 

@@ -40,14 +40,15 @@ class NetworkCharts:
         self._labels = gui.add_html("")
         self._changed = changed
 
-    def add_timeline(self, gui: viser.GuiApi, post: Callable[..., None]) -> None:
-        """Add the rows of nodes and what moves their window."""
+    def add_timeline(self, gui: viser.GuiApi, post: Callable[..., None], seek: Callable[[int], None]) -> None:
+        """Add the rows of nodes and what moves their window; ``seek`` moves the player to a time in ns."""
+        self._seek = seek
         self._views: Sequence[NetworkView] = ()
         self._whole = self._window = Window(0, 1_000_000_000)
         self._now_ns = 0
         self._painted: Window | None = None
         self._zoom = gui.add_slider(
-            "Window (s)",
+            "Span (s)",
             NARROWEST,
             0.0,
             0.05,
@@ -58,7 +59,7 @@ class NetworkCharts:
         keys = gui.add_button_group(
             "Timeline",
             (EARLIER, LATER, FRAMES, ALL),
-            hint=f"Move the window; show about {FRAMES_SHOWN} frames, or everything.",
+            hint=f"Move the window; go to the next {FRAMES_SHOWN} frames; show everything.",
         )
         keys.on_click(lambda event: post(self._press, event.target.value))
         self._rows = [gui.add_html("") for _ in range(4)]
@@ -121,28 +122,32 @@ class NetworkCharts:
         if key in (EARLIER, LATER):
             step_ns = round(0.8 * window.span_ns)
             self._look(window.start_ns + (step_ns if key == LATER else -step_ns), window.span_ns)
-            self._paint()
-            return
-        span_ns = self._whole.span_ns if key == ALL else self._frames_ns()
-        self._zoom.value = round(min(max(math.log10(span_ns / 1e9), NARROWEST), self._zoom.max), 2)
-        self._zoom_to(span_ns)
+        elif key == ALL:
+            self._window = self._whole
+        else:
+            first_ns, last_ns = self._next_frames_ns()
+            self._seek(first_ns)
+            span_ns = max(round(1.2 * (last_ns - first_ns)), 1_000_000)
+            self._look(first_ns - span_ns // 10, span_ns)
+        span_s = self._window.span_ns / 1e9
+        self._zoom.value = round(min(max(math.log10(span_s), NARROWEST), self._zoom.max), 2)
+        self._paint()
 
-    def _frames_ns(self) -> int:
-        """How long some frames take from here on, or up to here at the end."""
-        spans_ns = [self._window.span_ns]
-        for view in self._views:
-            starts_ns = view.pieces.start_ns[view.pieces.what == What.AIR]
-            ahead_ns = starts_ns[starts_ns >= self._now_ns][:FRAMES_SHOWN]
-            near_ns = ahead_ns if len(ahead_ns) else starts_ns[-FRAMES_SHOWN:]
-            if len(near_ns):
-                spans_ns.append(int(np.abs(near_ns - self._now_ns).max()))
-        return max(min(spans_ns), 1_000_000)
+    def _next_frames_ns(self) -> tuple[int, int]:
+        """When the next frames begin, the first and the last of them; at the end, those before it."""
+        starts_ns = np.sort(
+            np.concatenate([view.pieces.start_ns[view.pieces.what == What.AIR] for view in self._views])
+        )
+        if not len(starts_ns):
+            return self._now_ns, self._now_ns
+        first = min(int(np.searchsorted(starts_ns, self._now_ns)), max(len(starts_ns) - FRAMES_SHOWN, 0))
+        return int(starts_ns[first]), int(starts_ns[first : first + FRAMES_SHOWN][-1])
 
     def _paint(self) -> None:
         """Paint the rows if the window has moved, and the player's place."""
         several = len(self._views) > 1
         anew, self._painted = self._painted != self._window, self._window
-        self._zoom.label = f"Window ({short_time(self._window.span_ns / 1e9)})"
+        self._zoom.label = f"Span ({short_time(self._window.span_ns / 1e9)})"
         for index, view in enumerate(self._views):
             rows, cursor = self._rows[2 * index : 2 * index + 2]
             if anew:

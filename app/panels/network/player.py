@@ -58,7 +58,7 @@ class NetworkPlayer:
         self._scrub = gui.add_slider("Time (s)", 0.0, 1.0, 0.001, 0.0, hint="Drag to any simulated time.")
         changed(self._scrub, lambda: self.seek(round(self._scrub.value * 1e9)))
         self._speed = gui.add_slider(
-            "Speed (s/s)",
+            "Speed (×1)",
             SLOWEST,
             FASTEST,
             0.05,
@@ -122,7 +122,7 @@ class NetworkPlayer:
 
     def _hurry(self) -> None:
         self._timeline.speed = self.speed * 1e9 / STEP_NS
-        self._speed.label = f"Speed ({short_time(self.speed)}/s)"
+        self._speed.label = f"Speed (×{self.speed:.3g})"
 
     def _tick(self) -> None:
         self._timeline.tick()
@@ -135,4 +135,6 @@ class NetworkPlayer:
 
 def short_time(time_s: float) -> str:
     """A length of time in a label."""
+    if time_s >= 100.0:
+        return f"{time_s:.0f} s"
     return f"{time_s:.3g} s" if time_s >= 1.0 else f"{1000.0 * time_s:.3g} ms"
