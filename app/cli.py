@@ -264,6 +264,8 @@ def bench(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
     for case, result in run_benchmarks(only, CASES | NETWORK_CASES):
         peers = ", ".join(f"{name} {seconds:.3f} s" for name, seconds in result.peers.items()) or "no peer"
         say(f"{case}: {result.ours_s:.3f} s ({peers}), {result.peak_memory_bytes / 1e6:.0f} MB at most")
+        for note in result.notes:
+            say(f"  {note}")
         results[case] = result.record()
     write_json(out / "bench.json", results)
     if json:

@@ -44,6 +44,8 @@ class Saturation:
     """Attempts that failed, by cause."""
     packets_by_node: tuple[int, ...]
     """How many of each node's packets reached it."""
+    kernel_events: int
+    """Events of the simulation's kernel, warm-up included."""
 
 
 def saturation(
@@ -85,7 +87,8 @@ def saturation(
     env.run(until=horizon_ns)
     names, roles = tuple(map(str, range(nodes + 1))), (*["node"] * nodes, "sink")
     trace = recorder.trace(config, names, None, horizon_ns, roles)
-    return _summary(config, trace.counters, tallies)
+    kernel_events = next(env._eid)  # SimPy numbers the events that it schedules
+    return _summary(config, trace.counters, tallies, kernel_events)
 
 
 @dataclass(slots=True)
@@ -96,7 +99,9 @@ class _Tally:
     arrived: int = 0
 
 
-def _summary(config: NetworkConfig, counters: Counters, tallies: list[_Tally]) -> Saturation:
+def _summary(
+    config: NetworkConfig, counters: Counters, tallies: list[_Tally], kernel_events: int
+) -> Saturation:
     """What was counted after the warm-up."""
     events = counters.count[counters.warmup_minutes :].sum(axis=(0, 2))
     lost = events[EventKind.LOSS]
@@ -110,6 +115,7 @@ def _summary(config: NetworkConfig, counters: Counters, tallies: list[_Tally]) -
         attempts=int(events[EventKind.AIR].sum()),
         losses={cause: int(lost[cause]) for cause in Cause if lost[cause]},
         packets_by_node=tuple(tally.arrived for tally in tallies),
+        kernel_events=kernel_events,
     )
 
 

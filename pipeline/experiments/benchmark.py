@@ -22,6 +22,8 @@ class Benchmark:
     """How wrong the answers are, ours and the peers', where the truth is known."""
     runs: tuple[dict[str, Any], ...] = ()
     """Every single measurement, with what the case alone measures."""
+    notes: tuple[str, ...] = ()
+    """What to tell people below the times."""
 
     def record(self) -> dict[str, Any]:
         """Plain values; ``ratio`` is our time over the fastest peer's, ``ratios`` over every one's."""

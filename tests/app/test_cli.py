@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from app.cli import main
+from pipeline.experiments import benchmarks
+from pipeline.experiments.benchmark import Benchmark
 from pipeline.io import read_cloud, read_mesh
 from pipeline.scenes import DEMO_SCENES
 from tests.paths import ASSETS
@@ -132,6 +134,15 @@ def test_wrong_use_is_one_sentence_and_leaves_nothing_behind(capsys, tmp_path, a
     assert err.count("\n") == 1
     assert names in err
     assert not out_folder.exists() or not list(out_folder.iterdir())
+
+
+def test_bench_tells_the_notes_of_a_case_below_its_times(capsys, monkeypatch, tmp_path):
+    measured = Benchmark(1.5, {}, 10**7, notes=("one station", "no peer was found"))
+    monkeypatch.setattr(benchmarks, "run_benchmarks", lambda only, cases: [("network", measured)])
+    code, out, err = run(capsys, "bench", "--out", str(tmp_path), "--json")
+    assert code == 0
+    assert err == "network: 1.500 s (no peer), 10 MB at most\n  one station\n  no peer was found\n"
+    assert json.loads(out)["network"]["notes"] == list(measured.notes)
 
 
 def test_a_folder_that_cannot_be_written_is_named(capsys, tmp_path):

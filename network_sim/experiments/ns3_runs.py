@@ -1,4 +1,4 @@
-"""Saturated nodes around one sink in ns-3: what ``ns3_saturation.py`` sets beside network_sim.
+"""Saturated nodes around one sink in ns-3: what ``peer.py`` sets beside network_sim.
 
 ``python ns3_runs.py '[{"mac": "ieee802154", "nodes": 3, "payload_bytes": 116, "radius_m": 10, "seconds": 10,
 "seed": 1, "strict": false}]'`` prints JSON: what came of each run, and ns-3's own constants. It needs ns-3's
@@ -252,7 +252,7 @@ def main() -> None:
     ns.Config.SetDefault("ns3::WifiMacQueue::MaxDelay", ns.TimeValue(ns.Seconds(MAX_DELAY_S)))
     runs = [run(**scenario) for scenario in json.loads(sys.argv[1])]
     constants = {"ieee802154": constants_802154(), "ieee80211b": constants_80211b()}
-    print(json.dumps({"runs": runs, "constants": constants}))
+    json.dump({"runs": runs, "constants": constants}, sys.stdout)
 
 
 if __name__ == "__main__":
