@@ -223,16 +223,4 @@ class Book:
     def _record(
         self, kind: EventKind, packet: Packet, node: int, peer: int, cause: Cause = Cause.NONE
     ) -> None:
-        self._recorder.add(
-            int(self.env.now),
-            kind,
-            node,
-            peer,
-            packet.id,
-            packet.image,
-            packet.first_byte,
-            packet.size_bytes,
-            cause,
-            0,
-            packet.kind,
-        )
+        self._recorder.add_packet(int(self.env.now), kind, packet, node, peer, packet.size_bytes, cause)

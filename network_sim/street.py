@@ -18,7 +18,6 @@ import simpy
 
 from network_sim.config import NetworkConfig
 from network_sim.mac import Mac
-from network_sim.mac.records import record_packet
 from network_sim.mobility import (
     Contact,
     Routes,
@@ -200,12 +199,13 @@ class Street:
         whole_bytes = size_bytes + self._config.headers_bytes
         number = next(self._ids)
         packet = Packet(number, kind, source, destination, whole_bytes, now_ns, image, first_byte, size_bytes)
-        record_packet(self._recorder, now_ns, EventKind.ENQUEUE, packet, source, destination, whole_bytes)
+        record = self._recorder.add_packet
+        record(now_ns, EventKind.ENQUEUE, packet, source, destination, whole_bytes)
         delivery = yield from self._mac.send(packet, source, destination)
         if self._arrived[source] == number:
             return True
         now_ns, cause = int(self._env.now), delivery.cause
-        record_packet(self._recorder, now_ns, EventKind.DROP, packet, source, destination, whole_bytes, cause)
+        record(now_ns, EventKind.DROP, packet, source, destination, whole_bytes, cause)
         return False
 
     def _receive(self, packet: Packet, node: int) -> None:
@@ -213,7 +213,7 @@ class Street:
         now_ns = int(self._env.now)
         source, image = packet.source, packet.image
         self._arrived[source] = packet.id
-        record_packet(self._recorder, now_ns, EventKind.RECEIVE, packet, source, node, packet.size_bytes)
+        self._recorder.add_packet(now_ns, EventKind.RECEIVE, packet, source, node, packet.size_bytes)
         # Fragments go in order, and none after one that did not arrive: the last completes its image.
         if image >= 0 and packet.first_byte + packet.byte_count == self._config.image_bytes:
             self._snapshots.arrived[image] = True

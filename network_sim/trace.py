@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from network_sim.config import Keep, NetworkConfig
 from network_sim.counters import Counters, Tally
-from network_sim.types import Cause, EventKind, PacketKind, to_ns
+from network_sim.types import Cause, EventKind, Packet, PacketKind, to_ns
 
 COLUMNS = (
     ("t_ns", "<i8"),
@@ -157,6 +157,26 @@ class Recorder:
         rows = self._rows
         rows += self._pack(
             t_ns, duration_ns, packet, image, first_byte, size_bytes, node, peer, kind, cause, packet_kind
+        )
+        if len(rows) >= _BLOCK_BYTES:
+            self._flush()
+
+    def add_packet(
+        self,
+        t_ns: int,
+        kind: EventKind,
+        packet: Packet,
+        node: int,
+        peer: int,
+        size_bytes: int,
+        cause: Cause = Cause.NONE,
+        duration_ns: int = 0,
+    ) -> None:
+        """Records what ``node`` did with a packet for ``peer``; ``size_bytes`` with headers if on the air."""
+        number, packet_kind, _, _, _, _, image, first_byte, _ = packet
+        rows = self._rows
+        rows += self._pack(
+            t_ns, duration_ns, number, image, first_byte, size_bytes, node, peer, kind, cause, packet_kind
         )
         if len(rows) >= _BLOCK_BYTES:
             self._flush()

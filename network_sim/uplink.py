@@ -10,7 +10,6 @@ import numpy as np
 import simpy
 
 from network_sim.config import UplinkConfig
-from network_sim.mac.records import record_packet
 from network_sim.types import NS_PER_S, Cause, EventKind, Packet, to_ns
 from pipeline.errors import InputError
 
@@ -82,14 +81,7 @@ class Uplink:
     def _record(
         self, kind: EventKind, packet: Packet, cause: Cause = Cause.NONE, duration_ns: int = 0
     ) -> None:
-        record_packet(
-            self._recorder,
-            int(self._env.now),
-            kind,
-            packet,
-            self._sink,
-            self._cloud,
-            packet.size_bytes,
-            cause,
-            duration_ns,
+        now_ns, size_bytes = int(self._env.now), packet.size_bytes
+        self._recorder.add_packet(
+            now_ns, kind, packet, self._sink, self._cloud, size_bytes, cause, duration_ns
         )

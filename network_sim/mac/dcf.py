@@ -1,22 +1,21 @@
 """IEEE 802.11b distributed coordination function at 11 Mb/s (SPEC 6.3), with or without RTS/CTS.
 
 Contention is resolved per transmission, not per slot: a station knows when its countdown would end, and a
-busy channel freezes what is left of it. One timer runs for the countdown that ends first; a timer that has
-been overtaken does nothing. An answer is put on the air when the frame that it answers ends, to start a SIFS
-later: the channel does not become idle between them, so that nobody has to be told twice.
+busy channel freezes what is left of it. One timer runs for the countdown that ends first, an overtaken one
+does nothing, and a countdown that nothing can disturb is not waited for. An answer is put on the air when the
+frame that it answers ends, to start a SIFS later: nobody is told that the channel is idle between them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
-from functools import partial
+from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import simpy
 
 from network_sim.config import NetworkConfig
-from network_sim.mac.records import record_packet
+from network_sim.mac.draws import numbers_below
 from network_sim.types import Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:
@@ -49,7 +48,6 @@ ATTEMPTS = 7
 """Frames, or RTS, for a packet before it is given up."""
 
 _NEVER = 2**62
-_BLOCK = 4096
 
 
 def data_ns(size_bytes: int) -> int:
@@ -74,6 +72,7 @@ class _Station:
         "_leave",
         "answer_ns",
         "arrived",
+        "begins_ns",
         "event",
         "free_ns",
         "from_ns",
@@ -102,6 +101,8 @@ class _Station:
         """Succeeds when it may send; None without a packet."""
         self.slots = 0
         """Left to count."""
+        self.begins_ns = 0
+        """When its next frame begins, once that is certain."""
         self.from_ns = _NEVER
         """From when it counts; never while frozen."""
         self.free_ns = 0
@@ -185,7 +186,7 @@ class Dcf:
         self._env = env
         self._medium = medium
         self._rts = config.mac.rts
-        self._record = partial(record_packet, recorder)
+        self._record = recorder.add_packet
         self._up = up
         self._receive = receive
         self._eifs_ns = EIFS_NS if wait_after_loss else DIFS_NS
@@ -194,7 +195,7 @@ class Dcf:
         self._counting: dict[int, _Station] = {}
         self._resting: dict[int, _Station] = {}
         self._timer_ns = _NEVER
-        self._numbers = _numbers(rng)
+        self._numbers = numbers_below(MAX_WINDOW, rng)
 
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.
@@ -209,7 +210,9 @@ class Dcf:
         station.arrived = False
         window = MIN_WINDOW
         for attempt in range(1, ATTEMPTS + 1):
-            yield self._compete(station)
+            turn = self._compete(station, packet.size_bytes)
+            if turn is not None:
+                yield turn
             if not self._up(sender):
                 self._leave(station)
                 self._schedule()
@@ -223,14 +226,12 @@ class Dcf:
         yield self._env.timeout(station.answer_ns - DIFS_NS - self._env.now)
         return Delivery(False, Cause.ACK_LOST if station.arrived else Cause.RETRIES, ATTEMPTS)
 
-    def _compete(self, station: _Station) -> simpy.Event:
-        """What succeeds when the station may send."""
+    def _compete(self, station: _Station, size_bytes: int) -> simpy.Event | None:
+        """What succeeds when the station may send; None if nothing can happen before its frame is over."""
         env = self._env
         now_ns = int(env.now)
-        event = station.event = env.event()
-        resting = self._resting
-        resting.pop(station.node, None)
-        for other in tuple(resting.values()):
+        self._resting.pop(station.node, None)
+        for other in tuple(self._resting.values()):
             if other.expiry_ns <= now_ns:
                 self._leave(other)
         if station.listener is None:
@@ -238,9 +239,15 @@ class Dcf:
         if station.from_ns != _NEVER:
             if station.expiry_ns < now_ns:
                 station.from_ns, station.slots = now_ns, 0
+            begins_ns = station.expiry_ns
+            first_ns = RTS_NS if self._rts else data_ns(size_bytes)
+            if self._medium.alone and env.peek() > begins_ns + first_ns:
+                station.begins_ns, station.from_ns, station.sending = begins_ns, _NEVER, True
+                return None
             self._counting[station.node] = station
             self._schedule()
-        return event
+        station.event = env.event()
+        return station.event
 
     def _join(self, station: _Station, now_ns: int) -> None:
         """Listen to the channel; a station that finds it idle for long enough need not count."""
@@ -280,14 +287,14 @@ class Dcf:
 
     def _fire(self, _: simpy.Event) -> None:
         """Let everyone send whose countdown ends now."""
-        now_ns = self._env.now
+        now_ns = int(self._env.now)
         if now_ns != self._timer_ns:
             return
         self._timer_ns = _NEVER
         winners = [station for station in self._counting.values() if station.expiry_ns == now_ns]
         for station in winners:
             del self._counting[station.node]
-            station.from_ns, station.sending = _NEVER, True
+            station.begins_ns, station.from_ns, station.sending = now_ns, _NEVER, True
             event, station.event = station.event, None
             if event is not None:
                 event.succeed()
@@ -299,14 +306,16 @@ class Dcf:
     ) -> Generator[simpy.Event, Any, Cause]:
         """One attempt; returns ``NONE`` when the sender has the acknowledgement."""
         env, sender, size_bytes = self._env, station.node, packet.size_bytes
-        clearance = None
+        clearance, begins_ns = None, station.begins_ns
         if self._rts:
             clearance = yield from self._ask(packet, station, receiver)
             if clearance is None:
                 return Cause.COLLISION
+            begins_ns = clearance.end_ns + GAP_NS
         duration_ns, frame_bytes = data_ns(size_bytes), size_bytes + HEADER_BYTES
+        rest_ns = GAP_NS + ACK_NS
         frame = self._put(
-            EventKind.AIR, packet, sender, receiver, frame_bytes, duration_ns, GAP_NS + ACK_NS, clearance
+            EventKind.AIR, packet, sender, receiver, frame_bytes, begins_ns, duration_ns, rest_ns, clearance
         )
         yield env.timeout(frame.end_ns - env.now)
         cause = self._outcome(frame)
@@ -317,8 +326,9 @@ class Dcf:
             station.arrived = True
             self._record(frame.end_ns, EventKind.DELIVER, packet, sender, receiver, size_bytes)
             self._receive(packet, receiver)
-        answer = self._put(EventKind.ACK, packet, receiver, sender, ACK_BYTES, ACK_NS, 0, frame)
-        yield env.timeout(GAP_NS + ACK_NS)
+        begins_ns = frame.end_ns + GAP_NS
+        answer = self._put(EventKind.ACK, packet, receiver, sender, ACK_BYTES, begins_ns, ACK_NS, 0, frame)
+        yield env.timeout(rest_ns)
         if self._outcome(answer):
             self._lose(packet, station, answer, Cause.ACK_LOST, 0)
             return Cause.ACK_LOST
@@ -330,17 +340,20 @@ class Dcf:
         self, packet: Packet, station: _Station, receiver: int
     ) -> Generator[simpy.Event, Any, Transmission | None]:
         """RTS and CTS; returns the CTS, after which the data frame has to be sent, or None."""
-        sender = station.node
+        sender, begins_ns, rest_ns = station.node, station.begins_ns, GAP_NS + ACK_NS + GAP_NS
         request = self._put(
-            EventKind.ACK, packet, sender, receiver, RTS_BYTES, RTS_NS, GAP_NS + ACK_NS + GAP_NS, None
+            EventKind.ACK, packet, sender, receiver, RTS_BYTES, begins_ns, RTS_NS, rest_ns, None
         )
-        yield self._env.timeout(RTS_NS)
+        yield self._env.timeout(request.end_ns - self._env.now)
         cause = self._outcome(request)
         if cause:
             self._lose(packet, station, request, cause, self._answer_wait_ns)
             return None
+        begins_ns = request.end_ns + GAP_NS
         rest_ns = GAP_NS + data_ns(packet.size_bytes) + GAP_NS + ACK_NS
-        clearance = self._put(EventKind.ACK, packet, receiver, sender, ACK_BYTES, ACK_NS, rest_ns, request)
+        clearance = self._put(
+            EventKind.ACK, packet, receiver, sender, ACK_BYTES, begins_ns, ACK_NS, rest_ns, request
+        )
         yield self._env.timeout(GAP_NS + ACK_NS)
         cause = self._outcome(clearance)
         if cause:
@@ -355,24 +368,17 @@ class Dcf:
         sender: int,
         receiver: int,
         size_bytes: int,
+        begins_ns: int,
         duration_ns: int,
         reserve_ns: int,
         answered: Transmission | None,
     ) -> Transmission:
-        """Put a frame on the air, now, or a SIFS after the one that it answers and that ends now."""
-        after_ns = GAP_NS if answered is not None else 0
+        """Put a frame on the air; the one that it answers ends now."""
+        after_ns = begins_ns - int(self._env.now)
         frame = self._medium.start(sender, duration_ns, receiver, size_bytes, "cck", after_ns, reserve_ns)
         if answered is not None:
             self._medium.clear(answered)
-        self._record(
-            frame.start_ns,
-            kind,
-            packet,
-            sender,
-            receiver,
-            size_bytes,
-            duration_ns=duration_ns,
-        )
+        self._record(begins_ns, kind, packet, sender, receiver, size_bytes, Cause.NONE, duration_ns)
         self._schedule()
         return frame
 
@@ -392,9 +398,3 @@ class Dcf:
         receiver = frame.receiver if frame.sender == station.node else frame.sender
         self._record(now_ns, EventKind.LOSS, packet, station.node, receiver, packet.size_bytes, cause)
         station.answer_ns = now_ns + wait_ns + DIFS_NS
-
-
-def _numbers(rng: np.random.Generator) -> Iterator[int]:
-    """Random numbers below ``MAX_WINDOW``; their lowest bits are those of smaller windows."""
-    while True:
-        yield from rng.integers(0, MAX_WINDOW, size=_BLOCK).tolist()

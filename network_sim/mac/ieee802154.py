@@ -7,14 +7,14 @@ one event for backoff and assessment, and one for each part of the exchange.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import simpy
 
 from network_sim.config import NetworkConfig
-from network_sim.mac.records import record_packet
+from network_sim.mac.draws import numbers_below
 from network_sim.types import Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:
@@ -41,7 +41,6 @@ MAX_BE = 5
 MAX_CSMA_BACKOFFS = 4
 MAX_FRAME_RETRIES = 3
 
-_BLOCK = 4096
 """Random numbers drawn at once."""
 
 
@@ -73,7 +72,7 @@ class Ieee802154:
         self._ready_ns: dict[int, int] = {}
         self._answers: dict[int, int] = {}
         """Until when in ns each receiver acknowledges a frame."""
-        self._numbers = _numbers(rng)
+        self._numbers = numbers_below(1 << MAX_BE, rng)
 
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.
@@ -178,10 +177,4 @@ class Ieee802154:
         duration_ns: int = 0,
     ) -> None:
         now_ns = int(self._env.now)
-        record_packet(self._recorder, now_ns, kind, packet, node, peer, size_bytes, cause, duration_ns)
-
-
-def _numbers(rng: np.random.Generator) -> Iterator[int]:
-    """Random numbers below 2^MAX_BE; their lowest bits are those of smaller exponents."""
-    while True:
-        yield from rng.integers(0, 1 << MAX_BE, size=_BLOCK).tolist()
+        self._recorder.add_packet(now_ns, kind, packet, node, peer, size_bytes, cause, duration_ns)

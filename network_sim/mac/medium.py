@@ -175,7 +175,8 @@ class Medium:
             receiver: Node.
             size_bytes: Of the frame, and
             modulation: how it is sent, for bit errors; unused when the radio has no noise.
-            after_ns: It starts so much later, as an answer does; less than any frame lasts.
+            after_ns: It starts so much later, as an answer does; nothing else may happen meanwhile that
+                lasts as short.
             reserve_ns: How long after its end the frame asks everyone who can read it to be silent.
 
         Returns:
@@ -296,6 +297,11 @@ class Medium:
         sinr = frame.power_w / (interference_w + (self.radio.noise_w or 0.0))
         overlapped_bytes = frame.size_bytes * (end_ns - begin_ns) / (frame.end_ns - frame.start_ns)
         return self._rng.random() < self.radio.error_rate(sinr, overlapped_bytes, "oqpsk")
+
+    @property
+    def alone(self) -> bool:
+        """Whether nothing is on the air, and not more than one node listens."""
+        return not self._active and len(self._listeners) < 2
 
     def senses(self, node: int) -> bool:
         """Whether somebody else's frame is on the air at this node now."""

@@ -9,7 +9,6 @@ import numpy as np
 import simpy
 
 from network_sim.config import NetworkConfig
-from network_sim.mac.records import record_packet
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:
@@ -52,15 +51,13 @@ class OwnLink:
         start_ns = int(env.now)
         duration_ns = round(size_bytes * self._byte_ns)
         end_ns = start_ns + duration_ns
-        recorder = self._recorder
-        record_packet(
-            recorder, start_ns, EventKind.AIR, packet, sender, receiver, size_bytes, duration_ns=duration_ns
-        )
+        record = self._recorder.add_packet
+        record(start_ns, EventKind.AIR, packet, sender, receiver, size_bytes, duration_ns=duration_ns)
         yield env.timeout(duration_ns)
         if not (self._up(sender) and self._up(receiver)):
             cause = Cause.NODE_DOWN
-            record_packet(recorder, end_ns, EventKind.LOSS, packet, sender, receiver, size_bytes, cause)
+            record(end_ns, EventKind.LOSS, packet, sender, receiver, size_bytes, cause)
             return Delivery(False, cause, 1)
-        record_packet(recorder, end_ns, EventKind.DELIVER, packet, sender, receiver, size_bytes)
+        record(end_ns, EventKind.DELIVER, packet, sender, receiver, size_bytes)
         self._receive(packet, receiver)
         return Delivery(True, Cause.NONE, 1)

@@ -5,6 +5,7 @@ gives. Its PDC levels off at 6 x 120 images a minute, so it had 120 cells: the 6
 cell is a whole street in one direction. The pieces of 100 m in one direction that it asks for are 240.
 """
 
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -13,6 +14,7 @@ import pytest
 
 from network_sim.config import MacConfig, NetworkConfig, RadioConfig, RunConfig, SchemeConfig, StreetConfig
 from network_sim.conservation import balance, check
+from network_sim.mac.medium import Medium
 from network_sim.metrics import metrics
 from network_sim.simulate import simulate, street_of
 from network_sim.trace import NetworkTrace
@@ -215,21 +217,26 @@ def test_the_same_seed_gives_the_same_trace(name: str) -> None:
     assert all((a == b).all() for a, b in zip(first.events.columns(), second.events.columns(), strict=True))
 
 
+def _contending(name: str) -> NetworkConfig:
+    config = _config(name, 30, keep="all", horizon_s=300.0, warmup_s=0.0)
+    return replace(config, mac=MacConfig(kind="ieee80211b"))
+
+
 @pytest.mark.parametrize("name", ["baseline", "greedy", "pdc"])
 def test_over_contending_radios_nothing_is_lost_without_a_trace(name: str) -> None:
-    config = _config(name, 30, keep="all", horizon_s=300.0, warmup_s=0.0)
-    config = NetworkConfig(
-        scenario="street-grid",
-        mac=MacConfig(kind="ieee80211b"),
-        scheme=config.scheme,
-        street=config.street,
-        run=config.run,
-    )
-    trace = simulate(config)
+    trace = simulate(_contending(name))
     check(trace)
     sums = balance(trace)
     assert sums.received > 0.99 * sums.created
     assert metrics(trace)["coverage"].value > 0.3
+
+
+def test_not_waiting_for_a_countdown_that_nothing_can_disturb_changes_nothing(monkeypatch) -> None:
+    usual = simulate(_contending("baseline"))
+    monkeypatch.setattr(Medium, "alone", False)
+    waiting = simulate(_contending("baseline"))
+    for one, other in zip(usual.events.columns(), waiting.events.columns(), strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_the_places_of_a_run_are_known_without_running_it() -> None:
