@@ -20,10 +20,10 @@ SIDE = 10.0
 GAP = 1.12
 """Distance of two networks over their width."""
 ROLE_LOOKS: dict[str, tuple[tuple[int, int, int], float]] = {
-    "node": (BRAND, 0.22),
-    "vehicle": (BRAND, 0.18),
+    "node": (BRAND, 0.16),
+    "vehicle": (BRAND, 0.14),
     "access-point": (DELIVERED, 0.32),
-    "sink": (DELIVERED, 0.32),
+    "sink": (DELIVERED, 0.22),
     "cloud": (NEUTRAL, 0.5),
 }
 """Colour and size of the point for each role."""
@@ -31,7 +31,7 @@ CLOUD_HEIGHT = 1.6
 MOST_NAMES = 26
 MOST_PACKETS = 400
 """Of each network; of more, evenly chosen ones are drawn."""
-PACKET_SIZE = 0.14
+PACKET_SIZE = 0.11
 ARC = 0.12
 """How high a packet rises over the length of its way."""
 LOSS_HEIGHT = 0.22

@@ -11,7 +11,7 @@ import viser
 
 from app.jobs.network_records import NetworkView, What
 from app.networkwords import CURVE_HINTS, CURVES
-from app.panels.network.player import short_time
+from app.panels.network.player import RUN_S, NetworkPlayer, short_time
 from app.plots.gantt import Window, cursor_html, gantt_html, legend_html
 from app.plots.networkcurves import RUN_COLORS, NetworkCurves
 from network_sim.types import PacketKind
@@ -22,6 +22,8 @@ PAGE = 0.9
 """The window moves on when the player is past so much of it."""
 EARLIER, LATER, FRAMES, ALL = "Earlier", "Later", "Frames", "All"
 FRAMES_SHOWN = 20
+FRAMES_S = 15.0
+"""How long they take to play."""
 
 
 class NetworkCharts:
@@ -40,9 +42,9 @@ class NetworkCharts:
         self._labels = gui.add_html("")
         self._changed = changed
 
-    def add_timeline(self, gui: viser.GuiApi, post: Callable[..., None], seek: Callable[[int], None]) -> None:
-        """Add the rows of nodes and what moves their window; ``seek`` moves the player to a time in ns."""
-        self._seek = seek
+    def add_timeline(self, gui: viser.GuiApi, post: Callable[..., None], player: NetworkPlayer) -> None:
+        """Add the rows of nodes and what moves their window, and the ``player`` with it."""
+        self._player = player
         self._views: Sequence[NetworkView] = ()
         self._whole = self._window = Window(0, 1_000_000_000)
         self._now_ns = 0
@@ -59,7 +61,7 @@ class NetworkCharts:
         keys = gui.add_button_group(
             "Timeline",
             (EARLIER, LATER, FRAMES, ALL),
-            hint=f"Move the window; go to the next {FRAMES_SHOWN} frames; show everything.",
+            hint=f"Move the window; go to the next {FRAMES_SHOWN} frames, in slow motion; show everything.",
         )
         keys.on_click(lambda event: post(self._press, event.target.value))
         self._rows = [gui.add_html("") for _ in range(4)]
@@ -124,10 +126,12 @@ class NetworkCharts:
             self._look(window.start_ns + (step_ns if key == LATER else -step_ns), window.span_ns)
         elif key == ALL:
             self._window = self._whole
+            self._player.pace(self._whole.span_ns / 1e9 / RUN_S)
         else:
             first_ns, last_ns = self._next_frames_ns()
-            self._seek(first_ns)
+            self._player.seek(first_ns)
             span_ns = max(round(1.2 * (last_ns - first_ns)), 1_000_000)
+            self._player.pace(span_ns / 1e9 / FRAMES_S)
             self._look(first_ns - span_ns // 10, span_ns)
         span_s = self._window.span_ns / 1e9
         self._zoom.value = round(min(max(math.log10(span_s), NARROWEST), self._zoom.max), 2)

@@ -52,7 +52,7 @@ class NetworkPanel(Panel):
         self._said = gui.add_markdown("Nothing is simulated yet.")
         self._player = NetworkPlayer(gui, session.post, self.when_changed, self._moved)
         self._charts = NetworkCharts(gui, self.when_changed)
-        self._charts.add_timeline(gui, session.post, self._player.seek)
+        self._charts.add_timeline(gui, session.post, self._player)
         self._table = gui.add_html("")
         with gui.add_folder("All other numbers", expand_by_default=False):
             self._others = gui.add_html("")

@@ -58,7 +58,7 @@ class NetworkPlayer:
         self._scrub = gui.add_slider("Time (s)", 0.0, 1.0, 0.001, 0.0, hint="Drag to any simulated time.")
         changed(self._scrub, lambda: self.seek(round(self._scrub.value * 1e9)))
         self._speed = gui.add_slider(
-            "Speed (×1)",
+            "Speed ×1",
             SLOWEST,
             FASTEST,
             0.05,
@@ -87,13 +87,17 @@ class NetworkPlayer:
         span_s = max((end_ns - self._start_ns) / 1e9, 0.001)
         self._scrub.min, self._scrub.max = self._start_ns / 1e9, self._start_ns / 1e9 + span_s
         self._scrub.step = max(round(span_s / 2000.0, 3), 0.001)
-        self._speed.value = round(float(np.clip(np.log10(span_s / RUN_S), SLOWEST, FASTEST)) * 20.0) / 20.0
-        self._hurry()
+        self.pace(span_s / RUN_S)
         self._timeline.reset(-(-(end_ns - self._start_ns) // STEP_NS) + 1)
 
     def seek(self, t_ns: int) -> None:
         """Go to a simulated time."""
         self._timeline.seek(-(-(t_ns - self._start_ns) // STEP_NS))
+
+    def pace(self, speed: float) -> None:
+        """Play so many simulated seconds in a second, as nearly as the slider has them."""
+        self._speed.value = round(float(np.clip(np.log10(speed), SLOWEST, FASTEST)) * 20.0) / 20.0
+        self._hurry()
 
     def pause(self) -> None:
         """Stay where it is."""
@@ -122,7 +126,8 @@ class NetworkPlayer:
 
     def _hurry(self) -> None:
         self._timeline.speed = self.speed * 1e9 / STEP_NS
-        self._speed.label = f"Speed (×{self.speed:.3g})"
+        speed = f"{self.speed:.3g}" if self.speed >= 1.0 else f"1/{1.0 / self.speed:.0f}"
+        self._speed.label = f"Speed ×{speed}"
 
     def _tick(self) -> None:
         self._timeline.tick()
