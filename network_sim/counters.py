@@ -6,14 +6,13 @@ same whether the log is kept or not.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from network_sim.ledger import Ledger, Outcomes, grown
+from network_sim.ledger import Ledger, Outcomes, add_at, grown
 from network_sim.states import MINUTE_NS, StateTimes
 from network_sim.types import Cause, EventKind, PacketKind
 
@@ -79,9 +78,9 @@ class Tally:
         self._sums = grown(self._sums, int(minute.max()) + 1)
         offset_ns = since_ns - minute * MINUTE_NS
         place = (rows["kind"] * np.int64(_SHAPE[1]) + rows["packet_kind"]) * _SHAPE[2] + rows["cause"]
-        sums, size = self._sums.reshape(-1), math.prod(_SHAPE)
-        for index, what in enumerate((1, rows["size_bytes"], rows["duration_ns"], offset_ns)):
-            np.add.at(sums, (minute * len(_SUMS) + index) * size + place, what)
+        ones = np.ones(len(rows))
+        for index, what in enumerate((ones, rows["size_bytes"], rows["duration_ns"], offset_ns)):
+            add_at(self._sums[:, index], minute, place, what)
         self._states.take(rows)
         self._take_packets(rows)
         self._take_images(rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,3 +148,20 @@ def grown(array: NDArray, length: int, fill: int = 0) -> NDArray:
     larger = np.full((max(length, 2 * len(array), 16), *array.shape[1:]), fill, array.dtype)
     larger[: len(array)] = array
     return larger
+
+
+def add_at(sums: NDArray[np.int64], row: NDArray[np.int64], column: NDArray[np.int64], what: NDArray) -> None:
+    """``numpy.add.at`` for whole numbers whose sums stay below 2^53, several times as fast.
+
+    Args:
+        sums: (M, ...) added to; what follows the first axis counts as one.
+        row: (E,) places on the first axis.
+        column: (E,) places on the others, flattened.
+        what: (E,).
+    """
+    if not len(row):
+        return
+    first, width = int(row.min()), math.prod(sums.shape[1:])
+    count = int(row.max()) + 1 - first
+    added = np.bincount((row - first) * width + column, what, count * width)
+    sums[first : first + count] += added.astype(np.int64).reshape(count, *sums.shape[1:])

@@ -7,7 +7,7 @@ from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit  # student's t; scipy.stats takes a second to import
 
 from network_sim.batch import run_batch
 from network_sim.config import NetworkConfig
@@ -94,5 +94,5 @@ def t_interval(values: Iterable[float], confidence: float = 0.95) -> tuple[float
     numbers = np.fromiter(values, float)
     if len(numbers) < 2:
         return float(numbers.mean()), None
-    quantile = float(student_t.ppf(0.5 + 0.5 * confidence, len(numbers) - 1))
+    quantile = float(stdtrit(len(numbers) - 1, 0.5 + 0.5 * confidence))
     return float(numbers.mean()), quantile * float(numbers.std(ddof=1)) / math.sqrt(len(numbers))

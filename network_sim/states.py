@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from network_sim.ledger import grown
+from network_sim.ledger import add_at, grown
 from network_sim.types import NS_PER_S, EventKind
 
 MINUTE_NS = 60 * NS_PER_S
@@ -90,6 +90,8 @@ class StateTimes:
             later[:, 1] = np.maximum(later[:, 1], until_ns)
             self._spans[state] = later
             due[:, 2] = np.minimum(due[:, 2], until_ns)
+            if not len(due):
+                continue
             before, together = together, disjoint(np.concatenate((together, due)))
             self._count(state, together, 1)
             self._count(state, before, -1)
@@ -102,7 +104,7 @@ class StateTimes:
             minute = start_ns // MINUTE_NS
             self._sums = grown(self._sums, int(minute.max()) + 1)
             cut_ns = np.minimum(end_ns, (minute + 1) * MINUTE_NS)
-            np.add.at(self._sums[:, :, state], (minute, node), sign * (cut_ns - start_ns))
+            add_at(self._sums[:, :, state], minute, node, sign * (cut_ns - start_ns))
             rest = end_ns > cut_ns
             node, start_ns, end_ns = node[rest], cut_ns[rest], end_ns[rest]
 

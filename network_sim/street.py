@@ -91,7 +91,8 @@ class Street:
         most, size = config.scheme.datagram_bytes, config.scheme.image_bytes
         self._parts = [(first, min(most, size - first)) for first in range(0, size, most)]
         self._interval_ns = to_ns(config.scheme.summary_interval_s)
-        self._mac = mac_factory(self.places, lambda node: True, self._receive)
+        always_up = ([True] * len(self.names)).__getitem__
+        self._mac = mac_factory(self.places, always_up, self._receive)
 
     def drive_on(self, vehicle: int, meetings: list[Contact]) -> Generator[simpy.Event, Any, None]:
         """All meetings of one vehicle; it stays with an access point until it is out of its range."""

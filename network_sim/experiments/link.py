@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student_t
+from scipy.special import stdtrit  # student's t; scipy.stats takes a second to import
 
 from network_sim.config import PRESETS, NetworkConfig
 from network_sim.experiments.curves import curve, plain_curve
@@ -92,7 +92,7 @@ def slope_interval() -> tuple[float, float]:
     n, seconds = np.array(IMAGES, float), np.array(THESIS_S)
     slope = line_through_origin()
     deviation = np.sqrt(np.sum((seconds - slope * n) ** 2) / (len(n) - 1))
-    half = float(student_t.ppf(0.975, len(n) - 1) * deviation / np.sqrt(n @ n))
+    half = float(stdtrit(len(n) - 1, 0.975) * deviation / np.sqrt(n @ n))
     return slope - half, slope + half
 
 

@@ -374,8 +374,7 @@ class Dcf:
         answered: Transmission | None,
     ) -> Transmission:
         """Put a frame on the air; the one that it answers ends now."""
-        after_ns = begins_ns - int(self._env.now)
-        frame = self._medium.start(sender, duration_ns, receiver, size_bytes, "cck", after_ns, reserve_ns)
+        frame = self._medium.start(sender, duration_ns, receiver, size_bytes, "cck", begins_ns, reserve_ns)
         if answered is not None:
             self._medium.clear(answered)
         self._record(begins_ns, kind, packet, sender, receiver, size_bytes, Cause.NONE, duration_ns)

@@ -164,7 +164,7 @@ class Medium:
         receiver: int,
         size_bytes: int = 0,
         modulation: Modulation = "cck",
-        after_ns: int = 0,
+        begins_ns: int | None = None,
         reserve_ns: int = 0,
     ) -> Transmission:
         """Put a frame on the air and tell the listeners that sense it.
@@ -175,19 +175,18 @@ class Medium:
             receiver: Node.
             size_bytes: Of the frame, and
             modulation: how it is sent, for bit errors; unused when the radio has no noise.
-            after_ns: It starts so much later, as an answer does; nothing else may happen meanwhile that
-                lasts as short.
+            begins_ns: When it starts, now or later, as an answer does; whatever begins before that must
+                end after it. None is now.
             reserve_ns: How long after its end the frame asks everyone who can read it to be silent.
 
         Returns:
             What ``finish`` must be given, exactly at its end.
         """
-        now_ns = int(self.env.now)
-        start_ns = now_ns + after_ns
+        start_ns = int(self.env.now) if begins_ns is None else begins_ns
         end_ns = start_ns + duration_ns
-        if now_ns >= self._rows_end_ns:
+        if start_ns >= self._rows_end_ns:
             self._rows_w.clear()
-            self._rows_end_ns = now_ns + REFRESH_NS
+            self._rows_end_ns = start_ns + REFRESH_NS
         power_w = self.radio.faded_w(self.power_w(sender, receiver))
         frame = Transmission(
             sender, receiver, start_ns, end_ns, end_ns + reserve_ns, power_w, size_bytes, modulation
@@ -344,7 +343,7 @@ class Medium:
 
         Args:
             node: One listener per node.
-            on_busy: Given the time in ns, which may be ahead by the ``after_ns`` of an answer.
+            on_busy: Given the time in ns, which is ahead for an answer that begins later.
             on_idle: Given the time from which the channel is free (now, or when the frame's reservation
                 ends), and whether the last frame was received with errors (EIFS).
         """
