@@ -114,7 +114,7 @@ def test_a_browser_answers_while_another_one_meshes(page, browser, app):
     handle = slider(page, "Radius")
     handle.focus()
     before_the_mesh = []
-    for key in ("End", *["ArrowLeft"] * 5):  # a new radius every time, so that nothing is remembered
+    for key in ("End", *["ArrowLeft"] * 3):  # a new radius every time, so that nothing is remembered
         handle.press(key)
         page.get_by_text("Computing").first.wait_for()
         other.get_by_role("button", name="Copy as command").click()
@@ -124,7 +124,7 @@ def test_a_browser_answers_while_another_one_meshes(page, browser, app):
         other.get_by_text("The same from the command line").wait_for(state="detached")
         page.get_by_text("Up to date").wait_for()
     context.close()
-    assert sum(before_the_mesh) >= 3
+    assert sum(before_the_mesh) >= 2
 
 
 def test_a_closed_browser_leaves_no_session(page, browser, app):
