@@ -17,7 +17,7 @@ STEP_NS = 1000
 SLOWEST, FASTEST = -3.0, 2.5
 """Powers of ten of simulated seconds in a second."""
 PICTURE_S = 0.04
-"""Between two pictures while it plays: with 60 nodes and 90,000 events one takes half a millisecond to make."""
+"""Between two pictures while it plays: with 60 nodes and 90,000 events each takes half a millisecond."""
 RUN_S = 60.0
 """How long a whole run takes at first."""
 
