@@ -118,7 +118,7 @@ def test_a_click_with_the_brush_paints_points(depth):
 
 def test_a_file_that_is_no_network_is_a_sentence_and_changes_nothing(depth):
     begin = canvas(depth)
-    unfold(depth, "Network")
+    unfold(depth, "Neural network")
     depth.locator("input[type=file]").last.set_input_files(
         {"name": "mine.onnx", "mimeType": "application/octet-stream", "buffer": b"not a network"}
     )

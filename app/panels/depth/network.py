@@ -50,7 +50,7 @@ class NetworkFolder:
         self._folder, self._on_choose = folder, on_choose
         self._models: dict[str, str | None] = {SHIPPED: None}
         self._config = DepthConfig()
-        with gui.add_folder("Network", expand_by_default=False):
+        with gui.add_folder("Neural network", expand_by_default=False):
             gui.add_markdown(TEXT)
             self._model = gui.add_dropdown("Network file", [SHIPPED], hint="Which network infers the depth.")
             self._preset = gui.add_dropdown(
