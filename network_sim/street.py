@@ -35,6 +35,9 @@ from network_sim.types import EventKind, Packet, PacketKind, to_ns
 
 MacFactory = Callable[[Places, Callable[[int], bool], Callable[[Packet, int], None]], Mac]
 """Makes the medium access of nodes at these places; told whether a node is up, and what to do on arrival."""
+_ENQUEUE, _RECEIVE, _ARRIVE = EventKind.ENQUEUE, EventKind.RECEIVE, EventKind.ARRIVE
+_IMAGE = PacketKind.IMAGE
+"""An enumeration is slow to look up, and these are for every packet."""
 
 
 def start_street(
@@ -177,9 +180,7 @@ class Street:
                     return sent
                 if env.now >= image_ns + kept_ns:
                     break
-                arrived = yield from self._carry(
-                    PacketKind.IMAGE, vehicle, access_point, size_bytes, image, first_byte
-                )
+                arrived = yield from self._carry(_IMAGE, vehicle, access_point, size_bytes, image, first_byte)
                 if not arrived:
                     break
             else:
@@ -201,7 +202,7 @@ class Street:
         number = next(self._ids)
         packet = Packet(number, kind, source, destination, whole_bytes, now_ns, image, first_byte, size_bytes)
         record = self._recorder.add_packet
-        record(now_ns, EventKind.ENQUEUE, packet, source, destination, whole_bytes)
+        record(now_ns, _ENQUEUE, packet, source, destination, whole_bytes)
         delivery = yield from self._mac.send(packet, source, destination)
         if self._arrived[source] == number:
             return True
@@ -214,9 +215,9 @@ class Street:
         now_ns = int(self._env.now)
         source, image = packet.source, packet.image
         self._arrived[source] = packet.id
-        self._recorder.add_packet(now_ns, EventKind.RECEIVE, packet, source, node, packet.size_bytes)
+        self._recorder.add_packet(now_ns, _RECEIVE, packet, source, node, packet.size_bytes)
         # Fragments go in order, and none after one that did not arrive: the last completes its image.
         if image >= 0 and packet.first_byte + packet.byte_count == self._config.image_bytes:
             self._snapshots.arrived[image] = True
             size_bytes = self._config.image_bytes
-            self._recorder.add(now_ns, EventKind.ARRIVE, source, node, packet.id, image, 0, size_bytes)
+            self._recorder.add(now_ns, _ARRIVE, source, node, packet.id, image, 0, size_bytes)

@@ -48,6 +48,9 @@ ATTEMPTS = 7
 """Frames, or RTS, for a packet before it is given up."""
 
 _NEVER = 2**62
+_AIR, _ACK, _DELIVER, _NONE = EventKind.AIR, EventKind.ACK, EventKind.DELIVER, Cause.NONE
+"""An enumeration is slow to look up, and these are for every packet."""
+_AT_ONCE = Delivery(True, Cause.NONE, 1)
 
 
 def data_ns(size_bytes: int) -> int:
@@ -222,7 +225,7 @@ class Dcf:
             window = MIN_WINDOW if over else min(2 * window, MAX_WINDOW)
             self._rest(station, window)
             if not cause:
-                return Delivery(True, Cause.NONE, attempt)
+                return _AT_ONCE if attempt == 1 else Delivery(True, _NONE, attempt)
         yield self._env.timeout(station.answer_ns - DIFS_NS - self._env.now)
         return Delivery(False, Cause.ACK_LOST if station.arrived else Cause.RETRIES, ATTEMPTS)
 
@@ -315,7 +318,7 @@ class Dcf:
         duration_ns, frame_bytes = data_ns(size_bytes), size_bytes + HEADER_BYTES
         rest_ns = GAP_NS + ACK_NS
         frame = self._put(
-            EventKind.AIR, packet, sender, receiver, frame_bytes, begins_ns, duration_ns, rest_ns, clearance
+            _AIR, packet, sender, receiver, frame_bytes, begins_ns, duration_ns, rest_ns, clearance
         )
         yield env.timeout(frame.end_ns - env.now)
         cause = self._outcome(frame)
@@ -324,26 +327,24 @@ class Dcf:
             return cause
         if not station.arrived:
             station.arrived = True
-            self._record(frame.end_ns, EventKind.DELIVER, packet, sender, receiver, size_bytes)
+            self._record(frame.end_ns, _DELIVER, packet, sender, receiver, size_bytes)
             self._receive(packet, receiver)
         begins_ns = frame.end_ns + GAP_NS
-        answer = self._put(EventKind.ACK, packet, receiver, sender, ACK_BYTES, begins_ns, ACK_NS, 0, frame)
+        answer = self._put(_ACK, packet, receiver, sender, ACK_BYTES, begins_ns, ACK_NS, 0, frame)
         yield env.timeout(rest_ns)
         if self._outcome(answer):
             self._lose(packet, station, answer, Cause.ACK_LOST, 0)
             return Cause.ACK_LOST
         self._medium.clear(answer)
         station.answer_ns = answer.end_ns + DIFS_NS
-        return Cause.NONE
+        return _NONE
 
     def _ask(
         self, packet: Packet, station: _Station, receiver: int
     ) -> Generator[simpy.Event, Any, Transmission | None]:
         """RTS and CTS; returns the CTS, after which the data frame has to be sent, or None."""
         sender, begins_ns, rest_ns = station.node, station.begins_ns, GAP_NS + ACK_NS + GAP_NS
-        request = self._put(
-            EventKind.ACK, packet, sender, receiver, RTS_BYTES, begins_ns, RTS_NS, rest_ns, None
-        )
+        request = self._put(_ACK, packet, sender, receiver, RTS_BYTES, begins_ns, RTS_NS, rest_ns, None)
         yield self._env.timeout(request.end_ns - self._env.now)
         cause = self._outcome(request)
         if cause:
@@ -351,9 +352,7 @@ class Dcf:
             return None
         begins_ns = request.end_ns + GAP_NS
         rest_ns = GAP_NS + data_ns(packet.size_bytes) + GAP_NS + ACK_NS
-        clearance = self._put(
-            EventKind.ACK, packet, receiver, sender, ACK_BYTES, begins_ns, ACK_NS, rest_ns, request
-        )
+        clearance = self._put(_ACK, packet, receiver, sender, ACK_BYTES, begins_ns, ACK_NS, rest_ns, request)
         yield self._env.timeout(GAP_NS + ACK_NS)
         cause = self._outcome(clearance)
         if cause:
@@ -377,7 +376,7 @@ class Dcf:
         frame = self._medium.start(sender, duration_ns, receiver, size_bytes, "cck", begins_ns, reserve_ns)
         if answered is not None:
             self._medium.clear(answered)
-        self._record(begins_ns, kind, packet, sender, receiver, size_bytes, Cause.NONE, duration_ns)
+        self._record(begins_ns, kind, packet, sender, receiver, size_bytes, _NONE, duration_ns)
         self._schedule()
         return frame
 

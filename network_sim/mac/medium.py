@@ -28,6 +28,8 @@ MEMORY_NS = 5_000_000
 """How long the channel remembers an ended transmission: longer than any look back of a medium access."""
 REFRESH_NS = 100_000_000
 """How often powers between moving nodes are computed anew: a vehicle moves about a metre meanwhile."""
+_NONE = Cause.NONE
+"""An enumeration is slow to look up, and this is for every frame."""
 
 
 class Transmission:
@@ -283,7 +285,7 @@ class Medium:
             sinr = power_w / (radio.noise_w + interference_w)
             if self._rng.random() < radio.error_rate(sinr, frame.size_bytes, frame.modulation):
                 return Cause.NOISE
-        return Cause.NONE
+        return _NONE
 
     def _lost_in_overlap(self, frame: Transmission, powers_w: list[float], interference_w: float) -> bool:
         """Whether an 802.15.4 receiver was busy with an earlier frame, or got overlapped bits wrong."""
