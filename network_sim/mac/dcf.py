@@ -240,9 +240,10 @@ class Dcf:
         if station.listener is None:
             self._join(station, now_ns)
         if station.from_ns != _NEVER:
-            if station.expiry_ns < now_ns:
-                station.from_ns, station.slots = now_ns, 0
             begins_ns = station.expiry_ns
+            if begins_ns < now_ns:
+                station.from_ns, station.slots = now_ns, 0
+                begins_ns = now_ns
             first_ns = RTS_NS if self._rts else data_ns(size_bytes)
             if self._medium.alone and env.peek() > begins_ns + first_ns:
                 station.begins_ns, station.from_ns, station.sending = begins_ns, _NEVER, True
@@ -377,7 +378,8 @@ class Dcf:
         if answered is not None:
             self._medium.clear(answered)
         self._record(begins_ns, kind, packet, sender, receiver, size_bytes, _NONE, duration_ns)
-        self._schedule()
+        if self._counting:
+            self._schedule()
         return frame
 
     def _outcome(self, frame: Transmission) -> Cause:

@@ -199,7 +199,8 @@ class Medium:
                 frame.overlaps.append(other)
         frame.earlier = len(frame.overlaps)
         self._active.append(frame)
-        if self._listeners:
+        listeners = self._listeners
+        if len(listeners) > 1 or (listeners and sender not in listeners):
             self._tell_busy(frame)
         return frame
 
