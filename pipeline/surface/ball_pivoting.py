@@ -53,8 +53,8 @@ def roll_over(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
     triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
     if not len(triangles):
         raise ReconstructionError(_why_nothing(cloud, radii_m[-1]))
-    used, corners = np.unique(triangles, return_inverse=True)
-    kept, triangles = cloud.select(used), corners.reshape(-1, 3).astype(np.int32)
+    used = np.bincount(triangles.reshape(-1), minlength=len(cloud)) > 0
+    kept, triangles = cloud.select(used), (np.cumsum(used, dtype=np.int32) - 1)[triangles]
     return Surface(
         vertices_m=kept.points_m,
         triangles=triangles,

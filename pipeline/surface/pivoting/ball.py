@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from pipeline.surface.pivoting.compiled import compiled
 from pipeline.surface.pivoting.grid import gather
 
 TIE = 1e-12
@@ -13,7 +13,7 @@ _TOUCH = 1e-10
 """Where rounding moves a ball's surface further from its three points than this share, none is made."""
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def ball_center(points, a, b, c, radius):  # type: ignore[no-untyped-def]
     """(x, y, z, exists): centre of the ball through three points, on the side they are anticlockwise from.
 
@@ -42,14 +42,14 @@ def ball_center(points, a, b, c, radius):  # type: ignore[no-untyped-def]
     return x, y, z, touches
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def is_on(points, p, x, y, z, radius):  # type: ignore[no-untyped-def]
     """Whether a point lies on a ball, but for rounding."""
     dx, dy, dz = points[p, 0] - x, points[p, 1] - y, points[p, 2] - z
     return abs(np.sqrt(dx * dx + dy * dy + dz * dz) - radius) <= _TOUCH * radius
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def is_empty(grid, found, a, b, c, x, y, z, radius):  # type: ignore[no-untyped-def]
     """Whether no point of the cloud but a, b and c lies inside a ball."""
     for n in range(gather(grid, x, y, z, radius * (1.0 - TIE), found)):
@@ -59,7 +59,7 @@ def is_empty(grid, found, a, b, c, x, y, z, radius):  # type: ignore[no-untyped-
     return True
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def agrees(points, normals, a, b, c):  # type: ignore[no-untyped-def]
     """Whether the triangle's normal has a positive dot product with those of its three points."""
     ux, uy, uz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from pipeline.surface.pivoting.ball import TIE
+from pipeline.surface.pivoting.compiled import compiled
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 BOX = 6
@@ -55,7 +55,7 @@ def new_cell() -> Cell:
     )
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def begin(cell, nx, ny, nz, radius):  # type: ignore[no-untyped-def]
     """A box that contains the ball's possible centres on one side of the origin, that of a unit vector n."""
     sign = 1.0 if nz >= 0.0 else -1.0
@@ -78,12 +78,12 @@ def begin(cell, nx, ny, nz, radius):  # type: ignore[no-untyped-def]
                     _add_corner(cell, x, z, y)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _set_plane(cell, plane, x, y, z):  # type: ignore[no-untyped-def]
     cell.planes[plane, 0], cell.planes[plane, 1], cell.planes[plane, 2] = x, y, z
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def shrink(cell, near, count, radius, wanted):  # type: ignore[no-untyped-def]
     """Cut by the (count, 4) neighbours x, y, z, |x|^2 / 2 until every far corner is final; how many are.
 
@@ -113,7 +113,7 @@ def shrink(cell, near, count, radius, wanted):  # type: ignore[no-untyped-def]
             return -1
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _clip(cell, near, row):  # type: ignore[no-untyped-def]
     """Cut off what is nearer to a neighbour than to the origin; False if there is no room."""
     new = cell.counts[0]
@@ -146,7 +146,7 @@ def _clip(cell, near, row):  # type: ignore[no-untyped-def]
     return True
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _swap(cell, m, n):  # type: ignore[no-untyped-def]
     for k in range(3):
         cell.corners[m, k], cell.corners[n, k] = cell.corners[n, k], cell.corners[m, k]
@@ -155,7 +155,7 @@ def _swap(cell, m, n):  # type: ignore[no-untyped-def]
     cell.final[m], cell.final[n] = cell.final[n], cell.final[m]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _add_corner(cell, a, b, c):  # type: ignore[no-untyped-def]
     """The corner where three planes meet; at the origin if they do not."""
     ax, ay, az, ah = cell.planes[a, 0], cell.planes[a, 1], cell.planes[a, 2], cell.planes[a, 3]

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from pipeline.surface.pivoting.compiled import compiled
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 FACES, HEAD, TAIL, CURSOR, SETTLED = range(5)
@@ -79,7 +79,7 @@ def grown(front: Front) -> Front:
     return front._replace(**longer)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def find(front, a, b):  # type: ignore[no-untyped-def]
     """The half-edge from a to b, -1 for none."""
     edge = front.outgoing[a]
@@ -88,7 +88,7 @@ def find(front, a, b):  # type: ignore[no-untyped-def]
     return edge
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def can_join(front, a, x, b):  # type: ignore[no-untyped-def]
     """Whether half-edges a to x and x to b may be added: x is not interior, and the edges are free."""
     if front.outgoing[x] < 0:
@@ -96,7 +96,7 @@ def can_join(front, a, x, b):  # type: ignore[no-untyped-def]
     return front.open_count[x] > 0 and find(front, a, x) < 0 and find(front, x, b) < 0
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def add_triangle(front, a, b, c, x, y, z, radius_index):  # type: ignore[no-untyped-def]
     """Add a triangle with its ball's centre, glue its edges to the front, queue those that are new on it."""
     t = front.counts[FACES]

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from pipeline.surface.pivoting.compiled import compiled
 from pipeline.types import FloatArray, IntArray
 
 _CELLS_A_POINT = 4
@@ -50,7 +51,7 @@ def build_grid(points_m: FloatArray, ids: IntArray, cell_m: float) -> Grid:
     return Grid(kept_m[order], ids[order].astype(np.int32), starts, first, last, sizes, cell_m)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _cell(place_m, cell_m):  # type: ignore[no-untyped-def]
     """The cell of a coordinate, counted from the origin."""
     return np.int64(np.floor(min(max(place_m / cell_m, -_FARTHEST), _FARTHEST)))
@@ -77,14 +78,14 @@ def _sort(points_m, sizes, cell_m):  # type: ignore[no-untyped-def]
     return order, starts
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _cells(low_m, high_m, first, last, size, cell_m):  # type: ignore[no-untyped-def]
     """First and last cell of an interval on one axis, each of the grid's cells at most once."""
     low, high = max(_cell(low_m, cell_m), first), min(_cell(high_m, cell_m), last)
     return low, min(high, low + size - 1)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def gather(grid, x, y, z, reach_m, found):  # type: ignore[no-untyped-def]
     """Fills ``found`` with the rows of the grid's points within a distance of a place; how many."""
     points, starts, first, last, cell_m = grid.points_m, grid.starts, grid.first, grid.last, grid.cell_m
@@ -108,7 +109,7 @@ def gather(grid, x, y, z, reach_m, found):  # type: ignore[no-untyped-def]
     return count
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _select(points, begin, end, x, y, z, reach_m, found, count):  # type: ignore[no-untyped-def]
     """Append those of a run of rows that lie within a distance; how many there are then."""
     for row in range(begin, end):

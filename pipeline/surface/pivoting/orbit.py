@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from pipeline.surface.pivoting.ball import TIE
+from pipeline.surface.pivoting.compiled import compiled
 
-_NO_TURN = 5.0
 
-
-@numba.njit(cache=True, nogil=True)
+@compiled
 def orbit(points, a, b, toward_x, toward_y, toward_z, radius):  # type: ignore[no-untyped-def]
     """Frame of the circle about edge a to b: its middle, axis u, axis v, radius, and half the edge squared.
 
@@ -34,7 +32,7 @@ def orbit(points, a, b, toward_x, toward_y, toward_z, radius):  # type: ignore[n
     return 0.5 * mx, 0.5 * my, 0.5 * mz, ux, uy, uz, vx, vy, vz, np.sqrt(orbit2), 0.25 * length2
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def center_at(frame, cosine, sine):  # type: ignore[no-untyped-def]
     """(x, y, z) of the ball's centre at an angle."""
     mx, my, mz, ux, uy, uz, vx, vy, vz, size, _ = frame
@@ -42,7 +40,7 @@ def center_at(frame, cosine, sine):  # type: ignore[no-untyped-def]
     return mx + s * ux + t * vx, my + s * uy + t * vy, mz + s * uz + t * vz
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def in_plane(frame, x, y, z):  # type: ignore[no-untyped-def]
     """(px, py, level, flat2, rest2) of a point, which is on the ball where px cos + py sin = level.
 
@@ -57,36 +55,33 @@ def in_plane(frame, x, y, z):  # type: ignore[no-untyped-def]
     return px, py, level, flat2, flat2 - level * level
 
 
-@numba.njit(cache=True, nogil=True)
-def turn(cosine, sine):  # type: ignore[no-untyped-def]
-    """A number from 0 to 4 that grows with the angle from 0 to 2 pi, exact near 0."""
-    if sine >= 0.0:
-        return sine / (sine + cosine) if cosine >= 0.0 else 1.0 - cosine / (sine - cosine)
-    return 2.0 + sine / (sine + cosine) if cosine < 0.0 else 3.0 + cosine / (cosine - sine)
+@compiled
+def _is_before(cosine, sine, other_cosine, other_sine):  # type: ignore[no-untyped-def]
+    """Whether an angle from 0 to 2 pi is smaller than another, given multiples of their cosines and sines."""
+    if (sine < 0.0) != (other_sine < 0.0):
+        return other_sine < 0.0
+    return sine * other_cosine < cosine * other_sine
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def first_met(grid, rows, count, a, b, frame):  # type: ignore[no-untyped-def]
     """(row, cosine, sine) where an empty ball turning from angle 0 first comes onto a point; or row = -1.
 
     A point ahead that the ball touches already, or overlaps by rounding, is met at once.
     """
-    best, best_cosine, best_sine, hit = _NO_TURN, 0.0, 0.0, -1
+    hit, first_cosine, first_sine, first_scale = -1, 1.0, 0.0, 1.0
     tie = TIE * np.sqrt(frame[9] * frame[9] + frame[10])
     for n in range(count):
         row = rows[n]
-        if grid.ids[row] in (a, b):
-            continue
         px, py, level, flat2, rest2 = in_plane(
             frame, grid.points_m[row, 0], grid.points_m[row, 1], grid.points_m[row, 2]
         )
-        if rest2 < 0.0 or flat2 <= 0.0:
+        if rest2 < 0.0 or flat2 <= 0.0 or grid.ids[row] in (a, b):
             continue
-        angle, cosine, sine = 0.0, 1.0, 0.0
+        cosine, sine, scale = 1.0, 0.0, 1.0
         if py <= 0.0 or px - level < -tie:
             rest = np.sqrt(rest2)
-            cosine, sine = (level * px + rest * py) / flat2, (level * py - rest * px) / flat2
-            angle = turn(cosine, sine)
-        if angle < best:
-            best, best_cosine, best_sine, hit = angle, cosine, sine, row
-    return hit, best_cosine, best_sine
+            cosine, sine, scale = level * px + rest * py, level * py - rest * px, flat2
+        if hit < 0 or _is_before(cosine, sine, first_cosine, first_sine):
+            hit, first_cosine, first_sine, first_scale = row, cosine, sine, scale
+    return hit, first_cosine / first_scale, first_sine / first_scale

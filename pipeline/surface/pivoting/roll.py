@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from pipeline.surface.pivoting.ball import agrees, ball_center, is_empty, is_on
+from pipeline.surface.pivoting.compiled import compiled
 from pipeline.surface.pivoting.front import CURSOR, FACES, HEAD, SETTLED, TAIL, add_triangle, can_join
 from pipeline.surface.pivoting.grid import gather
 from pipeline.surface.pivoting.orbit import center_at, first_met, orbit
@@ -15,7 +15,7 @@ _NEAR = 1.0
 """The first search about an edge finds balls that moved by up to this many edge lengths."""
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def advance(points, normals, grid, front, scratch, radius, radius_index, limit):  # type: ignore[no-untyped-def]
     """Roll on until there are ``limit`` triangles; True when this ball can go nowhere any more."""
     counts = front.counts
@@ -40,7 +40,7 @@ def advance(points, normals, grid, front, scratch, radius, radius_index, limit):
     return False
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def restart(points, grid, front, scratch, radius):  # type: ignore[no-untyped-def]
     """Begin with a larger ball: queue the front's edges on whose triangle it finds an empty place."""
     counts = front.counts
@@ -62,7 +62,7 @@ def restart(points, grid, front, scratch, radius):  # type: ignore[no-untyped-de
                 counts[TAIL] += 1
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _roll_over(points, normals, grid, front, found, edge, radius, radius_index):  # type: ignore[no-untyped-def]
     """Pivot about one edge and join what stops the ball; otherwise the edge stays as boundary."""
     t = edge // 3
@@ -77,7 +77,7 @@ def _roll_over(points, normals, grid, front, found, edge, radius, radius_index):
         add_triangle(front, b, a, hit, x, y, z, radius_index)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def pivot(points, grid, found, a, b, center, radius):  # type: ignore[no-untyped-def]
     """(hit, x, y, z): the point that stops a ball turning about the edge a to b, and its centre there.
 

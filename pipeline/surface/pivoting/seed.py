@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from pipeline.surface.pivoting.ball import TIE, agrees, ball_center
 from pipeline.surface.pivoting.cell import BOX, Cell, begin, new_cell, shrink
+from pipeline.surface.pivoting.compiled import compiled
 from pipeline.surface.pivoting.grid import gather
 from pipeline.types import FloatArray, IntArray
 
@@ -35,7 +35,7 @@ def new_scratch(n_points: int) -> Scratch:
     )
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def find_seed(points, normals, grid, front, scratch, p, radius):  # type: ignore[no-untyped-def]
     """(b, c, x, y, z) of the seed triangle p, b, c and its ball's centre; b = -1 for none.
 
@@ -57,7 +57,7 @@ def find_seed(points, normals, grid, front, scratch, p, radius):  # type: ignore
     return _nearest_pair(points, normals, grid, front, scratch, count, p, radius)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _neighbours(points, grid, scratch, p, count, beyond_m, reach_m):  # type: ignore[no-untyped-def]
     """Add the neighbours of a point between two distances to the ``count`` in ``near``; how many then."""
     found, near = scratch.found, scratch.near
@@ -75,7 +75,7 @@ def _neighbours(points, grid, scratch, p, count, beyond_m, reach_m):  # type: ig
     return count
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _nearest_pair(points, normals, grid, front, scratch, count, p, radius):  # type: ignore[no-untyped-def]
     """The pair of neighbours, of all those at far corners of the cell, whose farther one is nearest."""
     near, rows, cell = scratch.near, scratch.rows, scratch.cell
@@ -103,7 +103,7 @@ def _nearest_pair(points, normals, grid, front, scratch, count, p, radius):  # t
     return seed
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _is_free(near, count, i, j, x, y, z, radius):  # type: ignore[no-untyped-def]
     """Whether no neighbour but i and j is inside the ball about (x, y, z) on whose surface the origin is."""
     for n in range(count):
