@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import viser
 
 from app.delay import Delay
+from app.page import running
 
-PATIENCE_S = 1.0
+PATIENCE_S = 1.5
 """Without an answer for so long, for want of a browser perhaps, it is taken as given."""
-_ANSWER = (
-    "const key = new KeyboardEvent('keydown', {key: 'Insert', ctrlKey: true, altKey: true, shiftKey: true});"
-    "requestAnimationFrame(() => requestAnimationFrame(() => document.documentElement.dispatchEvent(key)))"
-)
-"""Presses a key two frames later, as HTML cannot talk to the server by itself."""
 
 
 class Echo:
@@ -37,25 +33,36 @@ class Echo:
             on_answer: called there, once for each question.
         """
         self._on_answer = on_answer
-        self._asked = 0
+        self._said = 0
         self.waiting = False
         self._html = gui.add_html("")
         command = gui.add_command("Say that all is drawn", hotkey="insert", modifier="cmd/ctrl+alt+shift")
         command.on_trigger(lambda _: post(self._answered))
         self._patience = Delay(PATIENCE_S, lambda: post(self._answered))
 
-    def ask(self) -> None:
-        """Ask now; of two questions, only the last is answered."""
-        self._asked += 1
+    def hold(self) -> None:
+        """Have only new meshes drawn, until ``ask`` ends that or a second has passed."""
+        self._say("packetmesh.hold()")
+
+    def ask(self, vertices: Sequence[int] = (), hold: bool = False) -> None:
+        """Ask now; of two questions, only the last is answered.
+
+        Args:
+            vertices: of each mesh that is to be drawn first. While they are awaited nothing is drawn,
+                so that what they replace may be hidden at once.
+            hold: see there.
+        """
         self.waiting = True
-        self._html.content = (
-            f'<img alt="" style="display: none" src="data:," data-asked="{self._asked}" onerror="{_ANSWER}">'
-        )
+        self._say(f"packetmesh.ask({list(vertices)}, {str(hold).lower()})")
         self._patience.restart()
 
     def close(self) -> None:
         """End the timer."""
         self._patience.cancel()
+
+    def _say(self, script: str) -> None:
+        self._said += 1
+        self._html.content = running(script, mark=self._said)
 
     def _answered(self) -> None:
         if self.waiting:

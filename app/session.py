@@ -18,7 +18,7 @@ from app.drawing.cameras import look, stage_of
 from app.drawing.colors import BRAND, DELIVERED
 from app.jobs import entry
 from app.jobs.store import Store
-from app.keys import keep_keys_from_the_view
+from app.page import add_script
 from app.panel import Panel
 from app.state import CHAIN, Results, SharedViews, Spec, Step
 from app.stepper import Stepper
@@ -229,7 +229,7 @@ class Session:
 
     def _build(self) -> None:
         titles = [panel.title for panel in self._panels]
-        keep_keys_from_the_view(self.gui)
+        add_script(self.gui)
         self._stepper = Stepper(self.gui, titles, lambda title: self.post(self.show, title))
         self._status = self.gui.add_markdown("**Starting** …")
         self._bar = self.gui.add_progress_bar(0.0)

@@ -19,13 +19,17 @@ class SurfaceDrawing:
         self._rims_shown = True
         self._frame = scene.add_frame(below, show_axes=False)
 
-    def draw(self, view: MeshView | PaintedMesh) -> None:
+    def draw(self, view: MeshView | PaintedMesh, unseen: bool = False) -> None:
         """Draw this one; ``drop_old`` then takes the one before away.
 
-        A browser needs some frames to read a mesh. The one before stays until then, so that the
-        surface does not blink while the radius is dragged.
+        A browser needs some frames to read a mesh. The one before stays until then, so that the surface
+        does not blink; or at least, where it is ``unseen`` as the browser draws nothing in between, its
+        material stays, so that the browser need not compile its shader again.
         """
         self._made += 1
+        if unseen:
+            for handle in (*self._meshes, *self._rims):
+                handle.visible = False
         for kind, glb, handles in (("mesh", view.glb, self._meshes), ("rims", view.rims_glb, self._rims)):
             _shorten(handles, 1 if glb else 0)
             if glb:

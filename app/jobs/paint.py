@@ -84,7 +84,7 @@ def _painted(surface: Surface, wish: PaintWish, rig: Rig, cameras: list[Camera])
     colors = vertex_colors(surface, wish.coloring, rig, cameras)
     glb = surface_glb(surface, colors, photographed=wish.coloring == "color")
     rims_glb = b"" if wish.radius_m is not None else lines_glb(rim_segments_m(surface), LOSS)
-    return PaintedMesh(glb, rims_glb, len(surface.triangles))
+    return PaintedMesh(glb, rims_glb, len(surface.vertices_m), len(surface.triangles))
 
 
 def vertex_colors(surface: Surface, coloring: Coloring, rig: Rig, cameras: list[Camera]) -> ByteArray | None:

@@ -356,6 +356,7 @@ class PaintedMesh:
 
     glb: bytes
     rims_glb: bytes
+    vertices: int
     triangles: int
 
 

@@ -132,11 +132,9 @@ def test_a_delay_comes_once_after_the_last_restart_and_not_when_cancelled():
 
 def test_looks_get_coarser_for_a_slow_browser_and_finer_again_for_a_fast_one():
     detail = Detail()
-    detail.took(0.25)
-    assert detail.points == QUICK_POINTS // 2
-    for seconds in (0.1, 0.9, 0.9, 0.1):
+    for seconds in (0.2, 0.9, 0.9, 0.2):
         detail.took(seconds)
-    assert detail.points == QUICK_POINTS // 2
+    assert detail.points == QUICK_POINTS
     for _ in range(4 * LOOKS):
         detail.took(1.0)
     assert detail.points == FEWEST_POINTS
@@ -157,7 +155,7 @@ def test_the_detail_settles_whatever_the_speed(seconds_per_point):
 
 def test_what_is_asked_for_follows_the_browsers_answers(scene):
     browser, look, _ = scene
-    for _ in range(1 + LOOKS):
+    for _ in range(2 * LOOKS):
         look.want(wish(0.01))
         look._asked_s -= 0.5
         browser.finish()
@@ -167,4 +165,17 @@ def test_what_is_asked_for_follows_the_browsers_answers(scene):
         browser.answer()
     look.want(wish(0.02))
     asked = [asked.most_points for asked, _ in browser.jobs]
-    assert asked == [QUICK_POINTS] + [QUICK_POINTS // 2] * LOOKS + [QUICK_POINTS // 4]
+    assert asked == [QUICK_POINTS] * LOOKS + [QUICK_POINTS // 2] * LOOKS + [QUICK_POINTS // 4]
+
+
+def test_the_view_is_held_from_the_first_move_until_the_radius_rests(scene, monkeypatch):
+    browser, look, _ = scene
+    look.want(wish(0.01))
+    assert "packetmesh.hold()" in browser.questions.content
+    look.sent([4, 5])
+    assert "packetmesh.ask([4, 5], true)" in browser.questions.content
+    look.want(wish(0.02))
+    assert "packetmesh.ask([4, 5], true)" in browser.questions.content
+    look.close()
+    look.sent()
+    assert "packetmesh.ask([], false)" in browser.questions.content

@@ -1,15 +1,16 @@
 """How long after the radius slider moves its surface stands on the screen.
 
 ``python tests/benchmarks/slider_latency.py`` opens the app in Chromium, lets a hand drag the radius to and
-fro, and times each radius from the message that carries it to the first frame that draws a mesh which was
-not there before. Prints the median and the 95th percentile, for the machine's OpenGL driver (Mesa's
-software one where there is no graphics card) and for SwiftShader, Chromium's own without a driver.
+fro, and times each radius from the hand's move to when OpenGL has drawn the first frame with its mesh.
+Prints the median and the 95th percentile, for the machine's OpenGL driver (Mesa's software one where there
+is no graphics card) and for SwiftShader, Chromium's own without a driver.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+import time
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -35,14 +36,14 @@ WATCH = """
     for (const change of changes)
       log.moved.push({at: hand, mm: parseFloat(change.target.getAttribute("aria-valuenow"))});
   }).observe(document, {subtree: true, attributes: true, attributeFilter: ["aria-valuenow"]});
-  let last = 0;
   const draw = WebGL2RenderingContext.prototype.drawElements;
   WebGL2RenderingContext.prototype.drawElements = function (mode, count, type, offset) {
     draw.call(this, mode, count, type, offset);
-    if (mode === 4 && count > 3000) {
-      const indices = count;
-      requestAnimationFrame(() => log.drawn.push({at: performance.now(), indices}));
-    }
+    if (mode !== 4 || count < 3000) return;
+    const drawn = this.fenceSync(this.SYNC_GPU_COMMANDS_COMPLETE, 0), frame = document.timeline.currentTime;
+    const look = () => this.getSyncParameter(drawn, this.SYNC_STATUS) === this.SIGNALED
+      ? log.drawn.push({at: performance.now(), frame, indices: count}) : setTimeout(look, 2);
+    setTimeout(look, 2);
   };
 })();
 """
@@ -68,7 +69,7 @@ def drag(page, stops: int, pause_ms: int) -> dict:
     page.evaluate("surfaceLog.moved.length = surfaceLog.drawn.length = 0")
     for place in places:
         page.mouse.move(float(place), middle)
-        page.wait_for_timeout(pause_ms)
+        time.sleep(pause_ms / 1000.0)
     page.wait_for_timeout(300)
     log = page.evaluate("surfaceLog")
     page.mouse.up()
@@ -96,8 +97,9 @@ def latencies_s(log: dict, shown: list[tuple[float, int]]) -> list[float]:
 
 def between_meshes_s(log: dict) -> np.ndarray:
     """Seconds from one mesh to the next on the screen."""
-    frames = [{drawn["indices"] for drawn in group} for _, group in groupby(log["drawn"], itemgetter("at"))]
-    times = [at for at, _ in groupby(log["drawn"], itemgetter("at"))]
+    drawn = [list(group) for _, group in groupby(log["drawn"], itemgetter("frame"))]
+    frames = [{one["indices"] for one in group} for group in drawn]
+    times = [max(one["at"] for one in group) for group in drawn]
     new = [at for at, before, now in zip(times[1:], frames, frames[1:], strict=False) if now - before]
     return np.diff(new) / 1000.0
 

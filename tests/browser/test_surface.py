@@ -83,7 +83,9 @@ def test_a_hole_is_chosen_from_the_list_and_explained(surface):
 def test_no_answer_is_lost_beside_a_fast_hand(browser, app, monkeypatch):
     monkeypatch.setattr(echo, "PATIENCE_S", 600.0)
     asked, ask = [], echo.Echo.ask
-    monkeypatch.setattr(echo.Echo, "ask", lambda self: (asked.append(self), ask(self)))
+    monkeypatch.setattr(
+        echo.Echo, "ask", lambda self, *of, **how: (asked.append(self), ask(self, *of, **how))
+    )
     context = browser.new_context(viewport={"width": 900, "height": 640})
     page = context.new_page()
     page.goto(f"{app.url}?fixedDpr=1")

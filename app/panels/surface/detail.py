@@ -5,11 +5,11 @@ from __future__ import annotations
 from app.jobs.records import QUICK_POINTS
 
 FEWEST_POINTS = QUICK_POINTS // 4
-SLOW_S, FAST_S = 0.16, 0.06
+SLOW_S, FAST_S = 0.25, 0.11
 """A look that takes longer than the one is halved; shorter than the other, doubled. As half the points take
 about half the time, the two must differ by more than a factor of two, or the detail would swing."""
 LOOKS = 2
-"""So many in a row must agree, as one may be late by chance; the first says at once what to expect."""
+"""So many in a row must agree, as one may be late by chance."""
 
 
 class Detail:
@@ -17,15 +17,13 @@ class Detail:
 
     def __init__(self) -> None:
         self.points = QUICK_POINTS
-        self._needed = 1
         self._times_s: list[float] = []
 
     def took(self, seconds: float) -> None:
         """A look at so many points was rolled, sent and drawn in this time."""
         self._times_s.append(seconds)
-        if len(self._times_s) < self._needed:
+        if len(self._times_s) < LOOKS:
             return
-        self._needed = LOOKS
         if min(self._times_s) > SLOW_S:
             self.points = max(self.points // 2, FEWEST_POINTS)
         elif max(self._times_s) < FAST_S:

@@ -49,6 +49,7 @@ class SurfacePanel(Panel):
         self._view: SurfaceView | None = None
         self._yardsticks: dict[str, YardstickView] = {}
         self._look: SurfaceLook | None = None
+        self._line = ""
         self._by_click = False
         self._thinning: tuple[int, int] | None = None
         gui.add_markdown(TEXT)
@@ -96,7 +97,7 @@ class SurfacePanel(Panel):
             self._controls = Controls(
                 gui, ADVANCED, session.spec.config, lambda change: session.post(session.edit, change)
             )
-            self._look_quickly = QuickLook(gui, session, self._painted, self._drop_old, self._rested)
+            self._look_quickly = QuickLook(gui, session, self._painted, self._drawn, self._rested)
 
     @property
     def wide(self) -> bool:
@@ -137,19 +138,20 @@ class SurfacePanel(Panel):
         if not self._look_quickly.moving:
             self._take(view)
 
-    # The radius.
-
     def _dragged(self) -> None:
         """Show this ball's surface at once, and compute everything when the slider rests."""
         if self._shown.value in YARDSTICKS:
             self._shown.value = AFTER
             self._arrange()
-        coloring = COLORINGS[self._coloring.value]
-        self._look_quickly.want(PaintWish(self._stage.which, coloring, self._radius.value / 1000.0))
+        which, coloring = self._stage.which, COLORINGS[self._coloring.value]
+        self._look_quickly.want(PaintWish(which, coloring, self._radius.value / 1000.0))
 
-    def _drop_old(self) -> None:
+    def _drawn(self) -> None:
+        """What was sent last stands on the screen; its numbers waited, as the page is slow to write them."""
         with self.session.target.atomic():
             self._stage.drop_old()
+            if self._look_quickly.moving:
+                self._quick.content = self._line
 
     def _rested(self) -> None:
         session = self.session
@@ -206,17 +208,16 @@ class SurfacePanel(Panel):
 
     def _painted(self, view: PaintedView | None) -> None:
         """Draw it, unless something else is wanted by now."""
-        if view is None:
+        if view is None or view.wish.coloring != COLORINGS[self._coloring.value]:
             return
         quick = view.wish.radius_m is not None
-        if quick != self._look_quickly.moving or view.wish.coloring != COLORINGS[self._coloring.value]:
+        if quick != self._look_quickly.moving:
             return
         with self.session.target.atomic():
-            for which, mesh in view.meshes.items():
-                self._stage.draw(which, mesh)
-            if quick:
-                self._quick.content = quick_line(view)
-            self._look_quickly.sent()
+            drawn = [mesh for which, mesh in view.meshes.items() if self._stage.draw(which, mesh, quick)]
+            self._look_quickly.sent([mesh.vertices for mesh in drawn if mesh.triangles] if quick else ())
+        self._line = quick_line(view) if quick else ""
+        self.session.target.flush()
 
     def _picked_shown(self) -> None:
         """Show another surface; that of a yardstick is made first."""
@@ -353,8 +354,6 @@ class SurfacePanel(Panel):
             look_closely(self.session.clients(), *self._rolling.focus)
         else:
             self.session.frame_view(anew=True)
-
-    # The lesson.
 
     def _take_look(self, look: SurfaceLook) -> None:
         """Set the controls as a stop of the lesson says; what needs the surface waits for it."""

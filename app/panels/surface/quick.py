@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -56,13 +56,15 @@ class QuickLook:
 
     def want(self, wish: PaintWish) -> None:
         """The radius has moved."""
+        if not self.moving:
+            self._echo.hold()
         self._settle.restart()
         self._next = wish
         self._go_on()
 
-    def sent(self) -> None:
-        """A surface is on its way to the browser."""
-        self._echo.ask()
+    def sent(self, vertices: Sequence[int] = ()) -> None:
+        """Surfaces are on their way to the browser; quick ones, of so many vertices each."""
+        self._echo.ask(vertices, hold=self.moving)
 
     def close(self) -> None:
         """End the timers."""

@@ -38,11 +38,19 @@ class SurfaceStage:
         """(3,) from the middle of the scene to a surface."""
         return self._offset_m if which == "after" else -self._offset_m
 
-    def draw(self, which: Which, mesh: MeshView | PaintedMesh) -> None:
-        """Draw one of the ball's surfaces, if it is not drawn already."""
-        if which not in self._drawn or self._drawn[which].glb != mesh.glb:
-            self._drawings[which].draw(mesh)
-            self._drawn[which] = mesh
+    def draw(self, which: Which, mesh: MeshView | PaintedMesh, unseen: bool = False) -> bool:
+        """Draw one of the ball's surfaces; False if it is drawn already.
+
+        Args:
+            which: which one.
+            mesh: what it is now.
+            unseen: whether the browser draws nothing until it has this one.
+        """
+        if which in self._drawn and self._drawn[which].glb == mesh.glb:
+            return False
+        self._drawings[which].draw(mesh, unseen)
+        self._drawn[which] = mesh
+        return True
 
     def draw_yardstick(self, mesh: MeshView | None) -> None:
         """Draw a yardstick's surface, or none."""

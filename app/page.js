@@ -1,0 +1,111 @@
+// What PacketMesh adds to viser's page, once in a browser.
+(() => {
+  if (window.packetmesh) return;
+
+  // Arrow keys on a slider move the slider. viser turns the view by them, too, unless they go to a text field.
+  document.body.onkeydown = event => event.target.closest("[role=slider]") && event.stopPropagation();
+
+  // While it is told of anything new, viser draws one frame after another, most of them alike. Without a
+  // graphics card that takes the time in which the next mesh is made. A view that is held draws only frames
+  // in which a mesh is new. And while a mesh is awaited, its place may be empty: then nothing is drawn.
+  const MOST_MS = 1000; // held or awaited for longer than this, it is given up
+  const POLL_MS = 4;
+  const KEY = {key: "Insert", ctrlKey: true, altKey: true, shiftKey: true};
+
+  let gl = null; // what viser draws with
+  let held = false;
+  let until = 0; // by the page's clock, in ms
+  let awaited = []; // numbers of vertices of the meshes to come
+  let arrived = []; // those that came since the last answer
+  let whole = false; // whether the next frame has all that was awaited
+  let asked = 0;
+  let frame = null;
+  let skipped = false;
+  let width = 0;
+  let height = 0;
+
+  function answer(question) {
+    if (question !== asked) return; // there is a newer one
+    asked += 1;
+    awaited = [];
+    arrived = [];
+    whole = false;
+    document.documentElement.dispatchEvent(new KeyboardEvent("keydown", KEY));
+  }
+
+  function beginFrame() {
+    const late = performance.now() > until;
+    const emptied = width !== gl.drawingBufferWidth || height !== gl.drawingBufferHeight; // by a new size
+    [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+    skipped = !whole && !late && !emptied && (held || awaited.length > 0);
+    if (whole) queueMicrotask(answerWhenDrawn); // after all calls of this frame
+    whole = false;
+  }
+
+  function answerWhenDrawn() {
+    const question = asked;
+    const drawn = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    const look = () => {
+      if (gl.getSyncParameter(drawn, gl.SYNC_STATUS) !== gl.SIGNALED) return setTimeout(look, POLL_MS);
+      gl.deleteSync(drawn);
+      answer(question);
+    };
+    setTimeout(look, POLL_MS);
+  }
+
+  // Of a new mesh, three.js uploads the vertices before it clears the frame.
+  function uploaded(vertices) {
+    arrived.push(vertices);
+    if (!awaited.includes(vertices)) return;
+    awaited.splice(awaited.indexOf(vertices), 1);
+    whole = awaited.length === 0;
+  }
+
+  function before(name, action) {
+    const call = gl[name];
+    gl[name] = (...parameters) => {
+      action(...parameters);
+      if (!skipped || name === "bufferData") call.apply(gl, parameters);
+    };
+  }
+
+  function watch() {
+    gl = document.querySelector("canvas[data-engine]")?.getContext("webgl2") ?? null;
+    if (gl === null) return;
+    before("clear", () => {
+      if (frame === document.timeline.currentTime) return;
+      frame = document.timeline.currentTime;
+      beginFrame();
+    });
+    for (const name of ["drawElements", "drawArrays", "drawElementsInstanced", "drawArraysInstanced"])
+      before(name, () => {});
+    before("bufferData", (target, data) => target === gl.ARRAY_BUFFER && uploaded(data?.length / 3));
+    for (const kind of ["pointerdown", "pointerup", "wheel"])
+      window.addEventListener(kind, () => { held = false; }, true);
+  }
+
+  window.packetmesh = {
+    // Draw nothing but new meshes for now.
+    hold() {
+      if (gl === null) watch();
+      held = true;
+      until = performance.now() + MOST_MS;
+    },
+
+    // Press a key once meshes of so many vertices are drawn; without any, when the next frame is drawn if the
+    // view is held, as it goes on to be or not, and else two frames later.
+    ask(vertices, hold) {
+      if (gl === null) watch();
+      const question = ++asked;
+      held = hold;
+      until = performance.now() + MOST_MS;
+      awaited = vertices.filter(count => !arrived.includes(count));
+      const nothing = !hold && vertices.length === 0;
+      whole = !nothing && awaited.length === 0;
+      if (gl === null || nothing)
+        requestAnimationFrame(() => requestAnimationFrame(() => answer(question)));
+      else setTimeout(answer, MOST_MS, question);
+    },
+  };
+})();

@@ -1,0 +1,25 @@
+"""What the app adds to viser's page: a script of its own, ``page.js``."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+import viser
+
+_SCRIPT = Path(__file__).with_suffix(".js").read_text()
+
+
+def add_script(gui: viser.GuiApi) -> None:
+    """Have the page run the script, before it is first called."""
+    gui.add_html(running(_SCRIPT))
+
+
+def running(script: str, mark: object = "") -> str:
+    """HTML that runs a script when it is shown. It cannot hold one, but what is to be done without its image.
+
+    Args:
+        script: what to run.
+        mark: tells two apart that are otherwise alike, as a page runs the same HTML once only.
+    """
+    return f'<img alt="" style="display: none" src="data:," data-mark="{mark}" onerror="{escape(script)}">'
