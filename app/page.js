@@ -2,21 +2,19 @@
 (() => {
   if (window.packetmesh) return;
 
-  // Arrow keys on a slider move the slider. viser turns the view by them, too, unless they go to a text field.
-  document.body.onkeydown = event => event.target.closest("[role=slider]") && event.stopPropagation();
-
   // While it is told of anything new, viser draws one frame after another, most of them alike. Without a
   // graphics card that takes the time in which the next mesh is made. A view that is held draws only frames
   // in which a mesh is new. And while a mesh is awaited, its place may be empty: then nothing is drawn.
-  const MOST_MS = 1000; // held or awaited for longer than this, it is given up
+  const HELD_MS = 3000; // at most, since it was last said
+  const AWAITED_MS = 1000; // at most, before the answer is given without
   const POLL_MS = 4;
   const KEY = {key: "Insert", ctrlKey: true, altKey: true, shiftKey: true};
 
   let gl = null; // what viser draws with
   let held = false;
-  let until = 0; // by the page's clock, in ms
+  let until = 0; // held so long, by the page's clock in ms
   let awaited = []; // numbers of vertices of the meshes to come
-  let arrived = []; // those that came since the last answer
+  let arrived = []; // those that came while the view was held, since the last answer
   let whole = false; // whether the next frame has all that was awaited
   let asked = 0;
   let frame = null;
@@ -56,7 +54,7 @@
 
   // Of a new mesh, three.js uploads the vertices before it clears the frame.
   function uploaded(vertices) {
-    arrived.push(vertices);
+    if (held) arrived.push(vertices);
     if (!awaited.includes(vertices)) return;
     awaited.splice(awaited.indexOf(vertices), 1);
     whole = awaited.length === 0;
@@ -71,6 +69,7 @@
   }
 
   function watch() {
+    if (gl?.canvas.isConnected) return;
     gl = document.querySelector("canvas[data-engine]")?.getContext("webgl2") ?? null;
     if (gl === null) return;
     before("clear", () => {
@@ -81,31 +80,37 @@
     for (const name of ["drawElements", "drawArrays", "drawElementsInstanced", "drawArraysInstanced"])
       before(name, () => {});
     before("bufferData", (target, data) => target === gl.ARRAY_BUFFER && uploaded(data?.length / 3));
-    for (const kind of ["pointerdown", "pointerup", "wheel"])
-      window.addEventListener(kind, () => { held = false; }, true);
   }
+
+  // What a hand does now may turn the view; only arrow keys on a slider do not, though viser would turn it.
+  for (const kind of ["pointerdown", "pointerup", "wheel"])
+    window.addEventListener(kind, () => { held = false; }, true);
+  document.body.onkeydown = event => {
+    if (event.target.closest("[role=slider]")) event.stopPropagation();
+    else held = false;
+  };
 
   window.packetmesh = {
     // Draw nothing but new meshes for now.
     hold() {
-      if (gl === null) watch();
+      watch();
       held = true;
-      until = performance.now() + MOST_MS;
+      until = performance.now() + HELD_MS;
     },
 
     // Press a key once meshes of so many vertices are drawn; without any, when the next frame is drawn if the
     // view is held, as it goes on to be or not, and else two frames later.
     ask(vertices, hold) {
-      if (gl === null) watch();
+      watch();
       const question = ++asked;
       held = hold;
-      until = performance.now() + MOST_MS;
+      until = performance.now() + HELD_MS;
       awaited = vertices.filter(count => !arrived.includes(count));
       const nothing = !hold && vertices.length === 0;
       whole = !nothing && awaited.length === 0;
       if (gl === null || nothing)
         requestAnimationFrame(() => requestAnimationFrame(() => answer(question)));
-      else setTimeout(answer, MOST_MS, question);
+      else setTimeout(answer, AWAITED_MS, question);
     },
   };
 })();
