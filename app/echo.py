@@ -10,7 +10,8 @@ from app.delay import Delay
 from app.page import running
 
 PATIENCE_S = 1.5
-"""Without an answer for so long, for want of a browser perhaps, it is taken as given."""
+"""Without an answer for so long, for want of a browser perhaps, it is taken as given. A page that draws
+answers within a second (page.js)."""
 
 
 class Echo:
@@ -41,7 +42,7 @@ class Echo:
         self._patience = Delay(PATIENCE_S, lambda: post(self._answered))
 
     def hold(self) -> None:
-        """Have only new meshes drawn, until ``ask`` ends that or a second has passed."""
+        """Have only new meshes drawn, until ``ask`` ends that, a hand turns the view, or 3 s have passed."""
         self._say("packetmesh.hold()")
 
     def ask(self, vertices: Sequence[int] = (), hold: bool = False) -> None:
@@ -50,7 +51,7 @@ class Echo:
         Args:
             vertices: of each mesh that is to be drawn first. While they are awaited nothing is drawn,
                 so that what they replace may be hidden at once.
-            hold: see there.
+            hold: whether to hold the view from now on.
         """
         self.waiting = True
         self._say(f"packetmesh.ask({list(vertices)}, {str(hold).lower()})")

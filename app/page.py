@@ -7,7 +7,7 @@ from pathlib import Path
 
 import viser
 
-_SCRIPT = Path(__file__).with_suffix(".js").read_text()
+_SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
 
 
 def add_script(gui: viser.GuiApi) -> None:

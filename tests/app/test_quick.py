@@ -168,7 +168,7 @@ def test_what_is_asked_for_follows_the_browsers_answers(scene):
     assert asked == [QUICK_POINTS] * LOOKS + [QUICK_POINTS // 2] * LOOKS + [QUICK_POINTS // 4]
 
 
-def test_the_view_is_held_from_the_first_move_until_the_radius_rests(scene, monkeypatch):
+def test_the_view_is_held_from_the_first_move_until_the_radius_rests(scene):
     browser, look, _ = scene
     look.want(wish(0.01))
     assert "packetmesh.hold()" in browser.questions.content

@@ -54,7 +54,7 @@ def begin_to_count(page):
     page.evaluate("watched.surfaces = watched.drawn = watched.answers = 0; watched.covered = []")
 
 
-def test_while_the_radius_is_dragged_each_surface_is_drawn_once_and_none_blinks(page):
+def test_while_the_radius_is_dragged_only_new_surfaces_are_drawn_and_none_blinks(page):
     handle = slider(page, "Radius (mm)").bounding_box()
     x, y = handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2
     before = page.evaluate("look()")

@@ -49,7 +49,7 @@ class SurfacePanel(Panel):
         self._view: SurfaceView | None = None
         self._yardsticks: dict[str, YardstickView] = {}
         self._look: SurfaceLook | None = None
-        self._line = ""
+        self._quick_line = ""
         self._by_click = False
         self._thinning: tuple[int, int] | None = None
         gui.add_markdown(TEXT)
@@ -151,7 +151,7 @@ class SurfacePanel(Panel):
         with self.session.target.atomic():
             self._stage.drop_old()
             if self._look_quickly.moving:
-                self._quick.content = self._line
+                self._quick.content = self._quick_line
 
     def _rested(self) -> None:
         session = self.session
@@ -216,7 +216,7 @@ class SurfacePanel(Panel):
         with self.session.target.atomic():
             drawn = [mesh for which, mesh in view.meshes.items() if self._stage.draw(which, mesh, quick)]
             self._look_quickly.sent([mesh.vertices for mesh in drawn if mesh.triangles] if quick else ())
-        self._line = quick_line(view) if quick else ""
+        self._quick_line = quick_line(view) if quick else ""
         self.session.target.flush()
 
     def _picked_shown(self) -> None:
