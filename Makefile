@@ -26,7 +26,7 @@ reproduce: $(VENV)/.core  ## the thesis's claims beside ours
 	$(BIN)/packetmesh reproduce --out runs/reproduce $(ARGS)
 
 scenes: $(VENV)/.core  ## render the demo scenes again
-	$(BIN)/python -m assets.make_scenes $(ARGS)
+	$(BIN)/python -m lab.worlds $(ARGS)
 
 lock: $(VENV)/.uv  ## pin everything anew
 	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 pyproject.toml -o requirements.lock

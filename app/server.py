@@ -19,14 +19,14 @@ from pathlib import Path
 import viser
 
 from app.drawing.colors import BRAND
-from app.jobs.entry import warm_up
-from app.jobs.store import Store
-from app.panels import PANELS
+from app.jobs import warm_up
+from app.pool import ComputePool
+from app.screens import PANELS
 from app.session import Session, Target
 from app.state import SharedViews, Source, Spec
-from app.worker import ComputePool
+from app.store import Store
+from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.errors import InputError
 
 logger = logging.getLogger(__name__)
 

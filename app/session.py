@@ -14,19 +14,19 @@ from typing import Any, TypeAlias
 
 import viser
 
+from app import jobs
 from app.drawing.cameras import look, stage_of
 from app.drawing.colors import BRAND, DELIVERED
-from app.jobs import entry
-from app.jobs.store import Store
 from app.page import add_script
 from app.panel import Panel
+from app.pool import ComputePool, LatestWins, Outcome
 from app.state import CHAIN, Results, SharedViews, Spec, Step
 from app.stepper import Stepper
+from app.store import Store
 from app.tables import command_html
-from app.worker import ComputePool, LatestWins, Outcome
+from packetmesh.errors import PacketMeshError
+from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig
-from pipeline.errors import PacketMeshError
-from pipeline.progress import Progress
 
 logger = logging.getLogger(__name__)
 
@@ -156,7 +156,7 @@ class Session:
             self._say()
 
         lane.submit(
-            entry.run,
+            jobs.run,
             job,
             *arguments,
             on_progress=lambda value: self.post(progressed, value),
@@ -188,7 +188,7 @@ class Session:
         self._running, self._submitted = step, key
         self._say()
         self._chain.submit(
-            entry.run,
+            jobs.run,
             step,
             self.store,
             self.spec,

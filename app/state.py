@@ -10,8 +10,8 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from packetmesh.settings import differences
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.settings import differences
 
 Step = Literal["scene", "depth", "fuse", "surface"]
 CHAIN: tuple[Step, ...] = ("scene", "depth", "fuse", "surface")

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 Propagation = Literal["friis", "two-ray", "log-distance"]
 MacKind = Literal["ieee80211b", "ieee802154", "ideal", "serial"]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from network_sim.config import EnergyConfig
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 FloatArray = NDArray[np.float64]
 

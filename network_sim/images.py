@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from network_sim.types import Cause, EventKind, Packet, PacketKind
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 if TYPE_CHECKING:
     import simpy

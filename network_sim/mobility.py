@@ -14,7 +14,7 @@ import numpy as np
 
 from network_sim.config import StreetConfig
 from network_sim.types import NS_PER_S
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 STEPS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
 """Blocks east and north for each heading: east, north, west, south."""

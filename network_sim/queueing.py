@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 
 def md1_mean_wait_s(arrivals_per_s: float, service_s: float) -> float:

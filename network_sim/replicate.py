@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit  # student's t; scipy.stats takes a second to import
 
-from network_sim.batch import run_batch
 from network_sim.config import NetworkConfig
 from network_sim.metrics import Metric, metrics
 from network_sim.simulate import simulate
-from pipeline.errors import InputError
-from pipeline.progress import Progress
-from pipeline.settings import with_settings
+from packetmesh.batch import run_batch
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from packetmesh.settings import with_settings
 
 
 @dataclass(frozen=True, slots=True)

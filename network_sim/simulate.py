@@ -19,7 +19,7 @@ from network_sim.radio import Radio
 from network_sim.street import start_street, street_places
 from network_sim.trace import NetworkTrace, Recorder
 from network_sim.types import Packet, to_ns
-from pipeline.progress import Progress
+from packetmesh.progress import Progress
 
 REPORTS = 100
 """Reports of progress in a run."""

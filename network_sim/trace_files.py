@@ -21,9 +21,9 @@ from network_sim.counters import Counters
 from network_sim.ledger import Delays, Outcomes
 from network_sim.trace import COLUMNS, Events, NetworkTrace
 from network_sim.types import Cause, EventKind, PacketKind
-from pipeline.errors import InputError
-from pipeline.io.atomic import atomic_path
-from pipeline.settings import settings, with_settings
+from packetmesh.errors import InputError
+from packetmesh.files import atomic_path
+from packetmesh.settings import settings, with_settings
 
 _WORDS: dict[str, type[IntEnum]] = {"kind": EventKind, "cause": Cause, "packet_kind": PacketKind}
 _NAMES = tuple(name for name, _ in COLUMNS)

@@ -11,7 +11,7 @@ import simpy
 
 from network_sim.config import UplinkConfig
 from network_sim.types import NS_PER_S, Cause, EventKind, Packet, to_ns
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 if TYPE_CHECKING:
     from network_sim.trace import Recorder

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
+from packetmesh.settings import config_named
 
 OutlierMode = Literal["thesis", "depth_normalised", "robust"]
 AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]
@@ -217,3 +218,12 @@ PRESETS: dict[str, PipelineConfig] = {
     ),
 }
 """The two ways through the chain: ours (the default) and the thesis's own."""
+
+
+def load_config(preset: str) -> PipelineConfig:
+    """The preset of that name, or the config saved in that JSON file.
+
+    Raises:
+        InputError: neither a preset nor a readable config.
+    """
+    return config_named(preset, PRESETS)

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
 from pipeline.config import SurfaceConfig
-from pipeline.errors import InputError
 from pipeline.io.clouds import read_cloud
 from pipeline.io.meshes import mesh_suffix, write_mesh
-from pipeline.progress import Progress
 from pipeline.surface import radii, reconstruct_surface, smooth, spacing, voxel_average, voxel_for_count
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.normals import oriented_normals, turned_to_viewpoint

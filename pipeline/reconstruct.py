@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from packetmesh.errors import ReconstructionError
+from packetmesh.progress import Progress
 from pipeline import geometry
 from pipeline.acquisition import FilterResult, back_project, filter_outliers
 from pipeline.config import FusionMode, PipelineConfig
-from pipeline.depth import AlignmentResult, DepthNetwork, Overrides, Trust, align_depth, judge
-from pipeline.errors import ReconstructionError
-from pipeline.progress import Progress
+from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, Overrides, align_depth, judge
 from pipeline.registration import fuse, hidden_from, register
 from pipeline.registration.global_start import register_from_anywhere
 from pipeline.registration.pose_graph import graph_points, pose_edge, solve_pose_graph
@@ -55,7 +55,7 @@ class NodeClouds:
     provider: str
     """The execution provider that ran the network."""
     alignment: AlignmentResult
-    trust: Trust
+    judged: JudgedDepth
     """What of the aligned depth is to be believed in the sensor's holes."""
     inferred: PointCloud
     """The believed depth, or in ``union`` mode all of it, as in the thesis."""
@@ -170,8 +170,8 @@ def prepare_node(frame: RgbdFrame, config: PipelineConfig, network: DepthNetwork
     inferred_depth = network.infer(frame.rgb, crop=config.depth.crop)
     disparity = network.convention.kind == "inverse"
     alignment = align_depth(inferred_depth, frame.depth, config.depth.alignment, disparity)
-    trust = judge(alignment, frame.depth, frame.rgb, config.depth.reach, config.depth.least_confidence)
-    believed = trust.depth if config.fusion.mode == "fill" else alignment.depth
+    judged = judge(alignment, frame.depth, frame.rgb, config.depth.reach, config.depth.least_confidence)
+    believed = judged.depth if config.fusion.mode == "fill" else alignment.depth
     inferred = back_project(frame, believed, PointSource.INFERRED)
     registration = None
     if config.fusion.register_inferred:
@@ -184,7 +184,7 @@ def prepare_node(frame: RgbdFrame, config: PipelineConfig, network: DepthNetwork
         inferred_depth=inferred_depth,
         provider=network.provider,
         alignment=alignment,
-        trust=trust,
+        judged=judged,
         inferred=inferred,
         inferred_registration=registration,
         fused=fuse(sensor, inferred, config.fusion.mode),

@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from packetmesh.errors import ReconstructionError
+from packetmesh.files import atomic_path, write_json
+from packetmesh.settings import settings
 from pipeline.config import PipelineConfig, RegistrationConfig
-from pipeline.errors import ReconstructionError
-from pipeline.io.atomic import atomic_path
 from pipeline.io.clouds import write_cloud
-from pipeline.io.json_file import write_json
 from pipeline.register_pair import DEFAULT_METHOD, Answer
-from pipeline.settings import settings
 from pipeline.types import FloatArray, PointCloud
 
 _STEP_COLUMNS = (

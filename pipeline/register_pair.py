@@ -10,8 +10,8 @@ from typing import Literal, cast
 import numpy as np
 from scipy.spatial import cKDTree
 
+from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
 from pipeline.config import Method, Metric, RegistrationConfig
-from pipeline.errors import InputError, PacketMeshError, ReconstructionError
 from pipeline.geometry import apply
 from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
 from pipeline.registration.global_start import default_voxel_m, global_start

@@ -6,12 +6,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from packetmesh.files import write_json
+from packetmesh.memory import peak_memory_bytes
+from packetmesh.settings import settings
 from pipeline.io.clouds import write_cloud
-from pipeline.io.json_file import write_json
 from pipeline.io.meshes import write_mesh
-from pipeline.memory import peak_memory_bytes
 from pipeline.reconstruct import NodeRegistration, Reconstruction
-from pipeline.settings import settings
 from pipeline.types import PointCloud, PointSource, SurfaceResult
 
 

@@ -10,7 +10,7 @@ import viser
 
 from app.drawing.colors import NEUTRAL
 from app.drawing.poses import place
-from app.jobs.records import SceneNode
+from app.records import SceneNode
 from pipeline.geometry import apply
 from pipeline.types import FloatArray
 

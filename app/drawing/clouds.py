@@ -7,7 +7,7 @@ import viser
 
 from app.drawing.colors import NEUTRAL
 from app.drawing.poses import place
-from app.jobs.records import Sample
+from app.records import Sample
 from pipeline.types import ByteArray, FloatArray
 
 POINT_SIZE_M = 0.012

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from app.reports.html import pictures, table
-from pipeline.experiments.exhibits import Chart, Curve, Exhibit, HeatMap, Picture, Table
+from lab.claims.exhibits import Chart, Curve, Exhibit, HeatMap, Picture, Table
 from pipeline.types import ByteArray
 
 COLORS = (

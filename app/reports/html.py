@@ -9,7 +9,7 @@ from pathlib import Path
 
 import cv2
 
-from pipeline.io.atomic import atomic_path
+from packetmesh.files import atomic_path
 from pipeline.types import ByteArray
 
 STYLE = """

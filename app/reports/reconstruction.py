@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from app.jobs.pictures import depth_picture, depth_range_m
+from app.drawing.pictures import depth_picture, depth_range_m
 from app.reports.html import picture, pictures, table, write_page
 from pipeline.reconstruct import Reconstruction
 from pipeline.surface import Camera

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from app.reports.exhibits import exhibit_html
 from app.reports.html import table, write_page
-from pipeline.experiments import Verdict
+from lab.claims import Verdict
 
 
 def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:

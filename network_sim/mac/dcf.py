@@ -15,7 +15,7 @@ import numpy as np
 import simpy
 
 from network_sim.config import NetworkConfig
-from network_sim.mac.draws import numbers_below
+from network_sim.mac.random_blocks import numbers_below
 from network_sim.types import Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:

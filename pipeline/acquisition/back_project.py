@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.geometry import undistorted_rays
 from pipeline.types import DepthMap, FloatArray, PointCloud, PointSource, RgbdFrame
 

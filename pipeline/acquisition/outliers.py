@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from packetmesh.errors import InputError
 from pipeline.config import AcquisitionConfig
-from pipeline.errors import InputError
 from pipeline.types import BoolArray, FloatArray, PointCloud
 
 _MAD_TO_SIGMA = 1.4826

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import AlignmentMode
 from pipeline.depth.robust import fit_line
-from pipeline.errors import InputError, ReconstructionError
 from pipeline.types import BoolArray, DepthMap, FloatArray
 
 MIN_OVERLAP_PX = 100

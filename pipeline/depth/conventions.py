@@ -27,6 +27,7 @@ from dataclasses import dataclass, fields
 from math import inf
 from typing import Any, Literal, get_args
 
+from packetmesh.errors import InputError
 from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
 from pipeline.depth.preprocessing import (
     HEIGHT_PX,
@@ -36,7 +37,6 @@ from pipeline.depth.preprocessing import (
     WIDTH_PX,
 )
 from pipeline.depth.signature import Layout, Signature, signature_of
-from pipeline.errors import InputError
 
 Channels = Literal["RGB", "BGR"]
 Resize = Literal["fit", "stretch"]

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import onnxruntime
 
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.depth.conventions import Convention, Overrides, convention_of
 from pipeline.depth.preprocessing import centre_crop, fitted, free_size, padded, resized, unpad
 from pipeline.depth.signature import signature_of
-from pipeline.errors import InputError, ReconstructionError
 from pipeline.types import ByteArray, DepthMap, FloatArray
 
 SHIPPED_MODEL = Path(__file__).resolve().parents[2] / "assets" / "depth" / "resnet50.onnx"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import prod
 from typing import Any, Literal
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 Layout = Literal["NCHW", "NHWC"]
 Shape = list[int | str | None]

@@ -1,6 +1,6 @@
 """Files: images, intrinsics, clouds, meshes and rigs, checked when read and replaced whole when written."""
 
-from pipeline.io.atomic import atomic_path
+from packetmesh.files import atomic_path
 from pipeline.io.clouds import read_cloud, write_cloud
 from pipeline.io.images import read_color, read_depth, write_color, write_depth_mm
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics

@@ -7,9 +7,9 @@ import zipfile
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
+from packetmesh.files import MAX_GEOMETRY_BYTES
 from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, Path, check_count
-from pipeline.io.limits import MAX_GEOMETRY_BYTES
 
 _COLUMNS = {"points": POSITION, "colors": COLOR, "normals": NORMAL}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, Path, check_count, number_rows, truncated
 
 _MAX_HEADER_BYTES = 10_000

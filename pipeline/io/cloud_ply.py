@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.io.cloud_table import Path, check_count, number_rows, truncated
 
 _MAX_HEADER_BYTES = 10_000

@@ -7,7 +7,7 @@ import os
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.types import PointCloud
 
 Path = str | os.PathLike[str]

@@ -7,14 +7,13 @@ from pathlib import PurePath
 
 import numpy as np
 
-from pipeline.errors import InputError
-from pipeline.io.atomic import atomic_path
+from packetmesh.errors import InputError
+from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
 from pipeline.io.cloud_npz import parse_npz
 from pipeline.io.cloud_pcd import parse_pcd
 from pipeline.io.cloud_ply import TYPES, parse_ply
 from pipeline.io.cloud_table import COLOR, LABEL, NORMAL, POSITION, Path, cloud_of
 from pipeline.io.cloud_text import parse_text
-from pipeline.io.limits import MAX_GEOMETRY_BYTES, read_bytes
 from pipeline.types import PointCloud
 
 _PARSERS: dict[str, Callable[[Path, bytes], np.ndarray]] = {

@@ -8,9 +8,8 @@ import zlib
 import cv2
 import numpy as np
 
-from pipeline.errors import InputError
-from pipeline.io.atomic import atomic_path
-from pipeline.io.limits import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes
+from packetmesh.errors import InputError
+from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, atomic_path, read_bytes
 from pipeline.types import ByteArray, DepthMap
 
 COMMON_DEPTH_SCALES = (1.0, 100.0, 256.0, 1000.0, 5000.0, 10000.0)

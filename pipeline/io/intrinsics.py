@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.errors import InputError
-from pipeline.io.atomic import atomic_path
-from pipeline.io.limits import read_text
+from packetmesh.errors import InputError
+from packetmesh.files import atomic_path, read_text
 from pipeline.types import CameraIntrinsics
 
 _BROWN_CONRADY = {"", "plumb_bob", "rational_polynomial"}

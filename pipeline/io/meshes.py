@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import trimesh
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
+from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
 from pipeline.geometry import rigid
-from pipeline.io.atomic import atomic_path
-from pipeline.io.limits import MAX_GEOMETRY_BYTES, read_bytes
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")

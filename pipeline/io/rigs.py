@@ -1,4 +1,4 @@
-"""Camera nodes on disk: ``RIG/node_00/{color.png, depth.png, intrinsics.json, pose.txt}``."""
+"""Camera nodes on disk: ``RIG/node_00/{color.png, depth.png, intrinsics.json, pose.txt}`` and so on."""
 
 from __future__ import annotations
 
@@ -7,18 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.geometry import look_at
-from pipeline.io.atomic import atomic_path
 from pipeline.io.images import read_color, read_depth, write_color, write_depth_mm
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
-from pipeline.io.limits import read_text
-from pipeline.types import FloatArray, RgbdFrame, Rig
+from pipeline.io.poses import read_pose, write_pose
+from pipeline.io.truth import read_truth, write_truth
+from pipeline.types import RgbdFrame, Rig
 
 MAX_NODES = 6
 LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
 """T_world_camera of a node that says nothing about its pose: at the origin, upright, looking along +y."""
-_RIGID_TOLERANCE = 1e-4
 
 AnyPath = str | os.PathLike[str]
 
@@ -71,11 +70,12 @@ def load_rig(directory: AnyPath) -> Rig:
             f"The rig folder {directory} holds {len(folders)} nodes; try to move some away, so that at most "
             f"{MAX_NODES} remain"
         )
-    return Rig(directory.resolve().name, tuple(_load_node(folder) for folder in folders))
+    frames = tuple(_load_node(folder) for folder in folders)
+    return Rig(directory.resolve().name, frames, read_truth(directory, frames))
 
 
 def save_rig(directory: AnyPath, rig: Rig) -> None:
-    """Write every frame of ``rig`` as ``directory/node_NN``; the truth of a rendered rig is not written.
+    """Write every frame of ``rig`` as ``directory/node_NN``; with its truth beside them, if it has one.
 
     Raises:
         InputError: the folder cannot be written, or holds nodes of a larger rig.
@@ -90,33 +90,9 @@ def save_rig(directory: AnyPath, rig: Rig) -> None:
         write_color(folder / "color.png", frame.rgb)
         write_depth_mm(folder / "depth.png", frame.depth)
         write_intrinsics(folder / "intrinsics.json", frame.intrinsics)
-        with atomic_path(folder / "pose.txt") as sibling:
-            np.savetxt(sibling, frame.T_world_camera, fmt="%.17g")
-
-
-def read_pose(path: AnyPath) -> FloatArray:
-    """The (4, 4) rigid transform in a text file.
-
-    Raises:
-        InputError: the file does not hold sixteen numbers that make a rotation and a translation.
-    """
-    rows = [
-        line.split("#")[0].replace(",", " ").split() for line in read_text(path, "pose file").splitlines()
-    ]
-    try:
-        T = np.array([row for row in rows if row], dtype=np.float64)
-    except ValueError:
-        T = np.empty(0)
-    if T.shape != (4, 4) or not np.isfinite(T).all():
-        raise InputError(f"The pose file {path} does not hold 4 x 4 numbers; try four lines of four numbers")
-    rotation = T[:3, :3]
-    orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), atol=_RIGID_TOLERANCE)
-    if not orthonormal or np.linalg.det(rotation) < 0 or not np.allclose(T[3], (0, 0, 0, 1)):
-        raise InputError(
-            f"The pose file {path} is not a rigid transform; try a rotation and a translation in metres, "
-            "with 0 0 0 1 as the last line"
-        )
-    return T
+        write_pose(folder / "pose.txt", frame.T_world_camera)
+    if rig.truth is not None:
+        write_truth(directory, names, rig.truth)
 
 
 def _node_folders(directory: Path) -> list[Path]:

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.registration.degenerate import DegenerateError
 from pipeline.registration.matching import Matching
 from pipeline.registration.weighting import PairWeighting, PairWeights

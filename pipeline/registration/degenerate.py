@@ -1,6 +1,6 @@
 """When pairs do not determine a motion (SPEC 4.1)."""
 
-from pipeline.errors import ReconstructionError
+from packetmesh.errors import ReconstructionError
 
 
 class DegenerateError(ReconstructionError):

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.errors import InputError, ReconstructionError
 from pipeline.registration.loop import register
 from pipeline.types import FloatArray, PointCloud, RegistrationResult
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from packetmesh.errors import InputError
 from pipeline.config import RegistrationConfig
-from pipeline.errors import InputError
 from pipeline.registration.matching import Matching
 from pipeline.registration.trimmed import closest_rows, evenly
 from pipeline.registration.weighting import PairWeighting, PairWeights

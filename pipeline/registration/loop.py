@@ -7,8 +7,8 @@ from collections.abc import Generator
 
 import numpy as np
 
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.errors import InputError, ReconstructionError
 from pipeline.geometry import apply, rotation_angle_rad
 from pipeline.registration.acceleration import Acceleration
 from pipeline.registration.degenerate import DegenerateError

@@ -1,4 +1,4 @@
-"""Other people's registration programs behind one call, as yardsticks for ours (SPEC 4.6).
+"""Other people's registration programs behind one call, as baselines for ours (SPEC 4.6).
 
 Open3D comes with PacketMesh; small_gicp and pycpd take part where they are installed. Every peer gets
 the same points, start pose and gate, finds its normals, covariances and trees by itself, and that counts
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.geometry import apply, rigid
 from pipeline.registration.sample import draw
 from pipeline.types import FloatArray, PointCloud

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 

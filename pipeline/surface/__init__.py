@@ -1,11 +1,11 @@
 """From an oriented cloud to a triangle mesh and its measures (SPEC 5)."""
 
+from pipeline.rays import Camera, hit_depth
 from pipeline.surface.ball_pivoting import reconstruct_surface, roll_over
 from pipeline.surface.boundary import boundary_loops
 from pipeline.surface.normals import estimate_normals
 from pipeline.surface.quality import measure_quality, measured
 from pipeline.surface.radii import nearest_distances_m, radii, spacing
-from pipeline.surface.rays import Camera, hit_depth
 from pipeline.surface.smooth import smooth
 from pipeline.surface.truth import compare_with_truth, distances_to_truth_m
 from pipeline.surface.voxel import voxel_average, voxel_for_count

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import roll
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud

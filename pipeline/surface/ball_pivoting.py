@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.errors import InputError, ReconstructionError
+from packetmesh.errors import InputError, ReconstructionError
+from pipeline.rays import Camera
 from pipeline.surface.pivoting import roll
 from pipeline.surface.quality import measured
 from pipeline.surface.radii import spacing
-from pipeline.surface.rays import Camera
 from pipeline.types import PointCloud, Surface, SurfaceResult
 
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
+from pipeline.rays import triangle_areas_m2
 from pipeline.surface.holes import find_holes
 from pipeline.surface.quality import measure_quality
-from pipeline.surface.rays import triangle_areas_m2
 from pipeline.surface.truth import sample_surface
 from pipeline.types import BoolArray, FloatArray, IntArray, SurfaceResult
 

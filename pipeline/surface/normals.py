@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.open3d_runtime import o3d
 from pipeline.types import FloatArray, IntArray, PointCloud
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.geometry import pixel_rays
-from pipeline.surface.rays import Camera, tensor, triangle_scene
+from pipeline.rays import Camera, tensor, triangle_scene
 from pipeline.types import ByteArray, SurfaceResult
 
 MISSED = (255, 0, 255)

@@ -7,9 +7,9 @@ from dataclasses import fields
 
 import numpy as np
 
+from pipeline.rays import Camera, hit_depths, triangle_areas_m2
 from pipeline.surface.boundary import connected_parts, edges_and_faces
 from pipeline.surface.holes import open_area_m2
-from pipeline.surface.rays import Camera, hit_depths, triangle_areas_m2
 from pipeline.types import FloatArray, IntArray, Surface, SurfaceQuality, SurfaceResult
 
 

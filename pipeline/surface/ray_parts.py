@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.geometry import apply, inverse, pixel_rays, project, undistorted_rays
 from pipeline.open3d_runtime import o3d
-from pipeline.surface.rays import Camera, first_hits, tensor, triangle_scene
+from pipeline.rays import Camera, first_hits, tensor, triangle_scene
 from pipeline.types import BoolArray, FloatArray, IntArray, PointSource, SurfaceResult
 
 _FOLDED = 1e-3

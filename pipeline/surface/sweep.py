@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
+from pipeline.rays import Camera
 from pipeline.surface.holes import open_area_m2
 from pipeline.surface.pivoting import compile_all, roll
 from pipeline.surface.quality import no_hit_ray_share
-from pipeline.surface.rays import Camera
 from pipeline.surface.truth import compare_with_truth
 from pipeline.types import PointCloud, RigTruth
 

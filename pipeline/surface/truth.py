@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.geometry import apply, inverse, project
 from pipeline.open3d_runtime import o3d
-from pipeline.surface.rays import Camera, first_hits, hit_depths, tensor, triangle_areas_m2, triangle_scene
+from pipeline.rays import Camera, first_hits, hit_depths, tensor, triangle_areas_m2, triangle_scene
 from pipeline.types import BoolArray, FloatArray, IntArray, RigTruth
 
 TOLERANCES_M = (0.01, 0.03, 0.05)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.types import ByteArray, FloatArray, IntArray, PointCloud
 
 _COUNT_TOLERANCE = 0.02

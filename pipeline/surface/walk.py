@@ -9,8 +9,8 @@ from enum import IntEnum
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.errors import InputError, ReconstructionError
-from pipeline.progress import Progress
+from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.progress import Progress
 from pipeline.surface.holes import find_holes
 from pipeline.surface.pivoting import BallPivotBatch, iterate_roll
 from pipeline.types import ByteArray, FloatArray, IntArray

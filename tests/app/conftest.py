@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.jobs.store import Store
+from app.store import Store
 
 
 @pytest.fixture(scope="module")

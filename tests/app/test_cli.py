@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from app.cli import main
-from pipeline.experiments import benchmarks
-from pipeline.experiments.benchmark import Benchmark
+from lab.benchmarks.benchmark import Benchmark
+from lab.claims import benchmarks
 from pipeline.io import read_cloud, read_mesh
-from pipeline.scenes import DEMO_SCENES
+from pipeline.io.demos import DEMO_SCENES
 from tests.paths import ASSETS
 
 pytestmark = pytest.mark.xdist_group("cli")  # one worker makes the shared run once
@@ -100,7 +100,7 @@ def test_a_written_config_repeats_the_run_bit_for_bit(pair_run, capsys, tmp_path
 def test_scenes_lists_every_demo(capsys):
     code, out, _ = run(capsys, "scenes", "--json")
     assert code == 0
-    assert json.loads(out) == DEMO_SCENES
+    assert json.loads(out) == {name: scene.description for name, scene in DEMO_SCENES.items()}
 
 
 def test_doctor_finds_this_machine_well(capsys):

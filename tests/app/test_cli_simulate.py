@@ -10,7 +10,7 @@ from app.cli import main
 from network_sim.config import PRESETS
 from network_sim.replicate import measured
 from network_sim.trace_files import read_trace
-from pipeline.settings import settings, with_settings
+from packetmesh.settings import settings, with_settings
 
 TINY = ("nodes.image_bytes=2000", "run.horizon_s=10")
 CONFIG = with_settings(PRESETS["thesis-link"], TINY)

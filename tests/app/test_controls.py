@@ -4,11 +4,11 @@ import pytest
 
 from app import controls
 from app.controls import Choice, Number, Toggle
-from app.panels import depth, fuse, surface
+from app.screens import depth, fuse, surface
+from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.errors import InputError
 
-ALL = (*depth.FIRST, *depth.TRUST, *depth.ADVANCED, *fuse.ADVANCED, *surface.ADVANCED)
+ALL = (*depth.FIRST, *depth.CONFIDENCE_CONTROLS, *depth.ADVANCED, *fuse.ADVANCED, *surface.ADVANCED)
 
 
 @pytest.mark.parametrize("control", ALL, ids=lambda control: control.path)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from app.drawing.brush import REACH_DEG, clicked_disc, painted, picked_point
-from app.jobs.depth_discs import covered, disc_at, disc_px, window_around
-from app.jobs.depth_records import Disc, SeenSample
+from app.screens.depth.brush import REACH_DEG, clicked_disc, painted, picked_point
+from app.screens.depth.discs import covered, disc_at, disc_px, window_around
+from app.screens.depth.view import Disc, SeenSample
 
 WIDTH_PX, HEIGHT_PX, FOCAL_PX = 160, 120, 150.0
 FORWARD = np.array([0.0, 0.0, 1.0])

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 import viser
 
-from app.depthwords import PICTURES
 from app.drawing.colors import CONFIDENCE_STOPS, HOLE
-from app.drawing.split import split
-from app.jobs.pictures import (
+from app.drawing.pictures import (
     EQUAL,
     FARTHER,
     NEARER,
@@ -20,10 +18,12 @@ from app.jobs.pictures import (
     depth_picture,
     difference_picture,
 )
-from app.jobs.records import ColorBar, Picture, ResidualView
-from app.panels.depth.compare import CompareArea
-from app.plots.colorbar import captions_html
-from app.plots.residuals import residual_figure
+from app.records import ColorBar, Picture, ResidualView
+from app.screens.depth.colorbar import captions_html
+from app.screens.depth.compare import CompareArea
+from app.screens.depth.labels import PICTURES
+from app.screens.depth.residuals import residual_figure
+from app.screens.depth.split import split
 from pipeline.types import DepthMap
 
 RED, BLUE = (200, 10, 20), (5, 60, 190)
@@ -170,7 +170,7 @@ def test_pictures_of_the_same_names_replace_those_before(server):
 
 def test_a_burst_of_the_same_change_is_drawn_once(server, monkeypatch):
     drawn = []
-    monkeypatch.setattr("app.panels.depth.compare.split", lambda *a: drawn.append(a) or split(*a))
+    monkeypatch.setattr("app.screens.depth.compare.split", lambda *a: drawn.append(a) or split(*a))
     screen = Screen(server)
     screen.area.load(PICTURES_OF)
     for _ in range(9):
@@ -196,6 +196,6 @@ def test_all_five_pictures_have_names():
 
 def test_the_screen_needs_nothing_heavy():
     heavy = "{'onnxruntime', 'open3d', 'numba', 'pipeline.surface', 'pipeline.depth'}"
-    script = f"import sys, app.panels.depth; print({heavy} & set(sys.modules))"
+    script = f"import sys, app.screens.depth; print({heavy} & set(sys.modules))"
     told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == "set()"

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 import viser
 
-from app.depthwords import BLANK, MEASURED, OURS, PEER_NAMES
-from app.jobs.depth_records import Disc, FillRow, HiddenView, HideWish, NetworkView, NetworkWish, SeenSample
-from app.jobs.records import Picture
-from app.panels.depth import hide as hide_folder
-from app.panels.depth.hide import BESIDE, BUTTON, HideFolder, fills_table, painted_line
-from app.panels.depth.network import AS_IT_SAYS, LIMIT_BYTES, SHIPPED, NetworkFolder, network_table
-from app.panels.depth.numbers import LINES, fitted_line
-from app.panels.depth.settings import with_network
+from app.records import Picture
+from app.screens.depth import hide as hide_folder
+from app.screens.depth.hide import BESIDE, BUTTON, HideFolder, fills_table, painted_line
+from app.screens.depth.labels import BLANK, MEASURED, OURS, PEER_NAMES
+from app.screens.depth.network import AS_IT_SAYS, LIMIT_BYTES, SHIPPED, NetworkFolder, network_table
+from app.screens.depth.numbers import LINES, fitted_line
+from app.screens.depth.settings import with_network
+from app.screens.depth.view import Disc, FillRow, HiddenView, HideWish, NetworkView, NetworkWish, SeenSample
 from app.state import Source, Spec
+from packetmesh.errors import InputError
 from pipeline.config import DepthConfig, PipelineConfig
 from pipeline.depth.alignment import ALIGNMENTS, align_depth
-from pipeline.errors import InputError
 from pipeline.types import DepthMap
 
 PICTURE = Picture(np.zeros((4, 6, 3), np.uint8), "x")

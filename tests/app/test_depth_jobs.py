@@ -1,4 +1,4 @@
-"""What the computing process answers to the Depth screen: pictures, residuals, trust, and the hidden disc."""
+"""What the jobs of the Depth screen answer: pictures, residuals, confidence, and the hidden disc."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,7 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.depthwords import (
+from app.chain import network_for, prepared, rig_of
+from app.drawing.colors import HOLE
+from app.drawing.pictures import UNKNOWN, confidence_colors
+from app.screens.depth.discs import window_around
+from app.screens.depth.hide_job import LEAST_HIDDEN_PX, believed, fill_row, hidden_pixels, hide_job
+from app.screens.depth.job import depth_job, judged_view, residual_view
+from app.screens.depth.labels import (
     BLANK,
     CONFIDENCE,
     DIFFERENCE,
@@ -19,21 +25,15 @@ from app.depthwords import (
     PICTURES,
     SENSOR,
 )
-from app.drawing.colors import HOLE
-from app.jobs.chain import network_for, prepared, rig_of
-from app.jobs.depth import depth_job, residual_view, trust_view
-from app.jobs.depth_discs import window_around
-from app.jobs.depth_hide import LEAST_HIDDEN_PX, believed, fill_row, hidden_pixels, hide_job
-from app.jobs.depth_network import network_job
-from app.jobs.depth_records import Disc, HideWish, NetworkWish, SeenSample
-from app.jobs.pictures import UNKNOWN, confidence_colors
+from app.screens.depth.network_job import network_job
+from app.screens.depth.view import Disc, HideWish, NetworkWish, SeenSample
 from app.state import Source, Spec
+from packetmesh.errors import InputError
 from pipeline.config import DepthConfig
+from pipeline.depth.confidence import judge
 from pipeline.depth.conventions import PRESETS
+from pipeline.depth.fillers import PEERS
 from pipeline.depth.inference import SHIPPED_MODEL
-from pipeline.depth.trust import judge
-from pipeline.errors import InputError
-from pipeline.experiments.depth.peers import PEERS
 from pipeline.types import DepthMap
 from tests.app.answers import end
 
@@ -80,7 +80,7 @@ def test_what_is_unknown_is_marked_in_each_picture(store, rig, view):
 
 
 def test_wide_images_are_thinned_alike(store, rig, monkeypatch):
-    monkeypatch.setattr("app.jobs.depth.PICTURE_WIDTH_PX", rig.frames[0].rgb.shape[1] // 2)
+    monkeypatch.setattr("app.screens.depth.job.PICTURE_WIDTH_PX", rig.frames[0].rgb.shape[1] // 2)
     node = end(depth_job(store, SPEC)).nodes[0]
     assert {picture.rgb.shape for picture in node.pictures.values()} == {rig.frames[0].rgb[::2, ::2].shape}
     np.testing.assert_array_equal(node.pictures[PHOTO].rgb, rig.frames[0].rgb[::2, ::2])
@@ -89,7 +89,7 @@ def test_wide_images_are_thinned_alike(store, rig, monkeypatch):
 def test_the_confidence_of_every_drawn_point_is_that_of_its_pixel(store, rig, view):
     config = SPEC.config.depth
     for frame, clouds, node in zip(rig.frames, end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
-        trust = judge(clouds.alignment, frame.depth, frame.rgb, config.reach, config.least_confidence)
+        judged = judge(clouds.alignment, frame.depth, frame.rgb, config.reach, config.least_confidence)
         rows = {tuple(point): row for row, point in enumerate(clouds.inferred.points_m.astype(np.float32))}
         for drawn, colors in (
             (node.inferred, node.inferred_confidence),
@@ -97,7 +97,7 @@ def test_the_confidence_of_every_drawn_point_is_that_of_its_pixel(store, rig, vi
         ):
             assert len(drawn.points_m) == len(colors) > 0
             u, v = clouds.inferred.pixels[[rows[tuple(point)] for point in drawn.points_m]].T
-            np.testing.assert_array_equal(colors, confidence_colors(trust.confidence[v, u]))
+            np.testing.assert_array_equal(colors, confidence_colors(judged.confidence[v, u]))
 
 
 def test_the_drawn_sensor_points_know_their_pixels(rig, view):
@@ -137,14 +137,14 @@ def test_nothing_shared_gives_empty_residuals_and_no_trust_to_tell_of():
         True,
         True,
     )
-    assert np.isnan(trust_view(SimpleNamespace(), np.zeros((4, 4), bool)).kept_share)
+    assert np.isnan(judged_view(SimpleNamespace(), np.zeros((4, 4), bool)).kept_share)
 
 
 def test_trust_counts_only_where_the_sensor_is_blind():
     z_m = np.array([[1.0, np.nan], [2.0, np.nan]], np.float32)
     flying = np.array([[True, True], [False, False]])
-    trust = SimpleNamespace(depth=DepthMap(z_m), flying=flying, out_of_reach=~flying)
-    shares = trust_view(trust, np.array([[False, True], [True, True]]))
+    judged = SimpleNamespace(depth=DepthMap(z_m), flying=flying, out_of_reach=~flying)
+    shares = judged_view(judged, np.array([[False, True], [True, True]]))
     assert (shares.kept_share, shares.flying_share, shares.out_of_reach_share) == pytest.approx(
         (1 / 3, 1 / 3, 2 / 3)
     )

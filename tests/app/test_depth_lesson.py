@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from app.depthlesson import DepthLook, depth_lesson
-from app.depthwords import CONFIDENCE, DIFFERENCE, EVERYWHERE, INFERRED, PHOTO, SENSOR
-from app.jobs.depth_hide import hidden_pixels
-from app.jobs.depth_records import Disc, HideWish
+from app.screens.depth.hide_job import hidden_pixels
+from app.screens.depth.labels import CONFIDENCE, DIFFERENCE, EVERYWHERE, INFERRED, PHOTO, SENSOR
+from app.screens.depth.lesson import DepthLook, depth_lesson
+from app.screens.depth.view import Disc, HideWish
+from packetmesh.errors import InputError
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork, align_depth
-from pipeline.depth.trust import distance_to, judge
-from pipeline.errors import InputError
-from pipeline.scenes import load_demo
+from pipeline.depth.confidence import distance_to, judge
+from pipeline.io.demos import load_demo
 
 
 def lesson(tmp_path, text):
@@ -110,14 +110,14 @@ def test_alignment_does_what_the_lesson_says(room):
 
 def test_confidence_and_what_is_left_out_are_as_the_lesson_says(room):
     alignment = align_depth(DepthNetwork().infer(room.rgb), room.depth)
-    trust = judge(alignment, room.depth, room.rgb, look_at("Points that fly").reach, 0.0)
+    judged = judge(alignment, room.depth, room.rgb, look_at("Points that fly").reach, 0.0)
     blind = ~room.depth.valid
     distance = distance_to(room.depth.valid)
     near, far = (distance < 0.005) & blind, (distance > 0.02) & blind
-    assert trust.confidence[near].mean() > trust.confidence[far].mean() + 0.2
-    assert trust.flying.sum() > 100
-    assert trust.out_of_reach.sum() > 100
-    assert not np.any(trust.depth.valid & (trust.flying | trust.out_of_reach))
+    assert judged.confidence[near].mean() > judged.confidence[far].mean() + 0.2
+    assert judged.flying.sum() > 100
+    assert judged.out_of_reach.sum() > 100
+    assert not np.any(judged.depth.valid & (judged.flying | judged.out_of_reach))
 
 
 @pytest.mark.parametrize("scene", ["living-room", "office", "workshop", "box-on-table"])

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 import viser
 
-from app.depthlesson import depth_lesson
-from app.depthwords import COLORINGS, EVERYWHERE, HOLES, OURS, UNSEEN
-from app.drawing.brush import painted
-from app.jobs import entry
-from app.jobs.depth_records import NetworkWish
-from app.panels.depth import DepthPanel
+from app import jobs
+from app.screens.depth import DepthPanel
+from app.screens.depth.brush import painted
+from app.screens.depth.labels import COLORINGS, EVERYWHERE, HOLES, OURS, UNSEEN
+from app.screens.depth.lesson import depth_lesson
+from app.screens.depth.view import NetworkWish
 from app.state import Results, Source, Spec
+from packetmesh.errors import PacketMeshError
 from pipeline.depth.inference import SHIPPED_MODEL
-from pipeline.errors import PacketMeshError
 from tests.app.answers import end
 
 pytestmark = pytest.mark.xdist_group("depth panel")
@@ -45,13 +45,13 @@ class Session:
     def advance(self):
         for step in ("scene", "depth"):
             if not self.results.fresh(step, self.spec):
-                view = end(entry.run(step, self.store, self.spec))
+                view = end(jobs.run(step, self.store, self.spec))
                 self.results.put(step, self.spec.key(step), view)
                 self.panel.on_view(step, view)
 
     def side_job(self, job, *arguments, on_end):
         try:
-            view = end(entry.run(job, *arguments))
+            view = end(jobs.run(job, *arguments))
         except PacketMeshError as error:
             self.told.append(str(error))
             view = None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.reports.exhibits import HEIGHT, WIDTH, Axis, chart_svg, exhibit_html, ticks
-from pipeline.experiments.exhibits import Chart, Curve, HeatMap, Picture, Table, exhibit_record
+from lab.claims.exhibits import Chart, Curve, HeatMap, Picture, Table, exhibit_record
 
 CURVE = Curve("ours", (0.0, 1.0, 2.0), (4.0, 2.0, 1.0), (3.0, 1.5, 0.5), (5.0, 2.5, 1.5))
 CHART = Chart("error", "iterations", "cm", (CURVE, Curve("a plane", *[(0.0, 2.0)] * 4)))

@@ -5,13 +5,13 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from app.jobs.chain import ball_clouds, cameras_of, placed, prepared, rig_of, rolled
-from app.jobs.holes import explain_job, fill_job, hole_views, parts_of, views_of
+from app.chain import ball_clouds, cameras_of, placed, prepared, rig_of, rolled
+from app.screens.surface.holes_job import explain_job, fill_job, hole_views, parts_of, views_of
 from app.state import Source, Spec
+from packetmesh.errors import InputError
 from pipeline.config import PipelineConfig
-from pipeline.errors import InputError
 from pipeline.surface.boundary import boundary_loops
-from pipeline.surface.hole_reasons import explain_hole
+from pipeline.surface.hole_diagnosis import explain_hole
 from pipeline.surface.holes import find_holes
 from tests.app.answers import end
 from tests.app.gltf import arrays, srgb
@@ -101,7 +101,7 @@ def test_a_hole_is_explained_by_its_own_surface_cloud_and_cameras(store, rig, ba
 
 def test_an_explanation_is_remembered(store, monkeypatch):
     first = end(explain_job(store, SPEC, "after", 1))
-    monkeypatch.setattr("app.jobs.holes.explain_hole", None)
+    monkeypatch.setattr("app.screens.surface.holes_job.explain_hole", None)
     assert end(explain_job(store, SPEC, "after", 1)) == first
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import viser
 
-from app.drawing.holes import picked_hole, tape
-from app.jobs.hole_records import ExplainView, FilledView, HoleView, PartsView
-from app.jobs.records import MeshView
-from app.panels.surface.holes import NONE, HolesFolder, filled_sentence, hole_name, parts_sentence
+from app.records import MeshView
+from app.screens.surface.draw_holes import picked_hole, tape
+from app.screens.surface.holes import NONE, HolesFolder, filled_sentence, hole_name, parts_sentence
+from app.screens.surface.holes_view import ExplainView, FilledView, HoleView, PartsView
 from pipeline.geometry import rotation_exp
 from pipeline.surface import boundary_loops
 from pipeline.types import SurfaceQuality
@@ -297,6 +297,6 @@ def test_sentences_carry_the_numbers(screen):
 
 def test_the_folder_needs_nothing_heavy():
     heavy = "{'trimesh', 'open3d', 'numba', 'pipeline.surface'}"
-    script = f"import sys, app.panels.surface.holes; print({heavy} & set(sys.modules))"
+    script = f"import sys, app.screens.surface.holes; print({heavy} & set(sys.modules))"
     told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == "set()"

@@ -3,11 +3,11 @@
 import pytest
 import viser
 
-from app.jobs.records import Race, Start
-from app.lessonfolder import BEGIN, LessonFolder
-from app.racelesson import race_lesson
-from app.racewords import STARTS
-from pipeline.errors import InputError
+from app.lesson_folder import BEGIN, LessonFolder
+from app.records import Race, Start
+from app.screens.fuse.labels import STARTS
+from app.screens.fuse.lesson import race_lesson
+from packetmesh.errors import InputError
 
 
 def lesson(tmp_path, text):

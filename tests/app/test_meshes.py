@@ -5,8 +5,8 @@ import io
 import numpy as np
 import trimesh
 
-from app.jobs.glb import lines_glb, mesh_glb
-from app.jobs.meshes import DARKEST, mesh_view, rim_segments_m, surface_glb, vertex_normals
+from app.drawing.glb import lines_glb, mesh_glb
+from app.drawing.meshes import DARKEST, mesh_view, rim_segments_m, surface_glb, vertex_normals
 from pipeline.types import SurfaceQuality, SurfaceResult
 from tests.app.gltf import arrays, srgb
 

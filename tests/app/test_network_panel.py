@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import viser
 
-from app.jobs import entry
-from app.jobs.network_records import What
-from app.networkwords import NETWORKS
-from app.panels.network import NetworkPanel
-from app.panels.network.panel import CANCELLED, FAILED, ORIGIN
+from app import jobs
+from app.screens.network import NetworkPanel
+from app.screens.network.labels import NETWORKS
+from app.screens.network.panel import CANCELLED, FAILED, ORIGIN
+from app.screens.network.view import What
 from app.state import Results, Source, Spec
 from network_sim.config import PRESETS
-from pipeline.errors import InputError, PacketMeshError
-from pipeline.settings import with_settings
+from packetmesh.errors import InputError, PacketMeshError
+from packetmesh.settings import with_settings
 from tests.app.answers import end
 
 pytestmark = pytest.mark.xdist_group("network panel")
@@ -52,7 +52,7 @@ class Session:
 
     def apart_job(self, job, *arguments, on_end):
         try:
-            views = None if self.refuse else end(entry.run(job, *arguments))
+            views = None if self.refuse else end(jobs.run(job, *arguments))
         except PacketMeshError as error:
             self.told.append(str(error))
             views = None

@@ -6,18 +6,18 @@ import sys
 import numpy as np
 import pytest
 
-from app.drawing.network import Flights, ground_of
-from app.jobs.network import simulate_job, view_of
-from app.jobs.network_records import MetricRow, NetworkWish, Series, What
-from app.networkwords import ACCESS, NETWORKS, SCHEMES, ways
-from app.panels.network.numbers import metric_tables, ran, value_text
-from app.plots.gantt import WIDTH_PX, Window, areas, cursor_html, gantt_html, paint, row_px, visible
-from app.plots.networkcurves import polyline
+from app.screens.network.curves import polyline
+from app.screens.network.draw import Flights, ground_of
+from app.screens.network.gantt import WIDTH_PX, Window, areas, cursor_html, gantt_html, paint, row_px, visible
+from app.screens.network.job import simulate_job, view_of
+from app.screens.network.labels import ACCESS, NETWORKS, SCHEMES, ways
+from app.screens.network.numbers import metric_tables, ran, value_text
+from app.screens.network.view import MetricRow, NetworkWish, Series, What
 from network_sim.config import PRESETS, NetworkConfig, RunConfig
 from network_sim.trace import Recorder
 from network_sim.types import Cause, EventKind, PacketKind
-from pipeline.progress import Progress
-from pipeline.settings import with_settings
+from packetmesh.progress import Progress
+from packetmesh.settings import with_settings
 from tests.app.answers import end
 
 MS = 1_000_000

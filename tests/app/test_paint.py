@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.chain import ball_clouds, cameras_of, placed, rig_of, rolled
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET
-from app.jobs.chain import ball_clouds, cameras_of, placed, rig_of, rolled
-from app.jobs.paint import paint_job, vertex_colors
-from app.jobs.records import QUICK_POINTS, PaintWish
-from app.plots.legend import legend_html
+from app.records import QUICK_POINTS, PaintWish
+from app.screens.surface.labels import COLORINGS
+from app.screens.surface.legend import legend_html
+from app.screens.surface.paint_job import paint_job, vertex_colors
 from app.state import Source, Spec
-from app.surfacewords import COLORINGS
 from pipeline.config import PipelineConfig
 from pipeline.surface import distances_to_truth_m
 from pipeline.types import PointSource

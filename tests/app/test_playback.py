@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from app.playback import Ticker, Timeline
+from app.player import Ticker, Timeline
 
 
 class Clock:

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from app.delay import Delay
-from app.jobs.records import QUICK_POINTS, PaintedView, PaintWish
-from app.panels.surface import quick
-from app.panels.surface.detail import FEWEST_POINTS, LOOKS, SLOW_S, Detail
-from app.panels.surface.quick import QuickLook
+from app.debounce import Delay
+from app.records import QUICK_POINTS, PaintedView, PaintWish
+from app.screens.surface import quick
+from app.screens.surface.detail import FEWEST_POINTS, LOOKS, SLOW_S, Detail
+from app.screens.surface.quick import QuickLook
 
 
 class Browser:

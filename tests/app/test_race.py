@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.jobs.capture import capture_job
-from app.jobs.chain import prepared, rig_of
-from app.jobs.race import contest_of, race_job
-from app.jobs.records import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, Race, Start
-from app.jobs.store import Store
+from app.chain import prepared, rig_of
+from app.records import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, Race, Start
+from app.screens.fuse.capture_job import capture_job
+from app.screens.fuse.race_job import contest_of, race_job
 from app.state import Source, Spec
+from app.store import Store
+from packetmesh.errors import InputError
 from pipeline.config import PipelineConfig
-from pipeline.errors import InputError
 from tests.app.answers import end
 
 SPEC = Spec(Source(scene="box-on-table"))
@@ -144,7 +144,7 @@ def test_the_capture_range_is_the_same_again_and_from_any_start(capture, tmp_pat
 
 
 def test_without_truth_there_is_no_capture_range(tmp_path, monkeypatch, rig):
-    monkeypatch.setattr("app.jobs.chain.load_demo", lambda name: replace(rig, truth=None))
+    monkeypatch.setattr("app.chain.load_demo", lambda name: replace(rig, truth=None))
     spec = replace(SPEC, config=PipelineConfig())
     with pytest.raises(InputError, match="truth of this scene is not known"):
         end(capture_job(Store(str(tmp_path)), replace(spec, source=Source(scene="nowhere")), Race()))

@@ -6,8 +6,8 @@ import pytest
 
 from app.server import build_server, start_spec
 from app.state import Source
+from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.errors import InputError
 
 
 def test_a_taken_port_is_one_sentence():

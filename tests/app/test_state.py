@@ -9,8 +9,8 @@ import tyro
 from app import cli
 from app.controls import put
 from app.state import CHAIN, Results, Source, Spec
-from pipeline.config import PRESETS
-from pipeline.settings import load_config, with_settings
+from packetmesh.settings import with_settings
+from pipeline.config import PRESETS, load_config
 
 SPEC = Spec(Source(scene="office"))
 

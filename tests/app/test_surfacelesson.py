@@ -5,18 +5,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from app.surfacelesson import SurfaceLook, surface_lesson
-from app.surfacewords import BEFORE, BOTH, POISSON
+from app.screens.surface.labels import BEFORE, BOTH, POISSON
+from app.screens.surface.lesson import SurfaceLook, surface_lesson
+from packetmesh.errors import InputError
 from pipeline.config import PRESETS, SurfaceConfig
 from pipeline.depth import DepthNetwork
-from pipeline.errors import InputError
+from pipeline.io.demos import load_demo
 from pipeline.reconstruct import NodeClouds, merged_clouds, prepare_node, register_nodes
-from pipeline.scenes import load_demo
 from pipeline.surface import Camera, compare_with_truth, radii, reconstruct_surface, spacing
+from pipeline.surface.baselines import poisson_surface
 from pipeline.surface.quality import no_hit_ray_share
 from pipeline.surface.ray_parts import View, ray_parts
 from pipeline.surface.truth import distances_to_truth_m
-from pipeline.surface.yardsticks import poisson_surface
 from pipeline.types import FloatArray, PointCloud, PointSource, Rig, SurfaceResult
 
 pytestmark = pytest.mark.xdist_group("surface lesson")  # one worker makes the shared clouds once

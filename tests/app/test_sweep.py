@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 import viser
 
-from app.jobs.chain import ball_clouds
-from app.jobs.records import SpacingView
-from app.jobs.sweep import suggest_job, sweep_job
-from app.jobs.sweep_records import SuggestionRow, SweepRow, SweepView
-from app.panels.surface.advice import STOP, STOPPED, SWEEP, WAITING, AdviceFolder, suggestions_html
-from app.plots.spacing import ADVISED, OF_THESIS, USED, spacing_figure
-from app.plots.sweep import POINTS, sweep_figure, sweep_sentence
+from app.chain import ball_clouds
+from app.records import SpacingView
+from app.screens.surface.advice import STOP, STOPPED, SWEEP, WAITING, AdviceFolder, suggestions_html
+from app.screens.surface.spacing_plot import ADVISED, OF_THESIS, USED, spacing_figure
+from app.screens.surface.sweep_job import suggest_job, sweep_job
+from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
+from app.screens.surface.sweep_view import SuggestionRow, SweepRow, SweepView
 from app.state import Source, Spec
+from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig, SurfaceConfig
-from pipeline.progress import Progress
 
 SPEC = Spec(Source(scene="box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))
 NAN = float("nan")

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 import viser
 
-from app.drawing.rolling import RollingDrawing, pieces
-from app.jobs.store import Store
-from app.jobs.walk import PATCH_POINTS, PLACES, walk_job, walk_over
-from app.jobs.walk_records import WalkWish
-from app.panels.surface.rolling import CLOSE_UP, WHOLE, RollingFolder, said
+from app.screens.surface.draw_rolling import RollingDrawing, pieces
+from app.screens.surface.labels import BEFORE
+from app.screens.surface.rolling import CLOSE_UP, WHOLE, RollingFolder, said
+from app.screens.surface.walk_job import PATCH_POINTS, PLACES, walk_job, walk_over
+from app.screens.surface.walk_view import WalkWish
 from app.state import Source, Spec
-from app.surfacewords import BEFORE
-from pipeline.errors import ReconstructionError
+from app.store import Store
+from packetmesh.errors import ReconstructionError
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import roll
 from tests.app.answers import end

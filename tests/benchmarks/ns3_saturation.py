@@ -15,9 +15,9 @@ import argparse
 import json
 from dataclasses import asdict
 
+from lab.benchmarks.ns3 import CONSTANTS, NODES, TOLERANCE, Row, compare, find_python, run_ns3
 from network_sim.config import MacKind
-from network_sim.experiments.peer import CONSTANTS, NODES, TOLERANCE, Row, compare, find_python, run_ns3
-from pipeline.errors import PacketMeshError
+from packetmesh.errors import PacketMeshError
 
 REASON = (
     "ns-3's receivers do not detect the preamble of a frame that collides with an equally strong one, so "

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import sync_playwright
 
-from app.jobs.records import PaintedView
-from app.panels.surface import SurfacePanel
+from app.records import PaintedView
+from app.screens.surface import SurfacePanel
 from app.server import build_server
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "browser"))

@@ -7,7 +7,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from app.depthwords import COLORINGS, CONFIDENCE, DIFFERENCE, EVERYWHERE, OURS, PEER_NAMES
+from app.screens.depth.labels import COLORINGS, CONFIDENCE, DIFFERENCE, EVERYWHERE, OURS, PEER_NAMES
 from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, press, slider, unfold
 
 BY_CONFIDENCE = next(name for name, coloring in COLORINGS.items() if coloring == "confidence")

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import expect
 
 from app import echo
-from app.surfacewords import BOTH, COLORINGS, POISSON
+from app.screens.surface.labels import BOTH, COLORINGS, POISSON
 from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, pick, press, slider, unfold
 
 SOURCE = next(name for name, coloring in COLORINGS.items() if coloring == "source")
@@ -62,7 +62,7 @@ def test_side_by_side_and_colours_by_source_tell_what_was_guessed(surface):
     assert changed_from(surface, both)
 
 
-def test_poisson_is_a_yardstick_in_the_same_table(surface):
+def test_poisson_is_a_baseline_in_the_same_table(surface):
     ball = canvas(surface)
     assert len(numbers(surface, "No-hit rays")) == 2
     pick(surface, "Show", POISSON)

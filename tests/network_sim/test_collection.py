@@ -7,7 +7,7 @@ from network_sim.config import NetworkConfig
 from network_sim.conservation import balance, image_balance
 from network_sim.simulate import simulate
 from network_sim.types import BEGIN_WITHIN_NS, NS_PER_S, Cause, EventKind, PacketKind, to_ns
-from pipeline.settings import with_settings
+from packetmesh.settings import with_settings
 
 LINE = ["nodes.layout=line", "nodes.spacing_m=80", "nodes.image_bytes=5000", "mac.kind=ideal"]
 """Nodes that reach their neighbours only."""

@@ -7,8 +7,8 @@ import pytest
 
 from network_sim.config import PRESETS, NetworkConfig, NodesConfig
 from network_sim.places import FixedPlaces, laid_out
-from pipeline.errors import InputError
-from pipeline.settings import with_settings
+from packetmesh.errors import InputError
+from packetmesh.settings import with_settings
 
 
 @pytest.mark.parametrize(

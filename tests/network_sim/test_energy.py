@@ -9,7 +9,7 @@ import pytest
 
 from network_sim import energy as e
 from network_sim.config import EnergyConfig
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 
 def times(elapsed_s: float, tx_s: float, rx_s: float, sleep_s: float) -> e.RadioTimes:

@@ -8,7 +8,7 @@ import simpy
 from network_sim.images import Book, Fragments, encoded_bytes, pgm_bytes, ppm_bytes
 from network_sim.trace import Recorder
 from network_sim.types import Cause
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from network_sim.mobility import (
     drive,
 )
 from network_sim.types import NS_PER_S, to_ns
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 HORIZON_S = 1200.0
 CONFIG = StreetConfig(vehicles=8, blocks=5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from network_sim.queueing import md1_mean_wait_s
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 
 def test_known_waits() -> None:

@@ -16,9 +16,9 @@ from network_sim.replicate import (
     replications,
     t_interval,
 )
-from pipeline.errors import InputError
-from pipeline.progress import Progress
-from pipeline.settings import with_settings
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from packetmesh.settings import with_settings
 
 TINY = with_settings(PRESETS["thesis-link"], ["nodes.image_bytes=2000", "run.horizon_s=10"])
 

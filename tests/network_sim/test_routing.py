@@ -13,7 +13,7 @@ from network_sim.config import NetworkConfig, NodesConfig, RadioConfig
 from network_sim.places import FixedPlaces
 from network_sim.radio import Radio
 from network_sim.routing import link_success, shortest_paths
-from pipeline.settings import with_settings
+from packetmesh.settings import with_settings
 
 
 def line_success(config: NetworkConfig, *at_m: float) -> np.ndarray:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from network_sim import selection as s
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 SHARE = 1.0 - 1.0 / math.e
 

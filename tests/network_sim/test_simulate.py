@@ -7,7 +7,7 @@ from network_sim.config import PRESETS
 from network_sim.conservation import balance, image_balance
 from network_sim.simulate import iterate_simulation, simulate
 from network_sim.types import NS_PER_S, EventKind
-from pipeline.settings import with_settings
+from packetmesh.settings import with_settings
 
 SHORT = {
     "thesis-link": ["run.horizon_s=20"],

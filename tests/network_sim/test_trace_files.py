@@ -17,7 +17,7 @@ from network_sim.conservation import check
 from network_sim.metrics import metrics
 from network_sim.trace import Events, NetworkTrace
 from network_sim.trace_files import read_events, read_trace, write_trace
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from tests.network_sim.by_hand import random_run, small_run, trace_of
 
 FILES = ("trace.csv", "trace.json", "trace.ndjson")

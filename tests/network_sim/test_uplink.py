@@ -11,7 +11,7 @@ from network_sim.config import NetworkConfig, UplinkConfig
 from network_sim.trace import Events, Recorder
 from network_sim.types import Cause, EventKind, Packet, PacketKind
 from network_sim.uplink import Uplink
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 
 MS = 1_000_000
 SINK, CLOUD = 0, 1

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
 from pipeline.mesh_cloud import (
     ESTIMATED_OUTWARDS,
     ESTIMATED_VIEWPOINT,
@@ -18,7 +19,6 @@ from pipeline.mesh_cloud import (
     mesh_report,
     usable_points,
 )
-from pipeline.progress import Progress
 from pipeline.surface import spacing
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import perforated_plane, sphere

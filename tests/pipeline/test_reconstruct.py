@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from packetmesh.errors import PacketMeshError
+from packetmesh.progress import Progress
 from pipeline import geometry
 from pipeline.config import PRESETS, AcquisitionConfig, SurfaceConfig
-from pipeline.errors import PacketMeshError
-from pipeline.progress import Progress
+from pipeline.io.demos import load_demo
 from pipeline.reconstruct import iterate_reconstruction, reconstruct
 from pipeline.registration import point_error_m
-from pipeline.scenes import load_demo
 from pipeline.types import DepthMap, PointSource, Rig
 
 pytestmark = pytest.mark.xdist_group("reconstruct")  # one worker makes the shared reconstruction once

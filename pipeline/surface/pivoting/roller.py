@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.surface.pivoting.front import FACES, HEAD, SETTLED, TAIL, grown, new_front
 from pipeline.surface.pivoting.grid import build_grid
 from pipeline.surface.pivoting.roll import advance, restart

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError
 from pipeline.acquisition import back_project, depth_sigma_m
-from pipeline.errors import InputError
 from pipeline.geometry import project
 from pipeline.types import CameraIntrinsics, DepthMap, PointSource, RgbdFrame
 

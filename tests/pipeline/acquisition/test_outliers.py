@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError
 from pipeline.acquisition import filter_outliers
 from pipeline.config import AcquisitionConfig
-from pipeline.errors import InputError
 from pipeline.types import PointCloud
 
 FOCAL_PX = 100.0

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.depth import align_depth
-from pipeline.errors import InputError, ReconstructionError
 from pipeline.types import DepthMap
 
 HEIGHT_PX, WIDTH_PX = 120, 160

@@ -11,12 +11,12 @@ pytest.importorskip("onnx")
 
 from onnx import TensorProto, helper
 
+from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.settings import with_settings
 from pipeline.config import NetworkPreset, PipelineConfig
 from pipeline.depth import DepthNetwork, Overrides, align_depth
 from pipeline.depth.conventions import PRESETS, metadata_of
 from pipeline.depth.preprocessing import IMAGENET_DEVIATION, IMAGENET_MEAN, free_size
-from pipeline.errors import InputError, ReconstructionError
-from pipeline.settings import with_settings
 from pipeline.types import DepthMap
 from tests.pipeline.depth import networks
 

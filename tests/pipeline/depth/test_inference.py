@@ -3,11 +3,11 @@ import numpy as np
 import onnxruntime
 import pytest
 
+from packetmesh.errors import InputError
 from pipeline.depth import DepthNetwork, align_depth, depth_errors
 from pipeline.depth.inference import SHIPPED_MODEL
 from pipeline.depth.preprocessing import centre_crop, fitted, normalised_input, padded, unpad
-from pipeline.errors import InputError
-from pipeline.scenes import DEMO_SCENES, load_demo
+from pipeline.io.demos import DEMO_SCENES, load_demo
 
 SIZES = [(480, 640), (240, 320), (641, 361), (256, 256), (48, 64), (33, 700)]
 

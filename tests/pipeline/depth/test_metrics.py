@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError
 from pipeline.depth import depth_errors
-from pipeline.errors import InputError
 
 
 def test_a_hand_computed_map():

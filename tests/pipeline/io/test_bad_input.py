@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.io import (
     load_rig,
     read_cloud,
@@ -21,7 +21,7 @@ from pipeline.io import (
     write_depth_mm,
     write_mesh,
 )
-from pipeline.io.rigs import read_pose
+from pipeline.io.poses import read_pose
 from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RgbdFrame, Rig
 
 CAMERA = {"width": 16, "height": 12, "fx": 14.0, "fy": 14.0, "cx": 7.5, "cy": 5.5}
@@ -229,7 +229,7 @@ def test_a_damaged_mesh_gets_its_sentence(tmp_path, suffix, damage):
     ("read", "limit"),
     [
         (read_color, "pipeline.io.images.MAX_IMAGE_BYTES"),
-        (read_intrinsics, "pipeline.io.limits.MAX_TEXT_BYTES"),
+        (read_intrinsics, "packetmesh.files.MAX_TEXT_BYTES"),
         (read_cloud, "pipeline.io.clouds.MAX_GEOMETRY_BYTES"),
     ],
 )

@@ -6,7 +6,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.io import read_cloud
 from pipeline.open3d_runtime import o3d
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from lab.worlds.render import Renderer
+from lab.worlds.scene import Scene
 from pipeline.geometry import pixel_rays
-from pipeline.scenes.render import Renderer
-from pipeline.scenes.scene import Scene
 from pipeline.types import PointCloud
 
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from lab.worlds.boxes import box_room
+from lab.worlds.render import render
+from lab.worlds.sensor import sense_depth
 from pipeline.acquisition import back_project
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.registration import point_error_m, register
-from pipeline.scenes.boxes import box_room
-from pipeline.scenes.render import render
-from pipeline.scenes.sensor import sense_depth
 from pipeline.types import DepthMap, PointCloud, RgbdFrame
 
 ROOMS = 20

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.errors import InputError, ReconstructionError
 from pipeline.geometry import rigid
 from pipeline.registration import iterate, register
 from pipeline.types import PointCloud

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError
 from pipeline.config import RegistrationConfig
-from pipeline.errors import InputError
 from pipeline.geometry import inverse, rigid, rotation_exp
 from pipeline.registration import point_error_m, register
 from pipeline.registration.ceicp_literal import CeicpLiteral, density_information

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from lab.worlds import box_room
+from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.errors import ReconstructionError
 from pipeline.geometry import inverse, rigid, rotation_exp
 from pipeline.registration import point_error_m
 from pipeline.registration.global_start import default_voxel_m, global_start, register_from_anywhere
-from pipeline.scenes import box_room
 from pipeline.types import PointCloud
 from tests.pipeline.registration.rooms import seen_by
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.geometry import inverse
 from pipeline.registration.metrics import point_error_m
 from pipeline.registration.peers import PEERS, available_peers, run_peer

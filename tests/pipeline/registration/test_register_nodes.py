@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lab.worlds import box_room
+from lab.worlds.demos import disturbed
 from pipeline import reconstruct
 from pipeline.config import PRESETS, RegistrationConfig
 from pipeline.geometry import inverse, rigid, rotation_exp
 from pipeline.reconstruct import NodeClouds, register_nodes
 from pipeline.registration import point_error_m, register
-from pipeline.scenes import box_room
-from pipeline.scenes.demos import disturbed
 from pipeline.types import DepthMap, RgbdFrame
 from tests.pipeline.registration.rooms import seen_by
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError
 from pipeline.config import RegistrationConfig
-from pipeline.errors import InputError
 from pipeline.geometry import inverse, rigid, rotation_exp
 from pipeline.registration import iterate, point_error_m, register
 from pipeline.registration.fast_robust import FastRobustIcp, neighbourhood_m

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay, cKDTree
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.surface import estimate_normals
 from pipeline.surface.advice import NEIGHBOURS, closed_fans, needed_radii_m, suggest_radii
 from pipeline.surface.pivoting import roll

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError, PacketMeshError, ReconstructionError
+from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
 from pipeline.surface import reconstruct_surface
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.types import PointCloud

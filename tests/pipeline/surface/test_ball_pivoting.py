@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError, ReconstructionError
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.surface import boundary_loops, reconstruct_surface, spacing
 from pipeline.surface.boundary import edges_and_faces

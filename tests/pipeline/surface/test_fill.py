@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
+from pipeline.rays import triangle_areas_m2
 from pipeline.surface import measure_quality, reconstruct_surface
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.fill import fill_holes, least_area, skin_points_m
 from pipeline.surface.holes import find_holes
-from pipeline.surface.rays import triangle_areas_m2
 from pipeline.types import PointCloud, SurfaceResult
 from tests.pipeline.surface.shapes import grid_mesh, perforated_plane, sphere
 

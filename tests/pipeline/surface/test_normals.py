@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.surface.normals import oriented_normals, turned_to_viewpoint
 from pipeline.types import PointCloud

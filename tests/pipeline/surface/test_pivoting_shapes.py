@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.open3d_runtime import o3d
+from pipeline.rays import triangle_areas_m2
 from pipeline.surface import boundary_loops, estimate_normals, spacing, voxel_average
 from pipeline.surface.boundary import edges_and_faces, loop_measures
 from pipeline.surface.pivoting import Roller, iterate_roll, roll
-from pipeline.surface.rays import triangle_areas_m2
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import perforated_plane, rectangle, sphere
 

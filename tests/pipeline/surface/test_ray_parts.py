@@ -5,7 +5,7 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.geometry import look_at
 from pipeline.surface import Camera, measure_quality
 from pipeline.surface.ray_parts import View, known_there, ray_parts

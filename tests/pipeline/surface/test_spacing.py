@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError
 from pipeline.config import SurfaceConfig
-from pipeline.errors import InputError
 from pipeline.surface import estimate_normals, radii, spacing
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import sphere

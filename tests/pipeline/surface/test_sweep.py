@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.surface import Camera, compare_with_truth, reconstruct_surface
 from pipeline.surface.sweep import iterate_sweep, sweep_radii_m
 from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RigTruth

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.geometry import apply, look_at, rigid, rotation_exp
 from pipeline.surface import Camera, compare_with_truth, hit_depth
 from pipeline.surface.truth import sample_surface

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.errors import InputError
+from packetmesh.errors import InputError
 from pipeline.surface import voxel_average, voxel_for_count
 from pipeline.types import PointCloud, PointSource
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from pipeline.errors import InputError, ReconstructionError
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import iterate_roll, roll
 from pipeline.surface.walk import Kind, ball_on_arc, hole_on_flat_ground, iterate_walk, nearest_rows

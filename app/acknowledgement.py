@@ -1,0 +1,72 @@
+"""How the server learns that a browser has drawn what it was sent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import viser
+
+from app.debounce import Delay
+from app.page import running
+
+PATIENCE_S = 1.5
+"""Without an answer for so long, for want of a browser perhaps, it is taken as given. A page that draws
+answers within a second (page.js)."""
+
+
+class Echo:
+    """Asks the browser to answer once it has drawn everything sent so far.
+
+    A hand can move a slider faster than a slow browser draws. Without an answer to wait for, what is
+    sent would queue up there and the picture would lag farther and farther behind the hand.
+
+    The answer is a command, not a button: of all that is pressed and moved in the panel within 50 ms,
+    viser sends only the last, so that a button would get lost beside a slider, and now and then the
+    slider beside the button.
+    """
+
+    def __init__(self, gui: viser.GuiApi, post: Callable[..., None], on_answer: Callable[[], None]) -> None:
+        """Add the hidden parts.
+
+        Args:
+            gui: where to add them.
+            post: runs a function on the session's thread.
+            on_answer: called there, once for each question.
+        """
+        self._on_answer = on_answer
+        self._said = 0
+        self.waiting = False
+        self._html = gui.add_html("")
+        command = gui.add_command("Say that all is drawn", hotkey="insert", modifier="cmd/ctrl+alt+shift")
+        command.on_trigger(lambda _: post(self._answered))
+        self._patience = Delay(PATIENCE_S, lambda: post(self._answered))
+
+    def hold(self) -> None:
+        """Have only new meshes drawn, until ``ask`` ends that, a hand turns the view, or 3 s have passed."""
+        self._say("packetmesh.hold()")
+
+    def ask(self, vertices: Sequence[int] = (), hold: bool = False) -> None:
+        """Ask now; of two questions, only the last is answered.
+
+        Args:
+            vertices: of each mesh that is to be drawn first. While they are awaited nothing is drawn,
+                so that what they replace may be hidden at once.
+            hold: whether to hold the view from now on.
+        """
+        self.waiting = True
+        self._say(f"packetmesh.ask({list(vertices)}, {str(hold).lower()})")
+        self._patience.restart()
+
+    def close(self) -> None:
+        """End the timer."""
+        self._patience.cancel()
+
+    def _say(self, script: str) -> None:
+        self._said += 1
+        self._html.content = running(script, mark=self._said)
+
+    def _answered(self) -> None:
+        if self.waiting:
+            self.waiting = False
+            self._patience.cancel()
+            self._on_answer()

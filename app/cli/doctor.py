@@ -1,0 +1,119 @@
+"""``packetmesh doctor``: what this machine has, and what to do about what it lacks."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import os
+import platform
+import shutil
+import socket
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import psutil
+
+from app.cli.text import print_json
+from packetmesh.errors import PacketMeshError
+
+PACKAGES = ("numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "trimesh", "simpy", "viser")
+LINUX_LIBRARIES = "libgl1 libegl1 libx11-6 libidn2-0 libudev1 libgomp1"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at."""
+
+    name: str
+    ok: bool
+    detail: str
+
+
+def doctor(json: bool = False) -> None:
+    """Tell what this machine has, and what is wrong with it.
+
+    Args:
+        json: Print the findings as one JSON object.
+    """
+    findings = examine()
+    if json:
+        print_json({finding.name: {"ok": finding.ok, "detail": finding.detail} for finding in findings})
+    else:
+        for finding in findings:
+            print(f"{'ok ' if finding.ok else 'BAD'} {finding.name:<14} {finding.detail}")
+    bad = [finding.name for finding in findings if not finding.ok]
+    if bad:
+        raise PacketMeshError(f"Not everything is well: {', '.join(bad)} (see above)")
+
+
+def examine() -> list[Finding]:
+    """Look at everything the program leans on; never raises for what it finds."""
+    return [
+        finding
+        for look in (_python, _machine, _packages, _open3d, _network, _scenes, _port, _browser)
+        for finding in look()
+    ]
+
+
+def _tried(name: str, look: Callable[[], str], advice: str) -> Finding:
+    try:
+        return Finding(name, True, look())
+    except Exception as error:
+        return Finding(name, False, f"{str(error).splitlines()[0] if str(error) else error!r}; {advice}")
+
+
+def _python() -> Iterator[Finding]:
+    ok = (3, 11) <= sys.version_info[:2] <= (3, 13)
+    yield Finding("python", ok, platform.python_version() + ("" if ok else "; PacketMesh needs 3.11 to 3.13"))
+
+
+def _machine() -> Iterator[Finding]:
+    memory_gb = psutil.virtual_memory().total / 1e9
+    detail = f"{os.cpu_count()} cores, {memory_gb:.1f} GB of memory, {platform.system()} {platform.machine()}"
+    yield Finding("machine", memory_gb > 3, detail + ("" if memory_gb > 3 else "; the app wants 3 GB"))
+
+
+def _packages() -> Iterator[Finding]:
+    for name in PACKAGES:
+        yield _tried(name, partial(importlib.metadata.version, name), "run make again to install it")
+
+
+def _open3d() -> Iterator[Finding]:
+    advice = f"on Debian or Ubuntu: apt-get install {LINUX_LIBRARIES}"
+    yield _tried("open3d", lambda: importlib.import_module("pipeline.open3d_runtime").o3d.__version__, advice)
+
+
+def _network() -> Iterator[Finding]:
+    def look() -> str:
+        from pipeline.depth import DepthNetwork
+
+        network = DepthNetwork()
+        return f"{network.model_path.name} runs on {network.provider}"
+
+    yield _tried("depth network", look, "restore assets/depth from the repository")
+
+
+def _scenes() -> Iterator[Finding]:
+    def look() -> str:
+        from pipeline.io.demos import DEMO_SCENES, load_demo
+
+        return f"{len(DEMO_SCENES)} demos, {sum(len(load_demo(name).frames) for name in DEMO_SCENES)} nodes"
+
+    yield _tried("scenes", look, "restore assets/scenes from the repository")
+
+
+def _port() -> Iterator[Finding]:
+    with socket.socket() as probe:
+        free = probe.connect_ex(("127.0.0.1", 8080)) != 0
+    yield Finding("port 8080", True, "free" if free else "in use; start the app with --port 8081")
+
+
+def _browser() -> Iterator[Finding]:
+    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    yield Finding(
+        "test browser",
+        True,
+        found or "no Chromium: the browser tests will be skipped; apt-get install chromium",
+    )

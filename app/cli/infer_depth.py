@@ -1,0 +1,163 @@
+"""``packetmesh infer-depth``: photographs to depth images and coloured previews."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from app.cli.text import print_json, say, wrong_use
+from packetmesh.errors import InputError
+from pipeline.config import ModelKind, NetworkPreset
+
+if TYPE_CHECKING:
+    from pipeline.depth import DepthNetwork
+    from pipeline.types import DepthMap
+
+FARTHEST_M = 65.535
+"""What 16 bits of millimetres hold."""
+PREVIEW_PERCENTILES = (2.0, 98.0)
+
+
+def infer_depth(
+    photos: Annotated[tuple[Path, ...], tyro.conf.Positional],
+    out: Path,
+    model: Path | None = None,
+    preset: NetworkPreset | None = None,
+    kind: ModelKind | None = None,
+    size_px: tuple[int, int] | None = None,
+    normalisation: Literal["imagenet", "unit", "bytes"] | None = None,
+    channels: Literal["RGB", "BGR"] | None = None,
+    sensor: Path | None = None,
+    depth_scale: float = 1000.0,
+    json: bool = False,
+) -> None:
+    """Infer the depth of photographs (PNG or JPEG) with our network or any other.
+
+    Args:
+        photos: Colour images; the orientation that a camera noted in them is not applied.
+        out: Folder for NAME_depth.png, 16 bits, and NAME_preview.png. Metric depth is in millimetres, 0
+            where unknown; relative depth is scaled so that its largest value is 65535.
+        model: An ONNX depth network; the one that ships without it.
+        preset: How that network wants its image; without it, what its metadata say.
+        kind: What it gives: metres, depth up to scale, or disparity up to scale and shift.
+        size_px: Width and height of its input, where the file leaves them free.
+        normalisation: ImageNet's mean and deviation, or values from 0 to 1 (unit) or to 255 (bytes).
+        channels: Order of its channels.
+        sensor: The sensor's depth image of the one photograph, to make inferred depth metric.
+        depth_scale: Depth units per metre in that image.
+        json: Print what was done as one JSON object.
+    """
+    if not photos:
+        wrong_use("infer-depth needs at least one photograph")
+    if sensor is not None and len(photos) > 1:
+        wrong_use("--sensor belongs to one photograph; give one at a time")
+    from packetmesh.files import writable_folder
+    from pipeline.depth import DepthNetwork, Overrides
+
+    stems = [photo.stem for photo in photos]
+    twice = next((stem for stem in stems if stems.count(stem) > 1), None)
+    if twice is not None:
+        raise InputError(
+            f"Two photographs are called {twice}, and so would be their depth; try them one by one"
+        )
+    network = DepthNetwork(model, preset, Overrides(kind, size_px, normalisation, channels))
+    writable_folder(out)
+    report = {"model": str(network.model_path), "kind": network.convention.kind, "provider": network.provider}
+    say(f"{report['model']} ({report['kind']}) runs on {report['provider']}")
+    inferred = {}
+    for photo, record in _inferred(photos, network, out, sensor, depth_scale):
+        say(_line(photo, record))
+        inferred[str(photo)] = record
+    if json:
+        print_json({**report, "photos": inferred})
+
+
+def _inferred(
+    photos: tuple[Path, ...], network: DepthNetwork, out: Path, sensor: Path | None, depth_scale: float
+) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Each photograph with what was made of it."""
+    from pipeline.io.images import read_color, read_depth
+
+    for photo in photos:
+        rgb = read_color(photo)
+        measured = None if sensor is None else read_depth(sensor, depth_scale)
+        started = time.perf_counter()
+        depth = network.infer(rgb)
+        record: dict[str, Any] = {
+            "width_px": rgb.shape[1],
+            "height_px": rgb.shape[0],
+            "inference_ms": 1000.0 * (time.perf_counter() - started),
+        }
+        if measured is not None:
+            depth, record["alignment"] = _aligned(depth, measured, network)
+        yield photo, record | _written(depth, network.convention.kind, out, photo.stem)
+
+
+def _aligned(depth: DepthMap, sensor: DepthMap, network: DepthNetwork) -> tuple[DepthMap, dict[str, Any]]:
+    """Depth in the sensor's metres (SPEC 3.5); disparity needs a line of its own."""
+    from pipeline.depth import align_depth
+
+    result = align_depth(depth, sensor, disparity=network.convention.kind == "inverse")
+    return result.depth, {
+        "mode": result.mode,
+        "coefficients": result.coefficients,
+        "residual_rms_m": result.residual_rms_m,
+        "inliers": result.inliers,
+    }
+
+
+def _written(depth: DepthMap, kind: ModelKind, out: Path, stem: str) -> dict[str, Any]:
+    """Writes the depth image and its preview; returns what they hold."""
+    import numpy as np
+
+    from pipeline.io.images import write_color, write_depth_mm
+    from pipeline.types import DepthMap
+
+    image, preview = out / f"{stem}_depth.png", out / f"{stem}_preview.png"
+    known = depth.z_m[depth.valid]
+    record: dict[str, Any] = {"depth": str(image), "preview": str(preview), "known": depth.coverage}
+    if depth.kind == "metric":
+        record |= {"unit": "mm", "nearest_m": known.min(), "farthest_m": known.max()}
+        write_depth_mm(image, DepthMap(np.where(depth.z_m <= FARTHEST_M, depth.z_m, np.nan)))
+        record["too_far"] = float(np.mean(known > FARTHEST_M))
+    else:
+        values = 1.0 / depth.z_m if kind == "inverse" else depth.z_m
+        record["unit"] = f"shares of the largest {'disparity' if kind == 'inverse' else 'depth'}"
+        share = values.astype(np.float64) / np.nanmax(values)
+        # The writer's millimetres use all 16 bits; the least is 1 because 0 means unknown.
+        write_depth_mm(image, DepthMap(np.maximum(FARTHEST_M * share, 0.001)))
+    write_color(preview, _colored(depth))
+    return record
+
+
+def _colored(depth: DepthMap) -> Any:
+    """(H, W, 3) the nearness 1/z, light where near; magenta where unknown."""
+    import cv2
+    import numpy as np
+
+    from app.drawing.colors import HOLE
+
+    nearness = 1.0 / depth.z_m
+    low, high = np.nanpercentile(nearness, PREVIEW_PERCENTILES)
+    level = np.clip((nearness - low) / max(high - low, 1e-12), 0.0, 1.0)
+    gray = np.rint(255.0 * np.nan_to_num(level)).astype(np.uint8)
+    colors = cv2.applyColorMap(gray, cv2.COLORMAP_CIVIDIS)[..., ::-1].copy()
+    colors[~depth.valid] = HOLE
+    return colors
+
+
+def _line(photo: Path, record: dict[str, Any]) -> str:
+    size = f"{record['width_px']} x {record['height_px']} px"
+    values = f"in {record['unit']}"
+    if "nearest_m" in record:
+        values = f"{record['nearest_m']:.2f} to {record['farthest_m']:.2f} m"
+    if record.get("too_far"):
+        values += f", {record['too_far']:.1%} of it beyond {FARTHEST_M} m and left out"
+    aligned = record.get("alignment")
+    if aligned is not None:
+        values += f", {aligned['mode']} residual {1000.0 * aligned['residual_rms_m']:.0f} mm"
+    return f"{photo}: {size}, {record['inference_ms']:.0f} ms, depth {values}; see {record['depth']}"

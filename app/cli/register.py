@@ -1,0 +1,71 @@
+"""``packetmesh register``: one point cloud onto another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from app.cli.text import answers_table, print_json, say, wrong_use
+from packetmesh.errors import InputError
+
+
+def register(
+    source: Annotated[Path, tyro.conf.Positional],
+    target: Annotated[Path, tyro.conf.Positional],
+    out: Path,
+    method: str = "ceicp-a",
+    metric: Literal["point", "plane"] | None = None,
+    init: Path | None = None,
+    truth: Path | None = None,
+    voxel_m: float | None = None,
+    gate_m: float = 0.3,
+    start: Literal["given", "global"] = "given",
+    scale: bool = False,
+    json: bool = False,
+) -> None:
+    """Move one point cloud onto another: PLY, PCD, NPZ or text (XYZ, TXT, ASC, CSV), in metres.
+
+    Args:
+        source: The cloud that moves.
+        target: The cloud that stays.
+        out: Folder for transform.txt, metrics.json, steps.csv, aligned.ply and config.json.
+        method: A method or peer by name, or `all` to compare them; a wrong name lists them.
+        metric: Residual of our methods; point to plane unless a scale is asked for.
+        init: Start pose of the source in the target's frame, 4 x 4 numbers; the identity without it.
+        truth: The true pose, where it is known, to measure errors by.
+        voxel_m: Thin both clouds to one point per cube of this edge first.
+        gate_m: Largest distance of a pair.
+        start: `global` finds the start pose by matching features.
+        scale: Estimate a scale as well (our methods, point metric).
+        json: Print the metrics as one JSON object.
+    """
+    from packetmesh.files import writable_folder
+    from pipeline.io.clouds import read_cloud
+    from pipeline.io.poses import read_pose
+    from pipeline.register_folder import answer_metrics, chosen_pose, write_register_folder
+    from pipeline.register_pair import chosen_methods, config_for, prepared_pair, run_methods
+
+    try:
+        methods = chosen_methods(method)
+    except InputError as error:
+        wrong_use(str(error))
+    config = config_for(methods, metric=metric, gate_m=gate_m, start=start, with_scale=scale)
+    T_init, T_true = (None if path is None else read_pose(path) for path in (init, truth))
+    moving, fixed = read_cloud(source), read_cloud(target)
+    answers = []
+    for answer in run_methods(methods, prepared_pair(moving, fixed, config, voxel_m, T_init, T_true), config):
+        answers.append(answer)
+        say(f"{answer.method}: {answer.stop_reason}")
+    chosen_pose(answers)  # a run without a pose leaves no folder
+    writable_folder(out)
+    files = {"source": source, "target": target, "init": init, "truth": truth}
+    command: dict[str, Any] = {name: None if path is None else str(path) for name, path in files.items()}
+    command |= {"method": method, "voxel_m": voxel_m}
+    write_register_folder(out, answers, moving, config, command, truth is not None)
+    metrics = answer_metrics(answers, truth is not None)
+    if json:
+        print_json(metrics)
+    else:
+        print(answers_table(metrics))

@@ -1,0 +1,20 @@
+"""``packetmesh scenes``: what can be loaded."""
+
+from __future__ import annotations
+
+from app.cli.text import print_json
+
+
+def scenes(json: bool = False) -> None:
+    """List the demo scenes that can be loaded.
+
+    Args:
+        json: Print them as one JSON object.
+    """
+    from pipeline.io.demos import DEMO_SCENES
+
+    if json:
+        print_json({name: scene.description for name, scene in DEMO_SCENES.items()})
+        return
+    for name, scene in DEMO_SCENES.items():
+        print(f"{name:<14} {scene.description}")

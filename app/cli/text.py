@@ -1,0 +1,64 @@
+"""What the command line says, as text."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any, NoReturn
+
+from packetmesh.progress import Progress
+
+
+def say(text: str) -> None:
+    """A line on stderr, which leaves stdout to JSON and tables."""
+    sys.stderr.write(f"{text}\n")
+    sys.stderr.flush()
+
+
+def say_progress(progress: Progress) -> None:
+    """How far a computation is."""
+    say(f"{progress.fraction:4.0%}  {progress.stage}")
+
+
+def wrong_use(sentence: str) -> NoReturn:
+    """Say what is wrong with the options and exit with 2."""
+    say(f"packetmesh: {sentence}")
+    sys.exit(2)
+
+
+def print_json(value: Any) -> None:
+    """One strict JSON object on stdout."""
+    from packetmesh.files import finite
+
+    sys.stdout.write(f"{json.dumps(finite(value), allow_nan=False)}\n")
+
+
+def answers_table(metrics: dict[str, dict[str, Any]]) -> str:
+    """One line a method; centimetres and seconds."""
+    lengths = ["rmse_m", "average_hausdorff_m", "point_error_m"]
+    lengths = [name for name in lengths if all(name in row for row in metrics.values())]
+    headings = [f"{name.removesuffix('_m').replace('_', ' ')} cm" for name in lengths]
+    lines = [f"{'method':<20}" + "".join(f"{name:>22}" for name in ["iterations", "s", *headings])]
+    for method, row in metrics.items():
+        iterations = "-" if row["iterations"] is None else row["iterations"]
+        values = [f"{row['elapsed_s']:.3f}", *(f"{100.0 * row[name]:.3f}" for name in lengths)]
+        lines.append(f"{method:<20}{iterations:>22}" + "".join(f"{value:>22}" for value in values))
+    return "\n".join(lines)
+
+
+def mesh_lines(report: dict[str, Any]) -> str:
+    """The quality of a mesh; millimetres and seconds."""
+    closed = "" if report["genus"] is None else f", closed, genus {report['genus']}"
+    sizes = ", ".join(f"{1000.0 * radius_m:.4g}" for radius_m in report["radii_m"])
+    rows = {
+        "normals": report["normals"],
+        "radii": f"{sizes} mm",
+        "mesh": f"{report['triangles']} triangles of {report['vertices']} points{closed}",
+        "unused": f"{report['unused_points']} of {report['points']} points",
+        "boundary": f"{report['boundary_loops']} loops; holes of {report['hole_area_m2']:.4g} m2 in all",
+        "connection": f"{report['components']} components, Euler number {report['euler']}, "
+        f"{report['non_manifold_edges']} non-manifold edges",
+        "time": f"{report['elapsed_s']:.1f} s",
+        "file": report["out"],
+    }
+    return "\n".join(f"{name:<14} {value}" for name, value in rows.items())

@@ -1,0 +1,94 @@
+"""Depth as colour, safe for colour-blind eyes, with what cannot be known in magenta."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from app.drawing.colors import CONFIDENCE_STOPS, HOLE
+from app.records import ColorBar, Picture
+from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
+
+UNKNOWN = (90, 90, 90)
+NEARER, EQUAL, FARTHER = (0, 90, 181), (250, 250, 250), (230, 120, 0)
+FARTHEST_OFF_M = 0.3
+"""Difference from which on the colour does not change."""
+BAR_STOPS = 9
+
+
+def depth_range_m(depth: DepthMap) -> tuple[float, float]:
+    """2nd and 98th percentile of the known depths."""
+    known_m = depth.z_m[depth.valid]
+    if not len(known_m):
+        return 0.0, 1.0
+    nearest_m, farthest_m = np.percentile(known_m, [2, 98])
+    return float(nearest_m), float(max(farthest_m, nearest_m + 1e-3))
+
+
+def depth_picture(depth: DepthMap, range_m: tuple[float, float], what: str) -> Picture:
+    """Near is dark, far is bright, unknown is magenta."""
+    nearest_m, farthest_m = range_m
+    level = np.clip((depth.z_m - nearest_m) / (farthest_m - nearest_m), 0.0, 1.0)
+    rgb = _cividis((np.nan_to_num(level) * 255).astype(np.uint8))
+    rgb[~depth.valid] = HOLE
+    stops = _cividis(np.linspace(0, 255, BAR_STOPS).astype(np.uint8)[None])[0]
+    labels = tuple(f"{value_m:.2f} m" for value_m in np.linspace(nearest_m, farthest_m, 3))
+    return Picture(
+        rgb,
+        f"{what}: dark {nearest_m:.1f} m to bright {farthest_m:.1f} m, magenta where there is none",
+        ColorBar(tuple((int(r), int(g), int(b)) for r, g, b in stops), labels),
+    )
+
+
+def difference_picture(inferred: DepthMap, sensor: DepthMap, most_m: float = FARTHEST_OFF_M) -> Picture:
+    """Inferred minus sensed depth: blue nearer, orange farther, white equal; grey where one is unknown."""
+    difference_m = inferred.z_m - sensor.z_m
+    rgb = _diverging(np.clip(difference_m / most_m, -1.0, 1.0))
+    rgb[~np.isfinite(difference_m)] = UNKNOWN
+    centimetres = most_m * 100
+    return Picture(
+        rgb,
+        f"Inferred minus sensor: blue {centimetres:.0f} cm nearer, white equal, orange {centimetres:.0f} cm "
+        "farther, grey where one is missing",
+        ColorBar((NEARER, EQUAL, FARTHER), (f"−{centimetres:.0f} cm", "0 cm", f"+{centimetres:.0f} cm")),
+    )
+
+
+def confidence_picture(confidence: FloatArray, flying: BoolArray, out_of_reach: BoolArray) -> Picture:
+    """The surer, the brighter; magenta what flies, grey what is too far from anything measured or unknown.
+
+    Args:
+        confidence: (H, W) from 0 to 1, NaN where nothing is inferred.
+        flying: (H, W) pixels at a depth step that belong to neither side.
+        out_of_reach: (H, W) pixels too far from measured ones.
+    """
+    rgb = confidence_colors(confidence)
+    rgb[out_of_reach | ~np.isfinite(confidence)] = UNKNOWN
+    rgb[flying] = HOLE
+    return Picture(
+        rgb,
+        "Confidence in the inferred depth: dark unsure, bright sure; magenta pixels fly at an edge, grey "
+        "ones are out of reach",
+        ColorBar(CONFIDENCE_STOPS, ("0 %", "50 %", "100 %")),
+    )
+
+
+def confidence_colors(confidence: FloatArray) -> ByteArray:
+    """RGB of confidences from 0 to 1, with a last axis of 3; the darkest colour for NaN."""
+    at = np.linspace(0.0, 1.0, len(CONFIDENCE_STOPS))
+    level = np.nan_to_num(confidence)
+    channels = [np.interp(level, at, channel) for channel in zip(*CONFIDENCE_STOPS, strict=True)]
+    return np.rint(np.stack(channels, axis=-1)).astype(np.uint8)
+
+
+def _cividis(level: ByteArray) -> ByteArray:
+    """(H, W, 3) RGB of (H, W) levels from 0 to 255."""
+    return cv2.cvtColor(cv2.applyColorMap(level, cv2.COLORMAP_CIVIDIS), cv2.COLOR_BGR2RGB)
+
+
+def _diverging(level: FloatArray) -> ByteArray:
+    """(H, W, 3) blue, white, orange for -1, 0, 1."""
+    level = np.nan_to_num(level)[..., None]
+    blue, white, orange = (np.array(color, float) for color in (NEARER, EQUAL, FARTHER))
+    rgb = np.where(level < 0, white + (white - blue) * level, white + (orange - white) * level)
+    return rgb.astype(np.uint8)

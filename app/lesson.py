@@ -1,0 +1,101 @@
+"""Lessons: markdown files whose sections set a screen's controls and say what to look at.
+
+A lesson is a ``# title`` and sections. A section is a ``## title``, lines ``set: name = value`` and its
+text. What a section does not set is at its default, so that every stop can be shown by itself.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
+
+from packetmesh.errors import InputError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+LESSONS = Path(__file__).resolve().parents[1] / "assets" / "lessons"
+NUMBER = r"(\d+(?:\.\d+)?)"
+Value = TypeVar("Value")
+Look = TypeVar("Look", bound="DataclassInstance")
+"""What a screen is to show: a frozen record of all that a stop may set."""
+Setting: TypeAlias = Callable[[Look, str], Look]
+"""Changes a look as the text behind ``set: name =`` says; a ValueError says what to try instead."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stop(Generic[Look]):
+    """One section of a lesson."""
+
+    title: str
+    text: str
+    """Markdown."""
+    look: Look
+
+
+@dataclass(frozen=True, slots=True)
+class Lesson(Generic[Look]):
+    """A way through a screen in stops."""
+
+    title: str
+    stops: tuple[Stop[Look], ...]
+
+
+def read_lesson(path: Path, settings: Mapping[str, Setting[Look]], default: Look) -> Lesson[Look]:
+    """The lesson in a markdown file.
+
+    Args:
+        path: the file.
+        settings: what a section can set, by the names that it uses.
+        default: what is shown where a section sets nothing.
+
+    Raises:
+        InputError: the file cannot be read, has no title or no section, or sets what it cannot.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"The lesson {path.name} cannot be read as text: {error}.") from None
+    title = re.search(r"^# (.+)$", text, re.MULTILINE)
+    head, *sections = re.split(r"^## ", text, flags=re.MULTILINE)
+    if title is None or title.start() > len(head):
+        raise InputError(f"The lesson {path.name} has no title; begin it with a line '# title'.")
+    if not sections:
+        raise InputError(f"The lesson {path.name} has no sections; begin each with a line '## title'.")
+    stops = (_stop(section, path.name, settings, default) for section in sections)
+    return Lesson(title[1].strip(), tuple(stops))
+
+
+def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: Look) -> Stop[Look]:
+    title, *lines = section.splitlines()
+    text = "\n".join(line for line in lines if not line.startswith("set:")).strip()
+    where = f"The lesson {file}, section '{title.strip()}',"
+    if not text:
+        raise InputError(f"{where} has no text.")
+    for line in lines:
+        if line.startswith("set:"):
+            name, _, value = (part.strip() for part in line[4:].partition("="))
+            try:
+                look = choice(settings)(name)(look, value)
+            except ValueError as error:
+                raise InputError(f"{where} cannot set {name} = {value}: {error}.") from None
+    return Stop(title.strip(), text, look)
+
+
+def sets(key: str, read: Callable[[str], Any]) -> Callable[[Look, str], Look]:
+    """The setting that puts what ``read`` makes of the text into one field of the look."""
+    return lambda look, text: replace(look, **{key: read(text)})
+
+
+def choice(options: Mapping[str, Value]) -> Callable[[str], Value]:
+    """Reads one of the options' names."""
+
+    def read(text: str) -> Value:
+        if text not in options:
+            raise ValueError(f"try one of {', '.join(options)}")
+        return options[text]
+
+    return read

@@ -1,5 +1,0 @@
-"""Network: nodes, packets and what their ways cost, on one timeline."""
-
-from app.panels.network.panel import NetworkPanel
-
-__all__ = ["NetworkPanel"]

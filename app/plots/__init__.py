@@ -1,1 +1,0 @@
-"""The figures: plotly for histograms, uPlot for curves."""

@@ -1,0 +1,381 @@
+"""Heavy work in long-lived processes beside the server, so that no browser ever waits for another's.
+
+Open3D holds the interpreter lock, so nothing that computes runs in the serving process. A job is a
+module-level function and its arguments; if it returns a generator, what it yields is reported while
+it runs and the job can be stopped between two yields.
+"""
+
+from __future__ import annotations
+
+import inspect
+import logging
+import multiprocessing
+import os
+import signal
+import threading
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any, Literal
+
+import psutil
+
+from packetmesh.errors import PacketMeshError
+
+logger = logging.getLogger(__name__)
+
+PATIENCE_S = 3.0
+"""How long a superseded job may go on before its process is ended."""
+RESPAWN_PAUSE_S = 1.0
+"""Before a process is started again that died before it was ready."""
+MEMORY_LIMIT_BYTES = 2 << 30
+"""A process that holds more than this after a job is replaced by a fresh one."""
+DIED = "The computing process ended unexpectedly, perhaps out of memory: try fewer points or a smaller ball."
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a job ended."""
+
+    kind: Literal["result", "error", "stopped"]
+    value: Any = None
+    """The result, or the sentence that says what went wrong."""
+
+
+@dataclass(slots=True, eq=False)
+class Ticket:
+    """One job from its submission to its end."""
+
+    owner: object
+    """Whoever asks; an owner never has two jobs running at once."""
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    on_progress: Callable[[Any], None]
+    on_end: Callable[[Outcome], None]
+    state: Literal["waiting", "running", "ended"] = "waiting"
+    stopping: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class _Slot:
+    """One process of the pool and the job it has."""
+
+    process: BaseProcess | None = None
+    connection: Connection | None = None
+    ticket: Ticket | None = None
+    ready: bool = False
+
+
+class ComputePool:
+    """Spawned processes that take jobs in the order of submission, one at a time for each owner."""
+
+    def __init__(
+        self, size: int = 2, warm_up: Callable[[], None] | None = None, patience_s: float = PATIENCE_S
+    ) -> None:
+        self._context = multiprocessing.get_context("spawn")
+        self._warm_up = warm_up
+        self._patience_s = patience_s
+        self._threads_each = max(1, (os.cpu_count() or 1) // size)
+        self._lock = threading.Lock()
+        self._waiting: list[Ticket] = []
+        self._closed = False
+        self._closing = threading.Event()
+        self._slots = [_Slot() for _ in range(size)]
+        self._threads = [
+            threading.Thread(target=self._attend, args=(slot,), name=f"compute-{i}", daemon=True)
+            for i, slot in enumerate(self._slots)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def submit(
+        self,
+        owner: object,
+        function: Callable[..., Any],
+        *arguments: Any,
+        on_progress: Callable[[Any], None],
+        on_end: Callable[[Outcome], None],
+    ) -> Ticket:
+        """Queue a job; the callbacks run on a thread of the pool and must be brief."""
+        ticket = Ticket(owner, function, arguments, on_progress, on_end)
+        with self._lock:
+            if self._closed:
+                raise RuntimeError("the pool is closed")
+            self._waiting.append(ticket)
+            self._dispatch()
+        return ticket
+
+    def stop(self, ticket: Ticket) -> None:
+        """Ask a job to stop at its next report; end its process if it is deaf for too long."""
+        if self._withdraw(ticket):
+            return
+        with self._lock:
+            slot = self._slot_of(ticket)
+            if slot is None or ticket.stopping:
+                return
+            ticket.stopping = True
+            _send(slot, ("stop", None))
+        timer = threading.Timer(self._patience_s, self.cancel, (ticket,))
+        timer.daemon = True
+        timer.start()
+
+    def cancel(self, ticket: Ticket) -> None:
+        """End a job now, with its process if it runs."""
+        if self._withdraw(ticket):
+            return
+        with self._lock:
+            slot = self._slot_of(ticket)
+            if slot is not None and slot.process is not None:
+                ticket.stopping = True
+                slot.process.terminate()
+
+    def close(self) -> None:
+        """End all processes; jobs that have not ended are stopped."""
+        with self._lock:
+            self._closed = True
+            self._closing.set()
+            waiting, self._waiting = self._waiting, []
+            for slot in self._slots:
+                if slot.process is not None:
+                    slot.process.terminate()
+        for ticket in waiting:
+            _end(ticket, Outcome("stopped"))
+        for thread in self._threads:
+            thread.join(timeout=5.0)
+
+    def _withdraw(self, ticket: Ticket) -> bool:
+        """Drop a job that has not begun; False if it has."""
+        with self._lock:
+            if ticket not in self._waiting:
+                return False
+            self._waiting.remove(ticket)
+        _end(ticket, Outcome("stopped"))
+        return True
+
+    def _slot_of(self, ticket: Ticket) -> _Slot | None:
+        return next((slot for slot in self._slots if slot.ticket is ticket), None)
+
+    def _dispatch(self) -> None:
+        """Give waiting jobs to free processes; the lock is held."""
+        for slot in self._slots:
+            if slot.ticket is not None or not slot.ready:
+                continue
+            busy = {id(other.ticket.owner) for other in self._slots if other.ticket is not None}
+            ticket = next((t for t in self._waiting if id(t.owner) not in busy), None)
+            if ticket is None:
+                return
+            self._waiting.remove(ticket)
+            ticket.state, slot.ticket = "running", ticket
+            _send(slot, ("job", (ticket.function, ticket.arguments)))
+
+    def _attend(self, slot: _Slot) -> None:
+        """Keep one process alive and hand on what it says, until the pool closes."""
+        while self._start(slot):
+            assert slot.connection is not None
+            assert slot.process is not None
+            try:
+                while True:
+                    self._hear(slot, *slot.connection.recv())
+            except (EOFError, OSError):
+                slot.process.join(timeout=2.0)
+            except Exception:
+                logger.exception("a report of the computing process could not be read")
+                slot.process.kill()
+            if not slot.ready:
+                self._closing.wait(RESPAWN_PAUSE_S)
+            self._bury(slot)
+
+    def _start(self, slot: _Slot) -> bool:
+        with self._lock:
+            if self._closed:
+                return False
+            here, there = self._context.Pipe()
+            slot.process = self._context.Process(
+                target=_child, args=(there, self._warm_up, self._threads_each), daemon=True
+            )
+            slot.process.start()
+            there.close()
+            slot.connection = here
+            return True
+
+    def _hear(self, slot: _Slot, kind: str, value: Any) -> None:
+        ticket = slot.ticket
+        if kind == "progress" and ticket is not None:
+            _report(ticket, value)
+            return
+        with self._lock:
+            slot.ready, slot.ticket = True, None
+            if kind != "ready" and _memory_bytes(slot.process) > MEMORY_LIMIT_BYTES:
+                slot.ready = False
+                assert slot.process is not None
+                slot.process.terminate()
+            self._dispatch()
+        if ticket is not None:
+            _end(ticket, Outcome(kind, value))  # type: ignore[arg-type]
+
+    def _bury(self, slot: _Slot) -> None:
+        with self._lock:
+            ticket, slot.ticket = slot.ticket, None
+            slot.ready = False
+            if slot.connection is not None:
+                slot.connection.close()
+        if ticket is not None:
+            stopped = ticket.stopping or self._closed
+            _end(ticket, Outcome("stopped") if stopped else Outcome("error", DIED))
+
+
+def _send(slot: _Slot, message: tuple[str, Any]) -> None:
+    """Tell a process something; if it has just died, its attendant will notice."""
+    try:
+        assert slot.connection is not None
+        slot.connection.send(message)
+    except OSError:
+        logger.debug("the computing process is gone")
+
+
+def _report(ticket: Ticket, value: Any) -> None:
+    try:
+        ticket.on_progress(value)
+    except Exception:
+        logger.exception("a progress callback failed")
+
+
+def _end(ticket: Ticket, outcome: Outcome) -> None:
+    ticket.state = "ended"
+    try:
+        ticket.on_end(outcome)
+    except Exception:
+        logger.exception("an end callback failed")
+
+
+def _memory_bytes(process: BaseProcess | None) -> int:
+    try:
+        return psutil.Process(process.pid).memory_info().rss if process is not None else 0
+    except psutil.Error:
+        return 0
+
+
+def _child(connection: Connection, warm_up: Callable[[], None] | None, threads: int) -> None:
+    """Main function of a computing process: take a job, report, repeat until the server is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ.setdefault(name, str(threads))
+    try:
+        if warm_up is not None:
+            _try(warm_up)
+        connection.send(("ready", None))
+        while True:
+            kind, job = connection.recv()
+            if kind == "job":
+                connection.send(_answer(connection, *job))
+    except (EOFError, OSError):
+        return
+
+
+def _try(warm_up: Callable[[], None]) -> None:
+    """Warm up; what goes wrong here goes wrong again, and is reported, in the first job."""
+    try:
+        warm_up()
+    except Exception:
+        traceback.print_exc()
+
+
+def _answer(
+    connection: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]
+) -> tuple[str, Any]:
+    """Run one job and say how it ended, in a message for the attendant."""
+    try:
+        value = function(*arguments)
+        while inspect.isgenerator(value):
+            try:
+                connection.send(("progress", next(value)))
+            except StopIteration as stop:
+                value = stop.value
+                break
+            if connection.poll():
+                connection.recv()
+                value.close()
+                return "stopped", None
+        return "result", value
+    except PacketMeshError as error:
+        return "error", str(error)
+    except MemoryError:
+        return "error", "There is not enough memory for this: try fewer points or a smaller ball."
+    except OSError as error:
+        if isinstance(error, (BrokenPipeError, ConnectionError)):
+            raise
+        return "error", f"A file could not be used: {error}."
+    except Exception as error:
+        traceback.print_exc()
+        return "error", f"This step failed unexpectedly ({type(error).__name__}: {error})."
+
+
+@dataclass(slots=True)
+class _Request:
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    on_progress: Callable[[Any], None]
+    on_end: Callable[[Outcome], None]
+
+
+@dataclass(slots=True)
+class LatestWins:
+    """A lane of one running and one waiting job; a newer job replaces the waiting one.
+
+    The running job is asked to stop when a newer one arrives. If it ends first its result is still
+    delivered, before the newer one's.
+    """
+
+    pool: ComputePool
+    owner: object
+    _running: Ticket | None = None
+    _waiting: _Request | None = None
+    _lock: threading.RLock = field(default_factory=threading.RLock)
+
+    @property
+    def busy(self) -> bool:
+        return self._running is not None
+
+    def submit(
+        self,
+        function: Callable[..., Any],
+        *arguments: Any,
+        on_progress: Callable[[Any], None],
+        on_end: Callable[[Outcome], None],
+    ) -> None:
+        """Run this job as soon as the one before it is out of the way."""
+        request = _Request(function, arguments, on_progress, on_end)
+        with self._lock:
+            if self._running is None:
+                self._start(request)
+                return
+            self._waiting = request
+            running = self._running
+        self.pool.stop(running)
+
+    def cancel(self) -> None:
+        """Forget the waiting job and end the running one now."""
+        with self._lock:
+            self._waiting = None
+            running = self._running
+        if running is not None:
+            self.pool.cancel(running)
+
+    def _start(self, request: _Request) -> None:
+        self._running = self.pool.submit(
+            self.owner,
+            request.function,
+            *request.arguments,
+            on_progress=request.on_progress,
+            on_end=lambda outcome: self._ended(request, outcome),
+        )
+
+    def _ended(self, request: _Request, outcome: Outcome) -> None:
+        with self._lock:
+            self._running = None
+            following, self._waiting = self._waiting, None
+            if following is not None:
+                self._start(following)
+        request.on_end(outcome)

@@ -1,0 +1,86 @@
+"""What a brush has painted on a cloud, and which point a click meant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+
+from app.drawing.clouds import POINT_SIZE_M, add_cloud
+from app.drawing.colors import HOLE
+from app.records import Sample
+from app.screens.depth.discs import covered, disc_at
+from app.screens.depth.view import Disc, SeenSample
+from pipeline.types import BoolArray, FloatArray
+
+REACH_DEG = 1.0
+"""A click so far from a point still means it."""
+BEHIND = 0.05
+"""Points up to this share farther than the nearest one in reach are on the same surface."""
+SIZE_M = 1.7 * POINT_SIZE_M
+
+
+class BrushDrawing:
+    """The painted points of one cloud, large and in the colour that pictures give to what is unknown."""
+
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        self._scene, self._name = scene, name
+
+    def draw(self, cloud: SeenSample, T_world_camera: FloatArray, discs: Sequence[Disc]) -> None:
+        """Draw these instead of the last; none without discs."""
+        self._scene.remove_by_name(self._name)
+        points_m = cloud.points_m[painted(cloud, discs)]
+        if len(points_m):
+            sample = Sample(points_m, None, len(points_m))
+            add_cloud(self._scene, self._name, sample, T_world_camera, HOLE, SIZE_M)
+
+
+def painted(cloud: SeenSample, discs: Sequence[Disc]) -> BoolArray:
+    """(N,) which points of the cloud the discs cover in its image."""
+    return covered(discs, cloud.pixels[:, 0], cloud.pixels[:, 1], cloud.width_px, cloud.height_px)
+
+
+def clicked_disc(
+    cloud: SeenSample,
+    T_world_camera: FloatArray,
+    origin_m: FloatArray,
+    direction: FloatArray,
+    size_share: float,
+) -> Disc | None:
+    """The disc around the pixel of the point that a ray means.
+
+    Args:
+        cloud: in the frame of its camera.
+        T_world_camera: (4, 4) where that camera stands.
+        origin_m: (3,) of the ray, world frame.
+        direction: (3,) of the ray, world frame, of any length.
+        size_share: diameter of the disc, in widths of the image.
+
+    Returns:
+        None if the ray passes the cloud.
+    """
+    R = T_world_camera[:3, :3]
+    index = picked_point(cloud.points_m, (origin_m - T_world_camera[:3, 3]) @ R, direction @ R)
+    if index is None:
+        return None
+    u, v = cloud.pixels[index]
+    return disc_at(float(u), float(v), cloud.width_px, cloud.height_px, size_share)
+
+
+def picked_point(points_m: FloatArray, origin_m: FloatArray, direction: FloatArray) -> int | None:
+    """The row of the (N, 3) point that a ray means; None if none is within 1 degree of it.
+
+    Of the points in reach, those of the nearest surface count, and of these the one closest to the ray:
+    between the points of a sparse surface one sees what is behind it.
+    """
+    forward = np.asarray(direction, float) / np.linalg.norm(direction)
+    offset_m = points_m.astype(float) - origin_m
+    along_m = offset_m @ forward
+    aside_m = np.linalg.norm(offset_m - along_m[:, None] * forward, axis=1)
+    angle = np.arctan2(aside_m, along_m)
+    reached = angle <= np.radians(REACH_DEG)
+    if not reached.any():
+        return None
+    front = reached & (along_m <= (1.0 + BEHIND) * along_m[reached].min())
+    return int(np.argmin(np.where(front, angle, np.inf)))

@@ -1,0 +1,178 @@
+"""The folder that hides a part of what was measured, and sees how well it can be filled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.screens.depth.brush import BrushDrawing, clicked_disc
+from app.screens.depth.compare import CompareArea
+from app.screens.depth.labels import BLANK, MEASURED, OURS, PEER_NAMES
+from app.screens.depth.view import Disc, HiddenView, HideWish, SeenSample
+from app.tables import Row, number, table
+from pipeline.types import FloatArray
+
+TEXT = """Where the sensor is blind, nobody can tell how good a guess is. So **hide a part of what it did
+measure**, have it filled without that knowledge, and compare. **Tick the brush and click points in the
+picture**, or place discs with the sliders."""
+ADD, UNDO, CLEAR = "Add", "Undo", "Clear"
+BUTTON = "Hide and fill"
+WAITING = "Filling …"
+SILENT = "No answer came. Press the button again."
+BESIDE = "No measured point there. Click a point of the node that is chosen above."
+NAMES = (MEASURED, BLANK, OURS, *PEER_NAMES.values())
+
+
+class HideFolder:
+    """A brush, a button, the pictures before and after, and the errors of all ways to fill."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        scene: viser.SceneApi,
+        post: Callable[..., None],
+        changed: Callable[[Any, Callable[[], None]], None],
+        on_hide: Callable[[HideWish], None],
+    ) -> None:
+        """Add the folder.
+
+        Args:
+            gui: where to add it.
+            scene: where to draw what is painted.
+            post: runs a function on the session's thread.
+            changed: registers an action for a change of a handle by a person.
+            on_hide: called with what to hide, of the node that is shown.
+        """
+        self._on_hide = on_hide
+        self._drawing = BrushDrawing(scene, "/depth/painted")
+        self._cloud: SeenSample | None = None
+        self._T_world_camera: FloatArray = np.eye(4)
+        self.discs: tuple[Disc, ...] = ()
+        with gui.add_folder("Hide a region and see it filled", expand_by_default=False):
+            gui.add_markdown(TEXT)
+            self._add_brush(gui, post)
+            gui.add_button(BUTTON, icon=viser.Icon.ERASER, hint="It takes some seconds.").on_click(
+                lambda _: post(self._ask)
+            )
+            self._status = gui.add_markdown("")
+            self._area = CompareArea(gui, changed, NAMES, BLANK, OURS, visible=False)
+            self._table = gui.add_html("")
+
+    def _add_brush(self, gui: viser.GuiApi, post: Callable[..., None]) -> None:
+        self._brush = gui.add_checkbox(
+            "Brush", False, hint="Each click on a measured point in the 3-D scene hides a disc around it."
+        )
+        self._size = gui.add_slider(
+            "Diameter (%)", 4.0, 60.0, 1.0, 20.0, hint="Of the next disc, in % of the image's width."
+        )
+        self._x = gui.add_slider(
+            "Centre x (%)", 0.0, 100.0, 1.0, 50.0, hint="Of the disc that Add puts, from the left."
+        )
+        self._y = gui.add_slider(
+            "Centre y (%)", 0.0, 100.0, 1.0, 50.0, hint="Of the disc that Add puts, from the top."
+        )
+        keys = gui.add_button_group(
+            "Discs",
+            (ADD, UNDO, CLEAR),
+            hint="Add: a disc where the sliders say. Undo: takes the last one away. Clear: all of them.",
+        )
+        actions = {ADD: self._add, UNDO: self._undo, CLEAR: self.clear}
+        keys.on_click(lambda event: post(actions[event.target.value]))
+
+    def show(self, cloud: SeenSample, T_world_camera: FloatArray) -> None:
+        """Paint on this node's points, which have just been drawn."""
+        self._cloud, self._T_world_camera = cloud, T_world_camera
+        self._drawing.draw(cloud, T_world_camera, self.discs)
+
+    def clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
+        """Paint where a click in the scene meant, if the brush is in hand."""
+        if not self._brush.value or self._cloud is None:
+            return
+        size_share = self._size.value / 100.0
+        disc = clicked_disc(self._cloud, self._T_world_camera, origin_m, direction, size_share)
+        if disc is None:
+            self._status.content = BESIDE
+        else:
+            self._paint((*self.discs, disc))
+
+    def ask(self, wish: HideWish) -> None:
+        """Paint the discs and press the button, as a person would."""
+        last = wish.discs[-1]
+        self._x.value, self._y.value = round(100.0 * last.x_share), round(100.0 * last.y_share)
+        self._size.value = round(100.0 * last.size_share)
+        self._paint(wish.discs)
+        self._ask()
+
+    def clear(self) -> None:
+        """Take all discs away, and what was filled."""
+        self._paint(())
+
+    def forget(self) -> None:
+        """What was filled with other settings is not what these would fill."""
+        self._status.content = painted_line(self.discs)
+        self._table.content = ""
+        self._area.load(None)
+
+    def load(self, view: HiddenView | None) -> None:
+        """Show the answer; None was stopped or could not be."""
+        self.forget()
+        if view is None:
+            self._status.content = SILENT
+            return
+        self._status.content = f"**{view.hidden_px:,} measured pixels of {view.node} hidden.**"
+        self._area.load(view.pictures)
+        self._table.content = fills_table(view)
+
+    def _add(self) -> None:
+        disc = Disc(self._x.value / 100.0, self._y.value / 100.0, self._size.value / 100.0)
+        self._paint((*self.discs, disc))
+
+    def _undo(self) -> None:
+        self._paint(self.discs[:-1])
+
+    def _paint(self, discs: tuple[Disc, ...]) -> None:
+        self.discs = discs
+        self.forget()
+        if self._cloud is not None:
+            self._drawing.draw(self._cloud, self._T_world_camera, discs)
+
+    def _ask(self) -> None:
+        """Have the discs filled; without any, the one of the sliders."""
+        if not self.discs:
+            self._add()
+        self.forget()
+        self._status.content = WAITING
+        self._on_hide(HideWish(0, self.discs))
+
+
+def painted_line(discs: tuple[Disc, ...]) -> str:
+    """How much is painted; empty for nothing."""
+    if not discs:
+        return ""
+    count = "1 disc" if len(discs) == 1 else f"{len(discs)} discs"
+    return f"{count} painted in magenta. Paint more, or press **{BUTTON}**."
+
+
+def fills_table(view: HiddenView) -> str:
+    """HTML: a line for each way to fill: AbsRel, share within 5 %, share filled, time."""
+    hint = (
+        "AbsRel: mean of |filled - measured| / measured over the hidden pixels that were filled. Within 5 %: "
+        "share of all hidden pixels. Filled: share that got a depth at all. Time without the network's own."
+    )
+    rows = [
+        Row(
+            row.name,
+            hint,
+            (
+                number(row.abs_rel, 3),
+                number(row.within_share, 0, "%", 100.0),
+                number(row.filled_share, 0, "%", 100.0),
+                number(row.elapsed_s, 0, "ms", 1000.0),
+            ),
+        )
+        for row in view.rows
+    ]
+    return table(rows, ("AbsRel", "within 5 %", "filled", "time"))

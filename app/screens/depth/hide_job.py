@@ -1,0 +1,118 @@
+"""A part of the sensor depth is hidden, filled in several ways, and compared with what was measured there."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Sequence
+from functools import partial
+
+import numpy as np
+
+from app.chain import prepared, rig_of
+from app.drawing.pictures import depth_picture, depth_range_m
+from app.records import Picture
+from app.screens.depth.discs import covered, window_around
+from app.screens.depth.labels import BLANK, MEASURED, OURS, PEER_NAMES
+from app.screens.depth.view import Disc, FillRow, HiddenView, HideWish
+from app.state import Spec
+from app.store import Store
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from pipeline.config import DepthConfig
+from pipeline.depth import align_depth
+from pipeline.depth.confidence import judge
+from pipeline.depth.fillers import PEERS
+from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
+
+LEAST_HIDDEN_PX = 50
+WITHIN = 0.05
+"""Relative error up to which a filled pixel counts as right."""
+SHOWN_PX = 480
+
+
+def hide_job(store: Store, spec: Spec, wish: HideWish) -> Generator[Progress, None, HiddenView]:
+    """Hide discs of one node's sensor depth, align without them, fill them, and measure.
+
+    Raises:
+        InputError: the node does not exist, or hardly anything is measured in the discs.
+    """
+    rig = yield from rig_of(store, spec)
+    work = yield from prepared(store, spec)
+    if not 0 <= wish.node < len(rig.frames):
+        raise InputError(f"There is no node {wish.node}, only {len(rig.frames)} of them; choose one anew.")
+    frame, node = rig.frames[wish.node], work.nodes[wish.node]
+    hidden = hidden_pixels(frame.depth, wish.discs)
+    rest = DepthMap(np.where(hidden, np.float32(np.nan), frame.depth.z_m))
+    ways: dict[str, Callable[[], DepthMap]] = {
+        OURS: partial(
+            believed, node.inferred_depth, rest, frame.rgb, spec.config.depth, node.alignment.disparity
+        ),
+        **{PEER_NAMES.get(name, name): partial(peer, rest, frame.rgb) for name, peer in PEERS.items()},
+    }
+    rows, maps = [], {MEASURED: frame.depth, BLANK: rest}
+    for index, (name, fill) in enumerate(ways.items()):
+        yield Progress(f"filling what is hidden: {name}", (index + 1) / (len(ways) + 1))
+        started = time.perf_counter()
+        filled_m = fill().z_m
+        elapsed_s = time.perf_counter() - started
+        maps[name] = DepthMap(np.where(hidden, filled_m, frame.depth.z_m).astype(np.float32))
+        rows.append(fill_row(name, filled_m[hidden], frame.depth.z_m[hidden], elapsed_s))
+    return HiddenView(
+        wish, frame.name, int(hidden.sum()), tuple(rows), _pictures(maps, frame.depth, wish.discs)
+    )
+
+
+def hidden_pixels(sensor: DepthMap, discs: Sequence[Disc]) -> BoolArray:
+    """(H, W) the measured pixels of all discs.
+
+    Raises:
+        InputError: there are fewer than 50.
+    """
+    rows, columns = sensor.z_m.shape
+    y, x = np.ogrid[:rows, :columns]
+    hidden = covered(discs, x, y, columns, rows) & sensor.valid
+    if hidden.sum() < LEAST_HIDDEN_PX:
+        raise InputError(
+            f"Only {hidden.sum()} pixels under the brush are measured, and the test takes {LEAST_HIDDEN_PX}: "
+            "move it off the holes, make it larger or paint more."
+        )
+    return hidden
+
+
+def believed(
+    inferred: DepthMap, rest: DepthMap, rgb: ByteArray, config: DepthConfig, disparity: bool = False
+) -> DepthMap:
+    """The inferred depth as it is aligned and believed without knowing what is hidden."""
+    alignment = align_depth(inferred, rest, config.alignment, disparity)
+    return judge(alignment, rest, rgb, config.reach, config.least_confidence).depth
+
+
+def fill_row(name: str, filled_m: FloatArray, measured_m: FloatArray, elapsed_s: float) -> FillRow:
+    """The errors of (N,) filled depths, NaN where nothing was filled."""
+    relative = np.abs(filled_m.astype(float) - measured_m) / measured_m
+    known = np.isfinite(relative)
+    return FillRow(
+        name=name,
+        abs_rel=float(relative[known].mean()) if known.any() else float("nan"),
+        within_share=float(np.mean(known & (np.nan_to_num(relative) < WITHIN))),
+        filled_share=float(known.mean()),
+        elapsed_s=elapsed_s,
+    )
+
+
+def _pictures(maps: dict[str, DepthMap], sensor: DepthMap, discs: Sequence[Disc]) -> dict[str, Picture]:
+    """The discs and their surroundings, all in the colours of what was measured there."""
+    rows, columns = sensor.z_m.shape
+    window = window_around(discs, columns, rows)
+    range_m = depth_range_m(DepthMap(sensor.z_m[window]))
+    return {
+        name: _enlarged(depth_picture(DepthMap(depth.z_m[window]), range_m, name.capitalize()))
+        for name, depth in maps.items()
+    }
+
+
+def _enlarged(picture: Picture) -> Picture:
+    """Whole pixels grow to squares, so that nothing is blurred."""
+    times = max(1, SHOWN_PX // max(picture.rgb.shape[:2]))
+    rgb = picture.rgb.repeat(times, axis=0).repeat(times, axis=1)
+    return Picture(rgb, picture.caption, picture.bar)

@@ -1,0 +1,156 @@
+"""The job of the Depth screen: every node's depth, sensed, inferred, compared and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+
+import numpy as np
+
+from app.chain import prepared, rig_of
+from app.drawing.pictures import (
+    confidence_colors,
+    confidence_picture,
+    depth_picture,
+    depth_range_m,
+    difference_picture,
+)
+from app.records import (
+    SCREEN_POINTS,
+    DepthNode,
+    DepthView,
+    JudgedView,
+    Picture,
+    ResidualView,
+    Sample,
+    sample,
+)
+from app.screens.depth.labels import CONFIDENCE, DIFFERENCE, INFERRED, PHOTO, SENSOR
+from app.screens.depth.view import SeenSample
+from app.state import Spec
+from app.store import Store
+from packetmesh.progress import Progress
+from pipeline.depth.confidence import JudgedDepth
+from pipeline.reconstruct import NodeClouds
+from pipeline.types import BoolArray, DepthMap, PointCloud, PointSource, RgbdFrame, Rig
+
+PICTURE_WIDTH_PX = 640
+"""Wider images are thinned for the panel."""
+RESIDUAL_BINS = 60
+LEAST_RANGE_M = 0.01
+
+
+def depth_job(store: Store, spec: Spec) -> Generator[Progress, None, DepthView]:
+    """Every node's depth, sensed, inferred and fused."""
+    rig = yield from rig_of(store, spec)
+    work = yield from prepared(store, spec)
+    nodes = []
+    for index, (clouds, elapsed_s) in enumerate(zip(work.nodes, work.inference_s, strict=True)):
+        yield Progress(f"pictures of {clouds.name}", 0.9 + 0.1 * index / len(work.nodes))
+        nodes.append(_depth_node(rig, index, clouds, elapsed_s))
+    return DepthView(tuple(nodes))
+
+
+def _depth_node(rig: Rig, index: int, clouds: NodeClouds, elapsed_s: float | None) -> DepthNode:
+    drawn = SCREEN_POINTS / len(rig.frames) / max(1, len(clouds.fused))
+    frame, alignment, judged = rig.frames[index], clouds.alignment, clouds.judged
+    filled = clouds.fused.select(_inferred_rows(clouds.fused))
+    return DepthNode(
+        name=clouds.name,
+        pictures=_pictures(frame, clouds, judged),
+        sensor=_seen(clouds.sensor, frame, drawn),
+        inferred=_thinned(clouds.inferred, drawn),
+        outliers=_thinned(replace(clouds.filtered.outliers, colors=None), drawn),
+        fused=_thinned(clouds.fused, drawn),
+        filled=_thinned(filled, drawn),
+        inferred_confidence=_confidence(clouds.inferred, judged, drawn),
+        filled_confidence=_confidence(filled, judged, drawn),
+        alignment_mode=alignment.mode,
+        disparity=alignment.disparity,
+        coefficients=dict(alignment.coefficients),
+        residuals=residual_view(alignment.depth, frame.depth),
+        inlier_share=alignment.inliers,
+        judged=judged_view(judged, alignment.depth.valid & ~frame.depth.valid),
+        truth_error_m=_filled_error_m(rig, index, judged),
+        provider=clouds.provider,
+        inference_s=elapsed_s,
+    )
+
+
+def _pictures(frame: RgbdFrame, clouds: NodeClouds, judged: JudgedDepth) -> dict[str, Picture]:
+    range_m, aligned = depth_range_m(frame.depth), clouds.alignment.depth
+    pictures = {
+        PHOTO: Picture(frame.rgb, f"Colour image of {frame.name}"),
+        SENSOR: depth_picture(frame.depth, range_m, "Sensor depth"),
+        INFERRED: depth_picture(aligned, range_m, "Inferred depth, made metric"),
+        DIFFERENCE: difference_picture(aligned, frame.depth),
+        CONFIDENCE: confidence_picture(judged.confidence, judged.flying, judged.out_of_reach),
+    }
+    every = -(-frame.rgb.shape[1] // PICTURE_WIDTH_PX)
+    return {
+        name: replace(picture, rgb=np.ascontiguousarray(picture.rgb[::every, ::every]))
+        for name, picture in pictures.items()
+    }
+
+
+def _thinned(cloud: PointCloud, share: float) -> Sample:
+    """The same share of every cloud, so that their densities can be compared by eye."""
+    return sample(cloud.points_m, cloud.colors, int(share * len(cloud)) + 1)
+
+
+def _seen(cloud: PointCloud, frame: RgbdFrame, share: float) -> SeenSample:
+    """As ``_thinned``, with the pixels of the points."""
+    most = min(len(cloud), int(share * len(cloud)) + 1)
+    drawn = cloud.select(np.sort(np.random.default_rng(0).choice(len(cloud), most, replace=False)))
+    assert drawn.pixels is not None
+    height_px, width_px = frame.depth.z_m.shape
+    points_m = drawn.points_m.astype(np.float32)
+    return SeenSample(points_m, drawn.colors, len(cloud), drawn.pixels, width_px, height_px)
+
+
+def _confidence(cloud: PointCloud, judged: JudgedDepth, share: float) -> np.ndarray:
+    """(N, 3) RGB of the points that ``_thinned`` draws."""
+    assert cloud.pixels is not None
+    u, v = cloud.pixels.T
+    colors = _thinned(replace(cloud, colors=confidence_colors(judged.confidence[v, u])), share).colors
+    assert colors is not None
+    return colors
+
+
+def _inferred_rows(cloud: PointCloud) -> BoolArray:
+    if cloud.source is None:
+        return np.zeros(len(cloud), dtype=bool)
+    return cloud.source == PointSource.INFERRED
+
+
+def residual_view(aligned: DepthMap, sensor: DepthMap) -> ResidualView:
+    """How far aligned depth is from the sensor's; the bins reach as far as 98 % of the pixels."""
+    residual_m = (aligned.z_m - sensor.z_m).astype(float)
+    residual_m = residual_m[np.isfinite(residual_m)]
+    if not len(residual_m):
+        edges_m = np.linspace(-LEAST_RANGE_M, LEAST_RANGE_M, RESIDUAL_BINS + 1)
+        return ResidualView(edges_m, np.zeros(RESIDUAL_BINS, int), float("nan"), float("nan"))
+    most_m = max(LEAST_RANGE_M, float(np.percentile(np.abs(residual_m), 98.0)))
+    edges_m = np.linspace(-most_m, most_m, RESIDUAL_BINS + 1)
+    counts, _ = np.histogram(np.clip(residual_m, -most_m, most_m), edges_m)
+    rms_m = float(np.sqrt(np.mean(residual_m**2)))
+    return ResidualView(edges_m, counts, float(np.median(residual_m)), rms_m)
+
+
+def judged_view(judged: JudgedDepth, blind: BoolArray) -> JudgedView:
+    """What of the inferred depth is believed on the pixels ``blind``, (H, W)."""
+    if not blind.any():
+        return JudgedView(float("nan"), float("nan"), float("nan"))
+    kept, flying, far = (
+        mask[blind].mean() for mask in (judged.depth.valid, judged.flying, judged.out_of_reach)
+    )
+    return JudgedView(float(kept), float(flying), float(far))
+
+
+def _filled_error_m(rig: Rig, index: int, judged: JudgedDepth) -> float | None:
+    """Median absolute error of the inferred depth that is left where the sensor has none."""
+    if rig.truth is None:
+        return None
+    error_m = np.abs(judged.depth.z_m - rig.truth.depth[index].z_m)
+    error_m = error_m[~rig.frames[index].depth.valid & np.isfinite(error_m)]
+    return float(np.median(error_m)) if len(error_m) else None

@@ -1,0 +1,177 @@
+"""The folder with the depth network: the one that ships, or one of the person's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import viser
+
+from app.screens.depth.labels import NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
+from app.screens.depth.view import NetworkView, NetworkWish
+from app.tables import Row, number, table
+from packetmesh.errors import InputError
+from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
+
+SHIPPED, AS_IT_SAYS = "the network that ships", "as the file says"
+LIMIT_BYTES = 128 << 20
+TEXT = """Any ONNX network that makes depth of one picture will do. What it expects and what it answers
+(metric, relative or inverse depth, size, colours) is read from the file, or taken from a preset."""
+ADVICE: dict[ModelKind, str] = {
+    "metric": "It gives metres: the alignments *none* and *one scale* are worth a look.",
+    "relative": "",
+    "inverse": "It gives 1/depth: the alignment *scale, shift, local* starts from a line of 1/depth then.",
+}
+TRYING = "Trying the network …"
+KEPT = "The network before is kept. Say what this one expects, or choose another."
+
+
+class NetworkFolder:
+    """A list of networks, an upload button, a preset, and what the network says about itself."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        post: Callable[..., None],
+        changed: Callable[[Any, Callable[[], None]], None],
+        folder: Path,
+        on_choose: Callable[[NetworkWish], None],
+    ) -> None:
+        """Add the folder.
+
+        Args:
+            gui: where to add it.
+            post: runs a function on the session's thread.
+            changed: registers an action for a change of a handle by a person.
+            folder: where uploaded files are kept.
+            on_choose: called with the network that is wanted.
+        """
+        self._folder, self._on_choose = folder, on_choose
+        self._models: dict[str, str | None] = {SHIPPED: None}
+        self._config = DepthConfig()
+        with gui.add_folder("Neural network", expand_by_default=False):
+            gui.add_markdown(TEXT)
+            self._model = gui.add_dropdown("Network file", [SHIPPED], hint="Which network infers the depth.")
+            self._preset = gui.add_dropdown(
+                "Preset",
+                [AS_IT_SAYS, *NETWORK_PRESETS],
+                hint="How to feed a network whose file does not say so: size, colours, kind of output.",
+            )
+            self._kind = gui.add_dropdown(
+                "Gives",
+                [AS_IT_SAYS, *NETWORK_KINDS],
+                hint="What the network's numbers mean: metric: metres; relative: depth up to a scale; "
+                "inverse: 1/depth up to scale and shift, as MiDaS and Depth Anything have it.",
+            )
+            changed(self._model, self._picked)
+            for handle in (self._preset, self._kind):
+                changed(handle, self._chosen)
+            button = gui.add_upload_button(
+                "Add an ONNX file …", icon=viser.Icon.UPLOAD, mime_type=".onnx", hint="At most 128 MB."
+            )
+            button.on_upload(lambda event: post(self._keep, event.target.value))
+            self._add_input(gui, post)
+            self._status = gui.add_markdown("")
+            self._table = gui.add_html("")
+
+    def _add_input(self, gui: viser.GuiApi, post: Callable[..., None]) -> None:
+        """What only somebody who knows the network can say, for one that is not ours."""
+        self._advanced = gui.add_folder("Advanced: its input", expand_by_default=False, visible=False)
+        with self._advanced:
+            self._size = gui.add_vector2(
+                "Size (px)",
+                (0.0, 0.0),
+                min=(0.0, 0.0),
+                step=1.0,
+                hint="Width and height of the images it gets, where its file leaves them free; 0 and 0: as "
+                "the file says.",
+            )
+            self._normalisation = gui.add_dropdown(
+                "Pixel values",
+                [AS_IT_SAYS, *NORMALISATIONS],
+                hint="imagenet: with ImageNet's mean and deviation; unit: from 0 to 1; bytes: from 0 to 255.",
+            )
+            gui.add_button("Use this input", icon=viser.Icon.CHECK, hint="Tries the network anew.").on_click(
+                lambda _: post(self._chosen)
+            )
+
+    def write(self, config: DepthConfig) -> None:
+        """Show the network that is wanted."""
+        self._config = config
+        name = next((name for name, path in self._models.items() if path == config.model), None)
+        if name is None:
+            name = self._add(Path(str(config.model)).name, str(config.model))
+        self._model.value = name
+        self._preset.value = config.preset or AS_IT_SAYS
+        self._kind.value = config.model_kind or AS_IT_SAYS
+        self._size.value = (float(config.input_width_px or 0), float(config.input_height_px or 0))
+        self._normalisation.value = config.normalisation or AS_IT_SAYS
+        self._advanced.visible = config.model is not None
+
+    def load(self, view: NetworkView | None) -> None:
+        """Tell of the network that was tried; None could not be used, and the one before stays in use."""
+        if view is None:
+            self._status.content = KEPT
+            return
+        self._status.content = ADVICE[view.kind]
+        self._table.content = network_table(view)
+
+    def _picked(self) -> None:
+        """Another file gets the input that it asks for itself."""
+        self._size.value, self._normalisation.value = (0.0, 0.0), AS_IT_SAYS
+        self._chosen()
+
+    def _chosen(self) -> None:
+        self._status.content, self._table.content = TRYING, ""
+        model = self._models[self._model.value]
+        self._advanced.visible = model is not None
+        presets: dict[str, NetworkPreset] = {preset: preset for preset in NETWORK_PRESETS}
+        kinds: dict[str, ModelKind] = {kind: kind for kind in NETWORK_KINDS}
+        normalisations: dict[str, Normalisation] = {name: name for name in NORMALISATIONS}
+        width_px, height_px = (round(side) or None for side in self._size.value)
+        self._on_choose(
+            NetworkWish(
+                model,
+                presets.get(self._preset.value),
+                kinds.get(self._kind.value),
+                width_px,
+                height_px,
+                normalisations.get(self._normalisation.value),
+            )
+        )
+
+    def _keep(self, file: viser.UploadedFile) -> None:
+        if len(file.content) > LIMIT_BYTES:
+            raise InputError(
+                f"{file.name} has {len(file.content) >> 20} MB; the app takes networks up to "
+                f"{LIMIT_BYTES >> 20} MB, so name larger ones with depth.model on the command line."
+            )
+        path = self._folder / f"network_{len(list(self._folder.iterdir())):03d}.onnx"
+        path.write_bytes(file.content)
+        self._model.value = self._add(Path(file.name).name, str(path))
+        self._picked()
+
+    def _add(self, name: str, path: str) -> str:
+        """Put a file into the list, under a name of its own."""
+        while name in self._models:
+            name += "′"
+        self._models[name] = path
+        self._model.options = tuple(self._models)
+        return name
+
+
+def network_table(view: NetworkView) -> str:
+    """HTML: what was found when the network was tried, and what its file says."""
+    rows = [
+        Row("Answers", "What its numbers mean.", (f"{view.kind} depth",)),
+        Row(
+            "Provider",
+            "The execution provider that onnxruntime really used.",
+            (view.provider,),
+        ),
+        Row("First picture", "The first takes longer.", (number(view.inference_s, 0, "ms", 1000.0),)),
+        Row("File", "Its size.", (number(view.size_bytes, 1, "MB", 1e-6),)),
+    ]
+    rows += [Row(key, "From the file's own metadata.", (text,)) for key, text in view.description.items()]
+    return table(rows)

@@ -1,0 +1,39 @@
+"""A depth network is loaded and asked once, before anything depends on it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+
+import numpy as np
+
+from app.chain import network_for
+from app.screens.depth.view import NetworkView, NetworkWish
+from packetmesh.progress import Progress
+from pipeline.config import DepthConfig
+from pipeline.depth import DepthNetwork
+
+TEST_IMAGE = np.dstack(np.broadcast_arrays(*np.ogrid[0:240, 0:320], 128)).astype(np.uint8)
+"""(240, 320, 3) a ramp of colours; any network has something to say to it."""
+
+
+def network_job(wish: NetworkWish) -> Generator[Progress, None, NetworkView]:
+    """Load a network and infer one image.
+
+    Raises:
+        InputError: it is no depth network, nobody says what kind, or it does not take the size.
+        ReconstructionError: it answers without a depth.
+    """
+    yield Progress("loading the network", 0.3)
+    network = network_for(wish.put_into(DepthConfig()))
+    yield Progress("asking the network", 0.6)
+    started = time.perf_counter()
+    DepthNetwork.infer(network, TEST_IMAGE)
+    return NetworkView(
+        wish=wish,
+        kind=network.convention.kind,
+        provider=network.provider,
+        inference_s=time.perf_counter() - started,
+        size_bytes=network.model_path.stat().st_size,
+        description=network.description,
+    )

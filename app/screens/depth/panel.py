@@ -1,0 +1,249 @@
+"""Depth: what the sensor measured, what the network inferred, and how far to believe it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from app.controls import Controls
+from app.drawing.clouds import add_cloud, clear
+from app.drawing.colors import INFERRED, LOSS, TARGET
+from app.lesson_folder import LessonFolder
+from app.panel import Panel
+from app.records import DepthNode, DepthView, Sample, SceneView
+from app.screens.depth.compare import CompareArea
+from app.screens.depth.hide import HideFolder
+from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PHOTO, PICTURES, SENSOR
+from app.screens.depth.lesson import DepthLook, depth_lesson
+from app.screens.depth.network import NetworkFolder
+from app.screens.depth.numbers import confidence_table, depth_table, residual_table
+from app.screens.depth.residuals import residual_figure
+from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_network
+from app.screens.depth.view import HiddenView, HideWish, NetworkView, NetworkWish, SeenSample
+from app.state import Spec, Step
+
+TEXT = """**What you see.** Blue: points the sensor measured. Violet: points a neural network inferred
+from the colour image alone, made metric by comparing it with the sensor where both know a depth. Red:
+points the outlier filter rejects. Fusion takes the violet points where blue ones are missing.
+Go on with **Fuse**."""
+CONFIDENCE_TEXT = (
+    "Inferred depth that flies, lies too far from anything measured or is hardly believed is left out."
+)
+
+
+class DepthPanel(Panel):
+    """Sensed and inferred depth of every node."""
+
+    title = "Depth"
+    step: ClassVar[Step | None] = "depth"
+    drawn_below = "/depth"
+
+    def build(self) -> None:
+        """Two pictures to compare, alignment, what to draw; numbers of one node; the rest in folders."""
+        gui, session = self.gui, self.session
+        self._look: DepthLook | None = None
+        self._source = session.spec.source
+        gui.add_markdown(TEXT)
+        self._lesson = LessonFolder(gui, depth_lesson(), session.post, self.when_changed, self._take_look)
+        self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images and numbers are shown below.")
+        self.when_changed(self._node, self._picked_node)
+        self._area = CompareArea(gui, self.when_changed, PICTURES, PHOTO, SENSOR)
+        self._controls = [self._fields(FIRST)]
+        self._coloring = gui.add_dropdown(
+            "Colours", list(COLORINGS), hint="What the colours of the points in the 3-D scene mean."
+        )
+        self.when_changed(self._coloring, self._draw)
+        self._numbers = gui.add_html("")
+        self._build_folders()
+
+    def _build_folders(self) -> None:
+        gui, session = self.gui, self.session
+        with gui.add_folder("Residuals of the alignment", expand_by_default=False):
+            self._residuals = gui.add_html("")
+            self._histogram = gui.add_plotly(
+                residual_figure(None), aspect=0.62, config={"displayModeBar": False}
+            )
+        with gui.add_folder("How far to believe it", expand_by_default=False):
+            gui.add_markdown(CONFIDENCE_TEXT)
+            self._controls.append(self._fields(CONFIDENCE_CONTROLS))
+            self._confidence_table = gui.add_html("")
+        self._hide = HideFolder(gui, self.scene, session.post, self.when_changed, self._hidden_wish)
+        self._network = NetworkFolder(
+            gui, session.post, self.when_changed, session.folder, self._choose_network
+        )
+        with gui.add_folder("Advanced", expand_by_default=False):
+            self._drawn = gui.add_dropdown(
+                "Inferred points", list(DRAWN), hint="Which of the inferred (violet) points are drawn."
+            )
+            self._rejected = gui.add_checkbox(
+                "Outliers", True, hint="Draw the points the filter rejects, in red."
+            )
+            for handle in (self._drawn, self._rejected):
+                self.when_changed(handle, self._draw)
+            self._controls.append(self._fields(ADVANCED))
+        self.scene.on_click()(lambda event: session.post(self._clicked, event))
+
+    def _fields(self, fields: Any) -> Controls:
+        session = self.session
+        return Controls(
+            self.gui, fields, session.spec.config, lambda change: session.post(session.edit, change)
+        )
+
+    def on_spec(self, spec: Spec) -> None:
+        """Show the settings that are wanted; what was hidden with others is out of date."""
+        for controls in self._controls:
+            controls.write(spec.config)
+        self._network.write(spec.config.depth)
+        if spec.source != self._source:
+            self._source = spec.source
+            self._hide.clear()
+        self._hide.forget()
+
+    def on_view(self, step: Step, view: Any) -> None:
+        """Draw new clouds."""
+        if step != "depth":
+            return
+        names = tuple(node.name for node in view.nodes)
+        if names != self._node.options:
+            self._node.options = names
+        self._draw()
+        self._show_node()
+        self._show_look()
+
+    # What is drawn.
+
+    def _draw(self) -> None:
+        scene: SceneView | None = self.session.results.view("scene")
+        depth: DepthView | None = self.session.results.view("depth")
+        if scene is None or depth is None or len(scene.nodes) != len(depth.nodes):
+            return
+        own = COLORINGS[self._coloring.value] == "photo"
+        with self.session.target.atomic():
+            clear(self.scene, "/depth")
+            for place, node in zip(scene.nodes, depth.nodes, strict=True):
+                below, T = f"/depth/{node.name}", place.T_world_camera
+                add_cloud(self.scene, f"{below}/sensor", node.sensor, T, None if own else TARGET)
+                chosen = self._inferred(node)
+                if chosen is not None:
+                    points, color = chosen
+                    add_cloud(self.scene, f"{below}/inferred", points, T, color)
+                if self._rejected.value:
+                    add_cloud(self.scene, f"{below}/outliers", node.outliers, T, LOSS)
+            self._show_canvas()
+
+    def _inferred(self, node: DepthNode) -> tuple[Sample, tuple[int, int, int] | None] | None:
+        """The inferred points to draw, and their one colour; None where they have their own."""
+        everywhere = self._drawn.value == EVERYWHERE
+        if not everywhere and self._drawn.value != HOLES:
+            return None
+        points = node.inferred if everywhere else node.filled
+        coloring = COLORINGS[self._coloring.value]
+        if coloring == "confidence":
+            colors = node.inferred_confidence if everywhere else node.filled_confidence
+            return replace(points, colors=colors), None
+        return points, None if coloring == "photo" else INFERRED
+
+    def _shown(self) -> tuple[int, DepthNode] | None:
+        """Index and depth of the node that is chosen."""
+        view: DepthView | None = self.session.results.view("depth")
+        if view is None:
+            return None
+        names = [node.name for node in view.nodes]
+        index = names.index(self._node.value) if self._node.value in names else 0
+        return index, view.nodes[index]
+
+    def _picked_node(self) -> None:
+        self._hide.clear()
+        self._show_canvas()
+        self._show_node()
+
+    def _show_node(self) -> None:
+        shown = self._shown()
+        if shown is None:
+            return
+        node = shown[1]
+        with self.session.target.atomic():
+            self._area.load(node.pictures)
+            self._numbers.content = depth_table(node)
+            self._residuals.content = residual_table(node)
+            self._confidence_table.content = confidence_table(node)
+            self._histogram.figure = residual_figure(node.residuals)
+
+    # The folders.
+
+    def _show_canvas(self) -> None:
+        """Have the brush paint on the chosen node's points."""
+        scene: SceneView | None = self.session.results.view("scene")
+        shown = self._shown()
+        if scene is not None and shown is not None:
+            index, node = shown
+            assert isinstance(node.sensor, SeenSample)
+            self._hide.show(node.sensor, scene.nodes[index].T_world_camera)
+
+    def _clicked(self, event: Any) -> None:
+        frame = self.scene.get_handle_by_name(self.drawn_below)
+        if frame is not None and frame.visible:
+            self._hide.clicked(np.array(event.ray_origin), np.array(event.ray_direction))
+
+    def _hidden_wish(self, wish: HideWish) -> None:
+        session, spec, shown = self.session, self.session.spec, self._shown()
+        if shown is None or not session.results.fresh("depth", spec):
+            self._hide.load(None)
+            return
+        wish = replace(wish, node=shown[0])
+        session.quick_job(
+            "hide", session.store, spec, wish, on_end=lambda view: self._filled(spec, wish, view)
+        )
+
+    def _filled(self, spec: Spec, wish: HideWish, view: HiddenView | None) -> None:
+        shown = self._shown()
+        if spec != self.session.spec or wish.discs != self._hide.discs:
+            return
+        if shown is not None and shown[0] == wish.node:
+            with self.session.target.atomic():
+                self._hide.load(view)
+
+    def _choose_network(self, wish: NetworkWish) -> None:
+        """Try it first: a file that is no depth network is to change nothing."""
+        self.session.quick_job("network", wish, on_end=self._tried)
+
+    def _tried(self, view: NetworkView | None) -> None:
+        if view is not None:
+            self.session.edit(with_network(view.wish))
+        self._network.load(view)
+
+    # The lesson.
+
+    def _take_look(self, look: DepthLook) -> None:
+        """Set the controls as a stop of the lesson says; what is to be hidden waits for the depth."""
+        session = self.session
+        with session.target.atomic():
+            self._area.set(look.left, look.right, look.split_share)
+            self._coloring.value = next(name for name, key in COLORINGS.items() if key == look.coloring)
+            self._drawn.value = look.drawn
+            self._hide.clear()
+        self._look = look
+        session.edit(
+            lambda config: replace(
+                config,
+                depth=replace(
+                    config.depth,
+                    alignment=look.alignment,
+                    reach=look.reach,
+                    least_confidence=look.least_confidence,
+                ),
+            )
+        )
+        self._draw()
+        self._show_look()
+
+    def _show_look(self) -> None:
+        """Hide what the stop wants hidden, once the depth it is about has come."""
+        look, session = self._look, self.session
+        if look is None or not session.results.fresh("depth", session.spec):
+            return
+        self._look = None
+        if look.hide is not None:
+            self._hide.ask(look.hide)

@@ -1,0 +1,61 @@
+"""The settings of the Depth screen that have a control of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from app.controls import Choice, Number, Toggle
+from app.screens.depth.view import NetworkWish
+from pipeline.config import PipelineConfig
+
+FIRST = (
+    Choice(
+        "Alignment",
+        "depth.alignment",
+        {
+            "none": "none (as the network says)",
+            "median": "one scale",
+            "affine_depth": "scale and shift",
+            "affine_inverse": "scale and shift of 1/depth",
+            "local": "scale, shift, local",
+        },
+    ),
+)
+CONFIDENCE_CONTROLS = (
+    Number(
+        "Reach (% of the diagonal)",
+        "depth.reach",
+        1.0,
+        100.0,
+        1.0,
+        per_unit=100.0,
+        hint="How far from measured pixels inferred depth is let in, in % of the image's diagonal.",
+    ),
+    Number(
+        "Least confidence (%)",
+        "depth.least_confidence",
+        0.0,
+        100.0,
+        1.0,
+        per_unit=100.0,
+        hint="Inferred depth that is believed less than this is left out; 0 leaves out nothing.",
+    ),
+)
+ADVANCED = (
+    Choice(
+        "Outlier filter",
+        "acquisition.outlier_mode",
+        {"thesis": "thesis: mean + t sigma", "depth_normalised": "depth-normalised", "robust": "robust"},
+    ),
+    Number("Neighbours N", "acquisition.outlier_neighbours", 1, 16, 1),
+    Number("Threshold t (σ)", "acquisition.outlier_t", 0.0, 4.0, 0.1),
+    Toggle("Centre crop", "depth.crop"),
+    Choice("Fusion", "fusion.mode", {"union": "union: all points", "fill": "fill: only the holes"}),
+    Toggle("Rigid fit", "fusion.register_inferred"),
+)
+
+
+def with_network(wish: NetworkWish) -> Callable[[PipelineConfig], PipelineConfig]:
+    """The edit that takes another network."""
+    return lambda config: replace(config, depth=wish.put_into(config.depth))

@@ -1,0 +1,90 @@
+"""The race in charts: distance from truth, RMSE and entropy over the race, and the pairs by distance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.records import RaceView
+from app.screens.fuse.clock import RaceClock
+from app.screens.fuse.curves import LANE_COLORS, Curves
+from app.screens.fuse.draw import MARKS
+from app.screens.fuse.histogram import HistogramChart
+
+FIRST = f"{MARKS[0]} first"
+
+
+class RaceCharts:
+    """Four charts in tabs, all with the player's place marked."""
+
+    def __init__(self, gui: viser.GuiApi, changed: Callable[[Any, Callable[[], None]], None]) -> None:
+        """Add the tabs; ``changed`` registers an action for a change of a handle by a person."""
+        self._view: RaceView | None = None
+        self._rows: tuple[int, ...] = ()
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Error"):
+            self._error = Curves(gui, "error, cm", 0.1)
+            self._unknown = gui.add_markdown("The truth of this scene is not known.", visible=False)
+        with tabs.add_tab("RMSE"):
+            self._rmse = Curves(gui, "RMSE, cm", 0.1)
+        with tabs.add_tab("Entropy"):
+            self._entropy = Curves(gui, "entropy, nat", 1.0)
+            self._without = gui.add_markdown("None of these methods has an entropy.", visible=False)
+        with tabs.add_tab("Pairs"):
+            self._lane = gui.add_dropdown("Lane", [FIRST], hint="Method whose pairs are counted.")
+            changed(self._lane, self._show_pairs)
+            self._pairs = HistogramChart(gui)
+        self._legend = gui.add_html("")
+
+    def load(self, view: RaceView, clock: RaceClock) -> None:
+        """Show another race, or the same by another clock."""
+        self._view = view
+        lanes = view.lanes
+        self._error.load(clock, [[_cm(step.point_error_m) for step in lane.steps] for lane in lanes])
+        self._rmse.load(clock, [[_cm(step.rmse_m) for step in lane.steps] for lane in lanes])
+        entropies = [[step.entropy_nat for step in lane.steps] for lane in lanes]
+        self._entropy.load(clock, entropies)
+        self._unknown.visible = not view.has_truth
+        self._without.visible = not np.isfinite(np.concatenate(entropies)).any()
+        names = tuple(f"{MARKS[index]} {lane.label}" for index, lane in enumerate(lanes))
+        if names != tuple(self._lane.options):
+            kept = self._index()
+            self._lane.options = names
+            self._lane.value = names[min(kept, len(names) - 1)]
+        self._legend.content = legend(view)
+
+    def choose_lane(self, index: int) -> None:
+        """Count the pairs of another lane."""
+        self._lane.value = self._lane.options[min(index, len(self._lane.options) - 1)]
+        self._show_pairs()
+
+    def mark(self, place: int, rows: tuple[int, ...]) -> None:
+        """Follow the player."""
+        self._rows = rows
+        for curves in (self._error, self._rmse, self._entropy):
+            curves.mark(place)
+        self._show_pairs()
+
+    def _index(self) -> int:
+        return self._lane.options.index(self._lane.value)
+
+    def _show_pairs(self) -> None:
+        if self._view is not None and self._rows:
+            index = self._index()
+            self._pairs.show(self._view.lanes[index], self._rows[index], self._view.edges_m)
+
+
+def _cm(value_m: float | None) -> float:
+    return float("nan") if value_m is None else 100.0 * value_m
+
+
+def legend(view: RaceView) -> str:
+    """The lanes with the colours of their curves."""
+    names = " &emsp; ".join(
+        f"<b style='color:{color}; white-space: nowrap'>{mark} {lane.label}</b>"
+        for mark, color, lane in zip(MARKS, LANE_COLORS, view.lanes, strict=False)
+    )
+    return f"<div style='padding: 0 0.8em 0.5em; font-size: 13px'>{names}</div>"

@@ -1,0 +1,79 @@
+"""The pairs of one iteration by distance, with the kernel and the weight that the method gives them."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+from viser import uplot
+
+from app.drawing.colors import DELIVERED, INFERRED, NEUTRAL, css
+from app.records import PairHistogram, RaceLane
+from pipeline.types import FloatArray
+
+BARS, KERNEL, WEIGHT = css(NEUTRAL), css(DELIVERED), css(INFERRED)
+
+
+class HistogramChart:
+    """Grey bars of counts, the kernel f in green and the weight w in violet, all over their own peaks."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        self._plot = gui.add_uplot(
+            data=(np.array([0.0, 1.0]), *[np.full(2, np.nan)] * 3),
+            series=(
+                uplot.Series(label="x"),
+                uplot.Series(label="pairs", stroke=BARS, fill=f"{BARS}66", width=1),
+                uplot.Series(label="f", stroke=KERNEL, width=2, dash=(7, 3)),
+                uplot.Series(label="w", stroke=WEIGHT, width=2),
+            ),
+            scales={"x": uplot.Scale(time=False), "y": uplot.Scale(range=(0.0, 1.08))},
+            axes=(
+                uplot.Axis(label="pair distance, cm", labelSize=20, size=34),
+                uplot.Axis(label="over its peak", labelSize=18, size=46),
+            ),
+            legend=uplot.Legend(show=False),
+            cursor=uplot.Cursor(show=False),
+            padding=(12, 16, 0, 0),
+            height=190,
+        )
+        self._caption = gui.add_html("")
+
+    def show(self, lane: RaceLane, row: int, edges_m: FloatArray) -> None:
+        """Draw the pairs of a lane's step."""
+        shown = lane.steps[row].histogram
+        most = max(1, *(int(step.histogram.counts.max()) for step in lane.steps))
+        edges_cm = 100.0 * edges_m
+        self._plot.data = (
+            np.repeat(edges_cm, 2)[1:-1],
+            np.repeat(shown.counts / most, 2),
+            np.repeat(kernel(lane, shown, edges_m), 2)[1:-1],
+            np.repeat(weights(shown), 2),
+        )
+        self._caption.content = _caption(lane, shown)
+
+
+def kernel(lane: RaceLane, shown: PairHistogram, edges_m: FloatArray) -> FloatArray:
+    """(B + 1,) f(d) = exp(-d^2 / 2 sigma^2) at the bins' edges; NaN for methods without it."""
+    if not (lane.kernel and shown.sigma_m > 0):
+        return np.full(len(edges_m), np.nan)
+    return np.exp(-0.5 * (edges_m / shown.sigma_m) ** 2)
+
+
+def weights(shown: PairHistogram) -> FloatArray:
+    """(B,) mean weight of a pair in each bin over the largest; between known bins empty ones are bridged,
+    beyond the farthest pair nothing weighs."""
+    known = np.flatnonzero(np.isfinite(shown.weights))
+    if not len(known):
+        return shown.weights
+    bins = np.arange(len(shown.weights))
+    return np.interp(bins, known, shown.weights[known], right=0.0)
+
+
+def _caption(lane: RaceLane, shown: PairHistogram) -> str:
+    parts = [f"<b style='color:{BARS}'>▮ pairs</b> ({int(shown.counts.sum()):,})"]
+    if lane.kernel:
+        parts.append(f"<b style='color:{KERNEL}'>┅ kernel f</b>, σ = {100 * shown.sigma_m:.1f} cm")
+        parts.append(f"<b style='color:{WEIGHT}'>━ weight w = −p log p</b>")
+    else:
+        parts.append(f"<b style='color:{WEIGHT}'>━ weight w</b> (no kernel f)")
+    text = " · ".join(parts)
+    return f"<div style='padding: 0 0.8em 0.5em; font-size: 12px'>{text}. Last bar: all farther pairs.</div>"

@@ -1,0 +1,30 @@
+"""The words with which the panel and the lessons say what a race is."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from app.records import RaceMode, Rival
+from pipeline.config import Direction, Method, Metric
+
+MODES: dict[str, RaceMode] = {"node on node": "nodes", "inferred on sensor": "inferred"}
+DIRECTIONS: dict[str, Direction] = {
+    "source asks target": "q2p",
+    "target asks source": "p2q",
+    "both": "both",
+}
+STARTS: dict[str, tuple[float, float]] = {
+    "aligned": (0.0, 0.0),
+    "slightly off (3°, 6 cm)": (3.0, 6.0),
+    "far off (20°, 40 cm)": (20.0, 40.0),
+}
+"""Start errors to choose from: degrees, centimetres."""
+BY_HAND = "by hand"
+RIVALS: dict[str, Rival] = {
+    f"{method.upper()}, {metric}": (method, metric)
+    for method in get_args(Method)
+    for metric in get_args(Metric)
+}
+RIVAL_NAMES = {rival: name for name, rival in RIVALS.items()}
+NOBODY = "none"
+MOST_LANES = 4

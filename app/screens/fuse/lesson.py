@@ -1,0 +1,100 @@
+"""The lesson of the race: what a stop can set, and the file that ships."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from app.lesson import LESSONS, NUMBER, Lesson, Setting, choice, read_lesson, sets
+from app.records import Race, Rival, Start
+from app.screens.fuse.labels import DIRECTIONS, MODES, MOST_LANES, RIVALS, STARTS
+
+SHIPPED = LESSONS / "icp-against-ceicp.md"
+START = (3.0, 6.0)
+"""Start error of a section that names none: degrees, centimetres."""
+
+
+@dataclass(frozen=True, slots=True)
+class RaceLook:
+    """What a stop shows of which race."""
+
+    race: Race = field(default_factory=lambda: Race(start=Start.towards(*START, seed=0)))
+    """Without the nodes, which stay those that are chosen."""
+    in_ms: bool = False
+    """Whether the curves run over time instead of iterations."""
+    place: int | None = 0
+    """Iteration, or milliseconds, to show; None is the end."""
+    lane: int = 0
+    """Whose pairs the histogram shows."""
+
+
+def race_lesson(path: Path = SHIPPED) -> Lesson[RaceLook]:
+    """A lesson about races.
+
+    Raises:
+        InputError: the file is no lesson or sets what no race has.
+    """
+    return read_lesson(path, SETTINGS, RaceLook())
+
+
+def _races(key: str, read: Callable[[str], Any]) -> Setting[RaceLook]:
+    """The setting that puts what ``read`` makes of the text into one field of the race."""
+    return lambda look, text: replace(look, race=replace(look.race, **{key: read(text)}))
+
+
+def _quantity(unit: str, per_unit: float, most: float) -> Callable[[str], float]:
+    """Reads '2 cm' with unit cm; ``per_unit`` units make one of the stored unit."""
+
+    def read(text: str) -> float:
+        found = re.fullmatch(rf"{NUMBER} ?{unit}", text)
+        if found is None or float(found[1]) > most:
+            raise ValueError(f"try 0 to {most:g} {unit}")
+        return float(found[1]) / per_unit
+
+    return read
+
+
+def _methods(text: str) -> tuple[Rival, ...]:
+    names = {name.lower().replace(",", ""): rival for name, rival in RIVALS.items()}
+    rivals = tuple(choice(names)(part.strip().lower()) for part in text.split(","))
+    if len(rivals) > MOST_LANES:
+        raise ValueError(f"at most {MOST_LANES} methods race")
+    return rivals
+
+
+def _start(text: str) -> Start:
+    names = {name.partition(" (")[0]: error for name, error in STARTS.items()}
+    found = re.fullmatch(rf"{NUMBER} deg {NUMBER} cm", text)
+    if found is not None:
+        return Start.towards(float(found[1]), float(found[2]), seed=0)
+    if text not in names:
+        raise ValueError(f"try one of {', '.join(names)} or such as '10 deg 20 cm'")
+    return Start.towards(*names[text], seed=0)
+
+
+def _place(text: str) -> int | None:
+    if text in ("start", "end"):
+        return 0 if text == "start" else None
+    if not text.isdigit():
+        raise ValueError("try start, end or the number of an iteration")
+    return int(text)
+
+
+SETTINGS: dict[str, Setting[RaceLook]] = {
+    "mode": _races("mode", choice(MODES)),
+    "methods": _races("rivals", _methods),
+    "pairs": _races("direction", choice(DIRECTIONS)),
+    "start": _races("start", _start),
+    "noise": _races("noise_m", _quantity("cm", 100.0, 10.0)),
+    "outliers": _races("outlier_share", _quantity("%", 100.0, 60.0)),
+    "holes": _races("hole_share", _quantity("%", 100.0, 80.0)),
+    "cut off": _races("crop_share", _quantity("%", 100.0, 80.0)),
+    "depth bias": _races("depth_bias", _quantity("%", 100.0, 15.0)),
+    "axis": sets("in_ms", choice({"iterations": False, "milliseconds": True})),
+    "position": sets("place", _place),
+    "lane": sets("lane", choice({str(index + 1): index for index in range(MOST_LANES)})),
+}
+"""What a stop can set, by its name in the file."""

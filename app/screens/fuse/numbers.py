@@ -1,0 +1,134 @@
+"""The race in numbers and in a sentence, and the chain's own result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from app.records import SUCCESS_M, FuseView, RaceLane, RegistrationRow
+from app.screens.fuse.draw import MARKS
+from app.tables import Row, number, table
+
+STOPS = {"max_iterations": "limit"}
+
+
+def verdict(lanes: tuple[RaceLane, ...]) -> str:
+    """What the numbers say, whoever wins."""
+    if lanes[0].steps[-1].point_error_m is None:
+        return (
+            "The truth of this scene is not known. RMSE alone does not tell which is better: each method "
+            "pairs and weighs other points."
+        )
+    ranking = sorted(((lane.steps[-1].point_error_m or 0.0), lane.label) for lane in lanes)
+    (best_m, best), worst_m = ranking[0], ranking[-1][0]
+    missed = f" Nobody arrives within {100 * SUCCESS_M:.0f} cm." if best_m >= SUCCESS_M else ""
+    if len(ranking) == 1:
+        return f"**{best}** ends {_cm(best_m)} from the truth.{missed}"
+    if _alike(best_m, worst_m):
+        everyone = "both end" if len(ranking) == 2 else "all end"
+        return f"Here {everyone} equally close to the truth ({_cm(best_m)}).{missed}"
+    places = ", ".join(f"**{label}** {_cm(error_m)}" for error_m, label in ranking[1:])
+    return f"**{best}** ends {_cm(best_m)} from the truth, {places}.{_loss(ranking)}{missed}"
+
+
+def _cm(error_m: float) -> str:
+    return number(error_m, 2 if error_m < 0.01 else 1, "cm", 100.0)
+
+
+def _alike(one_m: float, other_m: float) -> bool:
+    return bool(np.isclose(one_m, other_m, rtol=0.05, atol=2e-4))
+
+
+def _loss(ranking: list[tuple[float, str]]) -> str:
+    """Says so if a method that is not CEICP ends before the best CEICP that races."""
+    best_m, best = ranking[0]
+    ours_m = [error_m for error_m, label in ranking if "CEICP" in label]
+    return " So CEICP loses here." if ours_m and "CEICP" not in best and not _alike(best_m, ours_m[0]) else ""
+
+
+def race_table(lanes: tuple[RaceLane, ...]) -> str:
+    """A column for each lane; every row's name explains itself."""
+
+    def row(name: str, hint: str, value: Callable[[RaceLane], str]) -> Row:
+        return Row(name, hint, tuple(value(lane) for lane in lanes))
+
+    rows = [
+        row("Iterations", "Matchings and pose updates until it stopped.", lambda x: str(x.iterations)),
+        row(
+            "Stopped",
+            "converged: it moves less than 0.1 mm and 0.1 mrad; stalled: no change of the error; limit: the "
+            "most iterations allowed; degenerate: too few pairs to go on; lost: no pair within the gate.",
+            lambda x: _stopped(x.stop_reason),
+        ),
+        row(
+            "Start error",
+            "RMS distance of the moved points from where they truly are, at the start.",
+            lambda x: number(x.steps[0].point_error_m, 1, "cm", 100),
+        ),
+        row(
+            "End error",
+            "The same at the end; below 2 cm counts as success.",
+            lambda x: number(x.steps[-1].point_error_m, 2, "cm", 100),
+        ),
+        row(
+            "AHD",
+            "Average Hausdorff distance of the clouds at the end: mean distance to the nearest point, both "
+            "ways. It hardly tells methods apart where one cloud has holes.",
+            lambda x: number(x.average_hausdorff_m, 2, "cm", 100),
+        ),
+        row(
+            "RMSE",
+            "Weighted RMS distance of the last pairs; not comparable between methods.",
+            lambda x: number(x.steps[-1].rmse_m, 2, "cm", 100),
+        ),
+        row(
+            "Eff. pairs",
+            "Effective pairs of the last matching, (Σw)² / Σw²: as many equal weights would count as much.",
+            lambda x: f"{x.effective_pairs:,.0f}",
+        ),
+        row(
+            "Time",
+            "Preparation and all iterations, in this app's computing process.",
+            lambda x: number(x.elapsed_s, 0, "ms", 1000),
+        ),
+    ]
+    return table(rows, MARKS[: len(lanes)])
+
+
+def _stopped(reason: str) -> str:
+    """A word for the table."""
+    head = reason.partition(":")[0]
+    return "lost" if reason.startswith("No point") else STOPS.get(head, head)
+
+
+def places_table(view: FuseView) -> str:
+    """The chain's own registrations."""
+    if not view.rows:
+        return ""
+    rows = [_place_row(row) for row in view.rows]
+    return "<div style='padding: 0 0.8em; font-size: 13px'><b>The chain's own result</b></div>" + table(
+        rows, ("iterations", "error before", "after")
+    )
+
+
+def _place_row(row: RegistrationRow) -> Row:
+    return Row(
+        f"{row.source} → {row.target}",
+        f"{row.method.upper()}: {row.stop_reason}. Errors: RMS distance of the points from the truth. "
+        f"{_loop(row)}",
+        (
+            str(row.iterations),
+            number(row.error_before_m, 1, "cm", 100),
+            number(row.error_after_m, 2, "cm", 100),
+        ),
+    )
+
+
+def _loop(row: RegistrationRow) -> str:
+    """What the other registrations say about this one."""
+    if not row.used:
+        return "Not used: it degenerated or contradicts the other registrations."
+    if not np.isfinite(row.loop_error_m):
+        return "No loop checks it."
+    return f"The way round by the other nodes ends {number(row.loop_error_m, 1, 'cm', 100)} from it."

@@ -1,0 +1,334 @@
+"""Fuse: how the nodes find their places, and up to four methods racing from the same start."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Hashable
+from dataclasses import replace
+from typing import Any, ClassVar, TypeAlias, get_args
+
+from app.controls import Choice, Controls
+from app.drawing.cameras import Stage, stage_of
+from app.drawing.clouds import add_cloud, clear
+from app.drawing.poses import move, place
+from app.lesson_folder import LessonFolder
+from app.panel import Panel
+from app.records import CaptureView, DepthView, FuseView, Race, RaceView, Start
+from app.screens.fuse.capture import COMPUTE, CaptureFolder
+from app.screens.fuse.charts import RaceCharts
+from app.screens.fuse.draw import RaceDrawing, gizmo_pose, look_at_lanes
+from app.screens.fuse.labels import MODES
+from app.screens.fuse.lesson import RaceLook, race_lesson
+from app.screens.fuse.numbers import places_table, race_table, verdict
+from app.screens.fuse.player import RacePlayer
+from app.screens.fuse.setup import RaceSetup
+from app.state import Spec, Step
+from pipeline.config import Method
+
+TEXT = """**What you see.** Methods move the orange cloud onto the blue one, all from the same start. Lines
+join the points each method pairs; the darker, the more weight. Press **Play**, or drag the iteration. Choose
+*result* to see all nodes in place. Go on with **Surface**."""
+SINGLE = """This scene has a single node: no other node to find its place beside. What races here is its
+inferred cloud, onto what its sensor measured."""
+RACES = {f"race: {name}": mode for name, mode in MODES.items()}
+RACE_NAMES = {mode: name for name, mode in RACES.items()}
+RESULT, BEFORE = "result", "before registration"
+ADVANCED = (
+    Choice(
+        "Chain: method",
+        "node_registration.method",
+        {m: m.upper() for m in get_args(Method)},
+        hint="Method that places the nodes in the chain (not in the race).",
+    ),
+    Choice("Chain: metric", "node_registration.metric"),
+    Choice("Chain: points", "fusion.align_nodes_with"),
+)
+
+
+_Wanted: TypeAlias = tuple[tuple[Hashable, ...], Race]
+"""A race of the clouds with this key."""
+
+
+class FusePanel(Panel):
+    """Registration, played step by step."""
+
+    title = "Fuse"
+    step: ClassVar[Step | None] = "fuse"
+    drawn_below = "/fuse"
+    _raced: _Wanted | None
+    """The race that was asked for last."""
+    _arrived: _Wanted | None
+    """The race that is shown."""
+    _mapped: _Wanted | None
+    """The race whose capture range was asked for last."""
+
+    def build(self) -> None:
+        """Lesson, what races, the player, charts and table; the rest in folders."""
+        gui, session = self.gui, self.session
+        self._raced = self._arrived = self._mapped = None
+        self._view: RaceView | None = None
+        self._drawing: RaceDrawing | None = None
+        self._drawn: Start = Start()
+        self._gizmo: Any = None
+        self._seek_at: int | None = 0
+        self._lanes = 0
+        gui.add_markdown(TEXT)
+        self._single = gui.add_markdown(SINGLE, visible=False)
+        self._lesson = LessonFolder(gui, race_lesson(), session.post, self.when_changed, self._take_stop)
+        self._shown = gui.add_dropdown("Show", [*RACES, RESULT, BEFORE], hint="What the 3-D view shows.")
+        self.when_changed(self._shown, self._picked_shown)
+        self._setup = RaceSetup(gui, self.when_changed)
+        self._setup.on_change = self._start
+        self._setup.add_methods(("Method ①", "Method ②"))
+        self._setup.add_preset()
+        self._player = RacePlayer(gui, session.post, self.when_changed, self._moved, self._clocked)
+        self._charts = RaceCharts(gui, self.when_changed)
+        self._verdict = gui.add_markdown("")
+        self._table = gui.add_html("")
+        self._build_folders()
+        self._rows = gui.add_html("")
+
+    def _build_folders(self) -> None:
+        gui, session = self.gui, self.session
+        with gui.add_folder("More methods, nodes and pairs", expand_by_default=False):
+            self._setup.add_methods(("Method ③", "Method ④"))
+            self._setup.add_nodes()
+        with gui.add_folder("Start by hand", expand_by_default=False):
+            self._dragging = gui.add_checkbox(
+                "Drag",
+                False,
+                hint="Arrows and rings in the first lane move the start of all lanes.",
+            )
+            self.when_changed(self._dragging, self._place_gizmo)
+            self._setup.add_numbers()
+        with gui.add_folder("Make the moving cloud worse", expand_by_default=False):
+            self._setup.add_degradations()
+        with gui.add_folder("Axis, speed and loop", expand_by_default=False):
+            self._player.add_options()
+        self._capture = CaptureFolder(
+            gui, session.post, self.when_changed, self._pressed_capture, self._picked_cell
+        )
+        with gui.add_folder("Chain", expand_by_default=False):
+            self._controls = Controls(
+                gui, ADVANCED, session.spec.config, lambda change: session.post(session.edit, change)
+            )
+
+    @property
+    def wide(self) -> bool:
+        """Whether lanes stand beside each other."""
+        return self._view is not None and len(self._view.lanes) > 1 and self._shown.value in RACES
+
+    def close(self) -> None:
+        """End the player's thread."""
+        if hasattr(self, "_player"):
+            self._player.close()
+
+    def on_spec(self, spec: Spec) -> None:
+        """Show the settings that are wanted."""
+        self._controls.write(spec.config)
+
+    def on_view(self, step: Step, view: Any) -> None:
+        """New scene: forget the race. New clouds: other nodes. New places: draw the result and race again."""
+        if step == "scene":
+            self._forget()
+        if step == "depth":
+            self._choose_nodes([node.name for node in view.nodes])
+        if step == "fuse":
+            self._draw_result(view)
+            self._rows.content = places_table(view)
+            self._start()
+
+    def on_show(self) -> None:
+        """Race at the latest when somebody looks."""
+        self._start()
+        self.session.post(self._stand_back, True)
+
+    # What races.
+
+    def _choose_nodes(self, names: list[str]) -> None:
+        single = len(names) == 1
+        options = tuple(name for name, mode in RACES.items() if mode == "inferred" or not single)
+        with self.session.target.atomic():
+            self._single.visible = single
+            if self._shown.options != (*options, RESULT, BEFORE):
+                self._shown.options = (*options, RESULT, BEFORE)
+                self._shown.value = options[0]
+            self._setup.choose_nodes(names)
+            if self._shown.value in RACES:
+                self._setup.choose_mode(RACES[self._shown.value])
+
+    def _picked_shown(self) -> None:
+        if self._shown.value in RACES:
+            self._setup.choose_mode(RACES[self._shown.value])
+            self._start()
+        self._arrange()
+        self._stand_back()
+
+    def _take_stop(self, stop: RaceLook) -> None:
+        """Set the controls as a stop of the lesson says, and race."""
+        single = RACE_NAMES["nodes"] not in self._shown.options
+        race = replace(stop.race, mode="inferred") if single else stop.race
+        with self.session.target.atomic():
+            self._shown.value = RACE_NAMES[race.mode]
+            self._setup.write(race)
+            self._player.choose(stop.in_ms)
+        self._seek_at = stop.place
+        if not self._start() and self._view is not None:
+            self._take_race(self._view)
+        self._charts.choose_lane(stop.lane)
+
+    def _picked_cell(self, turn_deg: float, shift_m: float) -> None:
+        with self.session.target.atomic():
+            self._setup.write_start(Start.towards(turn_deg, 100.0 * shift_m, self._setup.race.seed))
+        self._start()
+
+    # The race.
+
+    def _start(self) -> bool:
+        """Race if the clouds or the race have changed; whether it has to be waited for."""
+        session = self.session
+        if session.results.view("depth") is None or not session.results.fresh("fuse", session.spec):
+            return True
+        wanted = self._wanted()
+        if wanted != self._raced:
+            if self._mapped not in (None, _anywhere(wanted)):
+                self._capture.forget()
+            self._raced = wanted
+            ended = functools.partial(self._finished, wanted)
+            session.side_job("race", session.store, session.spec, wanted[1], on_end=ended)
+        return wanted != self._arrived
+
+    def _wanted(self) -> _Wanted:
+        return (self.session.spec.key("fuse"), self._setup.race)
+
+    def _forget(self) -> None:
+        """Take the race of another scene away."""
+        self._raced = self._arrived = self._view = self._drawing = self._gizmo = None
+        self._lanes = 0
+        with self.session.target.atomic():
+            clear(self.scene, "/fuse/race")
+            self._verdict.content = self._table.content = self._rows.content = ""
+            self._capture.forget()
+
+    def _finished(self, wanted: _Wanted, view: RaceView | None) -> None:
+        if wanted != self._raced:
+            return
+        if view is None:
+            self._raced = None
+            return
+        self._arrived, self._drawn = wanted, wanted[1].start
+        self._take_race(view)
+
+    def _take_race(self, view: RaceView) -> None:
+        self._view = view
+        with self.session.target.atomic():
+            self._drawing = RaceDrawing(self.scene, "/fuse/race", view, self._stage())
+            self._gizmo = None
+            self._place_gizmo()
+            self._verdict.content = verdict(view.lanes)
+            self._table.content = race_table(view.lanes)
+            self._player.load(view.lanes)
+            self._player.seek(self._seek_at)
+            self._seek_at = 0
+            self._arrange()
+        self._stand_back()
+
+    def _clocked(self) -> None:
+        if self._view is not None and self._player.clock is not None:
+            self._charts.load(self._view, self._player.clock)
+
+    def _moved(self, at: int) -> None:
+        clock = self._player.clock
+        if self._drawing is None or clock is None:
+            return
+        with self.session.target.atomic():
+            self._drawing.show(clock.rows(at))
+            self._charts.mark(at, clock.rows(at))
+
+    # The gizmo.
+
+    def _place_gizmo(self) -> None:
+        """Put the gizmo where the race starts, or away."""
+        if self._drawing is None or self._view is None:
+            return
+        if self._gizmo is None and self._dragging.value:
+            self._gizmo = self._drawing.add_gizmo(
+                self._drawn, lambda start, ended: self.session.post(self._dragged, start, ended)
+            )
+        if self._gizmo is not None:
+            place(self._gizmo, gizmo_pose(self._drawn, self._view.center_m))
+            self._gizmo.visible = self._dragging.value
+
+    def _dragged(self, start: Start, ended: bool) -> None:
+        if self._drawing is None:
+            return
+        with self.session.target.atomic():
+            self._drawing.preview(self._drawn, start)
+            self._setup.write_start(start)
+        if ended and not self._start():
+            self._moved(self._player.place)
+
+    # The capture range.
+
+    def _pressed_capture(self, button: str) -> None:
+        session = self.session
+        if button != COMPUTE:
+            session.cancel_side_job()
+            return
+        if session.results.view("depth") is None:
+            return
+        self._capture.wait()
+        self._mapped = wanted = _anywhere(self._wanted())
+        ended = functools.partial(self._take_capture, wanted)
+        session.side_job("capture", session.store, session.spec, wanted[1], on_end=ended)
+
+    def _take_capture(self, wanted: _Wanted, view: CaptureView | None) -> None:
+        with self.session.target.atomic():
+            self._capture.load(view if wanted == _anywhere(self._wanted()) else None)
+        self._start()
+
+    # The 3-D view.
+
+    def _stage(self) -> Stage:
+        return stage_of(self.session.results.view("scene").nodes)
+
+    def _stand_back(self, anew: bool = False) -> None:
+        """Have more than two lanes in the picture; the session sees to one or two."""
+        frame = self.scene.get_handle_by_name(self.drawn_below)
+        if frame is None or not frame.visible:
+            return
+        lanes = len(self._view.lanes) if self._view is not None and self._shown.value in RACES else 1
+        if (anew or lanes != self._lanes) and max(lanes, self._lanes) > 2:
+            look_at_lanes(self.session.clients(), self._stage(), lanes)
+        self._lanes = lanes
+
+    def _draw_result(self, view: FuseView) -> None:
+        depth: DepthView | None = self.session.results.view("depth")
+        if depth is None or len(depth.nodes) != len(view.registered):
+            return
+        with self.session.target.atomic():
+            clear(self.scene, "/fuse/result")
+            self._placed = [
+                add_cloud(self.scene, f"/fuse/result/{node.name}", node.fused, T)
+                for node, T in zip(depth.nodes, view.registered, strict=True)
+            ]
+            self._arrange()
+
+    def _arrange(self) -> None:
+        """Show the race or the nodes in one of their two places."""
+        racing = self._shown.value in RACES and self._view is not None
+        for name, visible in (("/fuse/race", racing), ("/fuse/result", not racing)):
+            frame = self.scene.get_handle_by_name(name)
+            if frame is not None:
+                frame.visible = visible
+        self.session.frame_view()
+        view: FuseView | None = self.session.results.view("fuse")
+        if view is not None and hasattr(self, "_placed"):
+            poses = view.believed if self._shown.value == BEFORE else view.registered
+            for handle, T in zip(self._placed, poses, strict=True):
+                move(handle, T)
+
+
+def _anywhere(wanted: _Wanted) -> _Wanted:
+    """The race without its start, which its capture range does not depend on."""
+    return (wanted[0], replace(wanted[1], start=Start()))

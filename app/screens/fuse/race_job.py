@@ -1,0 +1,237 @@
+"""Up to four registration methods from the same disturbed start, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from app.chain import PreparedNodes, prepared, rig_of
+from app.records import (
+    PairHistogram,
+    Race,
+    RaceLane,
+    RaceStep,
+    RaceView,
+    Rival,
+    Start,
+    sample,
+)
+from app.state import Spec
+from app.store import Store
+from app.views import true_pose
+from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.progress import Progress
+from pipeline import geometry
+from pipeline.config import Method, RegistrationConfig
+from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
+from pipeline.registration.degradation import Degradation, degrade
+from pipeline.types import FloatArray, PointCloud, RegistrationStep, Rig
+
+LANE_POINTS = 15_000
+DRAWN_PAIRS = 250
+BINS = 60
+MOST_BINNED_M = 1.0
+ERROR_POINTS, HAUSDORFF_POINTS = 2_000, 4_000
+KERNEL_METHODS: tuple[Method, ...] = ("ceicp-n", "ceicp-a", "ceicp-r")
+"""Methods that weigh a pair by -p log p, with p proportional to f(d) = exp(-d^2 / 2 sigma^2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contest:
+    """Two clouds, and where the one belongs on the other."""
+
+    source: PointCloud
+    """As the race asks for it, degraded."""
+    target: PointCloud
+    T_aligned: FloatArray
+    """T_target_source: the truth, or what the nodes believe where it is not known."""
+    T_true: FloatArray | None
+    center_m: FloatArray
+    """(3,) centre of the aligned source before it was degraded, target frame."""
+    error_points_m: FloatArray
+    """(N, 3) points before degradation whose distance from the truth is the error."""
+
+    def start_pose(self, start: Start) -> FloatArray:
+        """T_target_source so far from aligned."""
+        rotation = geometry.rotation_exp(np.radians(start.turn_deg))
+        shift_m = self.center_m - rotation @ self.center_m + np.array(start.shift_cm) / 100.0
+        return geometry.rigid(rotation, shift_m) @ self.T_aligned
+
+    def error_m(self, T: FloatArray) -> float | None:
+        """RMS distance of the points from where they truly are; None if the truth is not known."""
+        return None if self.T_true is None else point_error_m(T, self.T_true, self.error_points_m)
+
+
+def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, RaceView]:
+    """Run every rival from the same start."""
+    rig = yield from rig_of(store, spec)
+    work = yield from prepared(store, spec)
+
+    def run() -> Generator[Progress, None, RaceView]:
+        contest = contest_of(rig, work, race)
+        runs = []
+        for index, rival in enumerate(race.rivals):
+            yield Progress(f"race: {label_of(rival)}", index / len(race.rivals))
+            runs.append(_run(contest, race, rival, spec.config.node_registration))
+        edges_m = _edges_m([run.records for run in runs])
+        staying = race.source if race.mode == "inferred" else race.target
+        return RaceView(
+            source_name=rig.frames[race.source].name,
+            target_name=rig.frames[staying].name,
+            source=sample(contest.source.points_m, contest.source.colors, LANE_POINTS),
+            target=sample(contest.target.points_m, contest.target.colors, LANE_POINTS),
+            T_world_target=rig.frames[staying].T_world_camera,
+            center_m=contest.center_m,
+            edges_m=edges_m,
+            lanes=tuple(_lane(contest, run, edges_m) for run in runs),
+        )
+
+    return (yield from store.remember(("race", *race_key(spec), race), run))
+
+
+def race_key(spec: Spec) -> tuple[object, ...]:
+    """What a race depends on beside itself."""
+    return (*spec.key("depth"), spec.config.node_registration)
+
+
+def contest_of(rig: Rig, work: PreparedNodes, race: Race) -> Contest:
+    """The clouds of a race.
+
+    Raises:
+        InputError: a node cannot be moved onto itself.
+    """
+    moving = work.nodes[race.source]
+    if race.mode == "inferred":
+        source, target = moving.inferred, moving.sensor
+        T_true: FloatArray | None = np.eye(4)
+    else:
+        if race.source == race.target:
+            raise InputError(f"{moving.name} cannot be moved onto itself; choose another node.")
+        source, target = moving.sensor, work.nodes[race.target].sensor
+        T_true = true_pose(rig, race.source, race.target)
+    poses = [frame.T_world_camera for frame in rig.frames]
+    T_aligned = geometry.inverse(poses[race.target]) @ poses[race.source] if T_true is None else T_true
+    how = Degradation(
+        noise_m=race.noise_m,
+        outlier_share=race.outlier_share,
+        hole_share=race.hole_share,
+        depth_bias=race.depth_bias,
+        crop_share=race.crop_share,
+    )
+    return Contest(
+        source=source if how == Degradation() else degrade(source, how, race.seed),
+        target=target,
+        T_aligned=T_aligned,
+        T_true=T_true,
+        center_m=geometry.apply(T_aligned, source.points_m.mean(axis=0, keepdims=True))[0],
+        error_points_m=_every(source.points_m, ERROR_POINTS),
+    )
+
+
+def config_of(race: Race, rival: Rival, config: RegistrationConfig) -> RegistrationConfig:
+    """The chain's settings with a rival's method."""
+    method, metric = rival
+    return replace(
+        config, method=method, metric=metric, direction=race.direction, with_scale=False, start="given"
+    )
+
+
+def label_of(rival: Rival) -> str:
+    """What to call it."""
+    return f"{rival[0].upper()} {rival[1]}"
+
+
+def _every(points_m: FloatArray, most: int) -> FloatArray:
+    """About ``most`` of the points, evenly spaced in their order."""
+    return points_m[:: max(1, len(points_m) // most)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """What a rival did."""
+
+    rival: Rival
+    T_start: FloatArray
+    records: tuple[RegistrationStep, ...]
+    seconds: FloatArray
+    reason: str
+
+
+def _run(contest: Contest, race: Race, rival: Rival, config: RegistrationConfig) -> _Run:
+    T_start = contest.start_pose(race.start)
+    settings = config_of(race, rival, config)
+    try:
+        result, seconds = register_timed(contest.source, contest.target, settings, T_start)
+    except ReconstructionError as error:
+        return _Run(rival, T_start, (), np.empty(0), str(error))
+    return _Run(rival, T_start, result.steps, seconds, result.stop_reason)
+
+
+def _edges_m(runs: Sequence[Sequence[RegistrationStep]]) -> FloatArray:
+    """Bins that hold nearly all first pairs of every method, up to a metre."""
+    reaches_m = [float(np.percentile(records[0].distances_m, 97)) for records in runs if records]
+    return np.linspace(0.0, min(max([0.1, *reaches_m]), MOST_BINNED_M), BINS + 1)
+
+
+def _lane(contest: Contest, run: _Run, edges_m: FloatArray) -> RaceLane:
+    steps, T, time_s = [], run.T_start, 0.0
+    for record, done_s in zip(run.records, run.seconds, strict=True):
+        steps.append(_race_step(record, T, time_s, contest, edges_m))
+        T, time_s = record.T_target_source, float(done_s)
+    steps.append(_end_step(steps[-1] if steps else None, T, time_s, contest))
+    moved_m = geometry.apply(T, _every(contest.source.points_m, HAUSDORFF_POINTS))
+    return RaceLane(
+        label=label_of(run.rival),
+        kernel=run.rival[0] in KERNEL_METHODS,
+        steps=tuple(steps),
+        stop_reason=run.reason,
+        iterations=len(run.records),
+        elapsed_s=time_s,
+        average_hausdorff_m=average_hausdorff_m(moved_m, _every(contest.target.points_m, HAUSDORFF_POINTS)),
+        effective_pairs=run.records[-1].effective_pairs if run.records else 0.0,
+    )
+
+
+def _race_step(
+    record: RegistrationStep, T: FloatArray, time_s: float, contest: Contest, edges_m: FloatArray
+) -> RaceStep:
+    rows = np.unique(np.linspace(0, len(record.pairs) - 1, min(DRAWN_PAIRS, len(record.pairs))).astype(int))
+    pairs, weights = record.pairs[rows], record.weights[rows]
+    return RaceStep(
+        T_target_source=T,
+        source_points_m=contest.source.points_m[pairs[:, 0]].astype(np.float32),
+        target_points_m=contest.target.points_m[pairs[:, 1]].astype(np.float32),
+        weights=weights / max(float(record.weights.max()), 1e-12),
+        time_s=time_s,
+        rmse_m=record.rmse_m,
+        entropy_nat=record.entropy_nat,
+        point_error_m=contest.error_m(T),
+        histogram=_histogram(record, edges_m),
+    )
+
+
+def _end_step(last: RaceStep | None, T: FloatArray, time_s: float, contest: Contest) -> RaceStep:
+    """The pose after the last update, with the numbers of the last matching."""
+    nothing, unknown = np.empty((0, 3), np.float32), float("nan")
+    histogram = PairHistogram(np.zeros(BINS, int), np.full(BINS, np.nan), unknown)
+    return RaceStep(
+        T_target_source=T,
+        source_points_m=nothing,
+        target_points_m=nothing,
+        weights=np.empty(0),
+        time_s=time_s,
+        rmse_m=unknown if last is None else last.rmse_m,
+        entropy_nat=unknown if last is None else last.entropy_nat,
+        point_error_m=contest.error_m(T),
+        histogram=histogram if last is None else last.histogram,
+    )
+
+
+def _histogram(record: RegistrationStep, edges_m: FloatArray) -> PairHistogram:
+    bins = np.clip(np.searchsorted(edges_m, record.distances_m, side="right") - 1, 0, BINS - 1)
+    counts = np.bincount(bins, minlength=BINS)
+    sums = np.bincount(bins, record.weights, minlength=BINS)
+    means = np.divide(sums, counts, out=np.full(BINS, np.nan), where=counts > 0)
+    return PairHistogram(counts, means / max(float(np.nanmax(means)), 1e-12), record.sigma_m)

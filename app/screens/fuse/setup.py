@@ -1,0 +1,173 @@
+"""What races: the clouds, the methods, the start and what is done to the moving cloud."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import viser
+
+from app.records import Race, RaceMode, Start
+from app.screens.fuse.labels import BY_HAND, DIRECTIONS, MOST_LANES, NOBODY, RIVAL_NAMES, RIVALS, STARTS
+
+SLIGHTLY = list(STARTS)[1]
+METHOD_HINT = "Method and what it minimises: distance to the paired point, or to the plane at it."
+DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
+    "noise_m": ("Noise (cm)", 10.0, 0.5, 100.0, "More noise along the view rays: its standard deviation."),
+    "outlier_share": ("Outliers (%)", 60.0, 5.0, 100.0, "Points thrown anywhere into the cloud's box."),
+    "hole_share": ("Holes (%)", 80.0, 5.0, 100.0, "Points removed in round patches of the view."),
+    "crop_share": ("Cut off (%)", 80.0, 5.0, 100.0, "Points removed at one side, so that less overlaps."),
+    "depth_bias": ("Bias (%)", 15.0, 0.5, 100.0, "Smooth relative error of the depth: its RMS."),
+}
+"""By field of ``Race``: label, most, step, units shown in one unit of the field, hint."""
+
+
+class RaceSetup:
+    """The controls of a ``Race``; says when a person changes one."""
+
+    def __init__(self, gui: viser.GuiApi, changed: Callable[[Any, Callable[[], None]], None]) -> None:
+        """Set up without controls, which the panel adds where it wants them.
+
+        Args:
+            gui: where to add them.
+            changed: registers an action for a change of a handle by a person.
+        """
+        self._gui, self._changed = gui, changed
+        self._race = Race(start=Start.towards(*STARTS[SLIGHTLY], seed=0))
+        self.on_change: Callable[[], object] = lambda: None
+        self._slots: list[viser.GuiDropdownHandle[str]] = []
+
+    def add_methods(self, labels: Sequence[str]) -> None:
+        """The next drop-downs of methods; all but the first may stay empty."""
+        for label in labels:
+            index, rivals = len(self._slots), self._race.rivals
+            handle = self._gui.add_dropdown(
+                label,
+                list(RIVALS) if index == 0 else [NOBODY, *RIVALS],
+                initial_value=RIVAL_NAMES[rivals[index]] if index < len(rivals) else NOBODY,
+                hint=METHOD_HINT,
+            )
+            self._slots.append(handle)
+            self._changed(handle, self._picked)
+
+    def add_preset(self) -> None:
+        """Where the moving cloud starts, by name."""
+        self._preset = self._gui.add_dropdown(
+            "Start",
+            [*STARTS, BY_HAND],
+            initial_value=SLIGHTLY,
+            hint="How far from aligned the orange cloud starts. Aligned is the truth where it is known, "
+            "otherwise what the nodes believe.",
+        )
+        self._changed(self._preset, self._picked_preset)
+
+    def add_nodes(self) -> None:
+        """Who moves onto whom, and who asks whom for the nearest point."""
+        gui, names = self._gui, ["node_00", "node_01"]
+        self._source = gui.add_dropdown(
+            "Move", names, initial_value=names[1], hint="Node whose cloud moves (orange)."
+        )
+        self._target = gui.add_dropdown("onto", names, hint="Node whose cloud stays (blue).")
+        self._direction = gui.add_dropdown(
+            "Pairs", list(DIRECTIONS), hint="Whose points look for their nearest counterpart."
+        )
+        for handle in (self._source, self._target, self._direction):
+            self._changed(handle, self._picked)
+
+    def add_numbers(self) -> None:
+        """The start in numbers."""
+        gui, start = self._gui, self._race.start
+        self._turn = gui.add_vector3(
+            "Turn (°)",
+            start.turn_deg,
+            step=0.5,
+            hint="Rotation vector about the cloud's centre along the axes of the camera that stays, degrees.",
+        )
+        self._shift = gui.add_vector3(
+            "Shift (cm)", start.shift_cm, step=0.5, hint="Translation along the same axes, centimetres."
+        )
+        for handle in (self._turn, self._shift):
+            self._changed(handle, self._picked_numbers)
+        self._seed = gui.add_slider(
+            "Seed", 0, 20, 1, 0, hint="Draws the directions of the start error and what is done to the cloud."
+        )
+        self._changed(self._seed, self._picked_preset)
+
+    def add_degradations(self) -> None:
+        """What is done to the moving cloud."""
+        self._worse = {
+            name: self._gui.add_slider(label, 0.0, most, step, 0.0, hint=hint)
+            for name, (label, most, step, _, hint) in DEGRADATIONS.items()
+        }
+        for handle in self._worse.values():
+            self._changed(handle, self._picked)
+
+    @property
+    def race(self) -> Race:
+        """What the controls say."""
+        return self._race
+
+    def choose_nodes(self, names: Sequence[str]) -> None:
+        """Offer the nodes of another scene."""
+        if tuple(names) != tuple(self._source.options):
+            self._source.options = self._target.options = tuple(names)
+            self._source.value, self._target.value = names[min(1, len(names) - 1)], names[0]
+        self._race = self._read(self._race)
+
+    def choose_mode(self, mode: RaceMode) -> None:
+        """Race nodes, or one node's inferred cloud."""
+        self._race = replace(self._race, mode=mode)
+        self._target.disabled = mode == "inferred"
+
+    def write(self, race: Race) -> None:
+        """Show another race, between the nodes that are chosen."""
+        self._race = replace(race, source=self._race.source, target=self._race.target)
+        rivals = [RIVAL_NAMES[rival] for rival in race.rivals]
+        rivals += [NOBODY] * (MOST_LANES - len(rivals))
+        for slot, name in zip(self._slots, rivals, strict=True):
+            slot.value = name
+        self._direction.value = next(name for name, way in DIRECTIONS.items() if way == race.direction)
+        self._seed.value = race.seed
+        for name, handle in self._worse.items():
+            handle.value = DEGRADATIONS[name][3] * getattr(race, name)
+        self.choose_mode(race.mode)
+        self.write_start(race.start)
+
+    def write_start(self, start: Start) -> None:
+        """Show another start; a preset if it is one."""
+        self._race = replace(self._race, start=start)
+        self._turn.value, self._shift.value = start.turn_deg, start.shift_cm
+        self._preset.value = next(
+            (name for name, error in STARTS.items() if Start.towards(*error, self._race.seed) == start),
+            BY_HAND,
+        )
+
+    def _read(self, race: Race) -> Race:
+        """``race`` with what the controls of the clouds and methods say."""
+        names = list(self._source.options)
+        worse = {name: handle.value / DEGRADATIONS[name][3] for name, handle in self._worse.items()}
+        return replace(
+            race,
+            source=names.index(self._source.value),
+            target=names.index(self._target.value),
+            rivals=tuple(RIVALS[slot.value] for slot in self._slots if slot.value != NOBODY),
+            direction=DIRECTIONS[self._direction.value],
+            seed=int(self._seed.value),
+            **worse,
+        )
+
+    def _picked(self) -> None:
+        self._race = self._read(self._race)
+        self.on_change()
+
+    def _picked_preset(self) -> None:
+        self._race = self._read(self._race)
+        if self._preset.value != BY_HAND:
+            self.write_start(Start.towards(*STARTS[self._preset.value], self._race.seed))
+        self.on_change()
+
+    def _picked_numbers(self) -> None:
+        turn, shift = ((float(x), float(y), float(z)) for x, y, z in (self._turn.value, self._shift.value))
+        self.write_start(Start(turn, shift))
+        self.on_change()

@@ -1,0 +1,86 @@
+"""The numbers of one run or two, each with its unit and its definition, and what is said of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from app.screens.network.view import MetricRow, NetworkView
+from app.tables import Row, table
+
+FIRST = (
+    "image_delivery_ratio",
+    "packet_delivery_ratio",
+    "image_delay_mean",
+    "image_delay_p95",
+    "packet_delay_mean",
+    "throughput",
+    "images_per_minute",
+    "coverage",
+    "redundancy",
+    "airtime_share",
+    "attempts_lost",
+    "attempts_lost_collision",
+    "energy_radio",
+    "energy_total",
+)
+"""What the first table holds, as far as there is such a number; all others are in the second."""
+SHARES = ("ratio", "share", "coverage", "redundancy")
+"""Words in the names of numbers that are shown in per cent."""
+
+
+def metric_tables(views: Sequence[NetworkView]) -> tuple[str, str]:
+    """HTML of the most telling numbers, and of all others that are not zero in every run."""
+    by_name: dict[str, list[MetricRow | None]] = {}
+    for index, view in enumerate(views):
+        for metric in view.metrics:
+            by_name.setdefault(metric.name, [None] * len(views))[index] = metric
+    first = [name for name in FIRST if name in by_name]
+    others = [
+        name
+        for name, metrics in by_name.items()
+        if name not in FIRST and any(metric is not None and metric.value != 0.0 for metric in metrics)
+    ]
+    heads = tuple(view.label for view in views) if len(views) > 1 else ()
+    one, other = (table([_row(name, by_name[name]) for name in names], heads) for names in (first, others))
+    return one, other
+
+
+def _row(name: str, metrics: Sequence[MetricRow | None]) -> Row:
+    definition = next(metric.definition for metric in metrics if metric is not None)
+    title = name.replace("_", " ")
+    return Row(title[0].upper() + title[1:], f"{definition}.", tuple(map(value_text, metrics)))
+
+
+def value_text(metric: MetricRow | None) -> str:
+    """The value with its unit; a dash where a run has no such number."""
+    if metric is None:
+        return "–"
+    if metric.unit == "1" and any(word in metric.name for word in SHARES):
+        return f"{100.0 * metric.value:.4g} %"
+    value, unit = metric.value, metric.unit
+    if unit == "s" and abs(value) < 0.1:
+        value, unit = 1000.0 * value, "ms"
+    if unit in ("bit/s", "B/min", "J") and abs(value) >= 1e4:
+        value, unit = value / 1e3, f"k{unit}"
+    digits = f"{value:,.0f}" if abs(value) >= 1e4 or value == int(value) else f"{value:,.4g}"
+    return digits if unit == "1" else f"{digits} {unit}"
+
+
+def ran(views: Sequence[NetworkView]) -> str:
+    """What was simulated, and whether the timeline holds all of it."""
+    sentences = []
+    for view in views:
+        name = f"**{view.label}**: " if len(views) > 1 else ""
+        shown_s = (view.end_ns - view.start_ns) / 1e9
+        sentences.append(
+            f"{name}{shown_s:,.1f} s of the network's time, {view.packets:,} packets in all, simulated in "
+            f"{view.elapsed_s:.1f} s."
+        )
+        if view.told_until_ns < view.end_ns:
+            sentences.append(
+                f"The timeline shows the first {(view.told_until_ns - view.start_ns) / 1e9:,.1f} s, the "
+                "numbers and curves all."
+            )
+        if not len(view.pieces):
+            sentences.append("Nothing happened in that time: no event was kept.")
+    return " ".join(sentences)

@@ -1,0 +1,164 @@
+"""What is simulated: a preset, a few settings, free text for all others, and a second run beside."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from app.screens.network.labels import NETWORKS, ways
+from app.screens.network.view import NetworkWish
+from network_sim.config import PRESETS, NetworkConfig
+from packetmesh.errors import InputError
+from packetmesh.settings import differences, settings, with_settings
+
+TITLES = {preset.title: name for name, preset in NETWORKS.items()}
+NOTHING = "nothing"
+FIRST = next(iter(NETWORKS))
+WAY_HINTS = {
+    True: "Which images are asked for: all, what adds coverage, or each with a probability.",
+    False: "Who may send when.",
+}
+FREE = """Any setting of `packetmesh simulate --describe`, several separated by spaces, for example
+`radio.capture_db=6 nodes.images=2`. Those for the second run apply to it alone."""
+
+
+class NetworkSetup:
+    """The controls of one run or two; says when a person changes one."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        post: Callable[..., None],
+        changed: Callable[[Any, Callable[[], None]], None],
+        on_change: Callable[[], None],
+    ) -> None:
+        """Add the controls of the first screen.
+
+        Args:
+            gui: where to add them.
+            post: runs a function on the session's thread.
+            changed: registers an action for a change of a handle by a person.
+            on_change: called when something else is wanted.
+        """
+        self._gui, self._post, self._on_change = gui, post, on_change
+        self._extra: tuple[str, ...] = ()
+        self._beside_extra: tuple[str, ...] = ()
+        self._ways = ways(FIRST)
+        self._preset = gui.add_dropdown("Preset", list(TITLES), hint="Which network to begin with.")
+        self._count = gui.add_slider("Nodes", 1, 10, 1, 3, hint="How many nodes or vehicles have a camera.")
+        self._shadowing = gui.add_slider(
+            "Shadowing (dB)",
+            0.0,
+            12.0,
+            0.5,
+            0.0,
+            hint="Standard deviation of each link's own constant gain or loss.",
+        )
+        self._way = gui.add_dropdown("Medium access", list(self._ways), hint=WAY_HINTS[False])
+        self._seed = gui.add_slider(
+            "Seed", 0, 50, 1, 0, hint="Everything that is drawn at random; the same seed gives the same run."
+        )
+        self._beside = gui.add_dropdown(
+            "Beside", [NOTHING, *self._ways], hint="A second run with the same settings but this one."
+        )
+        changed(self._preset, self._picked)
+        for handle in (self._count, self._shadowing, self._way, self._seed, self._beside):
+            changed(handle, on_change)
+        self.reset()
+
+    def add_advanced(self) -> None:
+        """Free text for every other setting."""
+        gui = self._gui
+        gui.add_markdown(FREE)
+        self._text = gui.add_text("Setting key=value", "", hint="For example nodes.images=2")
+        self._beside_text = gui.add_text(
+            "Second run", "", hint="Settings that only a second run has; it is added if there is none."
+        )
+        gui.add_button("Use these settings", icon=viser.Icon.CHECK, hint="Simulates anew.").on_click(
+            lambda _: self._post(self._use_text)
+        )
+
+    @property
+    def preset(self) -> str:
+        """Name of the preset."""
+        return TITLES[self._preset.value]
+
+    def reset(self) -> None:
+        """Go back to the settings of the start."""
+        self._preset.value = NETWORKS[FIRST].title
+        self._load()
+
+    def wishes(self) -> tuple[NetworkWish, ...]:
+        """The runs that the controls say.
+
+        Raises:
+            InputError: settings that do not go together.
+        """
+        way, beside = self._way.value, self._beside.value
+        first = NetworkWish(way, self._config(way, self._extra))
+        if beside == NOTHING and not self._beside_extra:
+            return (first,)
+        second_way = way if beside == NOTHING else beside
+        label = " ".join((second_way, *self._beside_extra))
+        return first, NetworkWish(label, self._config(second_way, (*self._extra, *self._beside_extra)))
+
+    def command(self) -> str:
+        """The command lines that simulate the same."""
+        base = PRESETS[self.preset]
+        lines = []
+        for wish in self.wishes():
+            words = ["packetmesh", "simulate", "--preset", self.preset]
+            if changed := differences(wish.config, base):
+                words += ["--set", *changed]
+            lines.append(shlex.join(words))
+        return "\n".join(lines)
+
+    def _config(self, way: str, extra: tuple[str, ...]) -> NetworkConfig:
+        network = NETWORKS[self.preset]
+        config = with_settings(PRESETS[self.preset], network.settings)
+        shown = (
+            f"{network.count_key}={int(self._count.value)}",
+            f"radio.shadowing_db={float(self._shadowing.value)}",
+            f"run.seed={int(self._seed.value)}",
+        )
+        return with_settings(config, (*shown, *self._ways[way], *extra))
+
+    def _picked(self) -> None:
+        self._load()
+        self._on_change()
+
+    def _load(self) -> None:
+        """Show the preset's own values."""
+        network, own = NETWORKS[self.preset], settings(PRESETS[self.preset])
+        self._ways = ways(self.preset)
+        self._count.label = network.count_label
+        self._count.value = 1  # never beyond the ends while they move
+        self._count.max = max(network.most, int(own[network.count_key]))
+        self._count.value = int(own[network.count_key])
+        self._shadowing.value = float(own["radio.shadowing_db"])
+        self._seed.value = int(own["run.seed"])
+        self._way.label = "Scheme" if network.schemes else "Medium access"
+        self._way.options = tuple(self._ways)
+        self._way.value = next(iter(self._ways))
+        self._beside.options = (NOTHING, *self._ways)
+        self._beside.value = NOTHING
+        self._extra = self._beside_extra = ()
+        if hasattr(self, "_text"):
+            self._text.value = self._beside_text.value = ""
+
+    def _use_text(self) -> None:
+        """Take the free settings, unless they are wrong: then the ones before stay."""
+        before = self._extra, self._beside_extra
+        self._extra, self._beside_extra = (
+            tuple(self._text.value.split()),
+            tuple(self._beside_text.value.split()),
+        )
+        try:
+            self.wishes()
+        except InputError:
+            self._extra, self._beside_extra = before
+            raise
+        self._on_change()

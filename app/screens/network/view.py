@@ -1,0 +1,133 @@
+"""What the Network screen shows of a run: columns of numbers, no more than what is drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from network_sim.config import NetworkConfig
+from pipeline.types import FloatArray
+
+
+class What(IntEnum):
+    """What a piece of the timeline says. Those from ``LOSS`` on are instants."""
+
+    WAIT = 0
+    """A packet waited in the node's buffer for its first frame."""
+    DOWN = 1
+    """The node had failed or slept."""
+    AIR = 2
+    """A frame was on the air."""
+    ACK = 3
+    """An acknowledgement, or a request or clearance to send."""
+    CAPTURE = 4
+    """The camera took an image."""
+    ARRIVE = 5
+    """An image of the node was complete at its destination."""
+    LOSS = 6
+    """An attempt failed."""
+    DROP = 7
+    """A packet was given up."""
+    EXPIRE = 8
+    """An image was given up or thrown away."""
+
+
+FAILURES = (What.LOSS, What.DROP, What.EXPIRE)
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkWish:
+    """A run that is asked for."""
+
+    label: str
+    """What to call it where two are compared."""
+    config: NetworkConfig
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """Columns (P,) of the pieces of a timeline, by their start."""
+
+    start_ns: NDArray[np.int64]
+    end_ns: NDArray[np.int64]
+    """The same as the start for instants."""
+    packet: NDArray[np.int32]
+    image: NDArray[np.int32]
+    first_byte: NDArray[np.int32]
+    size_bytes: NDArray[np.int32]
+    node: NDArray[np.int16]
+    peer: NDArray[np.int16]
+    """The other end of a frame; -1 where there is none."""
+    what: NDArray[np.int8]
+    """``What``."""
+    cause: NDArray[np.int8]
+    """``Cause`` of a failure; of a frame, why its receiver did not get it."""
+    carries: NDArray[np.int8]
+    """``PacketKind``."""
+
+    def __len__(self) -> int:
+        return len(self.start_ns)
+
+    def where(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Pieces:
+        """Those that a mask (P,) or an array of indices selects."""
+        return Pieces(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """One quantity over the simulated time."""
+
+    t_s: FloatArray
+    """(T,) middles of the intervals, or their ends for what adds up."""
+    values: FloatArray
+    """(T,) NaN where there is nothing to say."""
+
+
+@dataclass(frozen=True, slots=True)
+class MetricRow:
+    """A number of the whole run."""
+
+    name: str
+    value: float
+    unit: str
+    definition: str
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkView:
+    """One run."""
+
+    label: str
+    config: NetworkConfig
+    names: tuple[str, ...]
+    """Of the N nodes, access points, sink and cloud."""
+    roles: tuple[str, ...]
+    track_s: FloatArray
+    """(K,) times of ``tracks_m``; a single one where nobody moves."""
+    tracks_m: NDArray[np.float32]
+    """(K, N, 2) metres east and north."""
+    start_ns: int
+    """End of the warm-up, where the timeline begins."""
+    end_ns: int
+    pieces: Pieces
+    told_until_ns: int
+    """The pieces end here if the run had more of them than are kept; otherwise ``end_ns``."""
+    series: dict[str, Series]
+    """By ``app.screens.network.labels.CURVES``."""
+    metrics: tuple[MetricRow, ...]
+    elapsed_s: float
+    """Time that the simulation took on this machine."""
+    packets: int
+    """That were created in all."""
+
+    def positions_m(self, t_ns: int) -> FloatArray:
+        """(N, 2) where everybody is."""
+        if len(self.track_s) == 1:
+            return self.tracks_m[0].astype(float)
+        at = float(np.interp(t_ns / 1e9, self.track_s, np.arange(len(self.track_s))))
+        before = min(int(at), len(self.track_s) - 2)
+        share = at - before
+        return (1.0 - share) * self.tracks_m[before] + share * self.tracks_m[before + 1]

@@ -1,0 +1,126 @@
+"""The folder that answers which ball radius to take: from the points, and from a sweep of all radii."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from app.screens.surface.sweep_plot import BELOW, sweep_figure, sweep_sentence
+from app.screens.surface.sweep_view import SuggestionRow, SweepView
+from app.tables import Row, number, table
+
+SWEEP, STOP = "Sweep the radius", "Stop the sweep"
+TEXT = """A ball bridges the triangles around a point if it is as wide as the largest of their circumcircles.
+How wide that is can be read off the points before any ball rolls."""
+NO_ADVICE = "No point has neighbours on all sides, so no radius can be read off this cloud; try more points."
+WAITING = "The first ball is about to roll."
+STOPPED = "Stopped; the curves end where the sweep did."
+UNNAMED = "–"
+"""Of the only button before there is a suggestion; it is not shown."""
+
+
+class AdviceFolder:
+    """Suggested radii to take with a button, and a sweep that shows what every radius does."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        post: Callable[..., None],
+        changed: Callable[[Any, Callable[[], None]], None],
+        on_press: Callable[[str], None],
+        on_radius_m: Callable[[float], None],
+    ) -> None:
+        """Add the folder.
+
+        Args:
+            gui: where to add it.
+            post: runs a function on the session's thread.
+            changed: registers an action for a change of a handle by a person.
+            on_press: called with ``SWEEP`` or ``STOP``.
+            on_radius_m: called with a suggested radius that is taken.
+        """
+        self._on_press, self._on_radius_m = on_press, on_radius_m
+        self._radii_m: dict[str, float] = {}
+        self._view: SweepView | None = None
+        with gui.add_folder("Which radius?", expand_by_default=False):
+            gui.add_markdown(TEXT)
+            self._table = gui.add_html("")
+            self._take = gui.add_button_group(
+                "Take", (UNNAMED,), hint="Roll one ball of this radius.", visible=False
+            )
+            self._take.on_click(lambda event: post(self._taken, event.target.value))
+            self._keys = gui.add_button_group(
+                "All radii",
+                (SWEEP, STOP),
+                hint="One ball after another, each alone over the cloud after fusion; it takes some seconds.",
+            )
+            self._keys.on_click(lambda event: post(self._pressed, event.target.value))
+            self._status = gui.add_markdown("")
+            self._below = gui.add_dropdown(
+                "Lower plot", list(BELOW), hint="What the lower of the two plots shows.", visible=False
+            )
+            changed(self._below, self._draw)
+            self._plot = gui.add_plotly(
+                sweep_figure(None), aspect=0.95, config={"displayModeBar": False}, visible=False
+            )
+        self.forget()
+
+    def suggest(self, rows: tuple[SuggestionRow, ...]) -> None:
+        """Show what the points suggest."""
+        self._radii_m = {row.name: row.radius_m for row in rows}
+        if rows:
+            self._take.options = tuple(self._radii_m)
+        self._take.visible = bool(rows)
+        self._table.content = suggestions_html(rows)
+
+    def load(self, view: SweepView | None) -> None:
+        """Show a sweep, or as much of it as there is; None was stopped."""
+        if view is None:
+            self._status.content = "Stopped." if self._view is None else STOPPED
+            return
+        self._view = view
+        self._draw()
+        running = f"{len(view.points)} of {view.planned} balls have rolled."
+        self._status.content = sweep_sentence(view) if view.done else running
+
+    def forget(self) -> None:
+        """The radii of another cloud are not those of this one."""
+        self._radii_m, self._view = {}, None
+        self._take.visible = False
+        self._draw()
+        self._table.content = self._status.content = ""
+
+    def _draw(self) -> None:
+        if self._view is not None:
+            self._plot.figure = sweep_figure(self._view, self._below.value)
+        self._plot.visible = self._below.visible = self._view is not None
+
+    def _taken(self, name: str) -> None:
+        if name in self._radii_m:
+            self._on_radius_m(self._radii_m[name])
+
+    def _pressed(self, key: str) -> None:
+        if key == SWEEP:
+            self._view = None
+            self._draw()
+            self._status.content = WAITING
+        self._on_press(key)
+
+
+def suggestions_html(rows: tuple[SuggestionRow, ...]) -> str:
+    """A line for each suggested radius: its name, the radius, and what it closes."""
+    if not rows:
+        return f"<div style='padding: 0 0.8em; font-size: 13px'>{NO_ADVICE}</div>"
+    return table(
+        [
+            Row(
+                row.name,
+                row.sentence,
+                (number(row.radius_m, 1, "mm", 1000.0), number(row.share, 0, "%", 100.0)),
+            )
+            for row in rows
+        ],
+        ("radius", "closes"),
+    )

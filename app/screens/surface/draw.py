@@ -1,0 +1,68 @@
+"""Surfaces before and after fusion, their holes as red loops."""
+
+from __future__ import annotations
+
+import viser
+
+from app.records import MeshView, PaintedMesh
+from pipeline.types import FloatArray
+
+
+class SurfaceDrawing:
+    """One mesh and its boundary loops below a scene node."""
+
+    def __init__(self, scene: viser.SceneApi, below: str, label: str) -> None:
+        self._scene, self._below, self._label = scene, below, label
+        self._meshes: list[viser.GlbHandle] = []
+        self._rims: list[viser.GlbHandle] = []
+        self._made = 0
+        self._rims_shown = True
+        self._frame = scene.add_frame(below, show_axes=False)
+
+    def draw(self, view: MeshView | PaintedMesh, unseen: bool = False) -> None:
+        """Draw this one; ``drop_old`` then takes the one before away.
+
+        A browser needs some frames to read a mesh. The one before stays until then, so that the surface
+        does not blink; or at least, where it is ``unseen`` as the browser draws nothing in between, its
+        material stays, so that the browser need not compile its shader again.
+        """
+        self._made += 1
+        if unseen:
+            for handle in (*self._meshes, *self._rims):
+                handle.visible = False
+        for kind, glb, handles in (("mesh", view.glb, self._meshes), ("rims", view.rims_glb, self._rims)):
+            _shorten(handles, 1 if glb else 0)
+            if glb:
+                handles.append(self._add(f"{kind}-{self._made}", glb, kind == "mesh" or self._rims_shown))
+
+    def drop_old(self) -> None:
+        """Remove all but what was drawn last."""
+        for handles in (self._meshes, self._rims):
+            _shorten(handles, 1)
+
+    def clear(self) -> None:
+        """Draw nothing."""
+        for handles in (self._meshes, self._rims):
+            _shorten(handles, 0)
+
+    def show(self, visible: bool, rims: bool, offset_m: FloatArray, top_m: FloatArray | None) -> None:
+        """Whether and where to show it; a label at ``top_m`` tells two apart."""
+        self._frame.visible = visible
+        self._frame.position = offset_m
+        self._rims_shown = rims
+        for handle in self._rims:
+            handle.visible = rims
+        name = f"{self._below}/label"
+        if top_m is not None:
+            self._scene.add_label(name, self._label, position=top_m, anchor="bottom-center")
+        elif self._scene.get_handle_by_name(name) is not None:
+            self._scene.remove_by_name(name)
+
+    def _add(self, name: str, glb: bytes, visible: bool) -> viser.GlbHandle:
+        return self._scene.add_glb(f"{self._below}/{name}", glb, cast_shadow=False, visible=visible)
+
+
+def _shorten(handles: list[viser.GlbHandle], most: int) -> None:
+    """Remove the first ones."""
+    while len(handles) > most:
+        handles.pop(0).remove()

@@ -1,0 +1,113 @@
+"""The chosen hole in the scene, and which hole a click meant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+
+from app.screens.surface.holes_view import HoleView
+from pipeline.types import ByteArray, FloatArray
+
+TAPE = ((255, 225, 0), (0, 0, 0))
+"""Yellow and black in turn, as on warning tape: seen on light and dark surfaces and beside red rims."""
+THICKNESS_PX = 6.0
+REACH_DEG = 1.5
+"""A click so far from a hole still means it."""
+
+
+class HoleDrawing:
+    """The loop of one hole with its number, below a scene node."""
+
+    def __init__(self, scene: viser.SceneApi, below: str) -> None:
+        self._scene, self._below = scene, below
+        self._frame = scene.add_frame(below, show_axes=False)
+        self._handles: list[viser.SceneNodeHandle] = []
+
+    def draw(self, hole: HoleView, name: str, offset_m: FloatArray) -> None:
+        """Draw this hole instead of the last; ``offset_m`` is where its surface stands."""
+        self.clear()
+        points, colors = tape(hole.loop_m)
+        loop = self._scene.add_line_segments(
+            f"{self._below}/loop", points, colors, thickness=THICKNESS_PX, thickness_units="screen"
+        )
+        label = self._scene.add_label(
+            f"{self._below}/name", name, position=hole.center_m, anchor="bottom-center"
+        )
+        self._handles = [loop, label]
+        self._frame.position = offset_m
+
+    def clear(self) -> None:
+        """Draw none."""
+        for handle in self._handles:
+            handle.remove()
+        self._handles = []
+
+
+def tape(loop_m: FloatArray) -> tuple[FloatArray, ByteArray]:
+    """(2 L, 2, 3) segments, two for each edge of an (L, 3) closed loop, and their colours in turn."""
+    middle_m = 0.5 * (loop_m + np.roll(loop_m, -1, axis=0))
+    stops_m = np.stack([loop_m, middle_m], axis=1).reshape(-1, 3)
+    points = np.stack([stops_m, np.roll(stops_m, -1, axis=0)], axis=1)
+    colors = np.tile(np.repeat(np.array(TAPE, np.uint8)[:, None], 2, axis=1), (len(loop_m), 1, 1))
+    return points.astype(np.float32), colors
+
+
+def picked_hole(holes: Sequence[HoleView], origin_m: FloatArray, direction: FloatArray) -> int | None:
+    """Which hole a ray means.
+
+    The nearest hole that the ray passes through; else the one whose edges it passes at the smallest
+    angle, up to 1.5 degrees; rims only where no hole is meant. The rim around a surface is passed
+    through wherever one looks at the surface, so a rim counts as passed through only if it runs as the
+    loop of a hole does: clockwise seen from the ray's origin.
+
+    Args:
+        holes: of one surface.
+        origin_m: (3,) in the frame of the holes.
+        direction: (3,) of any length.
+
+    Returns:
+        The index in ``holes``; None if there is none near.
+    """
+    axes = _axes(direction)
+    best: tuple[bool, float, float] | None = None
+    picked = None
+    for index, hole in enumerate(holes):
+        loop = (hole.loop_m - origin_m) @ axes.T
+        turns = _turns(loop)
+        through = turns > 0 if hole.rim else turns != 0
+        angle_deg = 0.0 if through else _edge_angle_deg(loop)
+        rank = (hole.rim, angle_deg, float(loop[:, 2].mean()))
+        if angle_deg <= REACH_DEG and (best is None or rank < best):
+            best, picked = rank, index
+    return picked
+
+
+def _axes(direction: FloatArray) -> FloatArray:
+    """(3, 3) right-handed unit axes as rows, the last along the direction."""
+    forward = np.asarray(direction, float) / np.linalg.norm(direction)
+    right = np.cross(np.eye(3)[np.argmin(np.abs(forward))], forward)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(forward, right), forward])
+
+
+def _turns(loop: FloatArray) -> int:
+    """How often an (L, 3) loop runs clockwise around the z axis, looking along it; 0 if not all ahead."""
+    if loop[:, 2].min() <= 0.0:
+        return 0
+    bearing = np.arctan2(loop[:, 1], loop[:, 0])
+    change = np.roll(bearing, -1) - bearing
+    return round(float(((change + np.pi) % (2 * np.pi) - np.pi).sum()) / (2 * np.pi))
+
+
+def _edge_angle_deg(loop: FloatArray) -> float:
+    """Smallest angle between the z axis and the edges of an (L, 3) loop, seen from the origin."""
+    edge = np.roll(loop, -1, axis=0) - loop
+    along, ee, ss = ((a * b).sum(axis=1) for a, b in ((loop, edge), (edge, edge), (loop, loop)))
+    # Where z / |loop + t edge|, the cosine, is stationary; the corners are looked at as well.
+    below = edge[:, 2] * along - loop[:, 2] * ee
+    t = np.divide(loop[:, 2] * along - edge[:, 2] * ss, below, out=np.zeros_like(below), where=below != 0.0)
+    points = np.concatenate([loop, loop + np.clip(t, 0.0, 1.0)[:, None] * edge])
+    cosine = points[:, 2] / np.maximum(np.linalg.norm(points, axis=1), 1e-12)
+    return float(np.degrees(np.arccos(min(float(cosine.max()), 1.0))))

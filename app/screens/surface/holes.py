@@ -1,0 +1,298 @@
+"""The folder with the holes of a surface: which there are, why they are there, and what filling costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.records import Which
+from app.screens.surface.draw_holes import HoleDrawing, picked_hole
+from app.screens.surface.holes_view import ExplainView, FilledView, HoleView, PartsView
+from app.tables import Row, number, table
+from pipeline.types import FloatArray
+
+TEXT = """**Click a red rim in the picture, or choose one here**, and read why it is there. A *hole* has
+surface all around it; at a *rim* the surface ends."""
+NONE, PREVIOUS, NEXT = "none", "Previous", "Next"
+LISTED_HOLES, LISTED_RIMS = 30, 10
+ASKING = "Looking for the reason …"
+SILENT = "No answer came, since something else was computed instead. Click the hole again to ask once more."
+FILL_MOST_CM = 100.0
+FILL_OFF = "Filling is off. Drag the slider to close small holes by guessing, and see what that is worth."
+FILLING = "Filling …"
+UNFILLED = "No answer came, since something else was computed instead. Drag the slider again."
+NOTHING: tuple[HoleView, ...] = ()
+WHICH: tuple[Which, ...] = ("after", "before")
+
+
+class HolesFolder:
+    """A list of the holes, the chosen one in the scene, and the reason why it is there."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        scene: viser.SceneApi,
+        post: Callable[..., None],
+        changed: Callable[[Any, Callable[[], None]], None],
+        on_ask: Callable[[Which, int], None],
+        on_fill: Callable[[float | None], None],
+    ) -> None:
+        """Add the folder.
+
+        Args:
+            gui: where to add it.
+            scene: where to draw the chosen hole.
+            post: runs a function on the session's thread.
+            changed: registers an action for a change of a handle by a person.
+            on_ask: called with a surface and the index of its hole that is to be explained.
+            on_fill: called with the length in metres of the longest hole to fill; None for none.
+        """
+        self._on_ask, self._on_fill = on_ask, on_fill
+        self._holes: dict[Which, tuple[HoleView, ...]] = {}
+        self._alone: Which | None = None
+        self._which: Which | None = None
+        self._index: int | None = None
+        self._offset_m: FloatArray = np.zeros(3)
+        self._drawing = HoleDrawing(scene, "/surface/hole")
+        with gui.add_folder("Holes", expand_by_default=False):
+            gui.add_markdown(TEXT)
+            self._list = gui.add_dropdown(
+                "Hole", [NONE], hint="Holes by area, the largest first, then rims by length, at the end."
+            )
+            changed(self._list, self._listed)
+            keys = gui.add_button_group("Go to", (PREVIOUS, NEXT), hint="The hole before or after this one.")
+            keys.on_click(lambda event: post(self._step, 1 if event.target.value == NEXT else -1))
+            self._why = gui.add_markdown("")
+            self._shares = gui.add_html("")
+            self._parts = gui.add_markdown("")
+            self._add_filling(gui, changed)
+        self.forget()
+
+    def _add_filling(self, gui: viser.GuiApi, changed: Callable[[Any, Callable[[], None]], None]) -> None:
+        self._fill = gui.add_slider(
+            "Fill small holes up to (cm)",
+            0.0,
+            FILL_MOST_CM,
+            5.0,
+            0.0,
+            hint="Closes the holes of the surface after fusion whose loop is no longer than this with as "
+            "little area as possible. 0 is off. Rims, where the surface ends, are left alone.",
+        )
+        changed(self._fill, self._dragged)
+        self._filled = gui.add_markdown(FILL_OFF)
+
+    def load(self, holes: Mapping[Which, tuple[HoleView, ...]], shown: Which | None) -> None:
+        """Take the holes of the surfaces, and list those of the one that is shown alone.
+
+        A hole of a surface that is the same as before stays chosen. A new surface after fusion is not
+        filled, so the slider goes back to off.
+        """
+        same = {which: _alike(holes.get(which, NOTHING), self._holes.get(which, NOTHING)) for which in WHICH}
+        self._holes = dict(holes)
+        if not same["after"]:
+            self._fill.value = 0.0
+            self.filled(None)
+        if self._which is None or self._alone != shown or not same[self._which]:
+            self._alone = self._which = shown
+            self._offset_m = np.zeros(3)
+            self._choose(None)
+
+    def parts(self, parts: PartsView | None) -> None:
+        """Tell where the rays of all pixels end; None if it is not known."""
+        self._parts.content = "" if parts is None else parts_sentence(parts)
+
+    def picked(
+        self, ray_origin_m: FloatArray, ray_direction: FloatArray, which: Which, offset_m: FloatArray
+    ) -> bool:
+        """Choose the hole that a click in the scene meant.
+
+        Args:
+            ray_origin_m: (3,) in the world.
+            ray_direction: (3,).
+            which: the surface on whose holes to look.
+            offset_m: (3,) where that surface stands in the scene.
+
+        Returns:
+            Whether the click meant one.
+        """
+        holes = self._holes.get(which, NOTHING)
+        index = picked_hole(holes, np.asarray(ray_origin_m) - offset_m, np.asarray(ray_direction))
+        if index is None:
+            return False
+        self._which, self._offset_m = which, np.asarray(offset_m)
+        self._choose(index)
+        return True
+
+    def choose_largest(self) -> None:
+        """Choose the first of the list, as a person would."""
+        if self._shown:
+            self._choose(0)
+
+    def tell(self, answer: ExplainView | None) -> None:
+        """Show why the chosen hole is there; None if nobody could say."""
+        if self._index is None:
+            return
+        if answer is None:
+            self._why.content = SILENT
+        elif (answer.which, answer.index) == (self._which, self._index):
+            self._why.content = reason_text(answer)
+            self._shares.content = shares_table(answer)
+
+    def filled(self, view: FilledView | None) -> None:
+        """Say what filling made of the surface; None if nobody could fill it."""
+        if not self.filling:
+            self._filled.content = FILL_OFF
+        else:
+            self._filled.content = UNFILLED if view is None else filled_sentence(view)
+
+    @property
+    def filling(self) -> bool:
+        """Whether small holes are to be filled."""
+        return self._fill.value > 0.0
+
+    def unfill(self) -> None:
+        """The surface is drawn anew, without what was filled."""
+        self._fill.value = 0.0
+        self.filled(None)
+
+    def forget(self) -> None:
+        """The surfaces are gone."""
+        self._holes, self._which, self._alone = {}, None, None
+        self._choose(None)
+        self.parts(None)
+        self.unfill()
+
+    def _listed(self) -> None:
+        names = self._names()
+        self._choose(next((index for index, name in names.items() if name == self._list.value), None))
+
+    def _step(self, by: int) -> None:
+        """Choose the next or previous hole; past the last comes the first."""
+        count = len(self._shown)
+        if count:
+            start = -1 if self._index is None and by > 0 else self._index or 0
+            self._choose((start + by) % count)
+
+    def _choose(self, index: int | None) -> None:
+        self._index = index
+        names = self._names()
+        self._list.options = [NONE, *names.values()]
+        self._list.value = NONE if index is None else names[index]
+        self._shares.content = ""
+        if index is None or self._which is None:
+            self._drawing.clear()
+            self._why.content = self._invitation()
+            return
+        self._drawing.draw(self._shown[index], names[index].partition(":")[0], self._offset_m)
+        self._why.content = ASKING
+        self._on_ask(self._which, index)
+
+    @property
+    def _shown(self) -> tuple[HoleView, ...]:
+        return NOTHING if self._which is None else self._holes.get(self._which, NOTHING)
+
+    def _names(self) -> dict[int, str]:
+        """What the list calls the largest holes, the longest rims and the chosen one, by index."""
+        holes = [index for index, hole in enumerate(self._shown) if not hole.rim]
+        rims = [index for index, hole in enumerate(self._shown) if hole.rim]
+        listed = {*holes[:LISTED_HOLES], *rims[:LISTED_RIMS]} | (
+            set() if self._index is None else {self._index}
+        )
+        return {index: hole_name(index, self._shown[index]) for index in sorted(listed)}
+
+    def _invitation(self) -> str:
+        """What to do while no hole is chosen."""
+        if not self._holes:
+            return ""
+        if self._which is None:
+            return "Click a red rim, or show one surface alone to have its holes listed here."
+        rims = sum(hole.rim for hole in self._shown)
+        counts = f"{_count(len(self._shown) - rims, 'hole')} and {_count(rims, 'rim')}"
+        return f"{counts} {self._which} fusion; none is chosen."
+
+    def _dragged(self) -> None:
+        longest_cm = float(self._fill.value)
+        self._filled.content = FILLING if longest_cm > 0.0 else FILL_OFF
+        self._on_fill(longest_cm / 100.0 if longest_cm > 0.0 else None)
+
+
+def _alike(some: tuple[HoleView, ...], others: tuple[HoleView, ...]) -> bool:
+    """Whether these are the holes of the same surface."""
+    return [(hole.length_m, hole.area_m2) for hole in some] == [(o.length_m, o.area_m2) for o in others]
+
+
+def _count(number_of: int, what: str) -> str:
+    return f"1 {what}" if number_of == 1 else f"{number_of:,} {what}s"
+
+
+def hole_name(index: int, hole: HoleView) -> str:
+    """Number, kind, length and area."""
+    if hole.rim:
+        return f"{index + 1}: rim, {100.0 * hole.length_m:,.0f} cm long"
+    return f"{index + 1}: {100.0 * hole.length_m:,.0f} cm around, {1e4 * hole.area_m2:,.1f} cm²"
+
+
+def reason_text(answer: ExplainView) -> str:
+    """Markdown: the reason in a word and in a sentence, and what to do about it."""
+    return f"**{answer.reason.capitalize()}.** {answer.sentence}\n\n**What to try:** {answer.remedy}"
+
+
+def shares_table(answer: ExplainView) -> str:
+    """HTML: who has a depth for the pixels that look into the hole; empty if no camera does."""
+    rows = [
+        Row(name, hint, (number(share, 0, "%", 100.0),))
+        for name, hint, share in (
+            (
+                "Sensor measured",
+                "Pixels with sensor depth: there are points, so the ball or their normals leave the hole.",
+                answer.sensor_share,
+            ),
+            (
+                "Only inferred",
+                "Pixels without sensor depth for which the depth network has one: here fusion can help.",
+                answer.inferred_share,
+            ),
+            (
+                "Neither",
+                "Pixels for which nobody has a depth. Only another camera or invention can close these.",
+                answer.unknown_share,
+            ),
+        )
+    ]
+    return table(rows, ("share of pixels",)) if np.isfinite(answer.sensor_share) else ""
+
+
+def parts_sentence(parts: PartsView) -> str:
+    """Markdown: where the rays of all pixels end on the surface after fusion."""
+
+    def share(value: float) -> str:
+        return number(value, 1, "%", 100.0)
+
+    missed = parts.missed_measured + parts.missed_inferred + parts.missed_unknown
+    return (
+        f"**All pixel rays, after fusion:** {share(parts.on_sensor)} end on measured surface and "
+        f"{share(parts.on_inferred)} on inferred surface. {share(missed)} miss it: "
+        f"{share(parts.missed_measured)} though the sensor measured there, "
+        f"{share(parts.missed_inferred)} where only inference has a depth, "
+        f"{share(parts.missed_unknown)} where nobody has one."
+    )
+
+
+def filled_sentence(view: FilledView) -> str:
+    """Markdown: what was invented, and how to judge it."""
+    if not view.holes:
+        return "No hole is that small. Drag the slider further."
+    truth = view.mesh.truth
+    worth = (
+        "" if truth is None else f", and an F-score at 5 cm of {number(truth['f_score_5cm'], 1, '%', 100.0)}"
+    )
+    area, missed = number(view.area_m2, 1, "cm²", 1e4), view.mesh.quality.no_hit_ray_share
+    return (
+        f"**{_count(view.holes, 'hole')} filled, {area}.** The magenta surface is invented: nobody measured "
+        f"it. It leaves {number(missed, 1, '%', 100.0)} no-hit rays{worth}. Compare that with the surfaces "
+        "before and after fusion: what fusion adds is inferred from the colour image, not made up from the "
+        "rim."
+    )

@@ -1,0 +1,146 @@
+"""The holes of a surface: where they are, why they are there, and what filling them costs."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from app.chain import (
+    PlacedNodes,
+    RolledBalls,
+    ball_clouds,
+    cameras_of,
+    compared,
+    placed,
+    prepared,
+    rig_of,
+    rolled,
+)
+from app.drawing.colors import HOLE, NEUTRAL
+from app.drawing.meshes import mesh_view, surface_glb
+from app.records import Which
+from app.screens.surface.holes_view import ExplainView, FilledView, HoleView, PartsView
+from app.state import Spec
+from app.store import Store
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from pipeline.reconstruct import NodeClouds
+from pipeline.surface.fill import Filled, fill_holes
+from pipeline.surface.hole_diagnosis import explain_hole
+from pipeline.surface.holes import find_holes
+from pipeline.surface.quality import no_hit_ray_share
+from pipeline.surface.ray_parts import View, ray_parts
+from pipeline.types import Rig, SurfaceResult
+
+
+def hole_views(surface: SurfaceResult) -> tuple[HoleView, ...]:
+    """The holes of a surface in the order of ``find_holes``."""
+    return tuple(
+        HoleView(
+            loop_m=surface.vertices_m[hole.loop].astype(np.float32),
+            length_m=hole.length_m,
+            area_m2=hole.area_m2,
+            center_m=hole.center_m,
+            rim=not hole.open,
+        )
+        for hole in find_holes(surface.vertices_m, surface.triangles)
+    )
+
+
+def views_of(rig: Rig, nodes: Sequence[NodeClouds], places: PlacedNodes) -> list[View]:
+    """What every registered camera knows of its pixels."""
+    return [
+        View(camera, frame.depth.valid, node.alignment.depth.valid)
+        for camera, frame, node in zip(cameras_of(rig, places), rig.frames, nodes, strict=True)
+    ]
+
+
+def parts_of(store: Store, spec: Spec, surface: SurfaceResult) -> Generator[Progress, None, PartsView]:
+    """Where the pixel rays of all cameras end on a surface of the spec."""
+    views = yield from _views(store, spec)
+    parts = ray_parts(surface, views)
+    return PartsView(
+        on_sensor=parts.on_sensor,
+        on_inferred=parts.on_inferred,
+        missed_measured=parts.missed_measured,
+        missed_inferred=parts.missed_inferred,
+        missed_unknown=parts.missed_unknown,
+    )
+
+
+def explain_job(
+    store: Store, spec: Spec, which: Which, index: int
+) -> Generator[Progress | RolledBalls, None, ExplainView]:
+    """Why one hole of the surface after or before fusion is there."""
+
+    def explain() -> Generator[Progress | RolledBalls, None, ExplainView]:
+        views = yield from _views(store, spec)
+        clouds = yield from ball_clouds(store, spec)
+        balls = yield from rolled(store, spec)
+        yield Progress("looking for the reason of the hole", 0.8)
+        surface = balls.after if which == "after" else balls.before
+        assert surface is not None
+        holes = find_holes(surface.vertices_m, surface.triangles)
+        if not 0 <= index < len(holes):
+            raise InputError(
+                f"There is no hole {index + 1} on the surface {which} fusion, which has {len(holes)} holes "
+                "and rims; choose one from the list"
+            )
+        cloud = clouds.fused if which == "after" else clouds.sensor
+        why = explain_hole(holes[index], surface, cloud, views)
+        return ExplainView(
+            which=which,
+            index=index,
+            reason=why.reason,
+            sentence=why.sentence,
+            remedy=why.remedy,
+            closing_radius_m=why.closing_radius_m,
+            sensor_share=why.sensor_share,
+            inferred_share=why.inferred_share,
+            unknown_share=why.unknown_share,
+        )
+
+    return (yield from store.remember(("explain", *spec.key("surface"), which, index), explain))
+
+
+def fill_job(
+    store: Store, spec: Spec, longest_cm: float
+) -> Generator[Progress | RolledBalls, None, FilledView]:
+    """The surface after fusion with its holes up to so long a rim filled, and what that makes of it."""
+    rig = yield from rig_of(store, spec)
+    places = yield from placed(store, spec)
+    balls = yield from rolled(store, spec)
+    yield Progress("filling small holes", 0.6)
+    filled = fill_holes(balls.after, longest_cm / 100.0)
+    yield Progress("measuring the filled surface", 0.8)
+    surface, cameras = filled.surface, cameras_of(rig, places)
+    missed = no_hit_ray_share(surface.vertices_m, surface.triangles, cameras)
+    surface = replace(surface, quality=replace(surface.quality, no_hit_ray_share=missed))
+    view = mesh_view(surface, compared(rig, surface, cameras))
+    return FilledView(replace(view, glb=_marked_glb(filled)), filled.holes, filled.area_m2)
+
+
+def _views(store: Store, spec: Spec) -> Generator[Progress, None, list[View]]:
+    rig = yield from rig_of(store, spec)
+    work = yield from prepared(store, spec)
+    places = yield from placed(store, spec)
+    return views_of(rig, work.nodes, places)
+
+
+def _marked_glb(filled: Filled) -> bytes:
+    """The surface with every invented triangle in one colour, for which it gets its own vertices."""
+    surface = filled.surface
+    count, corners = len(surface.vertices_m), surface.triangles[filled.filled].ravel()
+    own = count + np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+    known = np.tile(np.array(NEUTRAL, np.uint8), (count, 1)) if surface.colors is None else surface.colors
+    normals = surface.normals
+    marked = replace(
+        surface,
+        vertices_m=np.concatenate([surface.vertices_m, surface.vertices_m[corners]]),
+        triangles=np.concatenate([surface.triangles[~filled.filled], own]),
+        normals=None if normals is None else np.concatenate([normals, normals[corners]]),
+    )
+    invented = np.tile(np.array(HOLE, np.uint8), (len(corners), 1))
+    return surface_glb(marked, np.concatenate([known, invented]), photographed=True)

@@ -1,0 +1,90 @@
+"""The lesson of the surface: what a stop can set, and the file that ships."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, TypeAlias, get_args
+
+from app.lesson import LESSONS, NUMBER, Lesson, Setting, choice, read_lesson, sets
+from app.screens.surface.labels import AFTER, COLORINGS, RULES, SHOWN, Coloring
+from pipeline.config import RadiusRule, SurfaceConfig
+
+SHIPPED = LESSONS / "which-ball-radius.md"
+Watch: TypeAlias = Literal["off", "close up", "whole"]
+"""The rolling ball: not shown, a few triangles slowly, or the whole surface."""
+_DEFAULT = SurfaceConfig()
+_ON_OFF = {"on": True, "off": False}
+_RULES: dict[str, RadiusRule] = {rule: rule for rule in RULES.values() if rule != "manual"}
+_MOST_R_F = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceLook:
+    """What a stop shows of which surface; by default what the screen shows at first."""
+
+    shown: str = AFTER
+    """One of ``app.screens.surface.labels.SHOWN``."""
+    rule: RadiusRule = _DEFAULT.radius_rule
+    radius_in_r_F: float | None = None
+    """The ball radius over r_F of the fused cloud, so that it suits every scene; only with rule manual."""
+    coloring: Coloring = "color"
+    rims: bool = True
+    """Whether the rims of the holes are drawn."""
+    smoothing_passes: int = _DEFAULT.smoothing_passes
+    max_points: int = _DEFAULT.max_points
+    watch: Watch = "off"
+    holes: bool = False
+    """Whether the largest hole is chosen and explained."""
+
+
+def surface_lesson(path: Path = SHIPPED) -> Lesson[SurfaceLook]:
+    """A lesson about surfaces.
+
+    Raises:
+        InputError: the file is no lesson or sets what no surface has.
+    """
+    return read_lesson(path, SETTINGS, SurfaceLook())
+
+
+def _radii(look: SurfaceLook, text: str) -> SurfaceLook:
+    if text in _RULES:
+        return replace(look, rule=_RULES[text], radius_in_r_F=None)
+    found = re.fullmatch(rf"{NUMBER} ?r_F", text)
+    if found is None or not 0.0 < float(found[1]) <= _MOST_R_F:
+        raise ValueError(
+            f"try one of {', '.join(_RULES)} or such as '1.5 r_F', above 0 and at most {_MOST_R_F:g} r_F"
+        )
+    return replace(look, rule="manual", radius_in_r_F=float(found[1]))
+
+
+def _count(least: int, most: int) -> Callable[[str], int]:
+    """Reads a whole number such as 8000 or 8,000."""
+
+    def read(text: str) -> int:
+        digits = text.replace(",", "")
+        if not digits.isdecimal() or not least <= int(digits) <= most:
+            raise ValueError(f"try a whole number from {least:,} to {most:,}")
+        return int(digits)
+
+    return read
+
+
+def _short(name: str) -> str:
+    """What stands on the screen, up to its explanation."""
+    return re.split(r" \(|[,:]", name)[0]
+
+
+SETTINGS: dict[str, Setting[SurfaceLook]] = {
+    "show": sets("shown", choice({_short(name): name for name in SHOWN})),
+    "radii": _radii,
+    "colours": sets("coloring", choice({_short(name): coloring for name, coloring in COLORINGS.items()})),
+    "rims": sets("rims", choice(_ON_OFF)),
+    "smoothing": sets("smoothing_passes", _count(0, 5)),
+    "points": sets("max_points", _count(2_000, 60_000)),
+    "watch": sets("watch", choice({name: name for name in get_args(Watch)})),
+    "hole": sets("holes", choice({"largest": True, "none": False})),
+}
+"""What a stop can set, by its name in the file."""

@@ -1,0 +1,107 @@
+"""The numbers of the surfaces, each explained."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Mapping
+
+from app.records import MeshView, PaintedView
+from app.screens.surface.baselines_view import BaselineView
+from app.screens.surface.view import SurfaceView
+from app.tables import Row, number, table
+
+
+def quality_table(view: SurfaceView, baselines: Mapping[str, MeshView], has_truth: bool) -> str:
+    """HTML: before and after fusion and, beside them, the baselines that have been computed."""
+    columns: dict[str, MeshView | None] = {"before": view.before, "after fusion": view.after, **baselines}
+
+    def row(name: str, hint: str, value: Callable[[MeshView], str]) -> Row:
+        return Row(name, hint, tuple("…" if mesh is None else value(mesh) for mesh in columns.values()))
+
+    rows = [
+        row(
+            "No-hit rays",
+            "Share of the cameras' pixel rays that miss the surface: what one sees as holes.",
+            lambda m: number(m.quality.no_hit_ray_share, 1, "%", 100),
+        ),
+        row(
+            "Hole area",
+            "Area of the holes whose rim is shorter than 1 m, filled flat.",
+            lambda m: number(m.quality.hole_area_m2, 3, "m²"),
+        ),
+        row(
+            "Rims",
+            "Boundary loops: chains of edges with one triangle. More of them can mean fewer holes.",
+            lambda m: f"{m.quality.boundary_loops:,}",
+        ),
+        row(
+            "Rim length", "Length of all these edges.", lambda m: number(m.quality.boundary_length_m, 1, "m")
+        ),
+        row("Area", "Area of all triangles.", lambda m: number(m.quality.area_m2, 2, "m²")),
+        row("Triangles", "Triangles of the surface.", lambda m: f"{m.triangles:,}"),
+        row("Pieces", "Connected components.", lambda m: f"{m.quality.components:,}"),
+        row(
+            "Unused points", "Points that the ball never rested on.", lambda m: f"{m.quality.unused_points:,}"
+        ),
+        row(
+            "Bad edges", "Edges with more than two triangles.", lambda m: f"{m.quality.non_manifold_edges:,}"
+        ),
+    ]
+    if has_truth:
+        rows[1:1] = [row(name, hint, _truth_number(key, unit)) for name, hint, key, unit in TRUTH_ROWS]
+    head = ", ".join(f"{1000 * radius_m:.1f}" for radius_m in view.radii_m)
+    caption = f"<div style='padding: 0 0.8em; font-size: 13px'>Ball radii: {head} mm</div>"
+    return caption + table(rows, tuple(columns)) + _price(view)
+
+
+WAIT = "<div style='padding: 0 0.8em; font-size: 13px'>Computing the baseline …</div>"
+
+
+def note_html(view: BaselineView) -> str:
+    """What a baseline is, and what it took."""
+    text = f"{html.escape(view.note)} It took {view.elapsed_s:.1f} s."
+    return f"<div style='padding: 0 0.8em; font-size: 13px'>{text}</div>"
+
+
+def quick_line(view: PaintedView) -> str:
+    """What the quick look shows, while the numbers below are still those before it."""
+    mesh = next(iter(view.meshes.values()))
+    part = "" if view.points == view.all_points else f" of {view.all_points:,}; the rest when you let go"
+    return (
+        f"<div style='padding: 0 0.8em; font-size: 13px'><b>{1000 * (view.wish.radius_m or 0.0):.1f} mm</b>: "
+        f"{mesh.triangles:,} triangles over {view.points:,} points{part}; rolled in "
+        f"{1000 * view.roll_s:.0f} ms</div>"
+    )
+
+
+def _price(view: SurfaceView) -> str:
+    """Says so if the filled surface is nearer to complete but farther from the truth; empty otherwise."""
+    if view.before is None or view.before.truth is None or view.after.truth is None:
+        return ""
+    before, after = (mesh.truth["f_score_5cm"] for mesh in (view.before, view.after) if mesh.truth)
+    if after >= before:
+        return ""
+    return (
+        "<div style='padding: 0.4em 0.8em; font-size: 13px'>Fewer holes have a price here: what fills them "
+        f"is guessed, and the F-score falls from {before:.1%} to {after:.1%}.</div>"
+    )
+
+
+def _truth_number(key: str, unit: str) -> Callable[[MeshView], str]:
+    return lambda mesh: "…" if mesh.truth is None else number(mesh.truth.get(key), 1, unit, 100.0)
+
+
+TRUTH_ROWS = (
+    (
+        "F-score 5 cm",
+        "Harmonic mean of coverage and accuracy within 5 cm of the true surface.",
+        "f_score_5cm",
+        "%",
+    ),
+    (
+        "Depth error",
+        "Median depth error of the rays that hit, against the truth.",
+        "median_depth_error_m",
+        "cm",
+    ),
+)

@@ -1,0 +1,105 @@
+"""Surfaces in the colours that somebody asked for, and quick looks while the radius is dragged."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+
+import numpy as np
+
+from app.chain import (
+    RolledBalls,
+    ball_clouds,
+    cameras_of,
+    cloud_key,
+    placed,
+    rig_of,
+    rolled,
+    rolled_over,
+)
+from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET
+from app.drawing.glb import lines_glb
+from app.drawing.meshes import rim_segments_m, surface_glb
+from app.records import PaintedMesh, PaintedView, PaintWish, Which
+from app.screens.surface.labels import Coloring
+from app.state import Spec
+from app.store import Store
+from packetmesh.progress import Progress
+from pipeline.surface import Camera, distances_to_truth_m, voxel_average, voxel_for_count
+from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
+
+
+def paint_job(
+    store: Store, spec: Spec, wish: PaintWish
+) -> Generator[Progress | RolledBalls, None, PaintedView]:
+    """The surfaces of a spec, or of one ball instead of the spec's, in colours."""
+    rig = yield from rig_of(store, spec)
+    places = yield from placed(store, spec)
+    whole = yield from _clouds(store, spec)
+    if wish.radius_m is None:
+        balls = yield from rolled(store, spec)
+        thin, roll_s = whole, balls.elapsed_s
+        surfaces: dict[Which, Surface | None] = {"after": balls.after, "before": balls.before}
+    else:
+        thin = yield from _thinned(store, spec, wish.most_points)
+        started = time.perf_counter()
+        surfaces = {name: rolled_over(thin[name], (wish.radius_m,)) for name in wish.which}
+        roll_s = time.perf_counter() - started
+    cameras = cameras_of(rig, places)
+    return PaintedView(
+        wish,
+        {
+            name: _painted(surface, wish, rig, cameras)
+            for name, surface in surfaces.items()
+            if surface is not None and name in wish.which
+        },
+        len(thin[wish.which[0]]),
+        len(whole[wish.which[0]]),
+        roll_s,
+    )
+
+
+def _clouds(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, PointCloud]]:
+    clouds = yield from ball_clouds(store, spec)
+    return {"after": clouds.fused, "before": clouds.sensor}
+
+
+def _thinned(
+    store: Store, spec: Spec, most_points: int
+) -> Generator[Progress, None, dict[Which, PointCloud]]:
+    """Both clouds with about ``most_points`` points at most."""
+
+    def thin() -> Generator[Progress, None, dict[Which, PointCloud]]:
+        clouds = yield from _clouds(store, spec)
+        if len(clouds["after"]) <= most_points:
+            return clouds
+        voxel_m = voxel_for_count(clouds["after"].points_m, most_points)
+        return {name: voxel_average(cloud, voxel_m) for name, cloud in clouds.items()}
+
+    return (yield from store.remember(("quick", most_points, *cloud_key(spec)), thin))
+
+
+def _painted(surface: Surface, wish: PaintWish, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
+    """The rims come when the radius rests: lines are costly to draw in software."""
+    colors = vertex_colors(surface, wish.coloring, rig, cameras)
+    glb = surface_glb(surface, colors, photographed=wish.coloring == "color")
+    rims_glb = b"" if wish.radius_m is not None else lines_glb(rim_segments_m(surface), LOSS)
+    return PaintedMesh(glb, rims_glb, len(surface.vertices_m), len(surface.triangles))
+
+
+def vertex_colors(surface: Surface, coloring: Coloring, rig: Rig, cameras: list[Camera]) -> ByteArray | None:
+    """(V, 3) RGB; grey where it is not known what the colour would say."""
+    count = len(surface.vertices_m)
+    if not count or coloring == "color":
+        return surface.colors
+    if coloring == "source" and surface.source is not None:
+        palette = np.array([TARGET, INFERRED], dtype=np.uint8)
+        return palette[(surface.source == PointSource.INFERRED).astype(int)]
+    if coloring == "normal" and surface.normals is not None:
+        return np.rint(127.5 * (surface.normals + 1.0)).astype(np.uint8)
+    if coloring == "distance" and rig.truth is not None:
+        distance_m = distances_to_truth_m(surface.vertices_m, rig.truth, cameras)
+        at_m = np.linspace(0.0, MOST_DISTANCE_M, len(DISTANCE_STOPS))
+        channels = [np.interp(distance_m, at_m, channel) for channel in zip(*DISTANCE_STOPS, strict=True)]
+        return np.rint(np.stack(channels, axis=1)).astype(np.uint8)
+    return np.tile(np.array(NEUTRAL, dtype=np.uint8), (count, 1))

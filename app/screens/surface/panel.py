@@ -1,0 +1,399 @@
+"""Surface: a ball rolls over the points; its radius decides what becomes a surface and what a hole."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from app.controls import Controls
+from app.drawing.cameras import look_closely, stage_of
+from app.lesson_folder import LessonFolder
+from app.panel import Panel
+from app.records import MeshView, PaintedView, PaintWish, SceneView, Which
+from app.screens.surface.advice import SWEEP, AdviceFolder
+from app.screens.surface.baselines_view import BaselineView
+from app.screens.surface.holes import HolesFolder
+from app.screens.surface.holes_view import ExplainView, FilledView
+from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN
+from app.screens.surface.legend import legend_html
+from app.screens.surface.lesson import SurfaceLook, surface_lesson
+from app.screens.surface.numbers import WAIT, note_html, quality_table, quick_line
+from app.screens.surface.quick import QuickLook
+from app.screens.surface.rolling import RollingFolder
+from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
+from app.screens.surface.spacing_plot import spacing_figure
+from app.screens.surface.stage import SurfaceStage
+from app.screens.surface.view import SurfaceView
+from app.screens.surface.walk_view import WalkView, WalkWish
+from app.state import Spec, Step
+from pipeline.config import RadiusRule
+
+TEXT = """**What you see.** A ball rolls over the points and leaves a triangle wherever it rests on three.
+Too small, and it falls through between the points; too large, and it skips detail. Red lines are the rims
+of holes. Drag the radius, and compare before and after fusion. Go on with **Export**."""
+NAMES = {rule: name for name, rule in RULES.items()}
+
+
+class SurfacePanel(Panel):
+    """The surface before and after fusion, live while the radius is dragged."""
+
+    title = "Surface"
+    step: ClassVar[Step | None] = "surface"
+    drawn_below = "/surface"
+
+    def build(self) -> None:
+        """Radius, rule, what to draw; histogram and quality."""
+        gui, session = self.gui, self.session
+        self._view: SurfaceView | None = None
+        self._baselines: dict[str, BaselineView] = {}
+        self._look: SurfaceLook | None = None
+        self._quick_line = ""
+        self._by_click = False
+        self._thinning: tuple[int, int] | None = None
+        gui.add_markdown(TEXT)
+        self._lesson = LessonFolder(gui, surface_lesson(), session.post, self.when_changed, self._take_look)
+        self._radius = gui.add_slider(
+            "Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint="Radius of the ball; drag to roll it anew."
+        )
+        self.when_changed(self._radius, self._dragged)
+        self._rule = gui.add_dropdown(
+            "Radii",
+            list(RULES),
+            initial_value=NAMES[session.spec.config.surface.radius_rule],
+            hint="r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the "
+            "fused cloud. Several balls roll one after the other, the small ones first.",
+        )
+        self.when_changed(self._rule, self._picked_rule)
+        self._shown = gui.add_dropdown(
+            "Show",
+            list(SHOWN),
+            hint="Which surface is drawn: the ball's, or that of another method over the same points.",
+        )
+        self._coloring = gui.add_dropdown(
+            "Colours", list(COLORINGS), hint="What the colours of the surface mean."
+        )
+        self._legend = gui.add_html("", visible=False)
+        self.when_changed(self._coloring, self._picked_coloring)
+        self._loops = gui.add_checkbox("Hole rims", True, hint="Edges with one triangle only, in red.")
+        self.when_changed(self._shown, self._picked_shown)
+        self.when_changed(self._loops, self._arrange)
+        self._quick = gui.add_html("")
+        self._table = gui.add_html("")
+        self._histogram = gui.add_plotly(spacing_figure(None), aspect=0.62, config={"displayModeBar": False})
+        self._build_folders()
+        self._stage = SurfaceStage(self.scene)
+        self.scene.on_click()(lambda event: session.post(self._clicked, event))
+
+    def _build_folders(self) -> None:
+        gui, session = self.gui, self.session
+        self._advice = AdviceFolder(gui, session.post, self.when_changed, self._sweep, self._take_radius)
+        self._holes = HolesFolder(gui, self.scene, session.post, self.when_changed, self._explain, self._fill)
+        self._rolling = RollingFolder(
+            gui, self.scene, session.post, self.when_changed, session.target.atomic, self._watch
+        )
+        with gui.add_folder("Advanced", expand_by_default=False):
+            self._controls = Controls(
+                gui, ADVANCED, session.spec.config, lambda change: session.post(session.edit, change)
+            )
+            self._look_quickly = QuickLook(gui, session, self._painted, self._drawn, self._rested)
+
+    @property
+    def wide(self) -> bool:
+        """Whether both surfaces are shown."""
+        return self._shown.value == BOTH
+
+    def close(self) -> None:
+        """End the timers."""
+        if hasattr(self, "_look_quickly"):
+            self._look_quickly.close()
+            self._rolling.close()
+
+    def on_spec(self, spec: Spec) -> None:
+        """Show the settings that are wanted; what was made with others goes."""
+        self._controls.write(spec.config)
+        self._rule.value = NAMES[spec.config.surface.radius_rule]
+        thinning = (spec.config.surface.max_points, spec.config.surface.smoothing_passes)
+        if thinning != self._thinning:
+            self._advice.forget()
+        self._thinning = thinning
+        self._baselines = {}
+        if self._shown.value in BASELINES:
+            self._shown.value = AFTER
+        self._close_walk()
+        self._arrange()
+
+    def on_view(self, step: Step, view: Any) -> None:
+        """Draw both surfaces; a new cloud has other radii to suggest."""
+        if step == "fuse":
+            self._advice.forget()
+            self._holes.forget()
+        if step == "surface":
+            self.on_partial(view)
+
+    def on_partial(self, view: SurfaceView) -> None:
+        """Draw what is there; while the radius is dragged, only remember it."""
+        self._view = view
+        if not self._look_quickly.moving:
+            self._take(view)
+
+    def _dragged(self) -> None:
+        """Show this ball's surface at once, and compute everything when the slider rests."""
+        if self._shown.value in BASELINES:
+            self._shown.value = AFTER
+            self._arrange()
+        which, coloring = self._stage.which, COLORINGS[self._coloring.value]
+        self._look_quickly.want(PaintWish(which, coloring, self._radius.value / 1000.0))
+
+    def _drawn(self) -> None:
+        """What was sent last stands on the screen; its numbers waited, as the page is slow to write them."""
+        with self.session.target.atomic():
+            self._stage.drop_old()
+            if self._look_quickly.moving:
+                self._quick.content = self._quick_line
+
+    def _rested(self) -> None:
+        session = self.session
+        session.edit(with_rule("manual", self._radius.value))
+        if self._view is not None and session.results.fresh("surface", session.spec):
+            self._take(self._view)
+
+    def _take_radius(self, radius_m: float) -> None:
+        self.session.edit(with_rule("manual", 1000.0 * radius_m))
+        self._radius.value = round(2000.0 * radius_m) / 2.0
+
+    def _picked_rule(self) -> None:
+        self.session.edit(with_rule(RULES[self._rule.value], self._radius.value))
+
+    # What is drawn.
+
+    def _take(self, view: SurfaceView) -> None:
+        """Show a view of the chain."""
+        with self.session.target.atomic():
+            if COLORINGS[self._coloring.value] == "color":
+                self._stage.draw("after", view.after)
+                if view.before is not None:
+                    self._stage.draw("before", view.before)
+                self._look_quickly.sent()
+            if self.session.spec.config.surface.radius_rule != "manual":
+                self._radius.min, self._radius.max = slider_range_mm(view.spacing, view.radii_m)
+                self._radius.value = round(2000.0 * view.radii_m[-1]) / 2.0
+            self._tell_numbers()
+            self._quick.content = ""
+            self._arrange()
+        if view.before is not None:
+            suggested_m = [row.radius_m for row in view.suggestions]
+            self._histogram.figure = spacing_figure(view.spacing, view.radii_m, suggested_m)
+            self._repaint()
+        if view.holes:
+            with self.session.target.atomic():
+                self._advice.suggest(view.suggestions)
+                self._holes.parts(view.parts)
+                self._load_holes()
+            self._show_look()
+
+    def _tell_numbers(self) -> None:
+        if self._view is not None:
+            others: dict[str, MeshView] = {view.name: view.mesh for view in self._baselines.values()}
+            self._table.content = quality_table(self._view, others, self._has_truth())
+
+    def _repaint(self) -> None:
+        """Have the surfaces of the settings in the colours chosen."""
+        coloring = COLORINGS[self._coloring.value]
+        if coloring != "color" and self.session.results.view("fuse") is not None:
+            session = self.session
+            wish = PaintWish(("after", "before"), coloring)
+            session.quick_job("paint", session.store, session.spec, wish, on_end=self._painted)
+
+    def _painted(self, view: PaintedView | None) -> None:
+        """Draw it, unless something else is wanted by now."""
+        if view is None or view.wish.coloring != COLORINGS[self._coloring.value]:
+            return
+        quick = view.wish.radius_m is not None
+        if quick != self._look_quickly.moving:
+            return
+        with self.session.target.atomic():
+            drawn = [mesh for which, mesh in view.meshes.items() if self._stage.draw(which, mesh, quick)]
+            self._look_quickly.sent([mesh.vertices for mesh in drawn if mesh.triangles] if quick else ())
+        self._quick_line = quick_line(view) if quick else ""
+        self.session.target.flush()
+
+    def _picked_shown(self) -> None:
+        """Show another surface; that of a baseline is made first."""
+        session, label = self.session, self._shown.value
+        name = BASELINES.get(label)
+        self._quick.content = ""
+        if name is None or self._view is None:
+            self._load_holes()
+        elif label in self._baselines:
+            self._quick.content = note_html(self._baselines[label])
+            self._stage.draw_baseline(self._baselines[label].mesh)
+        else:
+            key = session.spec
+            self._stage.draw_baseline(None)
+            self._quick.content = WAIT
+            session.side_job(
+                "baseline", session.store, key, name, on_end=lambda view: self._measured(label, key, view)
+            )
+        self._arrange()
+
+    def _measured(self, label: str, spec: Spec, view: BaselineView | None) -> None:
+        if spec != self.session.spec:
+            return
+        self._quick.content = ""
+        if view is None:
+            self._shown.value = AFTER
+        else:
+            self._baselines[label] = view
+            self._quick.content = note_html(view)
+            self._tell_numbers()
+            if self._shown.value == label:
+                self._stage.draw_baseline(view.mesh)
+        self._arrange()
+
+    def _picked_coloring(self) -> None:
+        self._holes.unfill()
+        self._legend.content = legend_html(COLORINGS[self._coloring.value], self._has_truth())
+        if self._view is not None:
+            self._take(self._view)
+
+    def _has_truth(self) -> bool:
+        scene: SceneView | None = self.session.results.view("scene")
+        return scene is not None and scene.has_truth
+
+    def _arrange(self) -> None:
+        scene: SceneView | None = self.session.results.view("scene")
+        with self.session.target.atomic():
+            self._stage.shown = self._shown.value
+            place = None if scene is None else stage_of(scene.nodes)
+            self._stage.arrange(place, bool(self._loops.value), self._rolling.showing)
+            baseline = self._shown.value in BASELINES
+            self._coloring.disabled = baseline  # its vertices are no points with a source
+            self._legend.visible = bool(self._legend.content) and not baseline
+        self.session.frame_view()
+
+    # The folders.
+
+    def _sweep(self, button: str) -> None:
+        session = self.session
+        if button != SWEEP:
+            session.cancel_side_job()
+        elif session.results.view("fuse") is not None:
+            load = self._advice.load
+            session.side_job("sweep", session.store, session.spec, on_partial=load, on_end=load)
+
+    def _load_holes(self) -> None:
+        if self._view is not None and self._view.holes:
+            shown = None if self.wide or self._shown.value in BASELINES else self._stage.which[0]
+            self._holes.load(self._view.holes, shown)
+
+    def _clicked(self, event: Any) -> None:
+        """Explain the hole that was clicked."""
+        frame = self.scene.get_handle_by_name(self.drawn_below)
+        if frame is None or not frame.visible or self._rolling.showing or self._shown.value in BASELINES:
+            return
+        origin_m, direction = np.array(event.ray_origin), np.array(event.ray_direction)
+        for which in self._stage.which:
+            if self._holes.picked(origin_m, direction, which, self._stage.offset_m(which)):
+                self._by_click = True
+                return
+
+    def _explain(self, which: Which, index: int) -> None:
+        session = self.session
+        if session.results.fresh("surface", session.spec):
+            session.quick_job("explain", session.store, session.spec, which, index, on_end=self._explained)
+        else:
+            self._explained(None)  # the holes listed are of a surface that is being made anew
+
+    def _explained(self, answer: ExplainView | None) -> None:
+        self._holes.tell(answer)
+        if answer is not None and self._by_click:
+            self.session.notify(answer.reason.capitalize(), f"{answer.sentence} {answer.remedy}", "blue")
+        self._by_click = False
+
+    def _fill(self, longest_m: float | None) -> None:
+        session = self.session
+        if longest_m is None:
+            self._filled(None)
+        else:
+            session.side_job("fill", session.store, session.spec, 100.0 * longest_m, on_end=self._filled)
+
+    def _filled(self, view: FilledView | None) -> None:
+        with self.session.target.atomic():
+            self._holes.filled(view)
+            if view is not None and self._holes.filling:
+                self._stage.draw("after", view.mesh)
+                self._look_quickly.sent()
+            elif self._view is not None:
+                self._take(self._view)
+
+    def _watch(self, wish: WalkWish | None) -> None:
+        session = self.session
+        if wish is None:
+            session.cancel_side_job()
+            self._close_walk()
+            self._arrange()
+        elif session.results.view("fuse") is not None:
+            spec = session.spec
+            session.side_job("walk", session.store, spec, wish, on_end=lambda view: self._walked(spec, view))
+
+    def _close_walk(self) -> None:
+        """Take the walk away, and stand back again after a close-up."""
+        near = self._rolling.focus is not None
+        self._rolling.forget()
+        if near:
+            self.session.frame_view(anew=True)
+
+    def _walked(self, spec: Spec, view: WalkView | None) -> None:
+        if spec != self.session.spec:
+            return
+        self._rolling.load(view)
+        self._arrange()
+        if self._rolling.focus is not None:
+            look_closely(self.session.clients(), *self._rolling.focus)
+        else:
+            self.session.frame_view(anew=True)
+
+    def _take_look(self, look: SurfaceLook) -> None:
+        """Set the controls as a stop of the lesson says; what needs the surface waits for it."""
+        session = self.session
+        with session.target.atomic():
+            self._shown.value = look.shown
+            self._coloring.value = next(name for name, key in COLORINGS.items() if key == look.coloring)
+            self._loops.value = look.rims
+            self._close_walk()
+            self._picked_coloring()
+        self._look = look
+        rule: RadiusRule = "thesis+" if look.rule == "manual" else look.rule
+        wanted = replace(
+            session.spec.config.surface,
+            max_points=look.max_points,
+            smoothing_passes=look.smoothing_passes,
+        )
+        if look.rule != "manual" or wanted != session.spec.config.surface:
+            session.edit(
+                lambda config: replace(config, surface=replace(wanted, radius_rule=rule, radii_m=()))
+            )
+        if self._view is not None and session.results.fresh("surface", session.spec):
+            self._take(self._view)
+
+    def _show_look(self) -> None:
+        """What the stop wants of the surface that has just come."""
+        look, session = self._look, self.session
+        if look is None or self._view is None or not session.results.fresh("surface", session.spec):
+            return
+        if look.radius_in_r_F is not None:
+            self._look = replace(look, radius_in_r_F=None)
+            self._take_radius(look.radius_in_r_F * self._view.spacing.r_F_m)
+            if session.results.fresh("surface", session.spec):
+                self._show_look()
+            return
+        self._look = None
+        if look.shown in BASELINES:
+            self._shown.value = look.shown
+        self._picked_shown()
+        if look.holes:
+            self._holes.choose_largest()
+        if look.watch != "off":
+            self._rolling.watch(look.watch == "close up")

@@ -1,0 +1,99 @@
+"""Surfaces of a radius while a hand moves it: always the newest, and no faster than the browser draws."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import viser
+
+from app.acknowledgement import Echo
+from app.debounce import Delay
+from app.records import PaintedView, PaintWish
+from app.screens.surface.detail import Detail
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+QUIET_S = 0.4
+"""When the radius has not moved for so long, it rests."""
+
+
+class QuickLook:
+    """One surface at a time: rolled, sent, drawn; then that of where the hand is by now."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        session: Session,
+        on_view: Callable[[PaintedView], None],
+        on_drawn: Callable[[], None],
+        on_rest: Callable[[], None],
+    ) -> None:
+        """Add the hidden parts to the current container.
+
+        Args:
+            gui: where to add them.
+            session: runs the jobs.
+            on_view: called with each surface; it is to draw it and to call ``sent``.
+            on_drawn: called when what was sent last stands on the screen.
+            on_rest: called when the radius rests.
+        """
+        self._session, self._on_view, self._on_drawn, self._on_rest = session, on_view, on_drawn, on_rest
+        self._settle = Delay(QUIET_S, lambda: session.post(self._rest))
+        self._echo = Echo(gui, session.post, self._drawn)
+        self._next: PaintWish | None = None
+        self._rolling = False
+        self._detail = Detail()
+        self._asked_s: float | None = None
+
+    @property
+    def moving(self) -> bool:
+        """Whether the radius has not come to rest."""
+        return self._settle.pending
+
+    def want(self, wish: PaintWish) -> None:
+        """The radius has moved."""
+        if not self.moving:
+            self._echo.hold()
+        self._settle.restart()
+        self._next = wish
+        self._go_on()
+
+    def sent(self, vertices: Sequence[int] = ()) -> None:
+        """Surfaces are on their way to the browser; quick ones, of so many vertices each."""
+        self._echo.ask(vertices, hold=self.moving)
+
+    def close(self) -> None:
+        """End the timers."""
+        self._settle.cancel()
+        self._echo.close()
+
+    def _go_on(self) -> None:
+        session, wish = self._session, self._next
+        ready = session.results.fresh("fuse", session.spec)
+        if ready and wish is not None and not self._rolling and not self._echo.waiting:
+            self._rolling, self._next = True, None
+            self._asked_s = time.monotonic()
+            wish = replace(wish, most_points=self._detail.points)
+            session.quick_job("paint", session.store, session.spec, wish, on_end=self._came)
+
+    def _came(self, view: PaintedView | None) -> None:
+        self._rolling = False
+        if view is not None:
+            self._on_view(view)
+        if not self._echo.waiting:
+            self._go_on()
+
+    def _drawn(self) -> None:
+        if self._asked_s is not None:
+            self._detail.took(time.monotonic() - self._asked_s)
+            self._asked_s = None
+        self._on_drawn()
+        self._go_on()
+
+    def _rest(self) -> None:
+        self._next = None
+        self._on_rest()

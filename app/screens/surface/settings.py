@@ -1,0 +1,44 @@
+"""The settings of the ball: fields with a control of their own, and what the radius slider sets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from app.controls import Number
+from app.records import SpacingView
+from pipeline.config import PipelineConfig, RadiusRule
+
+ADVANCED = (
+    Number(
+        "Points",
+        "surface.max_points",
+        2_000,
+        60_000,
+        1_000,
+        hint="The clouds are voxel-averaged to about this many points before the ball rolls.",
+    ),
+    Number(
+        "Smoothing passes",
+        "surface.smoothing_passes",
+        0,
+        5,
+        1,
+        hint="How often every point is moved along its normal onto the plane of its neighbours. "
+        "0 leaves the sensor's noise in, as the thesis does, and the ball gets caught in it.",
+    ),
+)
+
+
+def with_rule(rule: RadiusRule, radius_mm: float) -> Callable[[PipelineConfig], PipelineConfig]:
+    """The edit that chooses a radius rule; the manual one rolls a single ball."""
+    radii_m = (round(float(radius_mm), 3) / 1000.0,) if rule == "manual" else ()
+    return lambda config: replace(config, surface=replace(config.surface, radius_rule=rule, radii_m=radii_m))
+
+
+def slider_range_mm(spacing: SpacingView, radii_m: Sequence[float]) -> tuple[float, float]:
+    """From half the spacing of the points to balls that are clearly too large."""
+    widest_m = 1.5 * (spacing.r_F_m + 4.0 * spacing.sigma_D_m)
+    most_m = max(*radii_m, widest_m, 6.5 * spacing.r_F_m)
+    return max(0.5, math.floor(500.0 * spacing.r_F_m)), math.ceil(1000.0 * most_m)

@@ -1,0 +1,81 @@
+"""Which surfaces stand where in the 3-D scene."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from app.drawing.cameras import Stage
+from app.records import MeshView, PaintedMesh, Which
+from app.screens.surface.draw import SurfaceDrawing
+from app.screens.surface.labels import AFTER, BASELINES, BEFORE, BOTH
+from pipeline.types import FloatArray
+
+
+class SurfaceStage:
+    """The surfaces after and before fusion, and a baseline's, of which some are shown."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        """Draw below "/surface"."""
+        self._drawings: dict[Which, SurfaceDrawing] = {
+            "after": SurfaceDrawing(scene, "/surface/after", AFTER),
+            "before": SurfaceDrawing(scene, "/surface/before", BEFORE),
+        }
+        self._drawn: dict[Which, MeshView | PaintedMesh] = {}
+        self._baseline = SurfaceDrawing(scene, "/surface/baseline", "baseline")
+        self.shown = AFTER
+        """One of ``app.screens.surface.labels.SHOWN``."""
+        self._offset_m: FloatArray = np.zeros(3)
+
+    @property
+    def which(self) -> tuple[Which, ...]:
+        """The ball's surfaces that are shown, or that stand ready behind a baseline."""
+        if self.shown == BOTH:
+            return ("after", "before")
+        return ("before",) if self.shown == BEFORE else ("after",)
+
+    def offset_m(self, which: Which) -> FloatArray:
+        """(3,) from the middle of the scene to a surface."""
+        return self._offset_m if which == "after" else -self._offset_m
+
+    def draw(self, which: Which, mesh: MeshView | PaintedMesh, unseen: bool = False) -> bool:
+        """Draw one of the ball's surfaces; False if it is drawn already.
+
+        Args:
+            which: which one.
+            mesh: what it is now.
+            unseen: whether the browser draws nothing until it has this one.
+        """
+        if which in self._drawn and self._drawn[which].glb == mesh.glb:
+            return False
+        self._drawings[which].draw(mesh, unseen)
+        self._drawn[which] = mesh
+        return True
+
+    def draw_baseline(self, mesh: MeshView | None) -> None:
+        """Draw a baseline's surface, or none."""
+        self._baseline.clear()
+        if mesh is not None:
+            self._baseline.draw(mesh)
+
+    def arrange(self, place: Stage | None, loops: bool, hidden: bool) -> None:
+        """Show what is to be shown, two side by side.
+
+        Args:
+            place: where the scene is; None before there is one.
+            loops: whether the rims of holes are drawn.
+            hidden: whether something else is watched instead.
+        """
+        both = self.shown == BOTH and place is not None
+        self._offset_m = 0.55 * place.width_m * place.right if both and place is not None else np.zeros(3)
+        top_m = place.top_m if both and place is not None else None
+        baseline = self.shown in BASELINES
+        for which, drawing in self._drawings.items():
+            visible = which in self.which and not hidden and not baseline
+            drawing.show(visible, loops, self.offset_m(which), top_m)
+        self._baseline.show(baseline and not hidden, loops, np.zeros(3), None)
+
+    def drop_old(self) -> None:
+        """Take away what a newer mesh has replaced, once that one stands on the screen."""
+        for drawing in self._drawings.values():
+            drawing.drop_old()

@@ -1,0 +1,158 @@
+"""What each ball radius of a sweep does: rays and accuracy above, triangles and time below."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+
+from app.drawing.colors import DELIVERED, INFERRED, LOSS, NEUTRAL, SOURCE, TARGET, css
+from app.screens.surface.sweep_view import SweepRow, SweepView
+
+NO_HIT, ACCURATE, LEFT, RIGHT = css(LOSS), css(TARGET), css(NEUTRAL), css(INFERRED)
+WORK, POINTS = "triangles and time", "unused points and hole area"
+BELOW = (WORK, POINTS)
+"""What the lower plot shows."""
+TICKS_MM = (1, 2, 5, 10, 20, 50, 100, 200, 500)
+AXIS_ENDS = (0.47, 6.4)
+"""Of a whole sweep, in r_F."""
+LEVEL_SHARE = 0.01
+"""Larger balls that close less than this share of the rays close nothing worth speaking of."""
+
+
+def sweep_figure(view: SweepView | None, below: str = WORK) -> go.Figure:
+    """Two plots above each other over the radius in millimetres, on a logarithmic axis.
+
+    Args:
+        view: the balls; an empty figure without.
+        below: one of ``BELOW``.
+    """
+    figure = go.Figure()
+    left, right = ("triangles", "ball, ms") if below == WORK else ("unused, %", "holes, m²")
+    figure.update_layout(
+        template="plotly_white",
+        margin={"l": 48, "r": 48, "t": 20, "b": 36},
+        xaxis=_radius_axis(view),
+        yaxis={"title": _titled(("no hit", NO_HIT), ("≤ 1 cm, %", ACCURATE)), "range": [0, 104]},
+        yaxis2={"title": _titled((left, LEFT)), "rangemode": "tozero"},
+        yaxis3={"title": _titled((right, RIGHT)), "rangemode": "tozero", "showgrid": False},
+        showlegend=False,
+        font={"size": 11},
+        hovermode="closest",
+    )
+    figure.update_layout(
+        yaxis={"domain": [0.56, 1.0], "nticks": 4},
+        yaxis2={"domain": [0.0, 0.46], "nticks": 4},
+        yaxis3={"overlaying": "y2", "side": "right", "nticks": 4},
+    )
+    if view is not None and view.points:
+        _fill(figure, view, below)
+    return figure
+
+
+def _fill(figure: go.Figure, view: SweepView, below: str) -> None:
+    rows = view.points
+    _curve(figure, rows, [100 * row.no_hit_ray_share for row in rows], "y", NO_HIT, ".1f", "% of rays miss")
+    accuracies = [100 * row.accuracy_1cm for row in rows]
+    if not np.isnan(accuracies).all():
+        _curve(figure, rows, accuracies, "y", ACCURATE, ".1f", "% of the surface within 1 cm of the truth")
+    if below == WORK:
+        _curve(figure, rows, [row.triangles for row in rows], "y2", LEFT, ",d", "triangles")
+        _curve(figure, rows, [1000 * row.elapsed_s for row in rows], "y3", RIGHT, ".0f", "ms for the ball")
+    else:
+        unused = [100 * row.unused_share for row in rows]
+        _curve(figure, rows, unused, "y2", LEFT, ".1f", "% of the points unused")
+        _curve(figure, rows, [row.hole_area_m2 for row in rows], "y3", RIGHT, ".3f", "m² of holes")
+    _line(figure, view.r_F_m, "r<sub>F</sub>", css(DELIVERED), "right")
+    _line(figure, view.r_F_m + view.sigma_D_m, "r<sub>F</sub>+σ<sub>D</sub>", css(SOURCE), "left")
+
+
+def sweep_sentence(view: SweepView) -> str:
+    """What the sweep says: from where on larger balls close hardly anything, and what they cost."""
+    rows = [row for row in view.points if row.triangles]
+    if not rows:
+        return "No ball of the sweep leaves a triangle."
+    missed = np.array([row.no_hit_ray_share for row in rows])
+    best = int(missed.argmin())
+    level = int(np.flatnonzero(missed < missed[best] + LEVEL_SHARE)[0])
+    start, last = rows[level], rows[-1]
+    parts = [
+        f"From {_mm(start)} on, larger balls close less than {LEVEL_SHARE:.0%} more of the rays "
+        f"({start.no_hit_ray_share:.1%} miss)"
+    ]
+    if missed[-1] >= missed[best] + LEVEL_SHARE:
+        parts.append(f"the widest, {_mm(last)}, misses {missed[-1]:.1%} again")
+    if level < len(rows) - 1 and math.isfinite(start.accuracy_1cm):
+        parts.append(f"accuracy within 1 cm {_went(start.accuracy_1cm, last.accuracy_1cm)} up to {_mm(last)}")
+    return "; ".join(parts) + "."
+
+
+def _mm(row: SweepRow) -> str:
+    return f"{1000 * row.radius_m:.0f} mm"
+
+
+def _went(first: float, last: float) -> str:
+    """Compared as they are written, so that no rise from 93 % to 93 % is told."""
+    before, after = round(100 * first), round(100 * last)
+    if before == after:
+        return f"stays at {after} %"
+    return f"{'falls' if after < before else 'rises'} from {before} to {after} %"
+
+
+def _titled(*parts: tuple[str, str]) -> str:
+    return ", ".join(f"<span style='color:{color}'>{text}</span>" for text, color in parts)
+
+
+def _radius_axis(view: SweepView | None) -> dict[str, object]:
+    axis: dict[str, object] = {
+        "title": "ball radius, mm",
+        "type": "log",
+        "tickvals": TICKS_MM,
+        "anchor": "y2",
+    }
+    if view is not None and view.points:
+        # From the first ball on as wide as for all, so that the curves grow without a jump.
+        widest_m = max(AXIS_ENDS[1] * view.r_F_m, 1.05 * view.points[-1].radius_m)
+        ends_mm = 1000 * AXIS_ENDS[0] * view.r_F_m, 1000 * widest_m
+        axis["range"] = [math.log10(end_mm) for end_mm in ends_mm]
+    return axis
+
+
+def _curve(
+    figure: go.Figure,
+    rows: Sequence[SweepRow],
+    values: Sequence[float],
+    axis: str,
+    color: str,
+    digits: str,
+    unit: str,
+) -> None:
+    figure.add_scatter(
+        x=[1000 * row.radius_m for row in rows],
+        y=list(values),
+        yaxis=axis,
+        mode="lines+markers",
+        line={"color": color, "width": 2},
+        marker={"size": 5},
+        hovertemplate=f"%{{x:.1f}} mm: %{{y:{digits}}} {unit}<extra></extra>",
+    )
+
+
+def _line(figure: go.Figure, at_m: float, label: str, color: str, side: str) -> None:
+    """A line over both plots; its label stands beside its upper end, so that two labels never meet."""
+    x = 1000.0 * at_m
+    figure.add_shape(
+        type="line", x0=x, x1=x, y0=0, y1=1, yref="paper", line={"color": color, "width": 1.5, "dash": "dot"}
+    )
+    figure.add_annotation(
+        x=math.log10(x),  # unlike shapes, annotations count a logarithmic axis in exponents
+        y=1.0,
+        yref="paper",
+        yanchor="bottom",
+        xanchor=side,
+        text=label,
+        showarrow=False,
+        font={"color": color},
+    )

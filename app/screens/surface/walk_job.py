@@ -1,0 +1,94 @@
+"""The ball's walk over the clouds of a spec, from pivot to pivot on a patch or in batches over all points."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+
+from app.chain import ball_clouds
+from app.screens.surface.walk_view import Happening, WalkView, WalkWish
+from app.state import Spec
+from app.store import Store
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from pipeline.surface import radii
+from pipeline.surface.pivoting import roll
+from pipeline.surface.walk import Kind, Walk, ball_on_arc, hole_on_flat_ground, iterate_walk, nearest_rows
+from pipeline.types import FloatArray, PointCloud
+
+PATCH_POINTS = 550
+PLACES = 10
+"""Places of the ball on one arc."""
+BATCHES = 170
+HAPPENINGS: dict[int, Happening] = {Kind.SEED: "seed", Kind.JOIN: "join", Kind.GLUE: "glue"}
+
+
+def walk_job(store: Store, spec: Spec, wish: WalkWish) -> Generator[Progress, None, WalkView]:
+    """Roll the spec's balls and keep every step.
+
+    Raises:
+        InputError: the cloud has no points, or the patch's centre is not finite.
+        ReconstructionError: no ball finds three points to rest on.
+    """
+    clouds = yield from ball_clouds(store, spec)
+    radii_m = radii(spec.config.surface, clouds.spacing.r_F_m, clouds.spacing.sigma_D_m)
+    cloud = clouds.fused if wish.which == "after" else clouds.sensor
+
+    def walk() -> Generator[Progress, None, WalkView]:
+        yield Progress("choosing where to look", 0.0)
+        return (yield from walk_over(cloud, radii_m, wish))
+
+    return (yield from store.remember(("walk", *spec.key("surface"), wish), walk))
+
+
+def walk_over(
+    cloud: PointCloud, radii_m: tuple[float, ...], wish: WalkWish
+) -> Generator[Progress, None, WalkView]:
+    """The walk over a cloud with normals, or over a patch of it; raises as ``walk_job``."""
+    if wish.close_up:
+        cloud = cloud.select(nearest_rows(cloud.points_m, _center_m(cloud, radii_m, wish), PATCH_POINTS))
+    batch = 1 if wish.close_up else max(1, 2 * len(cloud) // BATCHES)
+    walk = yield from iterate_walk(cloud.points_m, cloud.normals, radii_m, batch)
+    return _view_of(cloud, walk, wish)
+
+
+def _center_m(cloud: PointCloud, radii_m: tuple[float, ...], wish: WalkWish) -> FloatArray:
+    if wish.center_m is not None:
+        return np.array(wish.center_m)
+    triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
+    assert cloud.normals is not None  # or the ball would not have rolled
+    return hole_on_flat_ground(cloud.points_m, cloud.normals, triangles, PATCH_POINTS)
+
+
+def _view_of(cloud: PointCloud, walk: Walk, wish: WalkWish) -> WalkView:
+    if cloud.normals is None:
+        raise InputError("Ball pivoting needs normals and the cloud has none; try to estimate them first")
+    last = walk.step_ends - 1
+    if wish.close_up:
+        shares = np.arange(1, PLACES + 1) / PLACES
+        places_m = np.stack([ball_on_arc(walk, last, share) for share in shares], axis=1)
+        idle = np.diff(walk.step_ends, prepend=0) == 0
+        places_m[idle] = walk.ball_centers_m[last[idle], None]
+        kinds = np.where(idle, -1, walk.kind[last]).tolist()
+        happenings = tuple(HAPPENINGS.get(kind, "end") for kind in kinds)
+    else:
+        places_m, happenings = walk.ball_centers_m[last, None], ()
+    center_m = np.median(cloud.points_m, axis=0)
+    outward = cloud.normals.mean(axis=0)
+    return WalkView(
+        wish,
+        cloud.points_m.astype(np.float32),
+        cloud.colors,
+        walk.triangles.astype(np.int32),
+        walk.radii_m,
+        walk.step_ends.astype(np.int32),
+        walk.step_radius,
+        places_m.astype(np.float32),
+        happenings,
+        walk.glued_by,
+        walk.left_front.astype(np.uint16),
+        center_m,
+        float(np.linalg.norm(cloud.points_m - center_m, axis=1).max()),
+        outward / max(float(np.linalg.norm(outward)), 1e-9),
+    )

@@ -1,0 +1,128 @@
+"""Honest holes: real sensor depth hidden in the shapes in which that sensor loses it (SPEC 3.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.types import BoolArray, DepthMap, IntArray
+
+MIN_HOLE_PX = 4
+LARGEST_HOLE = 0.05
+"""Holes that take a larger share of the image are what the sensor did not see, not shapes to move."""
+EDGE_STEP = 1.08
+"""Ratio of the depths within 5 x 5 pixels that makes a depth edge."""
+BLOB_RADII = (0.015, 0.05)
+"""Half axes of a blob, in shares of the image's diagonal."""
+LARGEST_SHARE = 0.9
+MOST_MISSES = 100
+
+
+def hide(sensor: DepthMap, rng: np.random.Generator, share: float) -> BoolArray:
+    """Pixels with sensor depth to hide, so that what fills them can be measured.
+
+    Half of what is hidden takes the shapes of the frame's own holes, all of them equally often, turned
+    over and moved anywhere; the other half are elliptic blobs on depth edges, where structured light
+    fails most and filling is hard. A frame without holes gets blobs only, one without depth edges
+    shapes only, and one with neither, or with too few edges for the share, gets blobs anywhere.
+
+    Args:
+        sensor: (H, W) depth with its own holes.
+        rng: draws shapes and places.
+        share: of the pixels with depth that are to be hidden, above 0 and at most 0.9; the last shape
+            may go beyond it.
+
+    Returns:
+        (H, W) True for hidden pixels, all of which have depth.
+
+    Raises:
+        InputError: ``share`` is out of range, or no pixel has depth.
+    """
+    if not 0.0 < share <= LARGEST_SHARE:
+        raise InputError(f"A share of {share} of the depth cannot be hidden; try 0.15.")
+    valid = sensor.valid
+    if not valid.any():
+        raise InputError("The sensor depth has no valid pixel to hide; use another frame.")
+    shapes, edges = hole_shapes(valid), depth_edges(sensor)
+    wanted_px = max(1, round(share * int(valid.sum())))
+    hidden = np.zeros(valid.shape, bool)
+    if shapes:
+        part_px = wanted_px // 2 if edges.any() else wanted_px
+        stamp(hidden, valid, np.argwhere(valid), lambda: moved(shapes, rng), part_px, rng)
+    for places in (edges, valid):
+        if places.any():
+            stamp(hidden, valid, np.argwhere(places), lambda: blob(valid.shape, rng), wanted_px, rng)
+    return hidden
+
+
+def hole_shapes(valid: BoolArray) -> list[BoolArray]:
+    """The holes of 4 pixels to 5 % of the image, each cut out, without the margin the sensor lacks."""
+    field = cv2.boundingRect(valid.astype(np.uint8))
+    inside = valid[field[1] : field[1] + field[3], field[0] : field[0] + field[2]]
+    count, labels, boxes, _ = cv2.connectedComponentsWithStats((~inside).astype(np.uint8), connectivity=8)
+    shapes = []
+    for label in range(1, count):
+        left, top, width, height, area_px = boxes[label]
+        if MIN_HOLE_PX <= area_px <= LARGEST_HOLE * valid.size:
+            shapes.append(labels[top : top + height, left : left + width] == label)
+    return shapes
+
+
+def depth_edges(sensor: DepthMap) -> BoolArray:
+    """(H, W) pixels with depth whose 5 x 5 neighbours' depths differ by more than 8 %."""
+    window = np.ones((5, 5), np.uint8)
+    nearest_m = cv2.erode(np.where(sensor.valid, sensor.z_m, np.inf).astype(np.float32), window)
+    farthest_m = cv2.dilate(np.where(sensor.valid, sensor.z_m, 0.0).astype(np.float32), window)
+    return sensor.valid & (nearest_m < farthest_m / EDGE_STEP)
+
+
+def stamp(
+    hidden: BoolArray,
+    valid: BoolArray,
+    places: IntArray,
+    draw: Callable[[], BoolArray],
+    wanted_px: int,
+    rng: np.random.Generator,
+) -> None:
+    """Press drawn shapes into ``hidden`` (changed in place) until it has ``wanted_px`` pixels.
+
+    Gives up when a hundred shapes one after the other have found nothing left to hide.
+
+    Args:
+        hidden: (H, W) what is hidden so far.
+        valid: (H, W) what can be hidden.
+        places: (N, 2) row and column of the pixels on which shapes may be centred.
+        draw: gives a shape, True where it hides.
+        wanted_px: number of hidden pixels to reach.
+        rng: draws the places.
+    """
+    count_px, misses = int(hidden.sum()), 0
+    while count_px < wanted_px and misses < MOST_MISSES:
+        shape = draw()
+        top, left = places[rng.integers(len(places))] - np.array(shape.shape) // 2
+        rows = slice(max(0, -top), min(shape.shape[0], hidden.shape[0] - top))
+        columns = slice(max(0, -left), min(shape.shape[1], hidden.shape[1] - left))
+        there = (slice(top + rows.start, top + rows.stop), slice(left + columns.start, left + columns.stop))
+        fresh = shape[rows, columns] & valid[there] & ~hidden[there]
+        hidden[there] |= fresh
+        count_px += int(fresh.sum())
+        misses = 0 if fresh.any() else misses + 1
+
+
+def moved(shapes: list[BoolArray], rng: np.random.Generator) -> BoolArray:
+    """One of the shapes, perhaps mirrored across and upside down."""
+    flips = rng.choice([-1, 1], 2)
+    return shapes[rng.integers(len(shapes))][:: flips[0], :: flips[1]]
+
+
+def blob(size_px: tuple[int, int], rng: np.random.Generator) -> BoolArray:
+    """A turned ellipse with half axes of 1.5 to 5 % of the diagonal of an image of (H, W) pixels."""
+    axes_px = np.hypot(*size_px) * rng.uniform(*BLOB_RADII, 2)
+    reach_px = int(np.ceil(axes_px.max()))
+    y, x = np.mgrid[-reach_px : reach_px + 1, -reach_px : reach_px + 1]
+    angle = rng.uniform(0.0, np.pi)
+    along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    return (along / axes_px[0]) ** 2 + (across / axes_px[1]) ** 2 <= 1.0

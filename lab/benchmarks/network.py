@@ -1,0 +1,105 @@
+"""Speed of the simulator: the whole study of SPEC 6.2, on every core, and saturated nodes beside ns-3's."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+from lab.benchmarks.benchmark import Benchmark
+from lab.benchmarks.ns3 import Counts, Row, Run, compare, find_python, run_ns3
+from lab.claims.network.study import RUNS, SCHEMES, STREET, Case
+from lab.claims.network.tasks import TimedRun, timed_run
+from network_sim.config import SchemeName
+from network_sim.replicate import replications
+from packetmesh.batch import run_batch
+from packetmesh.errors import PacketMeshError
+
+OBJECTS = 60
+LONGEST_FIRST: tuple[SchemeName, ...] = ("baseline", "pdc", "greedy")
+"""So that the cores end together."""
+SATURATED: Counts = {"ieee802154": (1, 5), "ieee80211b": (1, 5, 20)}
+SATURATED_S = 10.0
+
+
+def network(
+    objects: int = OBJECTS,
+    horizon_s: float = STREET.run.horizon_s,
+    runs: int = RUNS,
+    saturated_s: float = SATURATED_S,
+) -> Benchmark:
+    """Every scheme with ``objects`` vehicles: five runs of five hours each; saturated nodes, too.
+
+    The time is that of the study, the start of the processes included; the memory that of its process which
+    held most. ns-3 has no such study, so it is a peer of the saturated nodes alone.
+    """
+    tasks = [
+        run for scheme in LONGEST_FIRST for run in replications(Case(scheme, objects).config(horizon_s), runs)
+    ]
+    started = time.perf_counter()
+    timed: list[TimedRun] = [run for _, run in run_batch(timed_run, tasks)]
+    elapsed_s = time.perf_counter() - started
+    total = {
+        "scheme": "all",
+        "elapsed_s": elapsed_s,
+        "simulated_s_per_s": sum(run.simulated_s for run in timed) / elapsed_s,
+        "events_per_s": sum(run.events for run in timed) / elapsed_s,
+    }
+    timed.sort(key=lambda run: (SCHEMES.index(run.scheme), run.seed))
+    rows, missing = _saturated(saturated_s)
+    return Benchmark(
+        elapsed_s,
+        {},
+        max(run.peak_memory_bytes for run in timed),
+        runs=(total, *(asdict(run) for run in timed), *map(_record, rows)),
+        notes=(
+            f"study: {total['simulated_s_per_s']:,.0f} simulated s and {total['events_per_s']:,.0f} lines of "
+            "the trace in a second",
+            *map(_note, rows),
+            *missing,
+        ),
+    )
+
+
+def _saturated(seconds: float) -> tuple[list[Row], list[str]]:
+    """Saturated nodes in both programs, and why not in ns-3."""
+    try:
+        theirs, _ = run_ns3(find_python(), SATURATED, seconds)
+    except PacketMeshError as error:
+        return compare(SATURATED, {}, seconds), [str(error)]
+    return compare(SATURATED, theirs, seconds), []
+
+
+def _record(row: Row) -> dict[str, Any]:
+    """Rates of both programs, and wall time and throughput of network_sim over ns-3's; None without ns-3."""
+    return {
+        "mac": row.mac,
+        "nodes": row.nodes,
+        "network_sim": _rates(row.network_sim),
+        "ns3": row.ns3 and _rates(row.ns3),
+        "time_ratio": row.time_ratio,
+        "throughput_ratio": row.ratio,
+        "verdict": row.verdict,
+    }
+
+
+def _rates(run: Run) -> dict[str, float]:
+    return {"simulated_s_per_s": run.simulated_s_per_s, "kernel_events_per_s": run.events_per_s}
+
+
+def _note(row: Row) -> str:
+    said = f"{row.mac}, {row.nodes} saturated: {_rates_text(row.network_sim)}"
+    if row.ns3:
+        said += (
+            f"; ns-3: {_rates_text(row.ns3)}; wall time {row.time_ratio:.2f} and "
+            f"throughput {row.ratio:.3f} of ns-3's ({row.verdict})"
+        )
+    return said
+
+
+def _rates_text(run: Run) -> str:
+    return f"{run.simulated_s_per_s:,.1f} simulated s and {run.events_per_s:,.0f} kernel events in a second"
+
+
+CASES: dict[str, Callable[[], Benchmark]] = {"network": network}

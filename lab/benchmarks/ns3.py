@@ -1,0 +1,223 @@
+"""Saturated nodes around one sink in network_sim and in ns-3: what they carry, and what it costs.
+
+ns-3 runs ``ns3_runs.py`` in an interpreter of its own, IEEE 802.11b twice: as ns-3 comes, and strict, which
+means that a receiver notices every frame.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from network_sim.config import MacConfig, MacKind, NetworkConfig, NodesConfig
+from network_sim.mac import dcf, ieee802154
+from network_sim.mac.saturation import saturation
+from packetmesh.errors import PacketMeshError
+
+TOLERANCE = 0.05
+RADIUS_M = 10.0
+SEED = 1
+UDP_IP_BYTES = 28
+RUNS = Path(__file__).with_name("ns3_runs.py")
+IMPORTS_NS3 = "import importlib.util, sys; sys.exit(importlib.util.find_spec('ns') is None)"
+PYTHON_VARIABLE = "PACKETMESH_NS3_PYTHON"
+"""Names an interpreter that has ns-3's bindings."""
+
+Counts = Mapping[MacKind, tuple[int, ...]]
+"""With how many nodes each medium access runs."""
+
+NODES: Counts = {"ieee802154": (1, 2, 3, 4, 5), "ieee80211b": (1, 2, 3, 5, 10, 20)}
+CONFIGS: dict[MacKind, NetworkConfig] = {
+    "ieee802154": NetworkConfig(
+        mac=MacConfig(kind="ieee802154"), nodes=NodesConfig(payload_bytes=116, spacing_m=RADIUS_M)
+    ),
+    "ieee80211b": NetworkConfig(
+        mac=MacConfig(kind="ieee80211b"),
+        nodes=NodesConfig(payload_bytes=1000 + UDP_IP_BYTES, header_bytes=UDP_IP_BYTES, spacing_m=RADIUS_M),
+    ),
+}
+CONSTANTS: dict[MacKind, dict[str, float]] = {
+    "ieee802154": {
+        "backoff": ieee802154.BACKOFF_NS / 1e3,
+        "turnaround": ieee802154.TURNAROUND_NS / 1e3,
+        "ACK wait": ieee802154.ACK_WAIT_NS / 1e3,
+        "LIFS": ieee802154.spacing_ns(127) / 1e3,
+        "BE at first": ieee802154.MIN_BE,
+        "BE at most": ieee802154.MAX_BE,
+        "backoffs again": ieee802154.MAX_CSMA_BACKOFFS,
+        "retries": ieee802154.MAX_FRAME_RETRIES,
+    },
+    "ieee80211b": {
+        "slot": dcf.SLOT_NS / 1e3,
+        "SIFS": dcf.SIFS_NS / 1e3,
+        "DIFS": dcf.DIFS_NS / 1e3,
+        "EIFS": dcf.EIFS_NS / 1e3,
+        "data frame": dcf.data_ns(1000 + UDP_IP_BYTES) / 1e3,
+        "ACK": dcf.ACK_NS / 1e3,
+        "ACK wait": dcf.ANSWER_WAIT_NS / 1e3,
+        "CW at first": dcf.MIN_WINDOW - 1,
+        "CW at most": dcf.MAX_WINDOW - 1,
+        "attempts": dcf.ATTEMPTS,
+    },
+}
+"""Of network_sim, times in microseconds, by the names that ``ns3_runs.py`` gives to ns-3's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What saturated nodes got in one program, and what it cost."""
+
+    throughput_bps: float
+    """Payload at the sink."""
+    delivery_ratio: float
+    """Share of packets that reached it before they were given up."""
+    attempts: float
+    """Frames sent for each packet that reached it."""
+    wall_per_s: float
+    """Wall seconds for a simulated second."""
+    events_per_s: float
+    """Events of the program's own kernel in a wall second; ns-3 has more of them for a frame."""
+
+    @property
+    def simulated_s_per_s(self) -> float:
+        """Simulated seconds in a wall second."""
+        return 1.0 / self.wall_per_s
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """The same scenario in both programs."""
+
+    mac: MacKind
+    nodes: int
+    network_sim: Run
+    ns3: Run | None
+    """None if it did not run, and so are the ratios."""
+    ns3_strict: Run | None
+    ratio: float | None
+    """Throughput of network_sim over ns-3's as it comes."""
+    ratio_strict: float | None
+    """The same over that of the strict ns-3."""
+
+    @property
+    def time_ratio(self) -> float | None:
+        """Wall time of network_sim over ns-3's as it comes."""
+        return self.network_sim.wall_per_s / self.ns3.wall_per_s if self.ns3 else None
+
+    @property
+    def verdict(self) -> str:
+        """How well they agree."""
+        if self.ratio is None:
+            return "ns-3 did not run"
+        if abs(self.ratio - 1.0) <= TOLERANCE:
+            return "agrees"
+        if self.ratio_strict is not None and abs(self.ratio_strict - 1.0) <= TOLERANCE:
+            return "agrees if strict"
+        return "differs"
+
+
+Theirs = dict[tuple[MacKind, int, bool], Run]
+"""Runs in ns-3 by medium access, nodes and whether it was strict."""
+
+
+def run_ours(mac: MacKind, nodes: int, seconds: float) -> Run:
+    """One run in network_sim."""
+    started = time.perf_counter()
+    got = saturation(CONFIGS[mac], nodes, seconds, SEED)
+    wall_s = time.perf_counter() - started
+    arrived = got.delivery_ratio * got.packets
+    return Run(
+        got.throughput_bps,
+        got.delivery_ratio,
+        got.attempts / arrived,
+        wall_s / seconds,
+        got.kernel_events / wall_s,
+    )
+
+
+def run_ns3(python: str, counts: Counts, seconds: float) -> tuple[Theirs, dict[str, dict[str, float]]]:
+    """All runs in ns-3, in an interpreter of its own.
+
+    Returns:
+        The runs; ns-3's constants like ``CONSTANTS``.
+
+    Raises:
+        PacketMeshError: ns-3 failed.
+    """
+    keys = [
+        (mac, nodes, strict)
+        for mac, node_counts in counts.items()
+        for nodes in node_counts
+        for strict in ((False, True) if mac == "ieee80211b" else (False,))
+    ]
+    scenarios = [
+        {
+            "mac": mac,
+            "nodes": nodes,
+            "payload_bytes": CONFIGS[mac].nodes.payload_bytes,
+            "radius_m": RADIUS_M,
+            "seconds": seconds,
+            "seed": SEED,
+            "strict": strict,
+        }
+        for mac, nodes, strict in keys
+    ]
+    done = subprocess.run([python, str(RUNS), json.dumps(scenarios)], capture_output=True, text=True)
+    if done.returncode:
+        raise PacketMeshError(f"ns-3 failed in {python}: {done.stderr.strip()[-2000:]}")
+    got = json.loads(done.stdout.splitlines()[-1])
+    runs = zip(keys, got["runs"], strict=True)
+    return {key: ns3_run(key[0], one, seconds) for key, one in runs}, got["constants"]
+
+
+def ns3_run(mac: MacKind, got: dict[str, float], seconds: float) -> Run:
+    """A run from what ``ns3_runs.py`` counted."""
+    nodes = CONFIGS[mac].nodes
+    data_bits = 8 * (nodes.payload_bytes - nodes.header_bytes)
+    return Run(
+        throughput_bps=got["arrived"] * data_bits / got["counted_s"],
+        delivery_ratio=got["arrived"] / got["packets"],
+        attempts=got["frames"] / got["arrived"],
+        wall_per_s=got["wall_s"] / seconds,
+        events_per_s=got["events"] / got["wall_s"],
+    )
+
+
+def compare(counts: Counts, theirs: Theirs, seconds: float) -> list[Row]:
+    """The same scenarios in network_sim, beside ns-3's runs where there are any."""
+    rows = []
+    for mac, node_counts in counts.items():
+        for nodes in node_counts:
+            ours = run_ours(mac, nodes, seconds)
+            plain, strict = theirs.get((mac, nodes, False)), theirs.get((mac, nodes, True))
+            rows.append(Row(mac, nodes, ours, plain, strict, _ratio(ours, plain), _ratio(ours, strict)))
+    return rows
+
+
+def _ratio(ours: Run, theirs: Run | None) -> float | None:
+    return ours.throughput_bps / theirs.throughput_bps if theirs else None
+
+
+def find_python(given: str | None = None) -> str:
+    """An interpreter that has ns-3: the one given, or the one that the environment names, or this one.
+
+    Raises:
+        PacketMeshError: it cannot import ns-3.
+    """
+    python = given or os.environ.get(PYTHON_VARIABLE) or sys.executable
+    try:
+        found = not subprocess.run([python, "-c", IMPORTS_NS3], capture_output=True).returncode
+    except OSError:
+        found = False
+    if not found:
+        raise PacketMeshError(
+            f"ns-3 was not found: {python} cannot import it; try `python3.11 -m venv ns3env`, "
+            f"`ns3env/bin/pip install ns3` and {PYTHON_VARIABLE}=ns3env/bin/python"
+        )
+    return python

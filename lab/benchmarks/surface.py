@@ -1,0 +1,271 @@
+"""How long balls take to roll, and how much memory: ours and the peers', each in a process of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import multiprocessing
+import statistics
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from packetmesh.memory import peak_memory_bytes
+from pipeline.config import PRESETS
+from pipeline.depth import DepthNetwork
+from pipeline.io.demos import load_demo
+from pipeline.open3d_runtime import o3d
+from pipeline.rays import tensor, triangle_scene
+from pipeline.reconstruct import merged_clouds, prepare_node
+from pipeline.surface import measure_quality, smooth, spacing, voxel_average, voxel_for_count
+from pipeline.surface.pivoting import roll
+from pipeline.types import FloatArray, IntArray, PointCloud
+
+logger = logging.getLogger(__name__)
+
+OURS = "packetmesh"
+ROOM = "living room"
+ROUGH_ROOM = "living room, not smoothed"
+TERRAIN = "terrain"
+POINTS = 50_000
+MANY_POINTS = 1_000_000
+BALLS: dict[str, tuple[float, ...]] = {
+    "r_F": (1.0,),
+    "1.5 r_F": (1.5,),
+    "2.5 r_F": (2.5,),
+    "4 r_F": (4.0,),
+    "r_F, 1.5, 2.5 and 4 r_F": (1.0, 1.5, 2.5, 4.0),
+}
+"""Multiples of r_F."""
+HEADLINE = "r_F, 1.5, 2.5 and 4 r_F"
+ROUGH_BALLS = ("1.5 r_F", "4 r_F")
+MANY_POINTS_BALLS = ("1.5 r_F", HEADLINE)
+ROUNDS = 3
+SLOW_S = 20.0
+"""A first round longer than this is the only one."""
+MOST_S = 150.0
+"""A program that takes longer for all its rounds is stopped and left out."""
+CLOSE_SHARE = 0.5
+"""A point with the mesh within this share of r_F counts as covered."""
+
+Ball = Callable[[FloatArray, FloatArray, Sequence[float]], tuple[FloatArray, IntArray]]
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceRun:
+    """One program's balls over one cloud."""
+
+    program: str
+    cloud: str
+    balls: str
+    points: int
+    r_F_m: float
+    radii_m: tuple[float, ...]
+    elapsed_s: float
+    """Median of the rounds."""
+    rounds: int
+    first_use_s: float
+    """The first surface of the process, of 100 points: compiled code comes from its cache."""
+    peak_memory_bytes: int
+    """Of a process that does nothing but this, libraries and cloud included."""
+    added_memory_bytes: int
+    """The peak less what the process held before it began."""
+    triangles: int
+    used_share: float
+    """Share of the points that are corners of a triangle."""
+    covered_share: float
+    """Share of the points with the mesh within half of r_F."""
+    non_manifold_edges: int
+    boundary_length_m: float
+
+
+def roll_ours(
+    points_m: FloatArray, normals: FloatArray, radii_m: Sequence[float]
+) -> tuple[FloatArray, IntArray]:
+    """Our own ball: vertices and triangles."""
+    return points_m, roll(points_m, normals, radii_m).triangles
+
+
+def roll_open3d(
+    points_m: FloatArray, normals: FloatArray, radii_m: Sequence[float]
+) -> tuple[FloatArray, IntArray]:
+    """Open3D's."""
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
+    cloud.normals = o3d.utility.Vector3dVector(normals)
+    mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(
+        cloud, o3d.utility.DoubleVector(radii_m)
+    )
+    return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+
+
+def roll_meshlab(
+    points_m: FloatArray, normals: FloatArray, radii_m: Sequence[float]
+) -> tuple[FloatArray, IntArray]:
+    """MeshLab's with its own defaults, once for each radius on what the smaller ones made."""
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet()
+    meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points_m, v_normals_matrix=normals))
+    for radius_m in radii_m:
+        meshes.generate_surface_reconstruction_ball_pivoting(ballradius=pymeshlab.PureValue(radius_m))
+    mesh = meshes.current_mesh()
+    return mesh.vertex_matrix(), mesh.face_matrix()
+
+
+PROGRAMS: dict[str, Ball] = {OURS: roll_ours, "open3d": roll_open3d, "meshlab": roll_meshlab}
+
+
+def available_programs() -> tuple[str, ...]:
+    """Ours first, and the peers that are installed."""
+    return tuple(
+        name for name in PROGRAMS if name != "meshlab" or importlib.util.find_spec("pymeshlab") is not None
+    )
+
+
+def room_cloud(points: int, smoothed: bool = True) -> PointCloud:
+    """About ``points`` of the living room's fused cloud, thinned by voxels and smoothed as the chain does.
+
+    Rendered depth with the sensor's noise, filled by the network's; three nodes at their true poses.
+    """
+    rig = load_demo("living-room")
+    assert rig.truth is not None
+    config = PRESETS["packetmesh"]
+    fine = replace(config, surface=replace(config.surface, max_points=3 * points, smoothing_passes=0))
+    network = DepthNetwork()
+    nodes = [prepare_node(frame, config, network) for frame in rig.frames]
+    _, fused = merged_clouds(nodes, rig.frames, rig.truth.T_world_camera, fine)
+    thin = voxel_average(fused, voxel_for_count(fused.points_m, points))
+    return smooth(thin, config.surface.smoothing_passes if smoothed else 0)
+
+
+def terrain(points: int, seed: int = 0, point_distance_m: float = 0.01, noise_m: float = 0.001) -> PointCloud:
+    """Exactly ``points`` on rolling ground whose area grows with their number, with its true normals.
+
+    Waves of 1 m length and 10 cm height; a jittered grid, and noise along z.
+    """
+    side = int(np.ceil(np.sqrt(points)))
+    rng = np.random.default_rng(seed)
+    cells = np.stack(np.divmod(np.arange(points), side), axis=-1)
+    x_m, y_m = ((cells + rng.uniform(-0.3, 0.3, cells.shape)) * point_distance_m).T
+    turn = 2.0 * np.pi
+    z_m = 0.05 * np.sin(turn * x_m) * np.sin(turn * y_m)
+    slope_x = 0.05 * turn * np.cos(turn * x_m) * np.sin(turn * y_m)
+    slope_y = 0.05 * turn * np.sin(turn * x_m) * np.cos(turn * y_m)
+    normals = np.column_stack([-slope_x, -slope_y, np.ones(points)])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return PointCloud(np.column_stack([x_m, y_m, z_m + rng.normal(0.0, noise_m, points)]), normals=normals)
+
+
+def run_alone(
+    program: str, cloud: PointCloud, name: str, balls: str, multiples: Sequence[float], rounds: int = ROUNDS
+) -> SurfaceRun:
+    """One program over one cloud, in a fresh process.
+
+    Args:
+        program: a name of ``PROGRAMS``.
+        cloud: points with normals.
+        name: of the cloud, for the record.
+        balls: what the radii are called.
+        multiples: the radii as multiples of the cloud's r_F, ascending.
+        rounds: how often; once if that takes long.
+
+    Raises:
+        TimeoutError: it took longer than ``MOST_S`` and was stopped.
+    """
+    context = multiprocessing.get_context("spawn")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cloud.npy"
+        np.save(
+            path, np.stack([cloud.points_m, _normals(cloud)])
+        )  # in a file: pickling would count as memory
+        with ProcessPoolExecutor(1, mp_context=context) as process:
+            work = process.submit(measure, program, path, multiples, rounds)
+            try:
+                run = work.result(timeout=MOST_S)
+            except TimeoutError:
+                for child in psutil.Process().children(recursive=True):
+                    child.kill()
+                raise
+    return replace(run, cloud=name, balls=balls)
+
+
+def measure(program: str, path: Path, multiples: Sequence[float], rounds: int) -> SurfaceRun:
+    """Time, memory and quality in this process."""
+    points_m, normals = np.load(path)
+    r_F_m, _ = spacing(points_m)
+    radii_m = tuple(factor * r_F_m for factor in multiples)
+    ball = PROGRAMS[program]
+    small = terrain(100)
+    started = time.perf_counter()
+    ball(small.points_m, _normals(small), [0.02])
+    first_use_s = time.perf_counter() - started
+    before = psutil.Process().memory_info().rss
+    seconds: list[float] = []
+    while len(seconds) < rounds and (not seconds or seconds[0] < SLOW_S):
+        started = time.perf_counter()
+        vertices_m, triangles = ball(points_m, normals, radii_m)
+        seconds.append(time.perf_counter() - started)
+    peak = peak_memory_bytes()
+    used, corners = np.unique(triangles, return_inverse=True)
+    quality = measure_quality(vertices_m[used], corners.reshape(-1, 3).astype(np.int32), (), len(points_m))
+    return SurfaceRun(
+        program=program,
+        cloud="",
+        balls="",
+        points=len(points_m),
+        r_F_m=r_F_m,
+        radii_m=radii_m,
+        elapsed_s=statistics.median(seconds),
+        rounds=len(seconds),
+        first_use_s=first_use_s,
+        peak_memory_bytes=peak,
+        added_memory_bytes=max(0, peak - before),
+        triangles=len(triangles),
+        used_share=len(used) / len(points_m),
+        covered_share=_covered_share(points_m, vertices_m, triangles, CLOSE_SHARE * r_F_m),
+        non_manifold_edges=quality.non_manifold_edges,
+        boundary_length_m=quality.boundary_length_m,
+    )
+
+
+def _normals(cloud: PointCloud) -> FloatArray:
+    assert cloud.normals is not None
+    return cloud.normals
+
+
+def _covered_share(points_m: FloatArray, vertices_m: FloatArray, triangles: IntArray, near_m: float) -> float:
+    if not len(triangles):
+        return 0.0
+    distances_m = triangle_scene(vertices_m, triangles).compute_distance(tensor(points_m, np.float32)).numpy()
+    return float((distances_m <= near_m).mean())
+
+
+def measure_speed(
+    points: int = POINTS, many: int = MANY_POINTS, programs: Sequence[str] | None = None
+) -> Iterator[SurfaceRun]:
+    """Every ball by every program on the room, and ours on a terrain of ``many`` points.
+
+    Args:
+        points: of the room, about.
+        many: of the terrain.
+        programs: names of ``PROGRAMS``; None takes those available.
+    """
+    chosen = programs or available_programs()
+    room = room_cloud(points)
+    cases = [(room, ROOM, balls, chosen) for balls in BALLS]
+    rough = room_cloud(points, smoothed=False)
+    cases += [(rough, ROUGH_ROOM, balls, chosen) for balls in ROUGH_BALLS]
+    wide = terrain(many)
+    cases += [(wide, TERRAIN, balls, (OURS,)) for balls in MANY_POINTS_BALLS]
+    for cloud, name, balls, rivals in cases:
+        for program in rivals:
+            try:
+                yield run_alone(program, cloud, name, balls, BALLS[balls])
+            except TimeoutError:
+                logger.warning("%s took more than %.0f s for %s on the %s", program, MOST_S, balls, name)

@@ -1,0 +1,91 @@
+"""A claim of the thesis, and the verdict on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lab.claims.exhibits import Exhibit, exhibit_record
+from packetmesh.progress import Progress
+from pipeline.types import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What our own computation of a claim gave."""
+
+    ours: dict[str, float]
+    """Measured values by name; shares from 0 to 1, lengths in metres."""
+    ci95: dict[str, tuple[float, float]]
+    """95 % intervals of those values that vary from case to case."""
+    reproduced: bool
+    why: str
+    """One sentence that a reader can check against ``ours``."""
+    exhibits: tuple[Exhibit, ...] = ()
+    """Tables and pictures for the report."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A claim beside its outcome."""
+
+    id: str
+    claim: str
+    thesis: str
+    tolerance: str
+    ours: dict[str, float]
+    ci95: dict[str, tuple[float, float]]
+    verdict: str
+    """``reproduced`` or ``not reproduced``."""
+    why: str
+    exhibits: tuple[Exhibit, ...] = ()
+
+    def record(self) -> dict[str, Any]:
+        """The verdict as plain values."""
+        exhibits = [exhibit_record(exhibit) for exhibit in self.exhibits]
+        return asdict(replace(self, exhibits=())) | {"exhibits": exhibits}
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """Something the thesis says that can be computed."""
+
+    id: str
+    """Its number in SPEC 8."""
+    claim: str
+    thesis: str
+    """The thesis's own value."""
+    tolerance: str
+    """What counts as reproduced."""
+    experiment: Callable[..., Outcome]
+    """Called with what ``prepare`` returned, if there is one, else with nothing."""
+    prepare: Callable[[Path], Generator[Progress, None, Any]] | None = None
+    """Long work that leaves its results in a folder; claims with the same one share a single run of it."""
+
+    def judge(self, *prepared: Any) -> Verdict:
+        """Run the experiment and compare."""
+        outcome = self.experiment(*prepared)
+        verdict = "reproduced" if outcome.reproduced else "not reproduced"
+        return Verdict(
+            self.id,
+            self.claim,
+            self.thesis,
+            self.tolerance,
+            outcome.ours,
+            outcome.ci95,
+            verdict,
+            outcome.why,
+            outcome.exhibits,
+        )
+
+
+def bootstrap_ci95(values: FloatArray, seed: int = 0, draws: int = 2000) -> tuple[float, float]:
+    """95 % percentile interval of the mean of (N,) ``values``."""
+    values = np.asarray(values, float)
+    rows = np.random.default_rng(seed).integers(0, len(values), (draws, len(values)))
+    low, high = np.percentile(values[rows].mean(axis=1), (2.5, 97.5))
+    return float(low), float(high)

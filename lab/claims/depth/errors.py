@@ -1,0 +1,188 @@
+"""Errors of inferred depth, by alignment, scene and distance (SPEC 3.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from lab.claims.depth.scenes import Site
+from lab.training.evaluate import Example
+from pipeline.config import AlignmentMode
+from pipeline.depth import DepthErrors, DepthNetwork, align_depth, depth_errors
+from pipeline.depth.metrics import NEAREST_M
+from pipeline.types import ByteArray, DepthMap, FloatArray
+
+ALIGNMENTS: dict[str, AlignmentMode] = {
+    "raw": "none",
+    "median-scaled": "median",
+    "affine-aligned": "affine_depth",
+}
+"""As the literature aligns: to the depth that judges. Raw takes the network's numbers as metres."""
+JUDGED = "median-scaled"
+CHAIN = "aligned as in the chain"
+"""Locally, to what the sensor sees; only beside the sensor's own error."""
+EDGES_M = (NEAREST_M, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 80.0)
+"""Of the bins of true depth."""
+STRIP_HEIGHT_PX = 200
+WORST_SHOWN = 0.5
+"""Relative error that has the brightest colour."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameErrors:
+    """One image."""
+
+    aligned: dict[str, DepthErrors]
+    """By the names of ``ALIGNMENTS``."""
+    total: dict[str, FloatArray]
+    """(bins,) sum of |p - g| / g over the pixels whose true depth is in a bin, by alignment."""
+    pixels: dict[str, FloatArray]
+    """(bins,) their number."""
+    sensor: float
+    """AbsRel of the sensor's own depth; NaN where the sensor is what judges."""
+    beside_sensor: dict[str, float]
+    """AbsRel over the sensor's pixels, by alignment and for ``CHAIN``; empty where the sensor judges."""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneErrors:
+    """All images of a site, in order."""
+
+    site: Site
+    frames: tuple[FrameErrors, ...]
+    strip: ByteArray
+    """(H, 4 W, 3) of the first: colour, truth, inferred median-scaled, relative error; black: unknown."""
+
+    def series(self, alignment: str, measure: str) -> FloatArray:
+        """(frames,) one measure of ``DepthErrors``."""
+        return np.array([getattr(frame.aligned[alignment], measure) for frame in self.frames])
+
+    def mean(self, alignment: str, measure: str) -> float:
+        """Of the images, each counting the same."""
+        return float(self.series(alignment, measure).mean())
+
+    def pooled_abs_rel(self, alignment: str) -> float:
+        """Of the pixels, each counting the same."""
+        total = sum(frame.total[alignment].sum() for frame in self.frames)
+        return float(total / sum(frame.pixels[alignment].sum() for frame in self.frames))
+
+    def sensor_abs_rel(self) -> float:
+        """AbsRel of the sensor's own depth, mean over the images; the site has a truth."""
+        return float(np.mean([frame.sensor for frame in self.frames]))
+
+    def beside_sensor(self, alignment: str) -> float:
+        """AbsRel of inferred depth at the sensor's pixels, mean over the images; the site has a truth."""
+        return float(np.mean([frame.beside_sensor[alignment] for frame in self.frames]))
+
+
+def scene_errors(site: Site, network: DepthNetwork) -> SceneErrors:
+    """Infer every image of a site and compare.
+
+    Raises:
+        InputError: a file of the site cannot be used, or nothing in an image can be compared.
+        ReconstructionError: an image has fewer than 100 pixels with known depth.
+    """
+    frames: list[FrameErrors] = []
+    strip = np.zeros((0, 0, 3), np.uint8)
+    for example in site.examples():
+        inferred = network.infer(example.rgb)
+        judging_m = within(example.truth_m, site.cap_m)
+        aligned_m = {
+            name: align_depth(inferred, DepthMap(judging_m), mode).depth.z_m
+            for name, mode in ALIGNMENTS.items()
+        }
+        frames.append(frame_errors(example, inferred, judging_m, aligned_m, site))
+        if len(frames) == 1:
+            strip = picture_strip(example.rgb, judging_m, aligned_m[JUDGED])
+    return SceneErrors(site, tuple(frames), strip)
+
+
+def within(truth_m: FloatArray, cap_m: float) -> FloatArray:
+    """The depths that judge, NaN elsewhere."""
+    with np.errstate(invalid="ignore"):
+        return np.where((truth_m > NEAREST_M) & (truth_m < cap_m), truth_m, np.nan)
+
+
+def frame_errors(
+    example: Example, inferred: DepthMap, judging_m: FloatArray, aligned_m: dict[str, FloatArray], site: Site
+) -> FrameErrors:
+    """Every measure of one image.
+
+    Args:
+        example: the image with its sensor.
+        inferred: (H, W) what the network said.
+        judging_m: (H, W) the depths that count, NaN elsewhere.
+        aligned_m: (H, W) each, the inferred depth by alignment.
+        site: where it belongs.
+    """
+    binned = {name: by_distance(z_m, judging_m) for name, z_m in aligned_m.items()}
+    sensor, beside = float("nan"), {}
+    if site.truth:
+        seen_m = np.where(example.sensor.valid, judging_m, np.nan)
+        sensor = depth_errors(example.sensor.z_m, seen_m, site.cap_m).abs_rel
+        chain_m = align_depth(inferred, example.sensor, "local").depth.z_m
+        beside = {
+            name: depth_errors(z_m, seen_m, site.cap_m).abs_rel
+            for name, z_m in (aligned_m | {CHAIN: chain_m}).items()
+        }
+    return FrameErrors(
+        {name: depth_errors(z_m, judging_m, site.cap_m) for name, z_m in aligned_m.items()},
+        {name: total for name, (total, _) in binned.items()},
+        {name: pixels for name, (_, pixels) in binned.items()},
+        sensor,
+        beside,
+    )
+
+
+def by_distance(z_m: FloatArray, judging_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sums of |p - g| / g and numbers of pixels in the bins between ``EDGES_M``, (bins,) each."""
+    compared = np.isfinite(z_m) & np.isfinite(judging_m)
+    g_m = judging_m[compared].astype(np.float64)
+    relative = np.abs(z_m[compared] - g_m) / g_m
+    pixels, _ = np.histogram(g_m, EDGES_M)
+    total, _ = np.histogram(g_m, EDGES_M, weights=relative)
+    return total, pixels.astype(np.float64)
+
+
+def distance_curve(frames: Iterable[FrameErrors], alignment: str) -> tuple[FloatArray, list[FloatArray]]:
+    """The middles (metres) of the bins that have pixels, and in each the AbsRel of the images there."""
+    middles_m = 0.5 * (np.array(EDGES_M[1:]) + np.array(EDGES_M[:-1]))
+    total, pixels = (
+        np.array([sums[alignment] for sums in columns])
+        for columns in zip(*((frame.total, frame.pixels) for frame in frames), strict=True)
+    )
+    filled = np.flatnonzero(pixels.any(axis=0))
+    seen = pixels > 0
+    values = [total[seen[:, k], k] / pixels[seen[:, k], k] for k in filled]
+    return middles_m[filled], values
+
+
+def picture_strip(rgb: ByteArray, truth_m: FloatArray, inferred_m: FloatArray) -> ByteArray:
+    """Colour, true depth, inferred depth on the same scale, and relative error, side by side.
+
+    Args:
+        rgb: (H, W, 3).
+        truth_m: (H, W), NaN where unknown; nearest and farthest set the scale of both.
+        inferred_m: (H, W), NaN where unknown.
+    """
+    near_m, far_m = np.nanpercentile(truth_m, (1.0, 99.0))
+    error = np.abs(inferred_m - truth_m) / truth_m
+    tiles = [
+        rgb,
+        colored(truth_m, near_m, far_m, cv2.COLORMAP_TURBO),
+        colored(inferred_m, near_m, far_m, cv2.COLORMAP_TURBO),
+        colored(error, 0.0, WORST_SHOWN, cv2.COLORMAP_INFERNO),
+    ]
+    width_px = max(1, round(STRIP_HEIGHT_PX * rgb.shape[1] / rgb.shape[0]))
+    size_px = (width_px, STRIP_HEIGHT_PX)
+    return np.hstack([cv2.resize(tile, size_px, interpolation=cv2.INTER_AREA) for tile in tiles])
+
+
+def colored(values: FloatArray, low: float, high: float, colors: int) -> ByteArray:
+    """(H, W, 3) a colour map from ``low`` to ``high``, black where a value is unknown."""
+    share = np.clip((np.nan_to_num(values) - low) / max(high - low, 1e-9), 0.0, 1.0)
+    bgr = cv2.applyColorMap(np.round(255.0 * share).astype(np.uint8), colors)
+    return np.where(np.isfinite(values)[..., None], bgr[..., ::-1], np.uint8(0))

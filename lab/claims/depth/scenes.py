@@ -1,0 +1,119 @@
+"""The images by which a depth network is judged: held-out rooms, demo scenes, real frames, a user's sets."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from lab.training.evaluate import FIRST_TEST_ROOM, Example, demo, held_out_rooms
+from pipeline.io.demos import DEMO_SCENES
+from pipeline.io.rigs import load_frame
+from pipeline.types import DepthMap, RgbdFrame
+
+HELD_OUT = "held-out rooms"
+HELD_OUT_SCENES = 3
+ROOMS_PER_SCENE = 5
+VIEWS_PER_ROOM = 3
+INDOOR_CAP_M = 10.0
+OUTDOOR_CAP_M = 80.0
+OUTDOOR_SETS = ("kitti",)
+SETS_VARIABLE = "PACKETMESH_DEPTH_SETS"
+"""Names more sets as ``kind=path``, separated like the folders of PATH."""
+DATA_VARIABLE = "PACKETMESH_SHARED_DATA"
+DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
+"""Where real frames lie if the variable does not say otherwise: beside the repository."""
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Images that are told together."""
+
+    name: str
+    group: str
+    """``held-out rooms``, ``demo scenes``, ``real frames`` or a user's set."""
+    examples: Callable[[], Iterator[Example]]
+    truth: bool = True
+    """What judges is the truth; if not, it is the sensor's own depth, whose error nobody knows."""
+    cap_m: float = INDOOR_CAP_M
+    """Farthest depth that counts."""
+
+
+def sites() -> tuple[Site, ...]:
+    """All there are on this machine; the thesis's three scenes first."""
+    return (*held_out_scenes(), *demo_scenes(), *real_frames(), *user_sets())
+
+
+def held_out_scenes(rooms: int = ROOMS_PER_SCENE, views: int = VIEWS_PER_ROOM) -> tuple[Site, ...]:
+    """Scene 1 to 3: rooms of the test split, which no training ever saw."""
+    starts = range(FIRST_TEST_ROOM, FIRST_TEST_ROOM + HELD_OUT_SCENES * rooms, rooms)
+    return tuple(
+        Site(f"Scene {number}", HELD_OUT, partial(held_out_rooms, range(start, start + rooms), views))
+        for number, start in enumerate(starts, 1)
+    )
+
+
+def demo_scenes() -> tuple[Site, ...]:
+    """The nodes of every demo scene."""
+    return tuple(Site(name, "demo scenes", partial(demo, name)) for name in DEMO_SCENES)
+
+
+def real_frames() -> tuple[Site, ...]:
+    """Every registered RGB-D pair among the real data; none where there is no such folder."""
+    return tuple(
+        Site(folder.name, "real frames", partial(real_frame, folder), truth=False)
+        for folder in real_folders()
+    )
+
+
+def real_folders() -> tuple[Path, ...]:
+    """Folders with color.png, depth.png and intrinsics.json below ``PACKETMESH_SHARED_DATA``."""
+    data = Path(os.environ.get(DATA_VARIABLE, DATA))
+    return tuple(sorted(depth.parent for depth in data.glob("*/depth.png")))
+
+
+def load_real(folder: Path) -> RgbdFrame:
+    """The registered pair in a folder, named after it."""
+    color, depth, intrinsics = (folder / name for name in ("color.png", "depth.png", "intrinsics.json"))
+    return load_frame(color, depth, intrinsics, name=folder.name)
+
+
+def real_frame(folder: Path) -> Iterator[Example]:
+    """One real image, judged where the sensor has depth."""
+    frame = load_real(folder)
+    yield Example(frame.rgb, frame.depth, frame.depth.z_m)
+
+
+def user_sets() -> tuple[Site, ...]:
+    """The sets that ``PACKETMESH_DEPTH_SETS`` names, all their images."""
+    named = [text for text in os.environ.get(SETS_VARIABLE, "").split(os.pathsep) if text]
+    kinds = [text.partition("=")[0].strip().lower() for text in named]
+    return tuple(
+        Site(
+            text,
+            f"set {kind}",
+            partial(pairs, text),
+            truth=False,
+            cap_m=OUTDOOR_CAP_M if kind in OUTDOOR_SETS else INDOOR_CAP_M,
+        )
+        for text, kind in zip(named, kinds, strict=True)
+    )
+
+
+def pairs(text: str) -> Iterator[Example]:
+    """Images of one set, ``kind=path``, judged in the crop that is usual for it.
+
+    Raises:
+        InputError: the kind is unknown, or the files are missing or unusable.
+    """
+    from lab.datasets import open_set
+
+    for pair in open_set(text):
+        judging_m = (
+            pair.truth_m if pair.judged is None else np.where(pair.judged, pair.truth_m, np.float32(np.nan))
+        )
+        yield Example(pair.rgb, DepthMap(pair.truth_m), judging_m)

@@ -1,0 +1,111 @@
+"""The benchmark's pictures: convergence (Fig. 4.9) and capture range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from lab.claims.claim import bootstrap_ci95
+from lab.claims.exhibits import Chart, Curve, HeatMap
+from lab.claims.registration.cases import CONDITIONS
+from lab.claims.registration.results import Results
+from lab.claims.registration.setup import CURVED, FIXED_GATE
+from lab.claims.registration.trials import CURVE_ITERATIONS
+from pipeline.types import FloatArray
+
+LAST_ITERATION = 60
+SECONDS = np.linspace(0.0, 0.4, 21)
+
+
+def convergence_charts(results: Results, condition: str) -> tuple[Chart, ...]:
+    """Point error and average Hausdorff distance against iterations, and point error against seconds."""
+    label = CONDITIONS[condition].label
+    iterations = np.arange(LAST_ITERATION + 1.0)
+    sampled = np.array(CURVE_ITERATIONS, float)
+    kinds: tuple[tuple[str, str, str, FloatArray, Callable[[dict], FloatArray]], ...] = (
+        (
+            "point error",
+            "iterations",
+            "cm",
+            iterations,
+            lambda trial: held(trial["curve_error_cm"], len(iterations)),
+        ),
+        (
+            "average Hausdorff distance",
+            "iterations",
+            "cm",
+            sampled[sampled <= LAST_ITERATION],
+            lambda trial: np.array(trial["curve_ahd_cm"])[sampled <= LAST_ITERATION],
+        ),
+        ("point error", "seconds", "cm", SECONDS, error_by_time),
+    )
+    return tuple(
+        Chart(
+            f"{quantity} against {over}, {label}",
+            over,
+            unit,
+            tuple(
+                _mean_curve(entrant, x, [of(trial) for trial in trials])
+                for entrant in CURVED
+                if (trials := results.trials(entrant, (condition,)))
+            ),
+            "Mean over the rooms and its 95 % bootstrap interval; a run that has ended keeps its last value. "
+            + ("Times are of this machine, two processes at once." if over == "seconds" else ""),
+        )
+        for quantity, over, unit, x, of in kinds
+    )
+
+
+def held(values: Sequence[float], length: int) -> FloatArray:
+    """(length,) the values, the last one repeated."""
+    return np.array(values)[np.minimum(np.arange(length), len(values) - 1)]
+
+
+def error_by_time(trial: dict) -> FloatArray:
+    """(T,) point error that a run has reached at each of ``SECONDS``."""
+    errors_cm = np.array(trial["curve_error_cm"])
+    return errors_cm[np.searchsorted(trial["elapsed_s"], SECONDS, side="right")]
+
+
+def capture_maps(results: Results) -> tuple[HeatMap, ...]:
+    """For every entrant, the share of the rooms that came home, by rotation and translation."""
+    maps = []
+    for entrant in dict.fromkeys(cell["entrant"] for cell in results.cells):
+        home = home_shares(results, entrant)
+        rotations = tuple(sorted({rotation for rotation, _ in home}))
+        translations = tuple(sorted({translation for _, translation in home}))
+        shares = tuple(tuple(home[r, t] for t in translations) for r in rotations)
+        maps.append(
+            HeatMap(
+                f"capture range, {entrant}",
+                "start moved by, metres",
+                translations,
+                "start turned by, degrees",
+                rotations,
+                shares,
+                "Share of the rooms that end within 1.5 degrees and 5 cm, on the clouds of “easy”"
+                + (
+                    "."
+                    if entrant == FIXED_GATE
+                    else "; the gate is told the distance: twice the translation."
+                ),
+            )
+        )
+    return tuple(maps)
+
+
+def home_shares(results: Results, entrant: str) -> dict[tuple[float, float], float]:
+    """Share of the rooms that came home from each (rotation in degrees, translation in metres)."""
+    found: dict[tuple[float, float], list[bool]] = {}
+    for cell in results.cells:
+        if cell["entrant"] == entrant:
+            found.setdefault((cell["rotation_deg"], cell["translation_m"]), []).append(cell["home"])
+    return {start: float(np.mean(home)) for start, home in found.items()}
+
+
+def _mean_curve(label: str, x: FloatArray, values: Sequence[FloatArray]) -> Curve:
+    columns = np.array(values).T
+    bands = [bootstrap_ci95(column, draws=400) for column in columns]
+    low, high = zip(*bands, strict=True)
+    return Curve(label, tuple(x.tolist()), tuple(columns.mean(axis=1).tolist()), low, high)

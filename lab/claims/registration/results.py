@@ -1,0 +1,53 @@
+"""The benchmark's stored results, asked for by entrant and condition."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from lab.claims.registration.store import Task
+from pipeline.config import Direction
+from pipeline.types import FloatArray
+
+
+class Results:
+    """Every trial of a benchmark; values of different entrants come in the same order of cases."""
+
+    def __init__(self, stored: dict[Task, dict[str, Any]]) -> None:
+        self._trials: dict[tuple[str, Direction, str], list[dict[str, Any]]] = {}
+        self.cells: list[dict[str, Any]] = []
+        """Capture-range cells."""
+        for result in stored.values():
+            self.cells += result.get("cells", [])
+            for trial, timing in zip(result.get("trials", []), result.get("timings", []), strict=True):
+                key = (trial["condition"], trial["direction"], trial["entrant"])
+                self._trials.setdefault(key, []).append(trial | timing)
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Those that were run, in order."""
+        return tuple(dict.fromkeys(condition for condition, _, _ in self._trials))
+
+    def entrants(self, conditions: Sequence[str], direction: Direction = "q2p") -> tuple[str, ...]:
+        """Those who took part in all of the conditions."""
+        everyone = dict.fromkeys(entrant for _, _, entrant in self._trials)
+        return tuple(e for e in everyone if all((c, direction, e) in self._trials for c in conditions))
+
+    def trials(
+        self, entrant: str, conditions: Sequence[str], direction: Direction = "q2p"
+    ) -> list[dict[str, Any]]:
+        """An entrant's trials, condition by condition, room by room; empty if it did not take part."""
+        return [t for c in conditions for t in self._trials.get((c, direction, entrant), [])]
+
+    def values(
+        self,
+        entrant: str,
+        conditions: Sequence[str],
+        name: str = "point_error_cm",
+        direction: Direction = "q2p",
+    ) -> FloatArray:
+        """(N,) one number of every trial; NaN where there is none."""
+        found = (trial[name] for trial in self.trials(entrant, conditions, direction))
+        return np.array([np.nan if value is None else float(value) for value in found])

@@ -1,0 +1,53 @@
+"""Figures 4.2 to 4.7 of the thesis on a scene of our own: one ball before and after fusion."""
+
+from __future__ import annotations
+
+from lab.claims.exhibits import Picture
+from lab.claims.surface.clouds import ChainClouds
+from pipeline.geometry import scaled
+from pipeline.surface import Camera, hit_depth, reconstruct_surface
+from pipeline.surface.pictures import mesh_picture
+from pipeline.types import ByteArray, PointCloud
+
+FIGURES: tuple[tuple[str, str, str, float], ...] = (
+    ("4.2", "before", "r_F", 0.0),
+    ("4.3", "before", "r_F + sigma_D/4", 0.25),
+    ("4.4", "before", "r_F + sigma_D/2", 0.5),
+    ("4.5", "before", "r_F + sigma_D", 1.0),
+    ("4.6", "after", "r_F", 0.0),
+    ("4.7", "after", "r_F + sigma_D/2", 0.5),
+)
+"""Number, before or after fusion, the radius and its multiple of sigma_D."""
+PICTURE_SIZE = 0.5
+"""Over the camera's own."""
+
+
+def thesis_figures(clouds: ChainClouds, how: str) -> Picture:
+    """The six surfaces, each of a single radius, from the node's camera.
+
+    Args:
+        how: what the chain does with the inferred points, for the title.
+    """
+    images = tuple(
+        _figure(clouds, number, when, name, clouds.r_F_m + factor * clouds.sigma_D_m)
+        for number, when, name, factor in FIGURES
+    )
+    return Picture(
+        f"Figures 4.2 to 4.7 on {clouds.name}, by {how}",
+        images,
+        "A single ball radius each, seen from the node's camera; magenta: rays that find nothing. The "
+        "thesis's radii are 0.0102, 0.0131, 0.0156 and 0.0209 before and 0.0102 and 0.0156 after fusion: "
+        "those of r_F + {0, 1/4, 1/2, 1} sigma_D and of r_F + {0, 1/2} sigma_D.",
+    )
+
+
+def _figure(clouds: ChainClouds, number: str, when: str, name: str, radius_m: float) -> tuple[str, ByteArray]:
+    cloud: PointCloud = clouds.sensor if when == "before" else clouds.fused
+    surface = reconstruct_surface(cloud, [radius_m])
+    intrinsics = scaled(clouds.camera.intrinsics, PICTURE_SIZE)
+    pose = clouds.camera.T_world_camera
+    missed = 1.0 - hit_depth(surface.vertices_m, surface.triangles, intrinsics, pose).coverage
+    caption = (
+        f"{number}: {when} fusion, {name} = {1000.0 * radius_m:.1f} mm; {missed:.0%} of the rays find nothing"
+    )
+    return caption, mesh_picture(surface, Camera(intrinsics, pose))

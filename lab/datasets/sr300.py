@@ -1,0 +1,143 @@
+"""The castle that an Intel RealSense SR300 filmed for ViSP: grey pictures and depth of a second camera.
+
+ViSP's mbt-depth/castel (Debian visp-images-data), read as its tutorial-mb-generic-tracker-rgbd does.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from lab.datasets.pair import Frame, Pair
+from lab.datasets.projection import nearest_per_pixel
+from packetmesh.errors import InputError
+from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes, read_text
+from pipeline.geometry import project
+from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
+
+METRES_PER_UNIT = 0.000124986647
+NEAREST_M = 0.1
+"""Nearer values are noise: the camera measures from 0.2 m."""
+INVERSE_DISTORTION = (0.165056542, -0.0508309528, 0.00435937941, 0.00541406544, 0.250085592)
+"""k1, k2, p1, p2, k3 of the depth camera, which lead from its pixels to rays, not back (librealsense's
+inverse Brown-Conrady); the tutorial has them, the set's own files do not."""
+_PGM = re.compile(rb"P5\s+(\d+)\s+(\d+)\s+255\s")
+
+
+def find(root: Path) -> list[Frame]:
+    """The frames beside every ``depth_M_color.txt`` at or below ``root``."""
+    frames = []
+    for extrinsics in sorted(root.rglob("depth_M_color.txt")):
+        for picture in sorted(extrinsics.parent.glob("*/image_*.pgm")):
+            depth = picture.with_name(f"depth_{picture.stem}.bin")
+            if depth.is_file():
+                name = f"{extrinsics.parent.name}/{picture.stem}"
+                frames.append(Frame(name, partial(_load, name, extrinsics, picture, depth)))
+    return frames
+
+
+def _load(name: str, extrinsics: Path, picture: Path, depth: Path) -> Pair:
+    grey, z_m = read_pgm(picture), read_depth_bin(depth)
+    color_camera = _camera(extrinsics.with_name("chateau.xml"), grey.shape)
+    depth_camera = _camera(extrinsics.with_name("chateau_depth.xml"), z_m.shape)
+    truth_m = registered(z_m, depth_camera, color_camera, np.linalg.inv(_pose(extrinsics)))
+    return Pair(name, np.repeat(grey[..., None], 3, axis=2), truth_m, color_camera)
+
+
+def registered(
+    z_m: FloatArray, depth_camera: CameraIntrinsics, color_camera: CameraIntrinsics, T_color_depth: FloatArray
+) -> FloatArray:
+    """(H, W) depth as the colour camera sees it, NaN where it sees no depth pixel.
+
+    Each depth pixel is a small square that covers the colour pixels between its projected corners
+    (librealsense's align): the colour camera's pixels are finer, so that points would leave gaps.
+    """
+    rows, columns = np.nonzero(np.isfinite(z_m))
+    pixels, depths_m = np.stack([columns, rows], axis=1), z_m[rows, columns]
+
+    def seen(offset_px: float) -> FloatArray:
+        points_m = rays(depth_camera, pixels + offset_px) * depths_m[:, None]
+        return points_m @ T_color_depth[:3, :3].T + T_color_depth[:3, 3]
+
+    first, last = (np.ceil(project(color_camera, seen(offset))).astype(int) for offset in (-0.5, 0.5))
+    centre_z_m = seen(0.0)[:, 2]
+    covered, seen_z_m = [], []
+    for du in range(int((last - first)[:, 0].max(initial=0))):
+        for dv in range(int((last - first)[:, 1].max(initial=0))):
+            here = (first[:, 0] + du < last[:, 0]) & (first[:, 1] + dv < last[:, 1])
+            covered.append(first[here] + (du, dv))
+            seen_z_m.append(centre_z_m[here])
+    shape = color_camera.height_px, color_camera.width_px
+    if not covered:
+        return np.full(shape, np.nan, dtype=np.float32)
+    return nearest_per_pixel(np.concatenate(covered), np.concatenate(seen_z_m), shape)
+
+
+def rays(camera: CameraIntrinsics, pixels: FloatArray) -> FloatArray:
+    """(N, 3) directions with z = 1 of (N, 2) positions in the depth image."""
+    k1, k2, p1, p2, k3 = INVERSE_DISTORTION
+    x, y = ((pixels - (camera.cx_px, camera.cy_px)) / (camera.fx_px, camera.fy_px)).T
+    r2 = x * x + y * y
+    factor = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    return np.stack(
+        [
+            x * factor + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+            y * factor + 2.0 * p2 * x * y + p1 * (r2 + 2.0 * y * y),
+            np.ones_like(x),
+        ],
+        axis=1,
+    )
+
+
+def read_pgm(file: Path) -> ByteArray:
+    """(H, W) uint8 of a binary PGM file.
+
+    Raises:
+        InputError: missing, truncated, or no 8-bit PGM.
+    """
+    data = read_bytes(file, MAX_IMAGE_BYTES, "grey image")
+    header = _PGM.match(data)
+    if header is None:
+        raise InputError(
+            f"The grey image {file} is no 8-bit PGM file; try the castel folder of ViSP's images"
+        )
+    width, height = int(header[1]), int(header[2])
+    if len(data) < header.end() + width * height:
+        raise InputError(f"The grey image {file} is truncated; try to unpack ViSP's images again")
+    return np.frombuffer(data, np.uint8, width * height, header.end()).reshape(height, width)
+
+
+def read_depth_bin(file: Path) -> FloatArray:
+    """(H, W) float32 metres: height and width in 32 bits, then 16-bit units of about an eighth of a mm.
+
+    Raises:
+        InputError: missing, or not as long as its size says.
+    """
+    data = read_bytes(file, MAX_IMAGE_BYTES, "SR300 depth")
+    height, width = np.frombuffer(data[:8].ljust(8, b"\0"), "<u4").tolist()
+    if height * width > MAX_IMAGE_PIXELS or len(data) != 8 + 2 * height * width or not height * width:
+        raise InputError(f"The SR300 depth {file} is truncated or damaged; try to unpack ViSP's images again")
+    z_m = np.frombuffer(data, "<u2", height * width, 8).reshape(height, width) * METRES_PER_UNIT
+    return np.where(z_m >= NEAREST_M, z_m, np.nan).astype(np.float32)
+
+
+def _camera(file: Path, shape: tuple[int, ...]) -> CameraIntrinsics:
+    text = read_text(file, "camera file")
+    values = [re.search(rf"<{key}>\s*([\d.]+)\s*</{key}>", text) for key in ("px", "py", "u0", "v0")]
+    if not all(values):
+        raise InputError(
+            f"The camera file {file} has no px, py, u0 and v0; try the one of ViSP's castel folder"
+        )
+    fx, fy, cx, cy = (float(value[1]) for value in values if value)
+    return CameraIntrinsics.pinhole(fx, fy, cx, cy, shape[1], shape[0])
+
+
+def _pose(file: Path) -> FloatArray:
+    """(4, 4) T_depth_color."""
+    try:
+        return np.array(read_text(file, "extrinsics").split(), dtype=np.float64).reshape(4, 4)
+    except ValueError:
+        raise InputError(f"The extrinsics {file} are not a 4 x 4 matrix; try the file of ViSP") from None

@@ -1,0 +1,101 @@
+"""Opening what furniture catalogues come in: Debian packages, and the zip files inside them."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import tarfile
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+from packetmesh.errors import InputError
+
+ZIP_SUFFIXES = (".sh3f", ".sh3t", ".jar", ".zip")
+_AR_MAGIC = b"!<arch>\n"
+_AR_HEADER_BYTES = 60
+
+
+def zip_files(source: Path, cache: Path) -> list[Path]:
+    """The zip files of a folder (with everything below), of a package, or ``source`` itself, sorted by name.
+
+    Args:
+        source: a folder, a ``.deb`` or a zip file; packages inside a folder are opened as well.
+        cache: folder for what packages hold; unpacked once.
+
+    Raises:
+        InputError: nothing of the kind is there, or a package cannot be read.
+    """
+    if not source.exists():
+        raise InputError(f"There is no furniture at '{source}'; name a folder, a .deb or a .sh3f file.")
+    below = sorted(file for file in source.rglob("*") if file.is_file()) if source.is_dir() else [source]
+    found = [file for file in below if file.suffix.lower() in ZIP_SUFFIXES]
+    for package in (file for file in below if file.suffix == ".deb"):
+        found += _unpacked(package, cache / "packages" / package.stem)
+    if not found:
+        raise InputError(f"'{source}' holds no .sh3f, .jar, .zip or .deb file; name the furniture's folder.")
+    return sorted(found, key=lambda file: file.name)
+
+
+def _unpacked(package: Path, folder: Path) -> list[Path]:
+    """The zip files of a Debian package, written to ``folder`` if they are not there yet."""
+    done = folder / "unpacked"
+    if not done.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        with _data_of(package) as archive:
+            for member in archive:
+                name = PurePosixPath(member.name).name
+                content = archive.extractfile(member) if name.endswith(ZIP_SUFFIXES) else None
+                if content is not None:
+                    temporary = folder / f"{name}.{os.getpid()}.tmp"
+                    temporary.write_bytes(content.read())
+                    temporary.rename(folder / name)
+        done.touch()
+    return [file for file in folder.iterdir() if file.suffix in ZIP_SUFFIXES]
+
+
+def _data_of(package: Path) -> tarfile.TarFile:
+    """The archive of files inside a Debian package, which is an ``ar`` archive of three members."""
+    with package.open("rb") as stream:
+        if stream.read(len(_AR_MAGIC)) != _AR_MAGIC:
+            raise InputError(f"'{package}' is no Debian package; download it again.")
+        while len(header := stream.read(_AR_HEADER_BYTES)) == _AR_HEADER_BYTES:
+            name, size = header[:16].decode("ascii", "replace").strip(" /"), int(header[48:58])
+            if name.startswith("data.tar"):
+                content = io.BytesIO(stream.read(size))
+                try:
+                    return tarfile.open(fileobj=content)
+                except tarfile.TarError:
+                    raise InputError(
+                        f"'{package}' is damaged or its {name} unreadable; unpack it with dpkg -x."
+                    ) from None
+            stream.seek(size + size % 2, io.SEEK_CUR)
+    raise InputError(f"'{package}' holds no files; download it again.")
+
+
+def numbered_records(file: Path, suffix: str) -> Iterator[tuple[dict[str, str], dict[str, str]]]:
+    """The numbered records of the catalogues in a zip file, each with what its catalogue says of itself.
+
+    Args:
+        file: zip file with Java properties whose names end in ``suffix``, in lines like ``width#3=60``.
+        suffix: for example ``FurnitureCatalog.properties``.
+
+    Raises:
+        InputError: the file is no zip file.
+    """
+    try:
+        with zipfile.ZipFile(file) as archive:
+            texts = [archive.read(name) for name in archive.namelist() if name.endswith(suffix)]
+    except (zipfile.BadZipFile, OSError):
+        raise InputError(f"'{file}' is no readable zip file; download it again.") from None
+    for text in texts:
+        about: dict[str, str] = {}
+        records: dict[int, dict[str, str]] = {}
+        for line in text.decode("latin-1").splitlines():
+            match = re.match(r"\s*(\w+)(?:#(\d+))?\s*[=:]\s*(.*)", line)
+            if match:
+                key, number, value = match.groups()
+                (records.setdefault(int(number), {}) if number else about)[key] = value.strip()
+        for record in records.values():
+            yield record, about

@@ -1,0 +1,360 @@
+"""Path-traced pictures of scenes: a Blender of its own renders, our ray caster gives the exact depth.
+
+Blender's Python module ``bpy`` needs other versions of things than we do, so it lives in an environment
+of its own; a room goes there as one ``.npz`` file, and its light comes back as one ``.npy`` file.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numba
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from lab.training import dataset
+from lab.training.furniture import Catalogue
+from lab.training.varied_rooms import varied_room
+from lab.training.viewpoints import views
+from lab.worlds import shading
+from lab.worlds.film import Film, develop
+from lab.worlds.pixels import camera_rays
+from lab.worlds.raycast import world_mesh
+from lab.worlds.render import Renderer
+from lab.worlds.rooms import random_room
+from lab.worlds.scene import Scene
+from lab.worlds.viewpoints import random_views
+from packetmesh.errors import InputError
+from pipeline.geometry import scaled
+from pipeline.open3d_runtime import o3d
+from pipeline.types import ByteArray, CameraIntrinsics, FloatArray, IntArray
+
+Camera = tuple[CameraIntrinsics, FloatArray]
+"""Undistorted intrinsics, and T_world_camera (4, 4)."""
+FIRST_TRACED = 500_000
+"""Traced rooms count up from here within their split, away from the ray-cast ones."""
+_SCRIPT = Path(__file__).with_name("blender_script.py")
+_FILM = Film(0.7, 0.08, noise=(0.0, 0.02), blur_px=(0.25, 0.6), vignette=(0.0, 0.25))
+_ATLAS_WIDTH = 4096
+_GUTTER = 2
+"""Texels around each chart, so that filtering never meets its neighbour."""
+_CHART_TEXELS = 700_000
+_FINEST_M, _COARSEST_M = 0.002, 0.03
+"""Range of the texels' size; between them, less than a pixel where a chart is nearest to a camera."""
+_TEXELS_A_PIXEL = 1.4
+_RAISED_M = 3e-4
+_GOLDEN = 0.6180339887498949
+"""Multiples of it, without their whole part, spread evenly over 0 to 1."""
+
+
+def render_traced(
+    data: Path,
+    split: str,
+    first: int,
+    last: int,
+    blender: Path,
+    samples: int = 16,
+    threads: int = 1,
+    catalogue: Catalogue | None = None,
+) -> Iterator[Path]:
+    """Path-trace shards [first, last) of ten rooms each; ready ones are kept. Yields each one's RGB file.
+
+    A shard is like those of ``dataset.render_shards``, under the name ``<split>_traced_<number>_rgb.npy``.
+
+    Args:
+        data: folder of the shards.
+        split: train, validation or test.
+        first: first shard.
+        last: one past the last shard.
+        blender: a Python that has ``bpy``.
+        samples: light paths a pixel, before denoising.
+        threads: threads that render.
+        catalogue: furnishes the rooms; without it, procedural pieces do.
+
+    Raises:
+        InputError: that Python cannot render.
+    """
+    data.mkdir(parents=True, exist_ok=True)
+    for shard in range(first, last):
+        rgb_file = data / f"{split}_traced_{shard:04d}_rgb.npy"
+        if not rgb_file.exists():
+            start = dataset.FIRST_SEED[split] + FIRST_TRACED + shard * dataset.ROOMS_PER_SHARD
+            seeds = range(start, start + dataset.ROOMS_PER_SHARD)
+            rooms = [traced_views(seed, blender, samples, threads, catalogue) for seed in seeds]
+            colors, depths = (np.concatenate(arrays) for arrays in zip(*rooms, strict=True))
+            dataset.save_array(rgb_file.with_name(rgb_file.name.replace("rgb", "depth")), depths)
+            dataset.save_array(rgb_file, colors)
+        yield rgb_file
+
+
+def traced_views(
+    seed: int, blender: Path, samples: int, threads: int, catalogue: Catalogue | None = None
+) -> tuple[ByteArray, FloatArray]:
+    """Photographs (N, H, W, 3) uint8 of one room and their depth (N, H, W) float16 as in ``room_views``."""
+    scene = varied_room(seed, catalogue) if catalogue is not None else random_room(seed)
+    rng = np.random.default_rng(seed)
+    renderer = Renderer(scene, threads)
+    if catalogue is not None:
+        seen = views(seed, scene, dataset.VIEWS_PER_ROOM, renderer, dataset.WIDTH_PX)
+        cameras = [(intrinsics, pose) for pose, intrinsics in seen]
+        focal_px = dataset.FOCAL_PX
+    else:
+        intrinsics = scaled(scene.intrinsics, dataset.WIDTH_PX / scene.intrinsics.width_px)
+        poses = random_views(scene, rng, dataset.VIEWS_PER_ROOM, renderer)
+        cameras = [(intrinsics, pose) for pose in poses]
+        focal_px = intrinsics.fx_px
+    light = trace(scene, cameras, blender, samples, threads)
+    depths_m = [renderer.depth(*camera) * (focal_px / camera[0].fx_px) for camera in cameras]
+    return np.stack([develop(view, _FILM, rng) for view in light]), np.stack(depths_m).astype(np.float16)
+
+
+def trace(
+    scene: Scene, cameras: Sequence[Camera], blender: Path, samples: int = 16, threads: int = 1
+) -> FloatArray:
+    """(N, H, W, 3) float32 linear light of N views of a scene, path-traced by a Python that has ``bpy``.
+
+    Raises:
+        InputError: a camera is distorted or has another size than the first, or that Python cannot render.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        room, light = Path(folder) / "room.npz", Path(folder) / "light.npy"
+        write_exchange(room, scene, cameras)
+        options = ["--samples", str(samples), "--threads", str(threads)]
+        try:
+            subprocess.run(
+                [blender, _SCRIPT, room, light, *options], check=True, capture_output=True, text=True
+            )
+        except OSError as error:
+            raise InputError(
+                f"Blender's Python '{blender}' does not start ({error.strerror}); name one that has bpy."
+            ) from error
+        except subprocess.CalledProcessError as error:
+            reason = (error.stderr.strip().splitlines() or ["no message"])[-1]
+            raise InputError(
+                f"'{blender}' could not render {scene.name} ({reason}); name a Python that has bpy."
+            ) from error
+        return np.load(light).astype(np.float32)
+
+
+def write_exchange(file: Path, scene: Scene, cameras: Sequence[Camera]) -> None:
+    """Write a scene and its cameras as plain arrays; lengths in metres, colours linear unless said.
+
+    ``corners_m`` (F, 3, 3) of the triangles, world, ``corner_normals`` (F, 3, 3) world, ``uv`` (F, 3, 2) from
+    the lower left of the image, ``material`` (F,) index into ``gloss`` and ``emission`` (M,);
+    ``atlas_png`` the bytes of an 8-bit sRGB PNG; ``light_position_m``, ``light_color`` (L, 3) at 1 m,
+    ``light_size_m`` (L,) radius; ``ambient`` (3,); ``matrix`` (N, 3, 3), ``T_world_camera`` (N, 4, 4),
+    ``size_px`` width and height.
+
+    Raises:
+        InputError: a camera is distorted or has another size than the first.
+    """
+    _check(cameras)
+    vertices, triangles = world_mesh(scene)
+    count = [len(part.triangles) for part in scene.parts]
+    finishes = np.array([(part.material.gloss, part.material.emission) for part in scene.parts], np.float32)
+    kinds, kind = np.unique(finishes, axis=0, return_inverse=True)
+    uv, atlas = unwrap(scene, _nearest_m(vertices, triangles, cameras))
+    np.savez(
+        file,
+        corners_m=_apart(vertices[triangles]).astype(np.float32),
+        corner_normals=_world_normals(scene),
+        uv=uv,
+        material=np.repeat(kind.ravel().astype(np.int32), count),
+        gloss=kinds[:, 0],
+        emission=kinds[:, 1],
+        atlas_png=cv2.imencode(".png", atlas[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1],
+        light_position_m=np.array([light.position_m for light in scene.lights]).reshape(-1, 3),
+        light_color=np.array([light.color for light in scene.lights]).reshape(-1, 3),
+        light_size_m=np.array([light.size_m for light in scene.lights]),
+        ambient=np.asarray(scene.ambient, float),
+        matrix=np.stack([intrinsics.matrix for intrinsics, _ in cameras]),
+        T_world_camera=np.stack([pose for _, pose in cameras]),
+        size_px=np.array([cameras[0][0].width_px, cameras[0][0].height_px]),
+    )
+
+
+def _check(cameras: Sequence[Camera]) -> None:
+    if not cameras:
+        raise InputError("No camera was given to path-trace; give at least one.")
+    sizes = {(intrinsics.width_px, intrinsics.height_px) for intrinsics, _ in cameras}
+    if len(sizes) > 1:
+        raise InputError(f"Cameras of sizes {sorted(sizes)} cannot be traced together; give one size.")
+    if any(np.any(intrinsics.distortion) for intrinsics, _ in cameras):
+        raise InputError("A camera with lens distortion cannot be path-traced; give one without.")
+
+
+def _apart(corners_m: FloatArray) -> FloatArray:
+    """(F, 3, 3) triangles raised by up to 0.3 mm, each by another height: light paths stick between twins."""
+    normals = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
+    raised_m = _RAISED_M * (np.arange(len(corners_m)) * _GOLDEN % 1.0)
+    return corners_m + (raised_m[:, None] * normals)[:, None]
+
+
+def _nearest_m(vertices: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> FloatArray:
+    """(F,) what a pixel covers of each triangle, metres, from the camera that is nearest; inf if unseen."""
+    caster = o3d.t.geometry.RaycastingScene()
+    caster.add_triangles(_tensor(vertices.astype(np.float32)), _tensor(triangles.astype(np.uint32)))
+    covered_m = np.full(len(triangles), np.inf)
+    for intrinsics, pose in cameras:
+        answer = caster.cast_rays(_tensor(camera_rays(intrinsics, pose)), nthreads=1)
+        z_m, triangle = answer["t_hit"].numpy(), answer["primitive_ids"].numpy()
+        seen = np.isfinite(z_m)
+        np.minimum.at(covered_m, triangle[seen], z_m[seen] / intrinsics.fx_px)
+    return covered_m
+
+
+def _tensor(array: Any) -> Any:
+    constructor: Any = o3d.core.Tensor
+    return constructor(array)
+
+
+def _world_normals(scene: Scene) -> FloatArray:
+    """(F, 3, 3) shading normals at the corners, as our own renderer has them."""
+    return np.concatenate(
+        [
+            shading.corner_normals(part.vertices_m, np.ascontiguousarray(part.triangles), part.smooth)
+            @ part.T_world_part[:3, :3].T.astype(np.float32)
+            for part in scene.parts
+        ]
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Charts:
+    """Connected triangles that face the same way along x, y or z, laid flat in one image."""
+
+    corners_px: FloatArray
+    """(F, 3, 2) places of the triangles' corners in the image."""
+    height_px: int
+
+
+def unwrap(scene: Scene, covered_m: FloatArray) -> tuple[FloatArray, ByteArray]:
+    """Bake the parts' solid textures into one image.
+
+    Args:
+        scene: its parts' triangles, one after the other, are the F triangles.
+        covered_m: (F,) how much of each triangle a pixel covers, which is how large its texels may be;
+            infinite where nobody looks.
+
+    Returns:
+        (F, 3, 2) float32 coordinates of the corners, 0 to 1 from the lower left, and the
+        (H, 4096, 3) uint8 sRGB image.
+    """
+    points = np.concatenate([part.vertices_m[part.triangles] for part in scene.parts])
+    part = np.repeat(np.arange(len(scene.parts)), [len(part.triangles) for part in scene.parts])
+    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
+    charts = _lay_out(points, normals, part, covered_m)
+    owner, places = _rasterise(charts.corners_px, points, charts.height_px, _ATLAS_WIDTH)
+    atlas = np.zeros((charts.height_px, _ATLAS_WIDTH, 3), np.uint8)
+    rows = np.flatnonzero(owner >= 0)
+    triangle = owner.ravel()[rows]
+    order = np.argsort(part[triangle], kind="stable")
+    rows, triangle = rows[order], triangle[order]
+    bounds = np.searchsorted(part[triangle], np.arange(len(scene.parts) + 1))
+    for k, piece in enumerate(scene.parts):
+        some = slice(bounds[k], bounds[k + 1])
+        if some.stop > some.start:
+            where = places.reshape(-1, 3)[rows[some]]
+            albedo = piece.material.texture(where, normals[triangle[some]].astype(np.float32))
+            atlas.reshape(-1, 3)[rows[some]] = _srgb(albedo)
+    uv = charts.corners_px / [_ATLAS_WIDTH, charts.height_px]
+    uv[..., 1] = 1.0 - uv[..., 1]
+    return uv.astype(np.float32), atlas
+
+
+def _lay_out(points: FloatArray, normals: FloatArray, part: IntArray, covered_m: FloatArray) -> _Charts:
+    """Project each chart along its axis and pack the charts on shelves, the tallest first."""
+    axis = np.argmax(np.abs(normals), axis=1)
+    facing = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0.0)
+    chart = _connected(points, 6 * part + facing)
+    across = np.stack([(axis + 1) % 3, (axis + 2) % 3], axis=1)
+    flat_m = np.take_along_axis(points, across[:, None], 2)
+    low, high, texel_m = _extent(flat_m, chart, covered_m)
+    size = np.ceil((high - low) / texel_m[:, None]).astype(int) + 2 * _GUTTER + 1
+    origin, height = np.empty_like(size), 0
+    x = shelf = 0
+    for k in np.argsort(-size[:, 1], kind="stable"):
+        if x + size[k, 0] > _ATLAS_WIDTH:
+            x, height, shelf = 0, height + shelf, 0
+        origin[k] = x, height
+        x, shelf = x + size[k, 0], max(shelf, size[k, 1])
+    corners = (flat_m - low[chart][:, None]) / texel_m[chart][:, None, None]
+    return _Charts(corners + (origin + _GUTTER + 0.5)[chart][:, None], height + shelf)
+
+
+def _extent(
+    flat_m: FloatArray, chart: IntArray, covered_m: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(C, 2) low and high corners of the charts, and (C,) sizes of their texels."""
+    count = int(chart.max()) + 1
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    covered = np.full(count, np.inf)
+    np.minimum.at(low, chart, flat_m.min(axis=1))
+    np.maximum.at(high, chart, flat_m.max(axis=1))
+    np.minimum.at(covered, chart, covered_m)
+    size = high - low
+    texel_m = np.clip(covered / _TEXELS_A_PIXEL, _FINEST_M, _COARSEST_M)
+    texel_m = np.maximum(texel_m, np.sqrt(size.prod(axis=1) / _CHART_TEXELS))
+    return low, high, np.maximum(texel_m, size.max(axis=1) / (_ATLAS_WIDTH - 4 * _GUTTER))
+
+
+def _connected(points: FloatArray, group: IntArray) -> IntArray:
+    """(F,) number of the patch of each triangle: those of one group that share corners belong together."""
+    count = len(points)
+    corners = np.concatenate(
+        [np.repeat(group, 3)[:, None], np.round(points.reshape(-1, 3) * 1e5).astype(np.int64)], axis=1
+    )
+    _, corner = np.unique(corners, axis=0, return_inverse=True)
+    edges = (np.repeat(np.arange(count), 3), count + corner.ravel())
+    nodes = count + int(corner.max()) + 1
+    graph = coo_matrix((np.ones(3 * count, np.int8), edges), shape=(nodes, nodes))
+    label = connected_components(graph, directed=False)[1][:count]
+    return np.unique(label, return_inverse=True)[1].ravel()
+
+
+@numba.njit(cache=True, nogil=True)
+def _rasterise(corners_px, points, height, width):  # type: ignore[no-untyped-def]
+    """(height, width) index of the triangle over each texel's centre or near it, -1 for none, and its place.
+
+    Triangles reach a texel and a half beyond their edges, where nothing else is nearer.
+    """
+    owner = np.full((height, width), -1, np.int32)
+    miss = np.full((height, width), 1.5, np.float32)
+    places = np.zeros((height, width, 3), np.float32)
+    for f in range(len(corners_px)):
+        a, b, c = corners_px[f, 0], corners_px[f, 1], corners_px[f, 2]
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if abs(area) < 1e-12:
+            continue
+        edge_a, edge_b = np.hypot(c[0] - b[0], c[1] - b[1]), np.hypot(a[0] - c[0], a[1] - c[1])
+        edge_c = np.hypot(b[0] - a[0], b[1] - a[1])
+        left, right = min(a[0], b[0], c[0]) - 1.5, max(a[0], b[0], c[0]) + 1.5
+        low, high = min(a[1], b[1], c[1]) - 1.5, max(a[1], b[1], c[1]) + 1.5
+        for y in range(max(0, int(low)), min(height, int(high) + 1)):
+            for x in range(max(0, int(left)), min(width, int(right) + 1)):
+                px, py = x + 0.5, y + 0.5
+                v = ((px - a[0]) * (c[1] - a[1]) - (py - a[1]) * (c[0] - a[0])) / area
+                w = ((b[0] - a[0]) * (py - a[1]) - (b[1] - a[1]) * (px - a[0])) / area
+                u = 1.0 - v - w
+                out = -abs(area) * min(u / edge_a, v / edge_b, w / edge_c)
+                if max(out, 0.0) < miss[y, x]:
+                    miss[y, x], owner[y, x] = max(out, 0.0), f
+                    for k in range(3):
+                        places[y, x, k] = u * points[f, 0, k] + v * points[f, 1, k] + w * points[f, 2, k]
+    return owner, places
+
+
+def _srgb(albedo: FloatArray) -> ByteArray:
+    """8-bit sRGB of linear colours."""
+    linear = np.clip(albedo, 0.0, 1.0)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    return np.round(255.0 * encoded).astype(np.uint8)

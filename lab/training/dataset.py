@@ -1,0 +1,174 @@
+"""Rendered rooms as training data: shards on disk, split by room, and the augmentation."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from pipeline.geometry import scaled
+from pipeline.types import ByteArray, FloatArray
+
+if TYPE_CHECKING:
+    from lab.training.furniture import Catalogue
+
+WIDTH_PX, HEIGHT_PX = 320, 240
+ROOMS_PER_SHARD = 10
+VIEWS_PER_ROOM = 5
+FOCAL_PX = 262.5
+"""Focal length of the images in shards, a Kinect's at half size."""
+FIRST_SEED = {"train": 0, "validation": 1_000_000, "test": 2_000_000}
+"""Room seeds count up from here; no room is in two splits."""
+
+
+def render_shards(
+    folder: Path, split: str, first_shard: int, last_shard: int, catalogue: Catalogue | None = None
+) -> Iterator[Path]:
+    """Render shards [first, last) of ten rooms each; ready ones are kept. Yields each one's RGB file.
+
+    A shard is ``<split>_<number>_rgb.npy`` (N, 240, 320, 3) uint8 and ``..._depth.npy`` (N, 240, 320)
+    float16 metres, NaN where the ray hits nothing; the RGB file appears last.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for shard in range(first_shard, last_shard):
+        rgb_file = folder / f"{split}_{shard:04d}_rgb.npy"
+        if not rgb_file.exists():
+            first = FIRST_SEED[split] + shard * ROOMS_PER_SHARD
+            seeds = range(first, first + ROOMS_PER_SHARD)
+            colors, depths = zip(
+                *(view for seed in seeds for view in room_views(seed, catalogue)), strict=True
+            )
+            save_array(rgb_file.with_name(rgb_file.name.replace("rgb", "depth")), np.stack(depths))
+            save_array(rgb_file, np.stack(colors))
+        yield rgb_file
+
+
+def room_views(seed: int, catalogue: Catalogue | None = None) -> Iterator[tuple[ByteArray, FloatArray]]:
+    """Five views of one furnished room, at the training size.
+
+    Args:
+        seed: of the room and its views.
+        catalogue: furnishes the room; without it, procedural pieces do. Its views differ in focal length;
+            as in ``zoom``, their depth is then what the training camera would measure for the same image:
+            true depth times 262.5 px / focal length (canonical cameras, Yin et al. 2023).
+    """
+    from lab.worlds.render import Renderer
+    from lab.worlds.rooms import random_room
+    from lab.worlds.viewpoints import random_views
+
+    if catalogue is not None:
+        yield from _varied_views(seed, catalogue)
+        return
+    scene, rng = random_room(seed), np.random.default_rng(seed)
+    renderer = Renderer(scene, threads=1)
+    intrinsics = scaled(scene.intrinsics, WIDTH_PX / scene.intrinsics.width_px)
+    for T_world_camera in random_views(scene, rng, VIEWS_PER_ROOM, renderer):
+        view = renderer.view(intrinsics, T_world_camera, "fast", rng)
+        yield view.rgb, view.z_m.astype(np.float16)
+
+
+def _varied_views(seed: int, catalogue: Catalogue) -> Iterator[tuple[ByteArray, FloatArray]]:
+    from lab.training.varied_rooms import varied_room
+    from lab.training.viewpoints import views
+    from lab.worlds.render import Renderer
+
+    scene, rng = varied_room(seed, catalogue), np.random.default_rng(seed)
+    renderer = Renderer(scene, threads=1)
+    for T_world_camera, intrinsics in views(seed, scene, VIEWS_PER_ROOM, renderer, WIDTH_PX):
+        view = renderer.view(intrinsics, T_world_camera, "fast", rng)
+        yield view.rgb, (view.z_m * (FOCAL_PX / intrinsics.fx_px)).astype(np.float16)
+
+
+def save_array(file: Path, array: np.ndarray) -> None:
+    """Write under a temporary name, then rename."""
+    temporary = file.with_suffix(f".{os.getpid()}.tmp")
+    with temporary.open("wb") as stream:
+        np.save(stream, array)
+    temporary.rename(file)
+
+
+class Shards:
+    """All finished shards of one split, memory-mapped; ``refresh`` finds newly rendered ones."""
+
+    def __init__(self, folder: Path, split: str) -> None:
+        self.folder, self.split = folder, split
+        self.files: list[Path] = []
+        self.arrays: list[tuple[np.ndarray, np.ndarray]] = []
+        self.index: list[tuple[int, int]] = []
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Open the shards that appeared since the last call."""
+        for file in sorted(self.folder.glob(f"{self.split}_*_rgb.npy")):
+            if file not in self.files:
+                rgb = np.load(file, mmap_mode="r")
+                depth = np.load(file.with_name(file.name.replace("rgb", "depth")), mmap_mode="r")
+                self.index += [(len(self.files), row) for row in range(len(rgb))]
+                self.files.append(file)
+                self.arrays.append((rgb, depth))
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def __getitem__(self, item: int) -> tuple[ByteArray, FloatArray]:
+        """(240, 320, 3) uint8 RGB and (240, 320) float32 metres."""
+        shard, row = self.index[item]
+        rgb, depth = self.arrays[shard]
+        return np.asarray(rgb[row]), np.asarray(depth[row], dtype=np.float32)
+
+
+def augment(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> tuple[ByteArray, FloatArray]:
+    """A plausible other photograph of the same place, with the depth that belongs to it."""
+    if rng.random() < 0.5:
+        rgb, depth_m = rgb[:, ::-1], depth_m[:, ::-1]
+    if rng.random() < 0.3:
+        rgb, depth_m = zoom(rgb, depth_m, rng)
+    return degrade(recolor(np.ascontiguousarray(rgb), rng), rng), depth_m
+
+
+def zoom(
+    rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator, largest: float = 1.6
+) -> tuple[ByteArray, FloatArray]:
+    """A random crop enlarged to the full size; as the focal length is kept, depth shrinks with it."""
+    factor = rng.uniform(1.0, largest)
+    width, height = round(WIDTH_PX / factor), round(HEIGHT_PX / factor)
+    left, top = rng.integers(WIDTH_PX - width + 1), rng.integers(HEIGHT_PX - height + 1)
+    window = np.s_[top : top + height, left : left + width]
+    rgb = cv2.resize(np.ascontiguousarray(rgb[window]), (WIDTH_PX, HEIGHT_PX))
+    depth_m = cv2.resize(
+        np.ascontiguousarray(depth_m[window]), (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_NEAREST
+    )
+    return rgb, depth_m / factor
+
+
+def recolor(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
+    """Random exposure, contrast, gamma and white balance, and sometimes saturation."""
+    level = np.linspace(0.0, 1.0, 256)
+    gamma, contrast, brightness = np.exp(rng.normal(0.0, (0.25, 0.2, 0.15)))
+    balance = np.exp(rng.normal(0.0, 0.08, 3))
+    curve = (level[:, None] ** gamma - 0.5) * contrast + 0.5 * brightness * balance
+    curve = np.clip(curve * balance, 0.0, 1.0)
+    table = np.round(255.0 * curve).astype(np.uint8)
+    rgb = cv2.merge([cv2.LUT(rgb[..., c], table[:, c]) for c in range(3)])
+    if rng.random() < 0.5:
+        grey = cv2.cvtColor(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), cv2.COLOR_GRAY2RGB)
+        saturation = rng.uniform(0.0, 1.5)
+        rgb = cv2.addWeighted(rgb, saturation, grey, 1.0 - saturation, 0.0)
+    return rgb
+
+
+def degrade(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
+    """What a cheap camera does: defocus, sensor noise, JPEG blocks, each only sometimes."""
+    if rng.random() < 0.3:
+        rgb = cv2.GaussianBlur(rgb, (0, 0), rng.uniform(0.3, 1.5))
+    if rng.random() < 0.4:
+        noise = rng.standard_normal(rgb.shape, dtype=np.float32) * np.float32(rng.uniform(1.0, 10.0))
+        rgb = np.clip(rgb + noise, 0, 255).astype(np.uint8)
+    if rng.random() < 0.2:
+        _, code = cv2.imencode(".jpg", rgb, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(40, 95))])
+        rgb = cv2.imdecode(code, cv2.IMREAD_COLOR)
+    return rgb

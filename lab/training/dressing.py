@@ -1,0 +1,97 @@
+"""Catalogue models as parts of a room: their materials, other colours, cloth, darkness, lamps that shine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from lab.training.furniture import Entry
+from lab.training.models import Model, Surface
+from lab.worlds import textures
+from lab.worlds.room_finishes import draw_seed, random_material, recolored
+from lab.worlds.scene import Material, Part, Texture
+from pipeline.types import FloatArray
+
+_UPHOLSTERED = ("sofa", "couch", "armchair", "bed", "cushion", "pouf", "puff", "ottoman", "curtain")
+_OPENING_DEPTH_M = 0.06
+
+
+def dressed(
+    entry: Entry, model: Model, T: FloatArray, rng: np.random.Generator, daylight: float
+) -> list[Part]:
+    """The parts of a model at ``T``.
+
+    Args:
+        entry: what it is.
+        model: its surfaces.
+        T: (4, 4) pose of its foot in the world.
+        rng: draws colours and cloth.
+        daylight: how bright window panes are; 0 at night, when they are dark and shiny.
+    """
+    share = placed_size_m(entry)[1] / entry.size_m[1]
+    parts = [_part(surface, entry, T, rng, daylight, share) for surface in model.surfaces]
+    kind = rng.random()
+    if kind < 0.4 or entry.category == "Characters":
+        return parts
+    if kind < 0.75:
+        return recolored(parts, rng)
+    if kind < 0.87:
+        return [_darkened(part) for part in parts]
+    soft = any(word in entry.name.lower() for word in _UPHOLSTERED)
+    material = _cloth(rng) if soft else random_material(rng)
+    return [part if part.material.emission > 0.0 else replace(part, material=material) for part in parts]
+
+
+def placed_size_m(entry: Entry) -> FloatArray:
+    """(3,) width, depth and height in the room; doors and windows only stand out of the wall a little."""
+    if entry.role != "opening":
+        return entry.size_m
+    return np.array([entry.size_m[0], min(entry.size_m[1], _OPENING_DEPTH_M), entry.size_m[2]])
+
+
+def _part(
+    surface: Surface, entry: Entry, T: FloatArray, rng: np.random.Generator, daylight: float, share: float
+) -> Part:
+    """One surface with the material of its kind, its depth scaled by ``share``."""
+    texture: Texture = surface.colors if share == 1.0 else _stretched(surface.colors, share)
+    gloss = float(rng.uniform(0.15, 0.45))
+    material = {
+        "matt": Material(texture),
+        "glossy": Material(texture, gloss),
+        "glass": Material(texture, 0.5, infrared=0.1),
+        "mirror": Material(textures.paint((0.8, 0.82, 0.8), 3, 0.0), 0.95, infrared=0.02),
+        "glowing": Material(texture, emission=float(rng.uniform(0.5, 3.0))),
+    }[surface.kind]
+    if surface.kind == "glass" and entry.role == "opening":
+        if daylight > 0.0:
+            material = Material(textures.paint((0.75, 0.85, 0.95), 5, 0.2), infrared=0.1, emission=daylight)
+        else:
+            material = Material(textures.paint((0.02, 0.02, 0.03), 5, 0.2), 0.7, infrared=0.02)
+    vertices = surface.vertices_m * np.array([1.0, share, 1.0])
+    return Part(vertices, surface.triangles, material, T, smooth=True)
+
+
+def _stretched(texture: Texture, share: float) -> Texture:
+    scale = np.array([1.0, 1.0 / share, 1.0], np.float32)
+    return lambda points_m, normals: texture(points_m * scale, normals)
+
+
+def _darkened(part: Part) -> Part:
+    """The part in black, also to infrared light: a depth sensor loses it."""
+    texture = part.material.texture
+    black = replace(part.material, texture=lambda p, n: 0.01 + 0.05 * texture(p, n), infrared=0.05)
+    return part if part.material.emission > 0.0 else replace(part, material=black)
+
+
+def _cloth(rng: np.random.Generator) -> Material:
+    """Plain weave, stripes or print."""
+    color, second = textures.random_palette(rng, 2)
+    seed = draw_seed(rng)
+    makers = (
+        lambda: textures.fabric(color, second, seed, rng.uniform(0.004, 0.02)),
+        lambda: textures.stripes(color, second, seed, rng.uniform(0.02, 0.1), bool(rng.integers(2))),
+        lambda: textures.motif(color, second, seed, rng.uniform(0.05, 0.25)),
+        lambda: textures.checker(color, second, rng.uniform(0.02, 0.15), seed),
+    )
+    return Material(makers[rng.integers(len(makers))]())

@@ -1,0 +1,220 @@
+"""A trained checkpoint to the ONNX file that ships: full-resolution head, static 8-bit integers."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import onnxruntime
+import torch
+from onnxruntime.quantization import (
+    CalibrationDataReader,
+    CalibrationMethod,
+    QuantFormat,
+    QuantType,
+    quantize_static,
+)
+from onnxruntime.quantization.shape_inference import quant_pre_process
+from torch import Tensor, nn
+
+from lab.training.dataset import Shards
+from lab.training.initial import LICENCES
+from lab.training.network import DepthNet, depth_from_logit
+from packetmesh.errors import InputError
+from pipeline.depth.conventions import Convention, metadata_of
+from pipeline.depth.metrics import depth_errors
+from pipeline.depth.preprocessing import (
+    HEIGHT_PX,
+    MEAN,
+    PADDED_HEIGHT_PX,
+    STANDARD_DEVIATION,
+    WIDTH_PX,
+    padded,
+    unpad,
+)
+from pipeline.types import ByteArray, FloatArray
+
+OPSET = 17
+CALIBRATION_IMAGES = 100
+COMPARED_IMAGES = 60
+CONVENTION = Convention(
+    "relative",
+    WIDTH_PX,
+    PADDED_HEIGHT_PX,
+    scale=1.0,
+    normalised_inside=True,
+    resize="fit",
+    fit_px=(WIDTH_PX, HEIGHT_PX),
+)
+"""What an exported file takes and gives: 8-bit values as they are, and metres that hold only up to a scale,
+which a picture does not tell."""
+INTEGER_LAYERS = ("/encoder/pool/", "/encoder/stages.", "/decoder/")
+FLOAT_LAYERS = ("/decoder/reduce.4/", "/decoder/join.4/", "/decoder/heads.3/")
+"""All else stays in floating point too: the input and the first convolution, and from the head's logit on to
+depth, which 8 bits would cut into 256 steps."""
+FACTS = ("seed", "width", "initial", "loss", "step", "images_seen", "elapsed_s", "learning_rate")
+"""What a file repeats of its training."""
+
+
+class Normalise(nn.Module):
+    """RGB in 0 to 255 to what the encoder takes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.tensor(255.0 * MEAN)[None, :, None, None])
+        self.register_buffer("deviation", torch.tensor(255.0 * STANDARD_DEVIATION)[None, :, None, None])
+
+    def forward(self, rgb: Tensor) -> Tensor:
+        return (rgb - self.mean) / self.deviation
+
+
+class Mirrored(nn.Module):
+    """The network with its finest head only, for RGB (N, 3, H, W) in 0 to 255.
+
+    It looks at each image and at its mirror image and gives the geometric mean of both depths, which errs
+    less than either (Godard et al. 2017, post-processing).
+    """
+
+    def __init__(self, network: DepthNet) -> None:
+        super().__init__()
+        self.normalise = Normalise()
+        self.encoder, self.decoder = network.encoder, network.decoder
+
+    def forward(self, rgb: Tensor) -> Tensor:
+        both = self.normalise(torch.cat([rgb, rgb.flip(3)]))
+        straight_m, mirrored_m = depth_from_logit(self.decoder(self.encoder(both))[-1]).chunk(2)
+        return torch.sqrt(straight_m * mirrored_m.flip(3))
+
+
+class CalibrationImages(CalibrationDataReader):
+    """Training images, one at a time, to find the range of every activation."""
+
+    def __init__(self, shards: Shards, count: int) -> None:
+        self.samples = inputs(shards, count)
+
+    def get_next(self) -> dict[str, np.ndarray] | None:
+        image = next(self.samples, None)
+        return None if image is None else {"rgb": image}
+
+
+def inputs(shards: Shards, count: int) -> Iterator[np.ndarray]:
+    """Network inputs of evenly chosen images."""
+    for row in np.linspace(0, len(shards) - 1, count).astype(int):
+        yield network_input(shards[row][0])
+
+
+def network_input(rgb: ByteArray) -> FloatArray:
+    """(240, 320, 3) uint8 to (1, 3, 256, 320) float32, 0 to 255."""
+    image = padded(rgb, WIDTH_PX, PADDED_HEIGHT_PX).astype(np.float32)
+    return np.ascontiguousarray(image.transpose(2, 0, 1)[None])
+
+
+def export(checkpoint: Path, data: Path, out: Path) -> dict[str, float]:
+    """Write ``out`` (8 bit) and ``out`` with suffix ``.float.onnx``; returns errors on validation rooms.
+
+    Args:
+        checkpoint: ``best.pt`` or ``last.pt`` of a training run.
+        data: folder of shards; training images calibrate, validation images compare.
+        out: the ONNX file to write.
+
+    Raises:
+        InputError: there is no such checkpoint.
+    """
+    if not checkpoint.is_file():
+        raise InputError(
+            f"There is no checkpoint at {checkpoint}: name the best.pt or last.pt of a training run."
+        )
+    saved = torch.load(checkpoint, weights_only=True, map_location="cpu")
+    network = DepthNet(saved["config"]["width"]).eval()
+    network.load_state_dict(saved["model"])
+    float_file = out.with_suffix(".float.onnx")
+    write_float(network, float_file)
+    training = Shards(data, "train")
+    quantise(float_file, out, training)
+    validation = Shards(data, "validation")
+    errors = mean_errors(out, validation)
+    errors["float_abs_rel"] = mean_errors(float_file, validation)["abs_rel"]
+    facts = saved["config"] | saved["state"]
+    for file in (float_file, out):
+        describe(file, {name: facts[name] for name in FACTS}, errors, described_data(training))
+    return errors
+
+
+def write_float(network: DepthNet, file: Path) -> None:
+    """The network as ONNX in 32-bit floating point."""
+    torch.onnx.export(
+        Mirrored(network).eval(),
+        (torch.zeros(1, 3, PADDED_HEIGHT_PX, WIDTH_PX),),
+        str(file),
+        input_names=["rgb"],
+        output_names=["depth_m"],
+        opset_version=OPSET,
+        dynamo=False,
+    )
+
+
+def quantise(float_file: Path, out: Path, training: Shards) -> None:
+    """The same network with 8-bit weights and activations, ranges from training images."""
+    prepared = out.with_suffix(".prepared.onnx")
+    quant_pre_process(str(float_file), str(prepared), skip_symbolic_shape=True)
+    nodes = [node.name for node in onnx.load(prepared).graph.node]
+    quantize_static(
+        str(prepared),
+        str(out),
+        CalibrationImages(training, CALIBRATION_IMAGES),
+        quant_format=QuantFormat.QDQ,
+        activation_type=QuantType.QUInt8,
+        weight_type=QuantType.QInt8,
+        per_channel=True,
+        calibrate_method=CalibrationMethod.MinMax,
+        nodes_to_exclude=[n for n in nodes if n.startswith(FLOAT_LAYERS) or not n.startswith(INTEGER_LAYERS)],
+    )
+    prepared.unlink()
+
+
+def mean_errors(file: Path, shards: Shards) -> dict[str, float]:
+    """Mean errors of an ONNX file over evenly chosen images, as it is and scaled by the median."""
+    session = onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
+    rows: list[dict[str, float]] = []
+    for row in np.linspace(0, len(shards) - 1, COMPARED_IMAGES).astype(int):
+        rgb, truth_m = shards[row]
+        (output,) = session.run(None, {"rgb": network_input(rgb)})
+        depth_m = unpad(output[0, 0])
+        known = np.isfinite(truth_m)
+        scale = np.median(truth_m[known]) / np.median(depth_m[known])
+        raw, scaled = depth_errors(depth_m, truth_m), depth_errors(scale * depth_m, truth_m)
+        rows.append(
+            {"abs_rel": raw.abs_rel, "rmse_m": raw.rmse_m, "delta_1": raw.delta_1, "silog": raw.silog}
+            | {"scaled_abs_rel": scaled.abs_rel, "scaled_delta_1": scaled.delta_1}
+        )
+    return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
+
+
+def described_data(training: Shards) -> str:
+    """What the network learned from, by the names of the shards."""
+    kinds = sorted({re.sub(r"_\d+_rgb\.npy$", "", file.name) for file in training.files})
+    return f"{len(training)} images in {len(training.files)} shards ({', '.join(kinds)})"
+
+
+def describe(file: Path, facts: dict[str, Any], errors: dict[str, float], data: str) -> None:
+    """Write into the file what it takes and gives, how it was made, and its errors on validation rooms."""
+    model = onnx.load(file)
+    said = {
+        **metadata_of(CONVENTION),
+        "kind": CONVENTION.kind,
+        "normalised_inside": "true",
+        "licence": LICENCES[facts["initial"]],
+        "data": data,
+        "metrics": json.dumps(errors),
+        "abs_rel": str(errors["abs_rel"]),
+        "float_abs_rel": str(errors["float_abs_rel"]),
+        **{name: str(value) for name, value in facts.items()},
+    }
+    onnx.helper.set_model_props(model, said)
+    model.producer_name = "PacketMesh"
+    onnx.save(model, file)

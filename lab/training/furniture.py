@@ -1,0 +1,213 @@
+"""Furniture catalogues of Sweet Home 3D: hundreds of free models with true sizes, and images for surfaces.
+
+Debian's package ``sweethome3d-furniture`` brings 820 models (public domain and CC BY 3.0); ``sweethome3d``
+brings photographs of floors and walls.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tempfile
+import zipfile
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from lab.training.archives import numbered_records, zip_files
+from lab.training.models import Model, load_model, make_model, save_model
+from lab.training.wavefront import decode_image, read_wavefront
+from packetmesh.errors import InputError
+from pipeline.types import ByteArray, FloatArray
+
+Role = Literal["opening", "ceiling", "wall", "against", "table", "chair", "free", "small", "unused"]
+"""Where a thing belongs: in, under, on or against something, or free on the floor."""
+_FORMAT = 2
+"""Changes when cached models must be made anew."""
+_KEPT_MODELS = 400
+_OUTDOORS = re.compile(
+    r"\b(sedan|elevator|garage|shutter|blind|screen door|street|lamppost|fences?|railing|hedge|goal|horse|"
+    r"hut|chimney|swimming|diving|snowman|motorbike|swing|sandpit|light source|hydrant|fountain|fitness|net|"
+    r"hanging clothes|mannequin male|shower door|wire coathanger)\b"
+)
+_TABLES = ("table", "desk", "nightstand", "commode", "chest of drawers", "sideboard", "counter", "workbench")
+_CHAIRS = ("chair", "stool", "pouf", "ottoman")
+_HUNG = ("picture", "painting", "poster", "frame", "mirror", "clock", "board")
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One model of a catalogue, not yet read."""
+
+    name: str
+    category: str
+    size_m: FloatArray
+    """(3,) width, depth and height."""
+    elevation_m: float
+    """Height of its lowest point above the floor."""
+    rotation: FloatArray
+    """(3, 3) turn of the model in its own frame."""
+    light_m: FloatArray | None
+    """(3,) where a lamp shines, in the frame of the piece: Z up, from the middle of its foot."""
+    licence: str
+    creator: str
+    file: Path
+    model: str
+    role: Role
+
+    @property
+    def key(self) -> str:
+        """Name of the model in the cache."""
+        text = f"{_FORMAT} {self.file.name} {self.model} {self.size_m.tolist()}"
+        return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceImage:
+    """A photograph that covers floors or walls by repetition."""
+
+    name: str
+    category: str
+    size_m: tuple[float, float]
+    rgba: ByteArray
+    """(H, W, 4)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Catalogue:
+    """Everything that rooms are furnished from; models are read when wanted and kept in ``cache``."""
+
+    entries: tuple[Entry, ...]
+    images: tuple[SurfaceImage, ...]
+    cache: Path
+    _models: OrderedDict[str, Model] = field(default_factory=OrderedDict, repr=False)
+    _by_role: dict[Role, tuple[Entry, ...]] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def open(cls, source: Path | str, cache: Path | str | None = None) -> Catalogue:
+        """Lists what a folder, a Debian package or a ``.sh3f`` file holds.
+
+        Args:
+            source: for example ``/usr/share/sweethome3d``, or a folder with both packages.
+            cache: folder for models made ready; without it, one in the system's temporary folder.
+
+        Raises:
+            InputError: ``source`` holds no furniture.
+        """
+        folder = Path(cache) if cache else Path(tempfile.gettempdir()) / "packetmesh-furniture"
+        (folder / "models").mkdir(parents=True, exist_ok=True)
+        entries: list[Entry] = []
+        images: list[SurfaceImage] = []
+        for file in zip_files(Path(source), folder):
+            for record, about in numbered_records(file, "FurnitureCatalog.properties"):
+                entries.append(_entry(record, about, file))
+            images += _images(file)
+        if not entries:
+            raise InputError(
+                f"'{source}' holds no FurnitureCatalog.properties; name sweethome3d's furniture."
+            )
+        return cls(tuple(entries), tuple(images), folder)
+
+    def of_role(self, role: Role) -> tuple[Entry, ...]:
+        """The entries that belong in one kind of place."""
+        if role not in self._by_role:
+            self._by_role[role] = tuple(entry for entry in self.entries if entry.role == role)
+        return self._by_role[role]
+
+    def model(self, entry: Entry) -> Model:
+        """The model of an entry, from memory, from the cache, or made now.
+
+        Raises:
+            InputError: its file lacks it, or it has no triangles.
+        """
+        file = self.cache / "models" / f"{entry.key}.npz"
+        if entry.key not in self._models:
+            if not file.exists():
+                with zipfile.ZipFile(entry.file) as archive:
+                    mesh = read_wavefront(archive, entry.model)
+                save_model(make_model(mesh, entry.rotation, entry.size_m, entry.light_m), file)
+            self._models[entry.key] = load_model(file)
+            if len(self._models) > _KEPT_MODELS:
+                self._models.popitem(last=False)
+        self._models.move_to_end(entry.key)
+        return self._models[entry.key]
+
+
+def _entry(record: dict[str, str], about: dict[str, str], file: Path) -> Entry:
+    """The entry that a catalogue's record describes; lengths there are centimetres."""
+    try:
+        size_m = np.array([float(record[key]) for key in ("width", "depth", "height")]) / 100.0
+        elevation_m = float(record.get("elevation", 0.0)) / 100.0
+        turn = np.array(record.get("modelRotation", "1 0 0 0 1 0 0 0 1").split(), float).reshape(3, 3)
+        name, model = record["name"], record["model"].lstrip("/")
+        light_m = _light(record, size_m)
+    except (KeyError, ValueError) as error:
+        text = f"A record of '{file}' is incomplete ({error}); download the catalogue again."
+        raise InputError(text) from None
+    category, opening = record.get("category", ""), record.get("doorOrWindow") == "true"
+    role = _role(name.lower(), category, size_m, elevation_m, opening)
+    return Entry(
+        name,
+        category,
+        size_m,
+        elevation_m,
+        turn,
+        light_m,
+        record.get("license") or about.get("license", "unknown"),
+        record.get("creator", "unknown"),
+        file,
+        model,
+        role,
+    )
+
+
+def _light(record: dict[str, str], size_m: FloatArray) -> FloatArray | None:
+    """Where the first lamp of a record shines; the catalogue counts x and y from the back left corner."""
+    if "lightSourceX" not in record:
+        return None
+    x, y, z = (float(record[f"lightSource{axis}"].split()[0]) / 100.0 for axis in "XYZ")
+    return np.array([x - 0.5 * size_m[0], 0.5 * size_m[1] - y, z])
+
+
+def _role(name: str, category: str, size_m: FloatArray, elevation_m: float, opening: bool) -> Role:
+    """Where a thing belongs, from its names and its size."""
+    width, depth, height = size_m
+    longest = float(size_m.max())
+    if category in ("Vehicles", "Staircases") or _OUTDOORS.search(name):
+        return "unused"
+    if (category == "Exterior" and longest > 2.0) or longest > 2.6 or size_m.min() <= 0.0:
+        return "unused"
+    if category == "Characters" and any(word in name for word in ("sit", "lying", "hold")):
+        return "unused"
+    if opening or category == "Doors and windows":
+        return "opening"
+    if elevation_m > 1.2 and (category == "Lights" or "ceiling" in name):
+        return "wall" if any(word in name for word in ("wall", "porch", "outdoor")) else "ceiling"
+    if elevation_m > 0.2 or (depth < 0.12 and height > 0.25 and any(word in name for word in _HUNG)):
+        return "wall" if depth < 0.7 else "unused"
+    if longest < 0.45 or (category == "Lights" and height < 0.9):
+        return "small"
+    if any(word in name for word in _TABLES):
+        return "table"
+    if any(word in name for word in _CHAIRS):
+        return "chair"
+    return "against" if height > 0.35 and width > 0.4 and category in _ROOMS else "free"
+
+
+_ROOMS = ("Living room", "Bedroom", "Kitchen", "Bathroom", "Office")
+
+
+def _images(file: Path) -> list[SurfaceImage]:
+    """The photographs of floors and walls in a zip file."""
+    images = []
+    with zipfile.ZipFile(file) as archive:
+        for record, _ in numbered_records(file, "TexturesCatalog.properties"):
+            path = record.get("image", "").lstrip("/")
+            rgba = decode_image(archive.read(path)) if path in archive.namelist() else None
+            if rgba is not None and {"width", "height"} <= record.keys():
+                size_m = float(record["width"]) / 100.0, float(record["height"]) / 100.0
+                images.append(SurfaceImage(record.get("name", ""), record.get("category", ""), size_m, rgba))
+    return images

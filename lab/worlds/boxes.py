@@ -1,0 +1,115 @@
+"""The plain test room of SPEC 4.8: boxes and balls, seen by cameras whose true poses are known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lab.worlds.primitives import Mesh, box, sphere
+from lab.worlds.room_finishes import draw_seed, muted, random_floor, random_wall
+from lab.worlds.scene import Light, Material, Part, Scene
+from lab.worlds.textures import plaster, random_palette
+from packetmesh.errors import InputError
+from pipeline.geometry import look_at, rigid, rotation_exp
+from pipeline.types import CameraIntrinsics, FloatArray
+
+
+def box_room(seed: int, nodes: int = 2, angle_deg: float = 25.0, baseline_m: float = 1.0) -> Scene:
+    """A room with 4 to 7 boxes and 1 to 3 balls, and neighbouring cameras that see about 60 % of the same.
+
+    Args:
+        seed: chooses everything but the cameras' spacing.
+        nodes: number of cameras, 1 to 6.
+        angle_deg: angle between the directions in which neighbours look, 5 to 60.
+        baseline_m: distance of neighbours, 0.1 to 3.
+
+    Raises:
+        InputError: an argument is out of its range.
+    """
+    _check(nodes, angle_deg, baseline_m)
+    rng = np.random.default_rng([seed, 4808])
+    reach_m = baseline_m / (2.0 * np.sin(np.radians(angle_deg) / 2.0))
+    cameras = _cameras(rng, nodes, np.radians(angle_deg), reach_m)
+    eyes = np.array([camera[:3, 3] for camera in cameras])
+    low = np.minimum([-2.4, -2.4, 0.0], eyes.min(axis=0) - 0.5) * [1, 1, 0]
+    high = np.maximum([2.4, 1.7, 2.6], eyes.max(axis=0) + 0.5)
+    parts = [*_shell(rng, low, high), *_things(rng, eyes)]
+    lamp = Light(np.array([*rng.uniform(-0.8, 0.8, 2), high[2] - 0.25]), np.array([3.2, 3.0, 2.7]), 0.2)
+    window = Light(np.array([low[0] + 0.3, rng.uniform(-1.0, 0.5), 1.6]), np.array([1.0, 1.15, 1.35]), 0.4)
+    intrinsics = CameraIntrinsics.pinhole(262.5, 262.5, 159.5, 119.5, 320, 240)
+    return Scene(f"boxes-{seed}", tuple(parts), (lamp, window), np.full(3, 0.3), cameras, intrinsics)
+
+
+def _check(nodes: int, angle_deg: float, baseline_m: float) -> None:
+    for name, value, low, high in (
+        ("nodes", nodes, 1, 6),
+        ("angle_deg", angle_deg, 5.0, 60.0),
+        ("baseline_m", baseline_m, 0.1, 3.0),
+    ):
+        if not low <= value <= high:
+            raise InputError(f"A box room's {name} is {value:g}; take {low:g} to {high:g}.")
+
+
+def _cameras(
+    rng: np.random.Generator, nodes: int, angle_rad: float, reach_m: float
+) -> tuple[FloatArray, ...]:
+    """Cameras on an arc about the room's middle: neighbours are a chord of baseline length apart."""
+    tilt = rng.uniform(0.12, 0.3)
+    target = np.array([0.0, 0.0, rng.uniform(0.6, 0.9)])
+    heading = -np.pi / 2.0 + (np.arange(nodes) - (nodes - 1) / 2.0) * angle_rad
+    places = [target + reach_m * np.array([np.cos(h), np.sin(h), 0.0]) for h in heading]
+    lift = np.array([0.0, 0.0, min(1.0, reach_m * np.tan(tilt))])
+    # All cameras look down equally, at points below the arc's centre, so the heading differs by the angle.
+    return tuple(look_at(place + lift, target) for place in places)
+
+
+def _shell(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> list[Part]:
+    """Floor, ceiling and walls as slabs; parts[0] is the floor."""
+    size, middle = high - low, 0.5 * (low + high)
+    wall, ceiling = random_wall(rng), Material(plaster(muted(rng, 1, 0.6, 0.8)[0]))
+    parts = []
+    for axis, sides in ((2, (-1.0, 1.0)), (0, (-1.0, 1.0)), (1, (-1.0, 1.0))):
+        for side in sides:
+            material = wall if axis != 2 else (random_floor(rng) if side < 0 else ceiling)
+            slab, at = size + 0.2, middle.copy()
+            slab[axis], at[axis] = 0.1, middle[axis] + side * (0.5 * size[axis] + 0.05)
+            parts.append(_part(box(tuple(slab)), material, rigid(np.eye(3), at)))
+    return parts
+
+
+def _things(rng: np.random.Generator, eyes: FloatArray) -> list[Part]:
+    """Boxes and balls on the floor about the middle, a metre or more from every camera."""
+    boxes, balls = int(rng.integers(4, 8)), int(rng.integers(1, 4))
+    parts = []
+    for k, spot in enumerate(_spots(rng, eyes[:, :2], boxes + balls)):
+        if k < boxes:
+            size = rng.uniform([0.25, 0.25, 0.25], [0.7, 0.7, 1.2])
+            turn = rotation_exp(np.array([0.0, 0.0, rng.uniform(0.0, np.pi)]))
+            parts.append(_part(box(tuple(size)), _paint(rng), rigid(turn, np.array([*spot, 0.5 * size[2]]))))
+        else:
+            radius = rng.uniform(0.15, 0.35)
+            parts.append(
+                _part(sphere(radius), _paint(rng), rigid(np.eye(3), np.array([*spot, radius])), True)
+            )
+    return parts
+
+
+def _spots(rng: np.random.Generator, eyes_m: FloatArray, count: int) -> list[FloatArray]:
+    """Places on the floor: the least crowded of a few random ones, one after the other."""
+    spots: list[FloatArray] = []
+    while len(spots) < count:
+        tries = rng.uniform([-1.7, -1.2], [1.7, 1.4], (12, 2))
+        tries = tries[np.min(np.linalg.norm(tries[:, None] - eyes_m, axis=2), axis=1) > 1.1]
+        if not len(tries):
+            continue
+        others = np.array(spots) if spots else np.full((1, 2), 9.0)
+        spots.append(tries[np.argmax(np.min(np.linalg.norm(tries[:, None] - others, axis=2), axis=1))])
+    return spots
+
+
+def _part(mesh: Mesh, material: Material, T_world_part: FloatArray, smooth: bool = False) -> Part:
+    return Part(*mesh, material, T_world_part, smooth)
+
+
+def _paint(rng: np.random.Generator) -> Material:
+    color = 0.08 + 0.8 * random_palette(rng, 1)[0]
+    return Material(plaster(color, draw_seed(rng), 0.03, 0.15))

@@ -1,0 +1,25 @@
+"""What random rooms are filled with: furniture with things on it, wall pieces, clutter and plain solids.
+
+A piece is a list of parts that stands on z = 0 about the origin, its front towards -y, as in ``furniture``.
+"""
+
+from lab.worlds.pieces.random_furniture import (
+    random_floor_thing,
+    random_group,
+    random_rug,
+    random_wall_furniture,
+)
+from lab.worlds.pieces.stock import bounds, moved, stocked
+from lab.worlds.pieces.walls import WallPiece, random_wall_piece
+
+__all__ = [
+    "WallPiece",
+    "bounds",
+    "moved",
+    "random_floor_thing",
+    "random_group",
+    "random_rug",
+    "random_wall_furniture",
+    "random_wall_piece",
+    "stocked",
+]

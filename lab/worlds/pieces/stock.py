@@ -1,0 +1,39 @@
+"""Pieces (lists of parts) as wholes: their bounds, their motion, and a stock of ready ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import TypeVar
+
+import numpy as np
+
+from lab.worlds.scene import Part
+from pipeline.types import FloatArray
+
+Rng = np.random.Generator
+_Made = TypeVar("_Made")
+
+
+@lru_cache(maxsize=2048)
+def stocked(maker: Callable[[Rng], _Made], variant: int) -> _Made:
+    """The piece that a maker builds from its own seed, kept: building costs more than rendering."""
+    return maker(np.random.default_rng([variant, 404]))
+
+
+def bounds(parts: list[Part]) -> tuple[FloatArray, FloatArray]:
+    """(3,) lowest and (3,) highest corner."""
+    places = [part.vertices_m @ part.T_world_part[:3, :3].T + part.T_world_part[:3, 3] for part in parts]
+    return np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
+
+
+def moved(parts: list[Part], T: FloatArray) -> list[Part]:
+    """The piece after a rigid (4, 4) motion."""
+    return [replace(part, T_world_part=T @ part.T_world_part) for part in parts]
+
+
+def draw(rng: Rng, makers: Sequence[tuple[float, Callable[[], _Made]]]) -> _Made:
+    """Calls one of the (weight, maker) pairs, chosen by weight."""
+    weight = np.array([w for w, _ in makers])
+    return makers[int(rng.choice(len(makers), p=weight / weight.sum()))][1]()

@@ -1,0 +1,114 @@
+"""A scene as Embree sees it: which part a ray meets, where, and whether something is in its way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lab.worlds import shading
+from lab.worlds.scene import Part, Scene
+from pipeline.open3d_runtime import o3d
+from pipeline.types import BoolArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class Hits:
+    """Where N rays meet the scene."""
+
+    t: FloatArray
+    """(N,) in units of the ray's direction; infinite for a miss."""
+    positions: FloatArray
+    """(N, 3)."""
+    normals: FloatArray
+    """(N, 3) unit, towards the ray's origin."""
+    view: FloatArray
+    """(N, 3) unit direction of the ray."""
+    part: IntArray
+    """(N,) index of the part, -1 for a miss."""
+
+    def select(self, rows: IntArray) -> Hits:
+        """The hits of some rays."""
+        return Hits(self.t[rows], self.positions[rows], self.normals[rows], self.view[rows], self.part[rows])
+
+
+class RayCaster:
+    """Casts rays, (N, 6) float32 origins and directions in the world frame.
+
+    Args:
+        scene: parts with emission do not block light, so that lamps shine through shades.
+        threads: Embree threads; 0 takes all cores.
+    """
+
+    def __init__(self, scene: Scene, threads: int = 0) -> None:
+        self._parts = scene.parts
+        self._threads = threads
+        self._meshes = [_world_mesh(part) for part in scene.parts]
+        self._corner_normals = np.concatenate([normals for _, _, normals in self._meshes])
+        counts = [len(triangles) for _, triangles, _ in self._meshes]
+        self._triangle_part = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+        self._all = _embree(self._meshes)
+
+    @cached_property
+    def _opaque(self) -> Any:
+        """What casts shadows."""
+        pairs = zip(self._meshes, self._parts, strict=True)
+        return _embree([mesh for mesh, part in pairs if part.material.emission <= 0.0])
+
+    def cast(self, rays: FloatArray) -> Hits:
+        """The first thing each ray meets."""
+        answer = self._all.cast_rays(_tensor(rays), nthreads=self._threads)
+        t, triangle = answer["t_hit"].numpy(), answer["primitive_ids"].numpy()
+        positions, normals, view = np.zeros((3, len(t), 3), np.float32)
+        barycentric = answer["primitive_uvs"].numpy()
+        shading.interpolate_hits(
+            rays, t, triangle, barycentric, self._corner_normals, positions, normals, view
+        )
+        seen = np.isfinite(t)
+        part = np.where(seen, self._triangle_part[np.where(seen, triangle, 0)], -1)
+        return Hits(t, positions, normals, view, part)
+
+    def reach(self, rays: FloatArray) -> FloatArray:
+        """(N,) how far each ray goes, in units of its direction; infinite for a miss."""
+        return self._all.cast_rays(_tensor(rays), nthreads=self._threads)["t_hit"].numpy()
+
+    def occluded(self, rays: FloatArray, t_far: float) -> BoolArray:
+        """(N,) True where something opaque is nearer than ``t_far`` times the ray's direction."""
+        return self._opaque.test_occlusions(_tensor(rays), 0.0, t_far, nthreads=self._threads).numpy()
+
+
+def world_mesh(scene: Scene) -> tuple[FloatArray, IntArray]:
+    """(V, 3) vertices in the world frame and (F, 3) triangles of all parts."""
+    return _merged([_world_mesh(part) for part in scene.parts])
+
+
+_ShadedMesh = tuple[FloatArray, IntArray, FloatArray]
+
+
+def _world_mesh(part: Part) -> _ShadedMesh:
+    """World vertices, triangles, and (F, 3, 3) shading normals of each triangle's corners."""
+    vertices = part.vertices_m @ part.T_world_part[:3, :3].T + part.T_world_part[:3, 3]
+    triangles = np.ascontiguousarray(part.triangles)
+    return vertices, triangles, shading.corner_normals(vertices, triangles, part.smooth)
+
+
+def _merged(meshes: list[_ShadedMesh]) -> tuple[FloatArray, IntArray]:
+    first = np.cumsum([0] + [len(vertices) for vertices, _, _ in meshes])
+    triangles = [triangles + start for (_, triangles, _), start in zip(meshes, first, strict=False)]
+    return np.concatenate([vertices for vertices, _, _ in meshes]), np.concatenate(triangles)
+
+
+def _embree(meshes: list[_ShadedMesh]) -> Any:
+    scene = o3d.t.geometry.RaycastingScene()
+    if meshes:
+        vertices, triangles = _merged(meshes)
+        scene.add_triangles(_tensor(vertices.astype(np.float32)), _tensor(triangles.astype(np.uint32)))
+    return scene
+
+
+def _tensor(array: Any) -> Any:
+    """Open3D's view of a numpy array; its stubs do not know that this constructor exists."""
+    constructor: Any = o3d.core.Tensor
+    return constructor(array)

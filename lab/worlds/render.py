@@ -1,0 +1,283 @@
+"""Ray-cast photographs of a scene, with the depth, normals and reflectance that the sensor model needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from lab.worlds import shading
+from lab.worlds.film import Film, develop
+from lab.worlds.pixels import camera_rays, dither, lit_pixels
+from lab.worlds.raycast import Hits, RayCaster
+from lab.worlds.scene import Part, Scene
+from pipeline.types import ByteArray, CameraIntrinsics, FloatArray, IntArray
+
+Quality = Literal["fast", "photo"]
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One rendered image and what is really there, all on the same pixel grid."""
+
+    rgb: ByteArray
+    """(H, W, 3)."""
+    z_m: FloatArray
+    """(H, W) float32 depth along the optical axis at the pixel centres; NaN where nothing is."""
+    normals: FloatArray
+    """(H, W, 3) unit surface normals in the world frame, towards the camera."""
+    infrared: FloatArray
+    """(H, W) infrared albedo, 0 to 1."""
+    gloss: FloatArray
+    """(H, W) strength of the mirror-like reflection, 0 to 1."""
+    T_world_camera: FloatArray
+    """(4, 4) pose it was rendered from."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Sampling:
+    """How many rays a quality spends."""
+
+    passes: int
+    """Camera rays a pixel."""
+    shadow_rays: int
+    """A light, pass and pixel."""
+    sky_rays: int
+    """Over the hemisphere, a pass and pixel."""
+    bounce: bool
+    """Gather the light of what sky rays hit, instead of only counting it as occluded."""
+    every_pixel: bool
+    """Trace light at all pixels, instead of at the white fields of a chess board."""
+    film: Film
+
+
+_SAMPLING = {
+    "fast": _Sampling(
+        1,
+        shadow_rays=1,
+        sky_rays=1,
+        bounce=False,
+        every_pixel=False,
+        film=Film(0.5, 0.08, noise=(0.0, 0.03), blur_px=(0.25, 0.75), vignette=(0.0, 0.25)),
+    ),
+    "photo": _Sampling(4, shadow_rays=4, sky_rays=4, bounce=True, every_pixel=True, film=Film()),
+}
+_OFFSETS_PX = {1: ((0.0, 0.0),), 4: ((0.125, 0.375), (-0.375, 0.125), (0.375, -0.125), (-0.125, -0.375))}
+"""A rotated grid: where in a pixel the passes look."""
+_DULL = 0.05
+"""Parts with less gloss reflect nothing."""
+_REACH_M = 1.2
+"""Things nearer than this occlude the ambient light."""
+
+
+class Renderer:
+    """A scene made ready for rays; keep it to render several views of one scene.
+
+    Args:
+        scene: what to render. Parts with emission do not cast shadows, so that lamps shine through shades.
+        threads: Embree threads; 0 takes all cores.
+    """
+
+    def __init__(self, scene: Scene, threads: int = 0) -> None:
+        self.scene = scene
+        self._caster = RayCaster(scene, threads)
+        materials = [part.material for part in scene.parts]
+        self._gloss = np.array([m.gloss for m in materials] + [0.0], np.float32)
+        self._infrared = np.array([m.infrared for m in materials] + [0.0], np.float32)
+        self._emission = np.array([m.emission for m in materials] + [0.0], np.float32)
+        self._mirror = np.where(self._emission > 0.0, np.float32(0.0), self._gloss)  # own light outshines it
+        self._ambient = np.asarray(scene.ambient, np.float32)
+
+    @cached_property
+    def _mean_albedo(self) -> FloatArray:
+        """(parts + 1, 3) mean albedo of each part, black for a miss."""
+        return np.stack([*(_mean_albedo(part) for part in self.scene.parts), np.zeros(3, np.float32)])
+
+    def view(
+        self,
+        intrinsics: CameraIntrinsics,
+        T_world_camera: FloatArray,
+        quality: Quality,
+        rng: np.random.Generator,
+    ) -> View:
+        """Renders one view (H, W of ``intrinsics``)."""
+        sampling = _SAMPLING[quality]
+        shape = (intrinsics.height_px, intrinsics.width_px)
+        center = self._caster.cast(camera_rays(intrinsics, T_world_camera))
+        albedo = self._albedo(center)
+        radiance = np.zeros((*shape, 3), np.float32)
+        for offset_px in _OFFSETS_PX[sampling.passes]:
+            if any(offset_px):
+                hits = self._caster.cast(camera_rays(intrinsics, T_world_camera, offset_px))
+                radiance += self._radiance(hits, self._albedo(hits), shape, sampling, rng)
+            else:
+                radiance += self._radiance(center, albedo, shape, sampling, rng)
+        seen = center.part >= 0
+        return View(
+            rgb=develop(radiance / sampling.passes, sampling.film, rng),
+            z_m=np.where(seen, center.t, np.float32(np.nan)).reshape(shape),
+            normals=center.normals.reshape(*shape, 3),
+            infrared=np.clip(_luminance(albedo) * self._infrared[center.part], 0.0, 1.0).reshape(shape),
+            gloss=self._gloss[center.part].reshape(shape),
+            T_world_camera=T_world_camera,
+        )
+
+    def depth(self, intrinsics: CameraIntrinsics, T_world_camera: FloatArray) -> FloatArray:
+        """(H, W) float32 true depth at the pixel centres; NaN where nothing is."""
+        t = self._caster.reach(camera_rays(intrinsics, T_world_camera))
+        t = np.where(np.isfinite(t), t, np.float32(np.nan))
+        return t.reshape(intrinsics.height_px, intrinsics.width_px)
+
+    def parts_seen(
+        self, intrinsics: CameraIntrinsics, T_world_camera: FloatArray
+    ) -> tuple[FloatArray, IntArray]:
+        """(H, W) depth like ``depth``, and the (H, W) index of the part at each pixel, -1 for none."""
+        hits = self._caster.cast(camera_rays(intrinsics, T_world_camera))
+        shape = (intrinsics.height_px, intrinsics.width_px)
+        z_m = np.where(hits.part >= 0, hits.t, np.float32(np.nan))
+        return z_m.reshape(shape), hits.part.reshape(shape)
+
+    def _albedo(self, hits: Hits) -> FloatArray:
+        """(N, 3) albedo from the parts' textures, black for misses."""
+        albedo = np.zeros((len(hits.part), 3), np.float32)
+        order = np.argsort(hits.part, kind="stable")
+        bounds = np.searchsorted(hits.part[order], np.arange(len(self.scene.parts) + 1))
+        for k, part in enumerate(self.scene.parts):
+            rows = order[bounds[k] : bounds[k + 1]]
+            if len(rows):
+                albedo[rows] = _evaluate(part, hits.positions[rows], hits.normals[rows])
+        return albedo
+
+    def _radiance(
+        self,
+        hits: Hits,
+        albedo: FloatArray,
+        shape: tuple[int, int],
+        sampling: _Sampling,
+        rng: np.random.Generator,
+    ) -> FloatArray:
+        """(H, W, 3) light towards the camera: traced at some pixels, spread within surfaces to all."""
+        lit = lit_pixels(shape, sampling.every_pixel)
+        some = hits.select(lit)
+        direct, shine, sky = (np.zeros((len(lit), 3), np.float32) for _ in range(3))
+        for _ in range(sampling.shadow_rays):
+            self._add_lights(some, self._mirror[some.part], dither(shape, rng)[lit], direct, shine)
+        for _ in range(sampling.sky_rays):
+            sky += self._sky(some, dither(shape, rng)[lit], sampling.bounce)
+        shine /= sampling.shadow_rays
+        self._add_mirrored(some, albedo[lit], dither(shape, rng)[lit], sampling.bounce, shine)
+
+        light, glint = np.full((2, len(hits.t), 3), np.nan, np.float32)
+        light[lit] = direct / sampling.shadow_rays + sky / sampling.sky_rays
+        glint[lit] = shine
+        radiance = albedo * (_smoothed(light, hits, shape) + self._emission[hits.part][:, None])
+        if shine.any():
+            radiance *= 1.0 - _mirror_share(hits, self._mirror[hits.part])[:, None]
+            radiance += _smoothed(glint, hits, shape)
+        return radiance.reshape(*shape, 3)
+
+    def _add_lights(
+        self,
+        hits: Hits,
+        gloss: FloatArray,
+        random: FloatArray,
+        irradiance: FloatArray,
+        shine: FloatArray,
+        shadows: bool = True,
+    ) -> None:
+        """Adds each light to (N, 3) irradiance, by one shadow ray or as if nothing were in its way.
+
+        Its blurred image in (N,) glossy surfaces goes to (N, 3) shine.
+        """
+        count = len(hits.t)
+        rays, weight = np.empty((count, 6), np.float32), np.empty(count, np.float32)
+        index = np.empty(count, np.int64)
+        for light in self.scene.lights:
+            center, color = np.asarray(light.position_m, np.float32), np.asarray(light.color, np.float32)
+            used = shading.light_rays(
+                hits.positions, hits.normals, center, np.float32(light.size_m), random, rays, weight, index
+            )
+            blocked = self._caster.occluded(rays[:used], 0.999) if shadows else np.zeros(used, bool)
+            lamp = (blocked, weight[:used], index[:used], rays, color)
+            shading.add_light(*lamp, hits.view, hits.normals, gloss, irradiance, shine)
+
+    def _sky(self, hits: Hits, random: FloatArray, bounce: bool) -> FloatArray:
+        """(N, 3) ambient irradiance by one ray over the hemisphere, with what it meets on the way."""
+        rays = np.empty((len(hits.t), 6), np.float32)
+        shading.hemisphere_rays(hits.positions, hits.normals, random, rays)
+        if bounce:
+            return 0.7 * self._met(rays, random, True) + 0.3 * self._ambient
+        blocked = self._caster.occluded(rays, _REACH_M)
+        return np.where(blocked[:, None], 0.35 * self._ambient, self._ambient).astype(np.float32)
+
+    def _met(self, rays: FloatArray, random: FloatArray, shadows: bool) -> FloatArray:
+        """(N, 3) light from what rays meet: its mean colour, lit by lamps and ambient light."""
+        hits = self._caster.cast(rays)
+        light = np.zeros((len(rays), 3), np.float32)
+        self._add_lights(hits, np.zeros(len(rays), np.float32), random, light, light, shadows)
+        near = np.clip(hits.t / _REACH_M, 0.1, 1.0)[:, None]
+        light += self._ambient * near + self._emission[hits.part][:, None]
+        light *= self._mean_albedo[hits.part]
+        light[hits.part < 0] = self._ambient
+        return light
+
+    def _add_mirrored(
+        self, hits: Hits, albedo: FloatArray, random: FloatArray, shadows: bool, shine: FloatArray
+    ) -> None:
+        """Adds what shiny parts reflect to (N, 3) shine, blurred by their roughness and tinted by metals."""
+        rows = np.flatnonzero(self._mirror[hits.part] > _DULL)
+        if not len(rows):
+            return
+        hits, albedo, random = hits.select(rows), albedo[rows], random[rows]
+        gloss = self._mirror[hits.part]
+        rays = np.empty((len(rows), 6), np.float32)
+        roughness = np.float32(0.3) * (1.0 - gloss) ** 2
+        shading.mirror_rays(hits.positions, hits.normals, hits.view, roughness, random, rays)
+        tint = 1.0 - gloss[:, None] * (1.0 - albedo)
+        reflected = np.minimum(self._met(rays, random, shadows), 6.0 * self._ambient.max() + 0.5)
+        shine[rows] += _mirror_share(hits, gloss)[:, None] * tint * reflected
+
+
+def render(
+    scene: Scene,
+    intrinsics: CameraIntrinsics,
+    T_world_camera: FloatArray,
+    quality: Quality,
+    rng: np.random.Generator,
+) -> View:
+    """One view of a scene; use ``Renderer`` for several."""
+    return Renderer(scene).view(intrinsics, T_world_camera, quality, rng)
+
+
+def _evaluate(part: Part, positions_m: FloatArray, normals: FloatArray) -> FloatArray:
+    """(N, 3) albedo at world positions of a part."""
+    T = part.T_world_part.astype(np.float32)
+    return part.material.texture((positions_m - T[:3, 3]) @ T[:3, :3], normals @ T[:3, :3])
+
+
+def _mean_albedo(part: Part) -> FloatArray:
+    """(3,) mean of the texture over places on some twenty triangles."""
+    triangles = np.ascontiguousarray(part.triangles[:: max(1, len(part.triangles) // 20)])
+    weights = np.array([[3, 3, 4], [7, 2, 1], [1, 7, 2]], np.float32) / 10.0
+    corners = part.vertices_m[triangles].astype(np.float32)
+    places = np.einsum("wc,fck->wfk", weights, corners).reshape(-1, 3)
+    normals = shading.corner_normals(part.vertices_m, triangles, False)[:, 0]
+    return part.material.texture(places, np.tile(normals, (3, 1))).mean(axis=0).astype(np.float32)
+
+
+def _mirror_share(hits: Hits, gloss: FloatArray) -> FloatArray:
+    """(N,) share of the light that is mirrored, more at grazing angles (after Schlick)."""
+    grazing = (1.0 - np.clip(-np.einsum("nk,nk->n", hits.view, hits.normals), 0.0, 1.0)) ** 4
+    return np.where(gloss > _DULL, gloss * (gloss + (1.0 - gloss) * grazing), np.float32(0.0))
+
+
+def _smoothed(image: FloatArray, hits: Hits, shape: tuple[int, int]) -> FloatArray:
+    """(H * W, 3) light averaged, and filled where it is NaN, within surfaces."""
+    surface = (hits.positions.reshape(*shape, 3), hits.normals.reshape(*shape, 3), hits.t.reshape(shape))
+    return shading.smooth_within_surfaces(image.reshape(*shape, 3), *surface, 2).reshape(-1, 3)
+
+
+def _luminance(rgb: FloatArray) -> FloatArray:
+    return rgb @ np.array([0.2126, 0.7152, 0.0722], np.float32)

@@ -1,0 +1,1 @@
+"""PacketMesh: from camera nodes and their packets to a surface mesh."""

@@ -1,0 +1,121 @@
+"""Files: output that is whole or absent, strict JSON, and bounded reading of what strangers made."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from packetmesh.errors import InputError
+
+MAX_TEXT_BYTES = 1_000_000
+"""Intrinsics and poses."""
+MAX_IMAGE_BYTES = 64_000_000
+MAX_IMAGE_PIXELS = 25_000_000
+MAX_GEOMETRY_BYTES = 1_000_000_000
+"""Clouds and meshes."""
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A temporary sibling of ``path`` to write to, renamed to ``path`` if the body succeeds.
+
+    The sibling has the same suffix, so that libraries choose the same format; the folder is made
+    when it is missing. Whatever the body raises, no partial file remains and an older ``path``
+    stays as it was.
+
+    Raises:
+        InputError: the folder or the file cannot be written.
+    """
+    path = Path(path)
+    sibling = path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        sibling.touch()
+        yield sibling
+        sibling.replace(path)
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be written ({error.strerror or error}); try another folder for the output"
+        ) from None
+    finally:
+        _remove(sibling)
+
+
+def _remove(sibling: Path) -> None:
+    try:
+        sibling.unlink(missing_ok=True)
+    except OSError:
+        return  # its folder does not exist, so neither does it
+
+
+def writable_folder(path: str | os.PathLike[str]) -> Path:
+    """``path`` as a folder that exists and takes files, so that a long run fails early or not at all.
+
+    Raises:
+        InputError: it cannot be made or written.
+    """
+    folder = Path(path)
+    with atomic_path(folder / "probe"):
+        pass
+    (folder / "probe").unlink()
+    return folder
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write ``value`` as strict JSON (NaN and infinity become null)."""
+    with atomic_path(path) as temporary:
+        Path(temporary).write_text(json.dumps(finite(value), indent=1, allow_nan=False) + "\n")
+
+
+def finite(value: Any) -> Any:
+    """``value`` with records and arrays as plain lists and non-finite numbers as None."""
+    if isinstance(value, dict):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if hasattr(value, "tolist"):
+        return finite(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def read_bytes(path: str | os.PathLike[str], max_bytes: int, what: str) -> bytes:
+    """The content of the file, ``what`` naming its kind in errors (``"depth image"``).
+
+    Raises:
+        InputError: the file is missing, unreadable, empty or larger than ``max_bytes``.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            data = file.read(max_bytes + 1)
+    except FileNotFoundError:
+        raise InputError(f"The {what} {path} does not exist; check the path") from None
+    except OSError as error:
+        raise InputError(f"The {what} {path} cannot be read ({error.strerror}); try another file") from None
+    if len(data) > max_bytes:
+        raise InputError(
+            f"The {what} {path} is larger than the {max_bytes / 1e6:g} MB that are read; try a smaller one"
+        )
+    if not data:
+        raise InputError(f"The {what} {path} is empty; try to copy or export it again")
+    return data
+
+
+def read_text(path: str | os.PathLike[str], what: str) -> str:
+    """The content of a small text file.
+
+    Raises:
+        InputError: as ``read_bytes``, or it is not UTF-8 text.
+    """
+    try:
+        return read_bytes(path, MAX_TEXT_BYTES, what).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"The {what} {path} is not a text file; check the path") from None

@@ -1,0 +1,137 @@
+"""Configs as text: preset names, ``key=value`` settings and the ``config.json`` beside every result."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import json
+import math
+import types
+import typing
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from packetmesh.errors import InputError
+
+Config = TypeVar("Config")
+"""Any config: a frozen dataclass whose fields are settings or further configs."""
+
+
+def config_named(preset: str, presets: Mapping[str, Config]) -> Config:
+    """The preset of that name, or the config saved in that JSON file.
+
+    Raises:
+        InputError: neither a preset nor a readable config.
+    """
+    if preset in presets:
+        return presets[preset]
+    if not preset.endswith(".json"):
+        near = difflib.get_close_matches(preset, presets, n=1)
+        names = near + [name for name in presets if name not in near]
+        raise InputError(f"There is no preset '{preset}'; try {' or '.join(names)}, or a config.json file")
+    try:
+        values = json.loads(Path(preset).read_text())
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"The config file {preset} cannot be read ({error}); try one that a run wrote"
+        ) from None
+    text = values.get("settings") if isinstance(values, dict) else None
+    if not isinstance(text, dict):
+        raise InputError(f"The config file {preset} has no settings; try the config.json of a finished run")
+    defaults = type(next(iter(presets.values())))()
+    return with_settings(defaults, [f"{key}={value}" for key, value in text.items()])
+
+
+def with_settings(config: Config, settings: Iterable[str]) -> Config:
+    """``config`` with settings such as ``"depth.alignment=median"`` applied.
+
+    Raises:
+        InputError: an unknown key (the nearest known ones are offered) or a value that the key does not
+            take.
+    """
+    values = {}
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        if not equals:
+            example = next(f"{key}={value}" for key, value in _as_text(config).items() if "." in key)
+            raise InputError(f"'{setting}' is not a setting; try key=value, for example {example}")
+        values[key.strip()] = value.strip()
+    return _replaced(config, values, list(_as_text(config)))
+
+
+def settings(config: object) -> dict[str, str]:
+    """All settings of ``config`` by dotted key, as text that ``with_settings`` reads back."""
+    return _as_text(config)
+
+
+def differences(config: Config, base: Config) -> list[str]:
+    """The settings, as ``key=value``, that turn ``base`` into ``config``."""
+    before = settings(base)
+    return [f"{key}={value}" for key, value in settings(config).items() if before[key] != value]
+
+
+def _as_text(config: Any, prefix: str = "") -> dict[str, str]:
+    text: dict[str, str] = {}
+    for field in dataclasses.fields(config):
+        key, value = prefix + field.name, getattr(config, field.name)
+        if dataclasses.is_dataclass(value):
+            text |= _as_text(value, f"{key}.")
+        elif isinstance(value, list | tuple):
+            text[key] = ",".join(str(item) for item in value)
+        elif isinstance(value, bool) or value is None:
+            text[key] = str(value).lower()
+        else:
+            text[key] = str(value)
+    return text
+
+
+def _replaced(config: Any, values: dict[str, str], known: list[str], prefix: str = "") -> Any:
+    """``config`` with ``values`` by keys below ``prefix``; ``known`` are all keys of the whole config."""
+    hints = typing.get_type_hints(type(config))
+    changes: dict[str, Any] = {}
+    for key in {key.partition(".")[0] for key in values}:
+        inner = {k.partition(".")[2]: v for k, v in values.items() if k.partition(".")[0] == key}
+        if key not in hints:
+            raise _unknown(".".join(filter(None, (prefix + key, next(iter(inner))))), known)
+        if dataclasses.is_dataclass(hints[key]) != all(inner):
+            raise InputError(f"'{prefix}{key}' is not a single setting; try {prefix}{key}.NAME=value")
+        if dataclasses.is_dataclass(hints[key]):
+            changes[key] = _replaced(getattr(config, key), inner, known, f"{prefix}{key}.")
+        else:
+            changes[key] = _parsed(hints[key], inner[""], prefix + key)
+    return dataclasses.replace(config, **changes)
+
+
+def _unknown(key: str, known: list[str]) -> InputError:
+    """What to say of a key that does not exist: the nearest ones, by their whole or their last name."""
+    last = key.rpartition(".")[2]
+    near = [name for name in known if name.rpartition(".")[2] == last]
+    near += [name for name in difflib.get_close_matches(key, known, n=3) if name not in near]
+    if not near:
+        names = difflib.get_close_matches(last, {name.rpartition(".")[2] for name in known}, n=3)
+        near = [name for name in known if name.rpartition(".")[2] in names]
+    if not near:
+        near = [name for name in known if name.partition(".")[0] == key.partition(".")[0]] or known
+    return InputError(f"There is no setting '{key}'; try {' or '.join(near[:6])}")
+
+
+def _parsed(hint: Any, text: str, key: str) -> Any:
+    """``text`` as a value of the type ``hint``."""
+    if typing.get_origin(hint) is Literal:
+        if text not in typing.get_args(hint):
+            raise InputError(f"{key}={text} is not possible; try one of {', '.join(typing.get_args(hint))}")
+        return text
+    if typing.get_origin(hint) in (types.UnionType, typing.Union):
+        return None if text == "none" else _parsed(typing.get_args(hint)[0], text, key)
+    if hint is bool:
+        return _parsed(Literal["true", "false"], text, key) == "true"
+    if typing.get_origin(hint) is tuple:
+        return tuple(_parsed(float, item, key) for item in text.split(",") if item)
+    try:
+        value = hint(text)
+    except ValueError:
+        raise InputError(f"{key}={text} is not a number; try {key}={hint(1)}") from None
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError(f"{key}={text} is not finite; try {key}=1.0")
+    return value

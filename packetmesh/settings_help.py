@@ -1,0 +1,85 @@
+"""What the settings of a config mean, read from the docstrings under its fields."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import sys
+from typing import Any, NamedTuple
+
+from packetmesh.settings import settings
+
+UNITS = {
+    "m": "m",
+    "mps": "m/s",
+    "s": "s",
+    "hz": "Hz",
+    "bps": "bit/s",
+    "bytes": "B",
+    "px": "px",
+    "deg": "°",
+    "db": "dB",
+    "dbm": "dBm",
+    "w": "W",
+    "j": "J",
+    "packets": "packets",
+    "images": "images",
+    "per_h": "1/h",
+}
+"""What the last part of a setting's name says of its unit."""
+
+UNITLESS = {"nakagami_m"}
+"""Names that end like a unit and have none."""
+
+
+class Setting(NamedTuple):
+    """One row of the help."""
+
+    key: str
+    value: str
+    """As text that ``with_settings`` reads back."""
+    unit: str
+    """Empty if it is a number without a unit, a choice or a name."""
+    doc: str
+
+
+def describe(config: Any) -> list[Setting]:
+    """Every setting of ``config`` with its value, unit and meaning, in the order of its fields."""
+    docs = _docs(config)
+    return [Setting(key, value, unit_of(key), docs[key]) for key, value in settings(config).items()]
+
+
+def unit_of(key: str) -> str:
+    """The unit that a setting's name ends in: ``radio.range_m`` is in metres."""
+    name = key.rpartition(".")[2]
+    if name in UNITLESS or "_" not in name:
+        return ""
+    return next((unit for end, unit in UNITS.items() if name.endswith(f"_{end}")), "")
+
+
+def _docs(config: Any, prefix: str = "") -> dict[str, str]:
+    docs: dict[str, str] = {}
+    own = _field_docs(type(config))
+    for field in dataclasses.fields(config):
+        value = getattr(config, field.name)
+        if dataclasses.is_dataclass(value):
+            docs |= _docs(value, f"{prefix}{field.name}.")
+        else:
+            docs[prefix + field.name] = own.get(field.name, "")
+    return docs
+
+
+def _field_docs(kind: type) -> dict[str, str]:
+    """The strings that stand directly under the fields of a dataclass, each as one line."""
+    tree = ast.parse(inspect.getsource(sys.modules[kind.__module__]))
+    bodies = [
+        node.body for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == kind.__name__
+    ]
+    docs = {}
+    for field, below in zip(bodies[0], bodies[0][1:], strict=False):
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+            match below:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    docs[field.target.id] = " ".join(text.split())
+    return docs

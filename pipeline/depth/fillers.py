@@ -1,0 +1,106 @@
+"""The obvious ways to fill depth without inferring it: inpainting, the nearest depth, joint bilateral."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.types import ByteArray, DepthMap, FloatArray
+
+INPAINT_RADIUS_PX = 5.0
+FULL_SCALE = 60_000.0
+"""The farthest depth in the 16-bit numbers that are inpainted: a step is 0.1 mm at 6 m. Telea's method
+rounds and moves by whole steps, so metres as floating-point numbers come out wrong by up to one metre."""
+WINDOW_PX = 7
+"""Half width of the joint bilateral window."""
+SPACE_SIGMA_PX = 3.5
+COLOR_SIGMA = 7.0
+"""Root mean square of the three channels' differences, in grey levels."""
+LEAST_WEIGHT = 1e-6
+"""What the colour leaves at least of a neighbour's weight, so that no pixel stays without depth."""
+
+
+def inpaint_telea(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
+    """Fast marching (Telea 2004), OpenCV's; the colours are not used."""
+    return inpainted(sensor, cv2.INPAINT_TELEA)
+
+
+def inpaint_ns(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
+    """Navier-Stokes (Bertalmio et al. 2001), OpenCV's; the colours are not used."""
+    return inpainted(sensor, cv2.INPAINT_NS)
+
+
+def inpainted(sensor: DepthMap, method: int) -> DepthMap:
+    """OpenCV's inpainting of 16-bit depth; measured pixels keep their bits."""
+    require_depth(sensor)
+    step_m = float(np.nanmax(sensor.z_m)) / FULL_SCALE
+    steps = np.rint(np.where(sensor.valid, sensor.z_m, 0.0) / step_m).astype(np.uint16)
+    filled = cv2.inpaint(steps, (~sensor.valid).astype(np.uint8), INPAINT_RADIUS_PX, method)
+    return DepthMap(np.where(sensor.valid, sensor.z_m, filled * step_m).astype(np.float32))
+
+
+def nearest(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
+    """Every pixel takes the depth of the nearest measured pixel; the colours are not used."""
+    require_depth(sensor)
+    _, labels = cv2.distanceTransformWithLabels(
+        (~sensor.valid).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    z_m = np.zeros(labels.max() + 1, np.float32)
+    z_m[labels[sensor.valid]] = sensor.z_m[sensor.valid]
+    return DepthMap(z_m[labels])
+
+
+def joint_bilateral(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
+    """Means of the known depths around, weighted by distance and likeness of colour, from the rims inwards.
+
+    Kopf et al. 2007, as an iteration: each pass fills the unknown pixels that have a known one within
+    3 pixels, from all known ones within 7.
+    """
+    require_depth(sensor)
+    pad = ((WINDOW_PX, WINDOW_PX), (WINDOW_PX, WINDOW_PX))
+    z_m = np.pad(np.where(sensor.valid, sensor.z_m, 0.0).astype(np.float32), pad)
+    known = np.pad(sensor.valid, pad)
+    smooth = cv2.GaussianBlur(rgb, (0, 0), 1.0)
+    colors = np.pad(smooth, (*pad, (0, 0)), mode="edge").astype(np.float32)
+    inside = np.pad(np.ones(sensor.valid.shape, bool), pad)
+    while not known[inside].all():
+        reached = cv2.dilate(known.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+        rows, columns = np.nonzero(reached & inside & ~known)
+        z_m[rows, columns] = weighted_means(z_m, known, colors, rows, columns)
+        known[rows, columns] = True
+    return DepthMap(z_m[WINDOW_PX:-WINDOW_PX, WINDOW_PX:-WINDOW_PX])
+
+
+def weighted_means(
+    z_m: FloatArray, known: np.ndarray, colors: FloatArray, rows: np.ndarray, columns: np.ndarray
+) -> FloatArray:
+    """(N,) bilateral means of the known depths around the pixels at ``rows`` and ``columns`` (N,)."""
+    here = colors[rows, columns]
+    total, weights = np.zeros((2, len(rows)), np.float32)
+    for down in range(-WINDOW_PX, WINDOW_PX + 1):
+        for right in range(-WINDOW_PX, WINDOW_PX + 1):
+            there = rows + down, columns + right
+            difference = np.mean((colors[there] - here) ** 2, axis=1) / (2.0 * COLOR_SIGMA**2)
+            space = np.exp(-(down**2 + right**2) / (2.0 * SPACE_SIGMA_PX**2))
+            weight = known[there] * space * (np.exp(-difference) + LEAST_WEIGHT)
+            total += weight * z_m[there]
+            weights += weight
+    return total / weights
+
+
+def require_depth(sensor: DepthMap) -> None:
+    """Raise InputError when there is nothing to fill from."""
+    if not sensor.valid.any():
+        raise InputError("The sensor depth has no valid pixel to fill from; use another frame.")
+
+
+PEERS: dict[str, Callable[[DepthMap, ByteArray], DepthMap]] = {
+    "inpaint-telea": inpaint_telea,
+    "inpaint-ns": inpaint_ns,
+    "nearest": nearest,
+    "joint-bilateral": joint_bilateral,
+}
+"""Dense depth from the sensor's alone, or guided by colour; measured pixels stay as they are."""

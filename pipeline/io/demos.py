@@ -1,0 +1,47 @@
+"""The demo scenes that ship in assets/scenes: rendered rigs with their truth, each described by a file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from packetmesh.errors import InputError
+from pipeline.io.rigs import load_rig
+from pipeline.types import Rig
+
+SCENES = Path(__file__).resolve().parents[2] / "assets" / "scenes"
+
+
+@dataclass(frozen=True, slots=True)
+class DemoScene:
+    """A place that ships."""
+
+    title: str
+    """What to call it on a screen."""
+    description: str
+    seed: int
+    """Of its sensor noise and of its nodes' pose errors, together with its name."""
+
+
+def _described() -> dict[str, DemoScene]:
+    scenes = {
+        path.parent.name: DemoScene(**json.loads(path.read_text(encoding="utf-8")))
+        for path in SCENES.glob("*/scene.json")
+    }
+    return dict(sorted(scenes.items(), key=lambda item: (item[0] != "living-room", item[0])))
+
+
+DEMO_SCENES: dict[str, DemoScene] = _described()
+"""By name; the living room first, which opens by itself."""
+
+
+def load_demo(name: str) -> Rig:
+    """The shipped rig of a demo, with its truth: the scene's mesh, the nodes' poses and hole-free depth.
+
+    Raises:
+        InputError: there is no demo of that name, or its files are missing.
+    """
+    if name not in DEMO_SCENES:
+        raise InputError(f"There is no demo scene {name!r}; try one of {', '.join(DEMO_SCENES)}")
+    return load_rig(SCENES / name)

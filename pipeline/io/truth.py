@@ -1,0 +1,49 @@
+"""What is really there, beside the nodes of a rig: ``RIG/truth.ply`` and ``RIG/node_NN/true_pose.txt``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from packetmesh.errors import InputError
+from pipeline.io.meshes import read_mesh, write_mesh
+from pipeline.io.poses import read_pose, write_pose
+from pipeline.rays import Camera, hit_depths
+from pipeline.types import RgbdFrame, RigTruth
+
+MESH_NAME = "truth.ply"
+POSE_NAME = "true_pose.txt"
+
+
+def read_truth(directory: Path, frames: Sequence[RgbdFrame]) -> RigTruth | None:
+    """The true surface and poses beside ``frames``, with the depth that the true cameras see of it.
+
+    Raises:
+        InputError: there is a true surface, but it cannot be read, or a node has no true pose.
+    """
+    if not (directory / MESH_NAME).exists():
+        return None
+    mesh = read_mesh(directory / MESH_NAME)
+    poses = []
+    for frame in frames:
+        path = directory / frame.name / POSE_NAME
+        if not path.exists():
+            raise InputError(
+                f"The rig {directory} has a true surface, but {frame.name} has no {POSE_NAME}; add it, or "
+                f"remove {MESH_NAME}"
+            )
+        poses.append(read_pose(path))
+    cameras = [Camera(frame.intrinsics, T) for frame, T in zip(frames, poses, strict=True)]
+    depth = tuple(hit_depths(mesh.vertices_m, mesh.triangles, cameras))
+    return RigTruth(mesh.vertices_m, mesh.triangles, tuple(poses), depth)
+
+
+def write_truth(directory: Path, names: Sequence[str], truth: RigTruth) -> None:
+    """Write the true surface and the true pose of every node in ``names``.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    write_mesh(directory / MESH_NAME, truth.vertices_m, truth.triangles)
+    for name, T_world_camera in zip(names, truth.T_world_camera, strict=True):
+        write_pose(directory / name / POSE_NAME, T_world_camera)

@@ -1,0 +1,117 @@
+"""Make a cloud worse in the ways that depth really is: noise, outliers, holes, bias, less overlap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.types import BoolArray, FloatArray, PointCloud
+
+LIMITS = {"noise_m": 0.2, "outlier_share": 0.8, "hole_share": 0.9, "depth_bias": 0.2, "crop_share": 0.9}
+"""Largest value of each degradation."""
+HOLES = 12
+BIAS_WAVES = 24
+"""Plane waves that make up the bias; many random ones make a Gaussian field."""
+BIAS_SCALE_OF_VIEW = 0.3
+"""Correlation length of the bias over the larger side of the view; with it plain ICP errs as in SPEC 4.8."""
+
+
+@dataclass(frozen=True, slots=True)
+class Degradation:
+    """What to do to a cloud; the plain one does nothing."""
+
+    noise_m: float = 0.0
+    """Standard deviation of noise along the view ray, metres."""
+    outlier_share: float = 0.0
+    """Share of the points replaced by points anywhere in the cloud's bounding box."""
+    hole_share: float = 0.0
+    """Share of the points removed in round patches of the view."""
+    depth_bias: float = 0.0
+    """Standard deviation, over the points, of a smooth relative depth error without a mean."""
+    crop_share: float = 0.0
+    """Share of the points removed at one side of the view, which lessens overlap."""
+
+    def __post_init__(self) -> None:
+        for part in fields(self):
+            value, most = getattr(self, part.name), LIMITS[part.name]
+            if not 0.0 <= value <= most:
+                raise InputError(f"degradation.{part.name} is {value}; try 0 to {most:g}")
+
+
+def degrade(cloud: PointCloud, how: Degradation, seed: int) -> PointCloud:
+    """The cloud with points cropped, punched out, bent, shaken and replaced, in this order.
+
+    Every kind draws from a stream of its own, so that changing one leaves the others as they were.
+
+    Args:
+        cloud: in its camera's frame, z forward.
+        how: what to do; shares are of the points that are left at that moment.
+        seed: same seed, same result.
+
+    Returns:
+        The points that are left; moved ones keep their other columns, replaced ones do too.
+
+    Raises:
+        InputError: there are no points, or some lie beside or behind the camera.
+    """
+    if not len(cloud) or not np.all(cloud.points_m[:, 2] > 0):
+        raise InputError("Only a cloud in front of its camera (z > 0) can be degraded.")
+    crop, holes, bias, noise, outliers = (np.random.default_rng([seed, kind]) for kind in range(5))
+    if how.crop_share:
+        cloud = cloud.select(_outside_crop(_view(cloud), how.crop_share, crop))
+    if how.hole_share:
+        cloud = cloud.select(_outside_holes(_view(cloud), how.hole_share, holes))
+    points_m: FloatArray = cloud.points_m.astype(np.float64)
+    if how.depth_bias:
+        points_m = points_m * np.exp(how.depth_bias * smooth_field(_view(cloud), bias))[:, None]
+    if how.noise_m:
+        along_m = how.noise_m * noise.standard_normal((len(points_m), 1))
+        points_m = points_m * (1.0 + along_m / np.linalg.norm(points_m, axis=1, keepdims=True))
+    if how.outlier_share:
+        points_m = _with_outliers(points_m, how.outlier_share, outliers)
+    return replace(cloud, points_m=points_m)
+
+
+def smooth_field(view: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """(N,) values of a random smooth function at (N, 2) view positions, with mean zero and variance one."""
+    scale = BIAS_SCALE_OF_VIEW * np.ptp(view, axis=0).max() + np.finfo(float).tiny
+    waves = rng.standard_normal((2, BIAS_WAVES)) / scale
+    field = np.cos(view @ waves + rng.uniform(0.0, 2.0 * np.pi, BIAS_WAVES)).sum(axis=1)
+    return (field - field.mean()) / max(field.std(), np.finfo(float).tiny)
+
+
+def _view(cloud: PointCloud) -> FloatArray:
+    """(N, 2) where each point stands in the view: x / z, y / z."""
+    return cloud.points_m[:, :2] / cloud.points_m[:, 2:]
+
+
+def _outside_crop(view: FloatArray, share: float, rng: np.random.Generator) -> BoolArray:
+    """(N,) True but for the share of the points farthest towards a random side."""
+    angle_rad = rng.uniform(0.0, 2.0 * np.pi)
+    return _without_least(-view @ np.array([np.cos(angle_rad), np.sin(angle_rad)]), share)
+
+
+def _outside_holes(view: FloatArray, share: float, rng: np.random.Generator) -> BoolArray:
+    """(N,) True outside round patches about random points, as large as the share needs."""
+    centers = view[rng.integers(0, len(view), HOLES)]
+    radii = rng.uniform(0.4, 1.0, HOLES)
+    inside = [np.sum((view - c) ** 2, axis=1) / r**2 for c, r in zip(centers, radii, strict=True)]
+    return _without_least(np.min(inside, axis=0), share)
+
+
+def _without_least(values: FloatArray, share: float) -> BoolArray:
+    """(N,) False for the share of the rows with the least values."""
+    keep = np.ones(len(values), np.bool_)
+    keep[np.argsort(values, kind="stable")[: round(share * len(values))]] = False
+    return keep
+
+
+def _with_outliers(points_m: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
+    """(N, 3) the points with a share of them drawn anew in the bounding box of all."""
+    replaced = rng.permutation(len(points_m))[: round(share * len(points_m))]
+    points_m = points_m.copy()
+    low, high = points_m.min(axis=0), points_m.max(axis=0)
+    points_m[replaced] = rng.uniform(low, high, (len(replaced), 3))
+    return points_m

@@ -1,0 +1,376 @@
+"""Why a hole is there, found by experiment: what would have to be different for the ball to close it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from packetmesh.errors import InputError
+from pipeline.rays import first_hits, triangle_scene
+from pipeline.surface.fill import skin_points_m
+from pipeline.surface.holes import Hole, beyond_m, half_edges, is_closed
+from pipeline.surface.pivoting import Rolled, Roller, roll
+from pipeline.surface.ray_parts import Known, View, known_there
+from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud, PointSource, SurfaceResult
+
+Reason = Literal["gap", "normals", "no points", "outside view"]
+
+MOST = 0.5
+"""More than this share of a hole decides."""
+GROWTH = 1.25
+"""Each ball that is tried is larger than the one before by this factor."""
+WIDE = 10.0
+"""Without views, a gap of this many point spacings is one where nobody measured."""
+_MOST_POINTS = 4000
+"""Points that one explanation rolls over, so that it takes a fraction of a second."""
+_BALLS_AROUND = 4.0
+"""Balls up to this many times the largest so far, or twice the hole, are tried."""
+_PLACES = 8
+"""Edges of a large rim that stand for all."""
+_WHOLE = 6.0
+"""A rim within this many balls' radii of its centre is examined whole."""
+_SAMPLES = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """Why a hole is there and what would close it."""
+
+    reason: Reason
+    sentence: str
+    remedy: str
+    closing_radius_m: float | None
+    """The smallest ball tried that closes it when it rolls after the surface's own; None if none did."""
+    sensor_share: float
+    """Share of the hole's pixels, in all cameras that see it, where the sensor measured; NaN without any."""
+    inferred_share: float
+    """Share of those where only the network's depth is known."""
+    unknown_share: float
+    """Share of those where neither is."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """The cloud around a hole, or around some edges of a long rim, with what is to be closed there."""
+
+    points_m: FloatArray
+    """(n, 3)."""
+    normals: FloatArray
+    """(n, 3)."""
+    agreed: FloatArray
+    """(n, 3) one direction for all points: the mean of the normals at the loop, or at the nearest edge."""
+    edges: IntArray
+    """(E, 2) rows of the loop's edges, in the direction of their triangles."""
+    ends: bool
+    """True for a rim: the surface ends here, and it is the edges that a ball must cross."""
+    samples_m: FloatArray
+    """(S, 3) points in the hole, or just beyond each edge of a rim."""
+    directions: FloatArray
+    """(S, 3) what is outside at each."""
+    height_m: float
+    """How far a surface that closes the hole may bulge from its smallest skin."""
+    spacing_m: float
+    """Median distance of nearest points."""
+    widest_gap_m: float
+    """Diameter of the largest circle around a sample without a point of the cloud."""
+    largest_m: float
+    """Largest ball whose emptiness these points can tell."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Findings:
+    """What the experiments showed."""
+
+    known: Known
+    layered: float
+    """Share that triangles lie over or under already."""
+    gained: float
+    """Share that the same balls close if the normals agree, and do not if they are as they are."""
+    radius_m: float | None
+    """Smallest ball that closes."""
+    most_radius_m: float | None
+    """Smallest ball that closes more than nine tenths, and is not known to close all."""
+    most: float
+    """Share that the largest ball closes."""
+
+
+def explain_hole(
+    hole: Hole, surface: SurfaceResult, cloud: PointCloud, views: Sequence[View] = ()
+) -> Explanation:
+    """Find out why a hole is there by rolling again over the points around it.
+
+    The causes are tried in this order. **outside view**: no camera sees most of the hole's inside, or
+    they look past a rim onto something farther. **normals**: the same balls close most of it once the
+    normals there agree, and do not otherwise. **no points**: at most of its pixels nothing gave the
+    surface a depth; without views, the hole is ten point spacings wide, or a rim that no ball crosses.
+    **gap**: all else.
+
+    A ball closes a hole if every edge of its loop gets its second triangle, and no triangle of the patch
+    that is added there has an edge with one face. It closes a rim if more than half of the edges looked
+    at get their second triangle: all, or eight of a large one. Islands are explained like rims.
+
+    Args:
+        hole: of ``surface``.
+        surface: made by balls, the smallest first.
+        cloud: what those balls rolled over.
+        views: what the cameras know; without any, the points alone decide.
+
+    Raises:
+        InputError: no ball made the surface, its vertices are not points of the cloud, or a view's mask
+            does not have its camera's image size.
+    """
+    if not surface.radii_m or cloud.normals is None:
+        raise InputError(
+            "This hole cannot be explained by rolling again: the surface has no ball radius or the cloud no "
+            "normals; take a surface that a ball made"
+        )
+    place = _place(hole, surface, cloud)
+    found = _findings(place, surface, views)
+    reason = _reason(place, surface, found)
+    sentence, remedy = _words(reason, place, surface, found)
+    if hole.island:
+        sentence = f"This loop runs around a piece that hangs on the rest by single points. {sentence}"
+    known = found.known
+    shares = known.sensor_share, known.inferred_share, known.unknown_share
+    return Explanation(reason, sentence, remedy, found.radius_m, *shares)
+
+
+def _findings(place: _Place, surface: SurfaceResult, views: Sequence[View]) -> _Findings:
+    closed = _closed(roll(place.points_m, place.normals, surface.radii_m), place)
+    agreed = _closed(roll(place.points_m, place.agreed, surface.radii_m), place)
+    known = known_there(place.samples_m, surface, views, 2.0 * surface.radii_m[-1])
+    return _Findings(
+        known, float(closed.mean()), float(np.mean(agreed & ~closed)), *_grow(place, surface.radii_m)
+    )
+
+
+def _reason(place: _Place, surface: SurfaceResult, found: _Findings) -> Reason:
+    known = found.known
+    if known.outside_share + known.hidden_share > MOST or (place.ends and known.past_share > MOST):
+        return "outside view"
+    if found.gained > MOST:
+        return "normals"
+    if np.isfinite(known.sensor_share):
+        inferred = known.inferred_share if _has_inferred(surface) else 0.0
+        nobody = known.sensor_share + inferred <= MOST
+    elif place.ends:
+        nobody = found.radius_m is None
+    else:
+        nobody = place.widest_gap_m >= WIDE * place.spacing_m
+    return "no points" if nobody else "gap"
+
+
+def _has_inferred(surface: SurfaceResult) -> bool:
+    return surface.source is not None and bool(np.any(surface.source == PointSource.INFERRED))
+
+
+def _place(hole: Hole, surface: SurfaceResult, cloud: PointCloud) -> _Place:
+    """Cut the cloud out around a hole."""
+    ends = hole.rim or hole.island
+    loop_m = surface.vertices_m[hole.loop]
+    edges = np.stack([hole.loop, np.roll(hole.loop, -1)], axis=1)
+    centers_m, radius_m = hole.center_m[None], float(np.linalg.norm(loop_m - hole.center_m, axis=1).max())
+    if ends and radius_m > _WHOLE * surface.radii_m[-1]:
+        edges = edges[np.unique(np.linspace(0, len(edges), _PLACES, endpoint=False).astype(int))]
+        a, b = surface.vertices_m[edges].swapaxes(0, 1)
+        centers_m, radius_m = 0.5 * (a + b), 0.5 * float(np.linalg.norm(b - a, axis=1).max())
+    rows, nearest, reach_m = _cut(cloud.points_m, centers_m, radius_m, surface.radii_m[-1])
+    points_m, normals = cloud.points_m[rows], np.asarray(cloud.normals)[rows]
+    tree = cKDTree(points_m)
+    local = _rows_of(tree, surface.vertices_m[edges].reshape(-1, 3)).reshape(-1, 2)
+    owner = cKDTree(centers_m).query(surface.vertices_m[edges].mean(axis=1))[1]
+    directions = _means(normals[local[:, 0]] + normals[local[:, 1]], owner, len(centers_m))
+    if ends:
+        samples_m = beyond_m(surface.vertices_m, surface.triangles, edges, surface.radii_m[-1])
+    else:
+        samples_m = skin_points_m(loop_m, _SAMPLES)
+    return _Place(
+        points_m=points_m,
+        normals=normals,
+        agreed=directions[nearest],
+        edges=local,
+        ends=ends,
+        samples_m=samples_m,
+        directions=directions[owner] if ends else np.broadcast_to(directions[0], samples_m.shape),
+        height_m=0.5 * hole.length_m / np.pi,
+        spacing_m=float(np.median(tree.query(points_m, k=2)[0][:, 1])),
+        widest_gap_m=2.0 * float(tree.query(samples_m)[0].max()),
+        largest_m=0.5 * (reach_m - radius_m),
+    )
+
+
+def _cut(
+    points_m: FloatArray, centers_m: FloatArray, radius_m: float, ball_m: float
+) -> tuple[IntArray, IntArray, float]:
+    """Rows of the cloud near the centres, each place once; the nearest centre of each; how far they reach."""
+    distances_m, nearest = cKDTree(centers_m).query(points_m)
+    wanted_m = radius_m + 2.0 * max(_BALLS_AROUND * ball_m, 2.0 * radius_m)
+    last = min(_MOST_POINTS, len(points_m)) - 1
+    reach_m = max(
+        min(wanted_m, float(np.partition(distances_m, last)[last])), radius_m + 2.0 * GROWTH * ball_m
+    )
+    rows = np.flatnonzero(distances_m <= reach_m)
+    rows = rows[np.sort(np.unique(points_m[rows], axis=0, return_index=True)[1])]
+    return rows, nearest[rows], reach_m
+
+
+def _rows_of(tree: cKDTree, places_m: FloatArray) -> IntArray:
+    """(M,) the points that lie exactly at (M, 3) places."""
+    distance_m, rows = tree.query(places_m)
+    if np.any(distance_m > 0.0):
+        raise InputError(
+            f"A corner of the hole is {distance_m.max():.3g} m from the nearest point of the cloud; "
+            "take the cloud that the ball rolled over"
+        )
+    return rows
+
+
+def _means(vectors: FloatArray, owner: IntArray, count: int) -> FloatArray:
+    """(count, 3) unit mean of the (M, 3) vectors of each owner."""
+    sums = np.stack([np.bincount(owner, weights=part, minlength=count) for part in vectors.T], axis=1)
+    return sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-12)
+
+
+def _grow(place: _Place, radii_m: Sequence[float]) -> tuple[float | None, float | None, float]:
+    """Let balls grow until one closes the hole, and does so too when it alone follows the given ones.
+
+    Returns:
+        The radius that closes; the one that closes nine tenths; the share that the last one closes.
+    """
+
+    def closes(rolled: Rolled) -> bool:
+        if place.ends:
+            return float(_closed(rolled, place).mean()) > MOST
+        return is_closed(rolled.triangles, rolled.radius_index >= len(radii_m), place.edges)
+
+    roller = Roller(place.points_m, place.normals)
+    for radius_m in radii_m:
+        rolled = roller.roll(radius_m)
+    most_radius_m = None
+    radius_m = GROWTH * radii_m[-1]
+    while radius_m <= place.largest_m:
+        rolled = roller.roll(radius_m)
+        if closes(rolled) and closes(roll(place.points_m, place.normals, (*radii_m, radius_m))):
+            return radius_m, None, 1.0
+        if most_radius_m is None and _closed(rolled, place).mean() > 0.9:
+            most_radius_m = radius_m
+        radius_m *= GROWTH
+    return None, most_radius_m, float(_closed(rolled, place).mean())
+
+
+def _closed(rolled: Rolled, place: _Place) -> BoolArray:
+    """(E,) the edges of a rim that have two triangles, or (S,) the samples of a hole that one covers.
+
+    A triangle covers a sample that lies under or over it, if it faces outside like the loop.
+    """
+    if place.ends:
+        return half_edges(rolled.triangles, place.edges[:, ::-1]) >= 0
+    a, b, c = place.points_m[rolled.triangles].swapaxes(0, 1)
+    facing = np.cross(b - a, c - a) @ place.directions[0] > 0.0
+    scene = triangle_scene(place.points_m, rolled.triangles[facing])
+    above_m = place.samples_m + place.height_m * place.directions
+    return first_hits(scene, above_m, -place.directions) <= 2.0 * place.height_m
+
+
+def _words(reason: Reason, place: _Place, surface: SurfaceResult, found: _Findings) -> tuple[str, str]:
+    """The sentence that says why, and the one or two that say what to do."""
+    if reason == "outside view":
+        return _unseen_words(place, found.known)
+    if reason == "normals":
+        return (
+            "Points are there, but their normals contradict each other: if they agreed, balls of up to "
+            f"{_length(surface.radii_m[-1])} would close {found.gained:.0%} more of "
+            f"{'this rim' if place.ends else 'the hole'}.",
+            "Take more smoothing passes, or estimate the normals from more neighbours.",
+        )
+    if reason == "no points":
+        return _unmeasured_words(place, surface, found)
+    return _gap_words(place, surface.radii_m[-1], found)
+
+
+def _length(length_m: float) -> str:
+    """A length as people say it."""
+    if length_m >= 0.1:
+        return f"{100 * length_m:.0f} cm"
+    return f"{1000 * length_m:.0f} mm" if length_m >= 0.01 else f"{1000 * length_m:.1f} mm"
+
+
+def _unseen_words(place: _Place, known: Known) -> tuple[str, str]:
+    if known.outside_share + known.hidden_share <= MOST:
+        return (
+            f"Beyond {known.past_share:.0%} of this rim a camera sees something farther away: the surface "
+            "turns to a side that no camera looks at.",
+            "Add a camera that looks at it from the other side, or move one there.",
+        )
+    return (
+        f"{known.outside_share:.0%} of {'what is beyond this rim' if place.ends else 'the hole'} is in no "
+        f"camera's image, and {known.hidden_share:.0%} is hidden behind the surface in all of them.",
+        "Add a camera that sees this place, or move one until it does.",
+    )
+
+
+def _unmeasured_words(place: _Place, surface: SurfaceResult, found: _Findings) -> tuple[str, str]:
+    known = found.known
+    if np.isfinite(known.sensor_share):
+        sentence = (
+            f"Of the pixels {'beyond this rim' if place.ends else 'of the hole'}, the sensor measured "
+            f"{known.sensor_share:.0%}; for {known.inferred_share:.0%} only the network inferred a depth, "
+            f"and for {known.unknown_share:.0%} nobody knows one."
+        )
+    elif place.ends:
+        sentence = (
+            f"The cloud ends here: beyond {1.0 - found.most:.0%} of the rim's edges, no ball of up to "
+            f"{_length(place.largest_m)} finds points to roll on to."
+        )
+    else:
+        sentence = (
+            f"No point lies in a gap of {_length(place.widest_gap_m)}, "
+            f"{place.widest_gap_m / place.spacing_m:.0f} times the points' spacing of "
+            f"{_length(place.spacing_m)}: nobody measured here."
+        )
+    if known.inferred_share > known.unknown_share and not _has_inferred(surface):
+        remedy = "Fuse the sensor's depth with the network's, which knows more here."
+    else:
+        remedy = "Add a view from another place."
+    return sentence, f"{remedy} {_ball_words(place, found)}"
+
+
+def _gap_words(place: _Place, ball_m: float, found: _Findings) -> tuple[str, str]:
+    ball, width = f"the largest ball so far, {_length(ball_m)} in radius,", _length(2.0 * ball_m)
+    if place.ends:
+        there = "Points go on" if found.radius_m is not None else "A depth is known"
+        return f"{there} beyond this rim, but {ball} does not reach them.", _ball_words(place, found)
+    gap = f"The widest gap in the hole is {_length(place.widest_gap_m)}"
+    remedy = _ball_words(place, found)
+    if place.widest_gap_m > 2.0 * ball_m:
+        sentence = f"{gap}, and {ball} falls through all that are wider than {width}."
+    elif found.layered > MOST and found.radius_m is None:
+        sentence = f"{gap}, but triangles lie over or under {found.layered:.0%} of it: there are two layers."
+        remedy = "Take more smoothing passes or fewer points, so that the layers become one."
+    else:
+        sentence = f"{gap}, less than the {width} of {ball} and yet it rests nowhere around the whole loop."
+    if found.known.past_share > MOST:
+        sentence += f" A camera looks through {found.known.past_share:.0%} of it: it may be a true opening."
+    return sentence, remedy
+
+
+def _ball_words(place: _Place, found: _Findings) -> str:
+    """What larger balls do."""
+    if found.radius_m is not None:
+        does = "goes on beyond most of this rim" if place.ends else "closes it"
+        return f"A ball of {_length(found.radius_m)} radius {does}, at the price of smaller details."
+    tried = _length(place.largest_m)
+    if place.ends:
+        return f"No ball of up to {tried} goes on beyond half of this rim."
+    if found.most_radius_m is not None:
+        return (
+            f"A ball of {_length(found.most_radius_m)} radius covers most of it, but none of up to {tried} "
+            "closes it without a remainder; fill that."
+        )
+    return (
+        f"No ball of up to {tried} closed it, at best {found.most:.0%}; take more points, or fill the hole."
+    )

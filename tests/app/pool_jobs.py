@@ -1,0 +1,56 @@
+"""Jobs that the worker tests run in spawned processes."""
+
+import os
+import time
+from pathlib import Path
+
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+
+
+def note(folder: str, name: str) -> str:
+    """Leave a trace of having run, wait for the file ``go``, and return the name."""
+    Path(folder, name).touch()
+    while not Path(folder, "go").exists():
+        time.sleep(0.005)
+    return name
+
+
+def count(n: int):
+    """Report n times, return n."""
+    for i in range(n):
+        yield Progress("counting", i / n)
+    return n
+
+
+def count_forever(folder: str):
+    """Report until stopped, leaving a trace of an orderly end."""
+    Path(folder, "began").touch()
+    try:
+        while True:
+            yield Progress("counting", 0.0)
+            time.sleep(0.005)
+    finally:
+        Path(folder, "tidied").touch()
+
+
+def deaf(folder: str) -> None:
+    """Compute without ever reporting."""
+    Path(folder, "began").touch()
+    time.sleep(600)
+
+
+def refuse() -> None:
+    raise InputError("The cloud 'x.ply' is empty; try another file.")
+
+
+def stumble() -> None:
+    raise ZeroDivisionError("division by zero")
+
+
+def crash() -> None:
+    os._exit(3)
+
+
+def process_id() -> int:
+    return os.getpid()

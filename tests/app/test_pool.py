@@ -1,0 +1,133 @@
+"""The pool of computing processes and its latest-wins lanes."""
+
+import queue
+import sys
+import threading
+from pathlib import Path
+
+import psutil
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+import pool_jobs as jobs
+
+from app.pool import DIED, ComputePool, LatestWins, Outcome
+
+TIMEOUT_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def pool():
+    pool = ComputePool(size=2, patience_s=0.3)
+    yield pool
+    pool.close()
+
+
+class Inbox:
+    """Collects what a job says and waits for its end."""
+
+    def __init__(self) -> None:
+        self.progress: list = []
+        self.ends: queue.Queue[Outcome] = queue.Queue()
+
+    def callbacks(self) -> dict:
+        return {"on_progress": self.progress.append, "on_end": self.ends.put}
+
+    def end(self) -> Outcome:
+        return self.ends.get(timeout=TIMEOUT_S)
+
+
+def wait_for(path: Path) -> None:
+    tick = threading.Event()
+    for _ in range(int(TIMEOUT_S / 0.01)):
+        if path.exists():
+            return
+        tick.wait(0.01)
+    raise TimeoutError(path)
+
+
+def test_progress_arrives_in_order_before_the_result(pool):
+    inbox = Inbox()
+    pool.submit("a", jobs.count, 5, **inbox.callbacks())
+    assert inbox.end() == Outcome("result", 5)
+    assert [report.fraction for report in inbox.progress] == [0.0, 0.2, 0.4, 0.6, 0.8]
+
+
+def test_of_a_burst_only_the_first_and_the_last_run(pool, tmp_path):
+    lane, inbox = LatestWins(pool, "burst"), Inbox()
+    for i in range(15):
+        lane.submit(jobs.note, str(tmp_path), f"job{i}", **inbox.callbacks())
+        if i == 0:
+            wait_for(tmp_path / "job0")
+    (tmp_path / "go").touch()
+    values = [inbox.end().value, inbox.end().value]
+    assert values[-1] == "job14"
+    assert {path.name for path in tmp_path.glob("job*")} == {"job0", "job14"}
+    assert inbox.ends.empty()
+    assert not lane.busy
+
+
+def test_a_superseded_job_stops_at_its_next_report(pool, tmp_path):
+    lane, first, second = LatestWins(pool, "supersede"), Inbox(), Inbox()
+    lane.submit(jobs.count_forever, str(tmp_path), **first.callbacks())
+    wait_for(tmp_path / "began")
+    lane.submit(jobs.count, 1, **second.callbacks())
+    assert first.end().kind == "stopped"
+    assert second.end() == Outcome("result", 1)
+    assert (tmp_path / "tidied").exists()
+
+
+def test_a_superseded_job_that_never_reports_loses_its_process(pool, tmp_path):
+    lane, first, second = LatestWins(pool, "deaf"), Inbox(), Inbox()
+    lane.submit(jobs.deaf, str(tmp_path), **first.callbacks())
+    wait_for(tmp_path / "began")
+    lane.submit(jobs.count, 1, **second.callbacks())
+    assert first.end().kind == "stopped"
+    assert second.end() == Outcome("result", 1)
+
+
+def test_cancel_ends_the_process_and_the_pool_recovers(pool, tmp_path):
+    lane, inbox, after = LatestWins(pool, "cancel"), Inbox(), Inbox()
+    lane.submit(jobs.deaf, str(tmp_path), **inbox.callbacks())
+    wait_for(tmp_path / "began")
+    lane.cancel()
+    assert inbox.end().kind == "stopped"
+    lane.submit(jobs.count, 2, **after.callbacks())
+    assert after.end() == Outcome("result", 2)
+
+
+@pytest.mark.parametrize(
+    ("function", "sentence"),
+    [
+        (jobs.refuse, "The cloud 'x.ply' is empty; try another file."),
+        (jobs.stumble, "This step failed unexpectedly (ZeroDivisionError: division by zero)."),
+        (jobs.crash, DIED),
+    ],
+)
+def test_every_failure_is_one_sentence_and_the_pool_goes_on(pool, function, sentence):
+    inbox, after = Inbox(), Inbox()
+    pool.submit("b", function, **inbox.callbacks())
+    assert inbox.end() == Outcome("error", sentence)
+    pool.submit("b", jobs.count, 1, **after.callbacks())
+    assert after.end() == Outcome("result", 1)
+
+
+def test_one_owner_never_holds_all_processes(pool, tmp_path):
+    greedy = [Inbox(), Inbox(), Inbox()]
+    for i, inbox in enumerate(greedy):
+        pool.submit("greedy", jobs.note, str(tmp_path), f"greedy{i}", **inbox.callbacks())
+    wait_for(tmp_path / "greedy0")
+    other = Inbox()
+    pool.submit("other", jobs.count, 1, **other.callbacks())
+    assert other.end() == Outcome("result", 1)
+    assert not (tmp_path / "greedy1").exists()
+    (tmp_path / "go").touch()
+    assert [inbox.end().value for inbox in greedy] == ["greedy0", "greedy1", "greedy2"]
+
+
+def test_close_leaves_no_process_behind():
+    pool, inbox = ComputePool(size=1), Inbox()
+    pool.submit("a", jobs.process_id, **inbox.callbacks())
+    pid = inbox.end().value
+    pool.close()
+    assert not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE

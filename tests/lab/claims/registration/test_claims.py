@@ -1,0 +1,174 @@
+"""C16 to C20 judge what the trials say, whatever that is; they share one run."""
+
+import json
+from functools import cache
+
+import pytest
+
+from app.reports.reproduction import write_reproduction_report
+from lab.claims import CLAIMS, run_experiments
+from lab.claims.exhibits import Chart, HeatMap, Table
+from lab.claims.registration import claims
+from lab.claims.registration.results import Results
+from lab.claims.registration.setup import CURVED, standard_setup
+from lab.claims.registration.trials import CURVE_ITERATIONS
+from packetmesh.files import finite
+from packetmesh.progress import Progress
+
+IDS = ("C16", "C17", "C18", "C19", "C20")
+ROOMS = 12
+
+
+def _trial(condition: str, room: int, direction: str, entrant: str, error_cm: float, iterations: int) -> dict:
+    error_cm *= 1.0 + 0.01 * ((7 * room) % 5)
+    curve = [10.0, *[error_cm] * iterations] if entrant in CURVED and direction == "q2p" else []
+    return {
+        "condition": condition,
+        "room": room,
+        "direction": direction,
+        "entrant": entrant,
+        "point_error_cm": error_cm,
+        "ahd_cm": 4.0,
+        "rotation_error_deg": 0.1,
+        "success": error_cm < 2.0,
+        "iterations": iterations,
+        "k90": iterations,
+        "stop_reason": "converged",
+        "start_error_cm": 10.0,
+        "overlap": 0.6,
+        "curve_error_cm": curve,
+        "curve_ahd_cm": [4.0] * len(CURVE_ITERATIONS) if curve else [],
+    }
+
+
+def _results(error_cm=None, iterations=None, far_home=None) -> Results:
+    """Made-up trials of the whole benchmark: everyone errs by 1 cm in 20 iterations but those named."""
+    error_cm, iterations = error_cm or {}, iterations or {}
+    stored = {}
+    for room in range(ROOMS):
+        for condition, lineup in _lineups().items():
+            trials = [
+                _trial(
+                    condition,
+                    room,
+                    direction,
+                    name,
+                    error_cm.get(name, 1.0),
+                    iterations.get(name, 20) + room % 3,
+                )
+                for direction, name in lineup
+            ]
+            timings = [
+                {"seconds": 0.1, "elapsed_s": [0.01 * k for k in range(len(t["curve_error_cm"]) - 1)]}
+                for t in trials
+            ]
+            stored[condition, room] = {"trials": trials, "timings": timings}
+        cells = [
+            {
+                "entrant": entrant.name,
+                "rotation_deg": r,
+                "translation_m": t,
+                "home": r < 45 or t < 0.6 or bool(far_home),
+            }
+            for entrant, _ in standard_setup().captured
+            for r in (5.0, 45.0)
+            for t in (0.1, 0.6)
+        ]
+        stored["capture", room] = {"cells": cells}
+    return Results(stored)
+
+
+@cache
+def _lineups() -> dict:
+    setup = standard_setup()
+    return {name: [(d, entrant.name) for d, entrant in lineup] for name, lineup in setup.lineups.items()}
+
+
+def _verdict(id_: str, **named) -> str:
+    return CLAIMS[id_].judge(_results(**named)).verdict
+
+
+def test_c16_needs_all_four_rivals_beaten():
+    beaten = dict.fromkeys(("icp", "picp", "ricp", "mricp"), 2.0)
+    assert _verdict("C16", error_cm=beaten) == "reproduced"
+    assert _verdict("C16", error_cm=beaten | {"ricp": 1.0}) == "not reproduced"
+    assert _verdict("C16", error_cm=beaten | {"ceicp-a": 3.0}) == "not reproduced"
+
+
+def test_c17_needs_at_most_six_tenths_of_icps_error():
+    assert _verdict("C17", error_cm={"icp": 2.0}) == "reproduced"
+    assert _verdict("C17", error_cm={"icp": 1.5}) == "not reproduced"
+    ours = CLAIMS["C17"].judge(_results(error_cm={"icp": 2.0})).ours
+    assert ours["point_error_ratio_ceicp-n"] == pytest.approx(0.5)
+    assert ours["ahd_ratio_ceicp-n"] == 1.0
+
+
+def test_c18_holds_unless_ceicp_is_worse():
+    for mricp_cm, verdict in ((1.0, "reproduced"), (2.0, "reproduced"), (0.5, "not reproduced")):
+        assert _verdict("C18", error_cm={"mricp": mricp_cm}) == verdict
+
+
+def test_c19_needs_fewer_iterations_of_both_versions():
+    assert _verdict("C19", iterations={"icp": 40}) == "reproduced"
+    assert _verdict("C19", iterations={"icp": 40, "ceicp-a": 60}) == "not reproduced"
+    assert _verdict("C19") == "not reproduced"
+
+
+def test_c20_needs_a_farthest_start_that_fails():
+    assert _verdict("C20") == "reproduced"
+    assert _verdict("C20", far_home=True) == "not reproduced"
+
+
+def test_equal_errors_are_told_as_ties():
+    why = CLAIMS["C16"].judge(_results(error_cm={"icp": 2.0})).why
+    assert "ficp 1.00 (tie)" in why
+    assert "hicp 1.00 (tie)" in why
+
+
+def test_the_five_share_one_run_and_its_progress_comes_first(monkeypatch, tmp_path):
+    runs = []
+
+    def prepare(folder):
+        runs.append(folder)
+        yield Progress("trials", 0.5)
+        return _results()
+
+    for id_ in IDS:
+        object.__setattr__(CLAIMS[id_], "prepare", prepare)
+    try:
+        events = list(run_experiments(IDS, tmp_path))
+    finally:
+        for id_ in IDS:
+            object.__setattr__(CLAIMS[id_], "prepare", claims.registration_results)
+    assert runs == [tmp_path]
+    assert isinstance(events[0], Progress)
+    assert [verdict.id for verdict in events[1:]] == list(IDS)
+
+
+@pytest.fixture(scope="module")
+def verdicts():
+    results = _results(error_cm={"icp": 2.0})
+    return [CLAIMS[id_].judge(results) for id_ in IDS]
+
+
+def test_the_exhibits_hold_the_promised_tables_and_pictures(verdicts):
+    exhibits = {exhibit.title: exhibit for verdict in verdicts for exhibit in verdict.exhibits}
+    filled = exhibits["Table 4.4, filled in"]
+    assert filled.rows[0][:4] == ("icp", 8.21, 10.12, 23.84)
+    assert filled.rows[0][8] == pytest.approx(2.04)
+    kinds = [type(exhibit) for exhibit in exhibits.values()]
+    assert (kinds.count(Chart), kinds.count(HeatMap)) == (6, 5)
+    assert kinds.count(Table) >= 7
+    for exhibit in exhibits.values():
+        if isinstance(exhibit, Table):
+            assert {len(row) for row in exhibit.rows} == {len(exhibit.header)}
+
+
+def test_the_report_draws_every_exhibit_and_the_record_is_strict_json(verdicts, tmp_path):
+    write_reproduction_report(verdicts, tmp_path / "r.html")
+    text = (tmp_path / "r.html").read_text()
+    pictures = sum(not isinstance(e, Table) for verdict in verdicts for e in verdict.exhibits)
+    assert text.count("<svg") == text.count("</svg>") == pictures
+    assert "Table 4.4, filled in" in text
+    assert "nan" not in text
+    json.dumps(finite([verdict.record() for verdict in verdicts]), allow_nan=False)

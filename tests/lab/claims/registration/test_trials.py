@@ -1,0 +1,177 @@
+"""What a trial measures, and what every entrant really is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lab.claims.registration.capture import capture_range
+from lab.claims.registration.cases import CONDITIONS, Case, make_case
+from lab.claims.registration.entrants import Entrant, ablations, methods, peers, tuned
+from lab.claims.registration.trials import AHD_VOXEL_M, Ruler, k90, run_entrant, run_task
+from lab.claims.registration.tuned import TUNED
+from lab.claims.registration.tuning import CANDIDATES, tuning_lineup, write_tuned
+from pipeline.geometry import rigid, rotation_exp
+from pipeline.registration import average_hausdorff_m, point_error_m
+from pipeline.registration.methods import METHODS
+from pipeline.surface import voxel_average
+
+EASY = CONDITIONS["easy"]
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return make_case(EASY, 2003)
+
+
+@pytest.fixture(scope="module")
+def small(case) -> Case:
+    return case.thinned(600)
+
+
+def _pose(entrant: Entrant, case: Case, direction="q2p") -> np.ndarray:
+    return run_entrant(entrant, case, direction, EASY.gate_m).poses[-1]
+
+
+def test_the_ruler_measures_what_the_metrics_define(case):
+    ruler = Ruler(case)
+    T = rigid(rotation_exp(np.array([0.02, -0.1, 0.05])), np.array([0.1, 0.02, -0.05]))
+    source, target = (voxel_average(cloud, AHD_VOXEL_M) for cloud in (case.source, case.target))
+    expected_cm = 100 * average_hausdorff_m(source.transformed(T).points_m, target.points_m)
+    assert ruler.ahd_cm(T) == pytest.approx(expected_cm, abs=1e-5)
+    expected_cm = 100 * point_error_m(T, case.T_true, case.source.points_m)
+    assert ruler.point_error_cm(T) == pytest.approx(expected_cm, abs=1e-5)
+    assert ruler.point_error_cm(case.T_true) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("errors", "expected"),
+    [([10.0, 5.0, 1.5, 1.0], 2), ([10.0, 1.0], 1), ([11.0, 5.0, 2.1, 2.0, 1.0], 3), ([5.0, 6.0], None)],
+)
+def test_k90_is_the_first_iteration_past_nine_tenths_of_the_drop(errors, expected):
+    """From 10 to 1 the mark is 1.9; from 11 to 1 it is 2.0."""
+    assert k90(errors) == expected
+
+
+def test_who_refuses_stays_at_the_start_and_says_why(small):
+    run = run_entrant(Entrant("ceicp-literal", settings=(("unit", "m"),)), small, "q2p", 0.3)
+    np.testing.assert_array_equal(run.poses[-1], small.T_init)
+    assert len(run.poses) == 1
+    assert "metres" in run.stop_reason
+
+
+@pytest.mark.parametrize("direction", ["q2p", "p2q"])
+def test_a_peer_brings_the_source_home_in_both_directions(case, direction):
+    start_cm = Ruler(case).point_error_cm(case.T_init)
+    T = _pose(Entrant("open3d-gicp"), case.thinned(3000), direction)
+    assert Ruler(case).point_error_cm(T) < 0.2 * start_cm
+
+
+def test_every_entrant_of_the_benchmark_runs(small):
+    condition = replace(EASY, name="small")
+    everyone = (*methods(), *methods("plane"), *peers(), *ablations("point"), *ablations("plane"))
+    trials, timings = run_task(small, condition, 2003, [("q2p", tuned(e)) for e in everyone], 600)
+    assert len(trials) == len(timings) == len(everyone) == len({trial.entrant for trial in trials})
+    refused = {trial.entrant for trial in trials if trial.stop_reason.startswith("refused")}
+    assert refused == {"ceicp-literal, metres"}
+
+
+def test_taking_the_entropy_factor_out_changes_the_way_but_hardly_the_goal(case):
+    thinned = case.thinned(3000)
+    whole, plain = (_pose(Entrant(name), thinned) for name in ("ceicp-a", "ceicp-a-gaussian"))
+    assert not np.array_equal(whole, plain)
+    assert point_error_m(whole, plain, thinned.source.points_m) < 0.003
+
+
+@pytest.mark.parametrize(
+    "name", ["ceicp-a-hard-gate", "ceicp-a-fixed-sigma", "ceicp-n-gaussian", "icp-gated"]
+)
+def test_variants_are_not_their_methods(small, name):
+    base = name.rsplit("-", 1)[0] if name != "ceicp-a-hard-gate" else "ceicp-a"
+    base = {"ceicp-a-fixed": "ceicp-a"}.get(base, base)
+    assert not np.array_equal(_pose(Entrant(name), small), _pose(Entrant(base), small))
+
+
+def test_tunable_constants_at_their_defaults_change_nothing(small):
+    """A parameter laid open for tuning is the method's own."""
+    for method, setting in (("ficp", ("exponent", 0.95)), ("ricp", ("gate_scale", 1e3))):
+        np.testing.assert_array_equal(
+            _pose(Entrant(method, settings=(setting,)), small), _pose(Entrant(method), small)
+        )
+
+
+def test_an_infinite_gate_turns_gated_icp_into_icp(small):
+    gated = Entrant("icp-gated", settings=(("gate_scale", 1e3),))
+    tolerance_m = 1e-3  # a wider gate also stops a little earlier
+    assert (
+        point_error_m(_pose(gated, small), _pose(Entrant("icp"), small), small.source.points_m) < tolerance_m
+    )
+
+
+def test_settings_reach_the_config_and_the_first_state(small):
+    config = Entrant("ceicp-a", "plane", settings=(("gate_scale", 1.5),)).config("q2p", 0.3, 600)
+    assert (config.method, config.metric, config.gate_m) == ("ceicp-a", "plane", pytest.approx(0.45))
+    assert Entrant("trimmed-icp", settings=(("trim", 0.7),)).config("p2q", 0.3, 600).trim == 0.7
+    start = Entrant("mricp", settings=(("level", 2),)).start()
+    assert start(config, small.source, small.target).level == 2
+
+
+def test_tuning_spends_equally_on_everyone():
+    assert set(METHODS) - {"icp"} <= set(CANDIDATES)
+    assert {len(values) for _, values in CANDIDATES.values()} == {4}
+    tried: dict[str, int] = {}
+    for _, entrant in tuning_lineup():
+        name = replace(entrant, label="").name
+        tried[name] = tried.get(name, 0) + 1
+    assert set(tried.values()) == {4}
+    assert set(TUNED) == set(tried)
+
+
+def test_the_chosen_value_is_the_best_that_was_tried():
+    for parameter, value, scores in TUNED.values():
+        assert parameter
+        assert scores[value] == min(scores.values())
+        assert len(scores) == 4
+
+
+def test_the_tuning_module_that_is_written_says_what_was_chosen(tmp_path):
+    chosen = {"a plane": ("gate_scale", 0.5, {0.5: 1.25, 1.0: 2.0})}
+    write_tuned(chosen, tmp_path / "tuned.py")
+    namespace: dict = {}
+    exec((tmp_path / "tuned.py").read_text(), namespace)
+    assert namespace["TUNED"] == chosen
+
+
+def test_capture_range_covers_the_grid_and_depends_on_how_far_the_method_looks(case):
+    small = case.thinned(1500)
+    config = Entrant("ceicp-a", "plane").config("q2p", 0.3, 1500)
+    told, untold = (
+        list(
+            capture_range(
+                small.source,
+                small.target,
+                small.T_true,
+                config,
+                (5.0, 30.0),
+                (0.1, 1.5),
+                seed=3,
+                gate_by_start=gate_by_start,
+            )
+        )
+        for gate_by_start in (True, False)
+    )
+    assert [(c.rotation_deg, c.translation_m) for c in told] == [(5, 0.1), (5, 1.5), (30, 0.1), (30, 1.5)]
+    assert told[0] == untold[0]
+    assert told[0].home
+    assert not untold[3].home
+    assert untold[3].point_error_m > 0.3
+
+
+def test_a_start_out_of_the_gates_reach_is_a_miss_not_an_error(case):
+    small = case.thinned(300)
+    config = Entrant("ceicp-n").config("q2p", 0.3, 300)
+    cell = next(
+        capture_range(small.source, small.target, small.T_true, config, (0.0,), (50.0,), gate_by_start=False)
+    )
+    assert not cell.home
+    assert cell.translation_error_m == pytest.approx(50.0)

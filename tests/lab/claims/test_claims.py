@@ -1,0 +1,81 @@
+"""Claims are judged by their own numbers, and the numbers can be had by other means."""
+
+import numpy as np
+import pytest
+
+from lab.benchmarks.cases import run_benchmarks
+from lab.claims import CLAIMS, Claim, run_experiments
+from lab.claims.claim import Outcome, bootstrap_ci95
+from lab.claims.outliers import brute_force_keep, with_gross_outliers
+from lab.claims.surface.clouds import single_node
+from packetmesh.errors import InputError
+from pipeline.acquisition import filter_outliers
+from pipeline.config import AcquisitionConfig
+from pipeline.io.demos import load_demo
+from pipeline.types import PointCloud
+
+
+def test_a_claim_is_reproduced_only_if_its_experiment_says_so():
+    for reproduced, verdict in ((True, "reproduced"), (False, "not reproduced")):
+        outcome = Outcome({"x": 1.0}, {}, reproduced, "because")
+        assert Claim("C0", "claim", "1", "exact", lambda outcome=outcome: outcome).judge().verdict == verdict
+
+
+def test_the_record_holds_what_the_report_promises():
+    record = (
+        Claim("C0", "c", "t", "tol", lambda: Outcome({"x": 1.0}, {"x": (0.5, 2.0)}, True, "w"))
+        .judge()
+        .record()
+    )
+    assert {"thesis", "ours", "ci95", "tolerance", "verdict", "why"} <= set(record)
+
+
+def test_the_bootstrap_interval_covers_the_mean_95_times_of_100():
+    rng = np.random.default_rng(5)
+    covered = [
+        low <= 3.0 <= high for low, high in (bootstrap_ci95(rng.normal(3, 1, 40), seed=k) for k in range(400))
+    ]
+    assert 0.90 <= np.mean(covered) <= 0.98
+
+
+def test_a_constant_has_an_interval_of_no_width():
+    assert bootstrap_ci95(np.full(12, 0.25)) == (0.25, 0.25)
+
+
+def test_the_outlier_filter_keeps_what_the_printed_formulae_keep():
+    rng = np.random.default_rng(2)
+    points_m = np.concatenate([rng.normal(0, 0.2, (800, 3)), rng.uniform(-3, 3, (40, 3))])
+    points_m[:, 2] += 3.0
+    config = AcquisitionConfig(outlier_mode="thesis", outlier_neighbours=4, outlier_t=1.0)
+    keep = filter_outliers(PointCloud(points_m), config, 525.0).keep
+    np.testing.assert_array_equal(keep, brute_force_keep(points_m, 4, 1.0))
+    assert 0 < (~keep).sum() < 200
+
+
+def test_gross_outliers_move_along_their_rays_and_are_about_one_in_a_hundred():
+    points_m = np.random.default_rng(3).uniform(1, 2, (20_000, 3))
+    moved_m, moved = with_gross_outliers(PointCloud(points_m), np.random.default_rng(4))
+    np.testing.assert_array_equal(moved_m[~moved], points_m[~moved])
+    np.testing.assert_allclose(np.cross(moved_m, points_m), 0, atol=1e-12)
+    assert 0.007 < moved.mean() < 0.013
+
+
+def test_a_single_node_stands_at_its_true_pose_with_its_own_truth():
+    rig = load_demo("box-on-table")
+    alone = single_node(rig, 2)
+    np.testing.assert_array_equal(alone.frames[0].T_world_camera, rig.truth.T_world_camera[2])
+    assert len(alone.truth.depth) == len(alone.frames) == 1
+
+
+def test_unknown_names_are_told_with_the_known_ones():
+    with pytest.raises(InputError, match="C10"):
+        list(run_experiments(["C99"]))
+    with pytest.raises(InputError, match="reconstruct"):
+        list(run_benchmarks(["nothing"]))
+
+
+def test_every_claim_says_what_the_thesis_says_and_what_counts():
+    for name, claim in CLAIMS.items():
+        assert claim.id == name
+        assert claim.thesis
+        assert claim.tolerance
