@@ -7,10 +7,11 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from app.screens.surface.labels import Coloring
 from pipeline.config import Direction, Method, Metric
 from pipeline.types import ByteArray, FloatArray, IntArray, SurfaceQuality
 
+Coloring = Literal["color", "source", "distance", "normal"]
+"""What the colours of a surface mean."""
 RaceMode = Literal["nodes", "inferred"]
 """nodes: one node's sensor cloud onto another's; inferred: a node's inferred cloud onto its sensor cloud."""
 Rival: TypeAlias = tuple[Method, Metric]

@@ -21,7 +21,12 @@ import viser
 from app.drawing.colors import BRAND
 from app.jobs import warm_up
 from app.pool import ComputePool
-from app.screens import PANELS
+from app.screens.depth.panel import DepthPanel
+from app.screens.export.panel import ExportPanel
+from app.screens.fuse.panel import FusePanel
+from app.screens.network.panel import NetworkPanel
+from app.screens.scene.panel import ScenePanel
+from app.screens.surface.panel import SurfacePanel
 from app.session import Session, Target
 from app.state import SharedViews, Source, Spec
 from app.store import Store
@@ -31,6 +36,8 @@ from pipeline.config import PRESETS, PipelineConfig
 logger = logging.getLogger(__name__)
 
 PANEL_WIDTH_PX = 440
+PANELS = (ScenePanel, DepthPanel, FusePanel, SurfacePanel, NetworkPanel, ExportPanel)
+"""The steps of the app, in their order."""
 
 
 @dataclass(slots=True)

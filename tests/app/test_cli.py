@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from app.cli import main
+from lab.benchmarks import cases as benchmarks
 from lab.benchmarks.benchmark import Benchmark
-from lab.claims import benchmarks
 from pipeline.io import read_cloud, read_mesh
 from pipeline.io.demos import DEMO_SCENES
 from tests.paths import ASSETS

@@ -8,10 +8,10 @@ import pytest
 import viser
 
 from app import jobs
-from app.screens.depth import DepthPanel
 from app.screens.depth.brush import painted
 from app.screens.depth.labels import COLORINGS, EVERYWHERE, HOLES, OURS, UNSEEN
 from app.screens.depth.lesson import depth_lesson
+from app.screens.depth.panel import DepthPanel
 from app.screens.depth.view import NetworkWish
 from app.state import Results, Source, Spec
 from packetmesh.errors import PacketMeshError

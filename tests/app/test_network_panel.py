@@ -9,9 +9,8 @@ import pytest
 import viser
 
 from app import jobs
-from app.screens.network import NetworkPanel
 from app.screens.network.labels import NETWORKS
-from app.screens.network.panel import CANCELLED, FAILED, ORIGIN
+from app.screens.network.panel import CANCELLED, FAILED, ORIGIN, NetworkPanel
 from app.screens.network.view import What
 from app.state import Results, Source, Spec
 from network_sim.config import PRESETS

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from app import echo
+from app import acknowledgement as echo
 from app.screens.surface.labels import BOTH, COLORINGS, POISSON
 from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, pick, press, slider, unfold
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from app.records import Coloring
 from pipeline.config import RadiusRule
 
 AFTER, BEFORE, BOTH = "after fusion", "before fusion (sensor only)", "side by side"
@@ -11,7 +12,6 @@ POISSON, ALPHA = "Poisson, a baseline", "alpha shape, a baseline"
 BASELINES: dict[str, Literal["poisson", "alpha"]] = {POISSON: "poisson", ALPHA: "alpha"}
 SHOWN = (AFTER, BEFORE, BOTH, POISSON, ALPHA)
 """Which surface is drawn."""
-Coloring = Literal["color", "source", "distance", "normal"]
 COLORINGS: dict[str, Coloring] = {
     "the camera's colours": "color",
     "source: sensor or inferred": "source",

@@ -6,8 +6,8 @@ from functools import partial
 
 import pytest
 
+from lab.benchmarks import ns3 as peer
 from lab.benchmarks.network import SATURATED, network
-from lab.claims.network import peer
 from network_sim.config import NetworkConfig
 from network_sim.mac.saturation import saturation
 from packetmesh.errors import PacketMeshError

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from lab.benchmarks import surface as surface_speed
 from lab.benchmarks.cases import CASES, Benchmark, run_benchmarks
 from lab.benchmarks.surface import (
     OURS,
@@ -15,7 +16,6 @@ from lab.benchmarks.surface import (
     run_alone,
     terrain,
 )
-from lab.claims import surface_speed
 from lab.claims.surface import growth
 from packetmesh.errors import InputError
 from pipeline.surface import spacing

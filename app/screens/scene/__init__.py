@@ -1,0 +1,1 @@
+"""Scene: which place, and what its camera nodes deliver."""
