@@ -35,6 +35,7 @@ Metric = Literal["point", "plane"]
 Direction = Literal["q2p", "p2q", "both"]
 FusionMode = Literal["union", "fill"]
 RadiusRule = Literal["thesis", "thesis+", "manual"]
+NodePoints = Literal["sensor", "fused"]
 
 
 def _at_least(key: str, value: float, least: float) -> None:
@@ -161,7 +162,7 @@ class FusionConfig:
 
     mode: FusionMode = "fill"
     """union: all points of both; fill: inferred points only where the sensor has none."""
-    align_nodes_with: Literal["sensor", "fused"] = "sensor"
+    align_nodes_with: NodePoints = "sensor"
     """Which points register one node to another."""
     register_inferred: bool = False
     """Move each node's inferred cloud rigidly onto its sensor cloud, as the thesis does; without it

@@ -65,6 +65,18 @@ def roll_over(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
     )
 
 
+def roll_or_nothing(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
+    """``roll_over``, with a surface of no triangle where the balls fall through everywhere.
+
+    Raises:
+        InputError: as ``roll_over``.
+    """
+    try:
+        return roll_over(cloud, radii_m)
+    except ReconstructionError:
+        return Surface(np.empty((0, 3)), np.empty((0, 3), np.int32), None, tuple(radii_m))
+
+
 def _why_nothing(cloud: PointCloud, radius_m: float) -> str:
     r_F_m, sigma_D_m = spacing(cloud.points_m)
     if radius_m < r_F_m / 2:
