@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 
 import viser
 
-from app.debounce import Delay
+from app.debounce import Debounce
 from app.page import running
 
-PATIENCE_S = 1.5
+TIMEOUT_S = 1.5
 """Without an answer for so long, for want of a browser perhaps, it is taken as given. A page that draws
 answers within a second (page.js)."""
 
 
-class Echo:
+class DrawAcknowledgement:
     """Asks the browser to answer once it has drawn everything sent so far.
 
     A hand can move a slider faster than a slow browser draws. Without an answer to wait for, what is
@@ -34,16 +34,16 @@ class Echo:
             on_answer: called there, once for each question.
         """
         self._on_answer = on_answer
-        self._said = 0
+        self._scripts_sent = 0
         self.waiting = False
         self._html = gui.add_html("")
         command = gui.add_command("Say that all is drawn", hotkey="insert", modifier="cmd/ctrl+alt+shift")
         command.on_trigger(lambda _: post(self._answered))
-        self._patience = Delay(PATIENCE_S, lambda: post(self._answered))
+        self._timeout = Debounce(TIMEOUT_S, lambda: post(self._answered))
 
     def hold(self) -> None:
         """Have only new meshes drawn, until ``ask`` ends that, a hand turns the view, or 3 s have passed."""
-        self._say("packetmesh.hold()")
+        self._run_script("packetmesh.hold()")
 
     def ask(self, vertices: Sequence[int] = (), hold: bool = False) -> None:
         """Ask now; of two questions, only the last is answered.
@@ -54,19 +54,19 @@ class Echo:
             hold: whether to hold the view from now on.
         """
         self.waiting = True
-        self._say(f"packetmesh.ask({list(vertices)}, {str(hold).lower()})")
-        self._patience.restart()
+        self._run_script(f"packetmesh.ask({list(vertices)}, {str(hold).lower()})")
+        self._timeout.restart()
 
     def close(self) -> None:
         """End the timer."""
-        self._patience.cancel()
+        self._timeout.cancel()
 
-    def _say(self, script: str) -> None:
-        self._said += 1
-        self._html.content = running(script, mark=self._said)
+    def _run_script(self, script: str) -> None:
+        self._scripts_sent += 1
+        self._html.content = running(script, mark=self._scripts_sent)
 
     def _answered(self) -> None:
         if self.waiting:
             self.waiting = False
-            self._patience.cancel()
+            self._timeout.cancel()
             self._on_answer()

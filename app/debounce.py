@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 
 
-class Delay:
+class Debounce:
     """Calls ``action`` when ``wait_s`` have passed since the last ``restart``."""
 
     def __init__(self, wait_s: float, action: Callable[[], None]) -> None:

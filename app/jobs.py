@@ -9,7 +9,7 @@ JOBS = {
     "scene": "app.views:scene_job",
     "depth": "app.screens.depth.job:depth_job",
     "hide": "app.screens.depth.hide_job:hide_job",
-    "network": "app.screens.depth.network_job:network_job",
+    "model": "app.screens.depth.model_job:model_job",
     "fuse": "app.views:fuse_job",
     "surface": "app.views:surface_job",
     "paint": "app.screens.surface.paint_job:paint_job",

@@ -126,7 +126,7 @@ class Results:
         """Remember that this cannot be computed, so that it is not tried again until something changes."""
         self._failures[step] = (key, sentence)
 
-    def forgive(self) -> None:
+    def retry_failed(self) -> None:
         """Try failed steps again."""
         self._failures.clear()
 

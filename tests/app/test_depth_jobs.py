@@ -25,8 +25,8 @@ from app.screens.depth.labels import (
     PICTURES,
     SENSOR,
 )
-from app.screens.depth.network_job import network_job
-from app.screens.depth.view import Disc, HideWish, NetworkWish, SeenSample
+from app.screens.depth.model_job import model_job
+from app.screens.depth.view import Disc, HideRequest, ModelChoice, SeenSample
 from app.state import Source, Spec
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig
@@ -38,7 +38,7 @@ from pipeline.types import DepthMap
 from tests.app.answers import end
 
 SPEC = Spec(Source(scene="box-on-table"))
-FLAT = HideWish(0, (Disc(0.15, 0.35, 0.2),))
+FLAT = HideRequest(0, (Disc(0.15, 0.35, 0.2),))
 """On the wall, where depth is a plane."""
 
 
@@ -206,7 +206,7 @@ def test_the_hidden_disc_is_blank_then_filled_and_nothing_else_changes(rig, hidd
 
 def test_the_pictures_show_the_region_around_all_discs(store, rig):
     discs = (Disc(0.15, 0.35, 0.1), Disc(0.45, 0.35, 0.1))
-    both = end(hide_job(store, SPEC, HideWish(0, discs)))
+    both = end(hide_job(store, SPEC, HideRequest(0, discs)))
     assert both.hidden_px == hidden_pixels(rig.frames[0].depth, discs).sum()
     rows, columns = window_around(discs, *rig.frames[0].rgb.shape[1::-1])
     shown = both.pictures[BLANK].rgb
@@ -250,21 +250,21 @@ def test_the_words_of_the_screen_are_those_of_the_pipeline():
 
 
 def test_the_network_that_ships_says_what_it_is():
-    view = end(network_job(NetworkWish()))
-    assert (view.wish, view.kind) == (NetworkWish(), "relative")
+    view = end(model_job(ModelChoice()))
+    assert (view.choice, view.kind) == (ModelChoice(), "relative")
     assert view.provider.endswith("ExecutionProvider")
     assert view.size_bytes == SHIPPED_MODEL.stat().st_size
     assert 0.0 < view.inference_s < 30.0
 
 
-def test_the_network_wished_is_fed_as_wished(tmp_path):
+def test_a_chosen_model_is_fed_as_its_choice_says(tmp_path):
     networks = pytest.importorskip("tests.pipeline.depth.networks")
     file = networks.input_side(tmp_path / "n.onnx", 3)
-    wish = NetworkWish(str(file), None, "metric", 96, 64, "unit")
-    assert end(network_job(wish)).wish == wish
-    convention = network_for(wish.put_into(DepthConfig())).convention
+    request = ModelChoice(str(file), None, "metric", 96, 64, "unit")
+    assert end(model_job(request)).choice == request
+    convention = network_for(request.put_into(DepthConfig())).convention
     assert (convention.width_px, convention.height_px, convention.normalised_inside) == (96, 64, True)
-    assert network_for(replace(wish.put_into(DepthConfig()), reach=0.3)).convention is convention
+    assert network_for(replace(request.put_into(DepthConfig()), reach=0.3)).convention is convention
 
 
 @pytest.mark.parametrize(
@@ -280,7 +280,7 @@ def test_a_bad_input_size_is_one_sentence(tmp_path, width_px, height_px, sentenc
     networks = pytest.importorskip("tests.pipeline.depth.networks")
     file = networks.input_side(tmp_path / "n.onnx", 3)
     with pytest.raises(InputError, match=sentence) as refused:
-        end(network_job(NetworkWish(str(file), "midas-small", None, width_px, height_px)))
+        end(model_job(ModelChoice(str(file), "midas-small", None, width_px, height_px)))
     assert "\n" not in str(refused.value)
 
 
@@ -288,4 +288,4 @@ def test_a_file_that_is_no_network_is_one_sentence(tmp_path):
     path = tmp_path / "mine.onnx"
     path.write_bytes(b"not a network")
     with pytest.raises(InputError, match=r"mine\.onnx is not a readable ONNX network"):
-        end(network_job(NetworkWish(str(path))))
+        end(model_job(ModelChoice(str(path))))

@@ -57,7 +57,7 @@ def test_a_failed_step_holds_the_chain_until_something_changes():
     assert results.status("depth", SPEC, None) == "failed"
     assert results.status("fuse", SPEC, None) == "missing"
     assert results.first_stale(edited("depth.crop", True)) == "depth"
-    results.forgive()
+    results.retry_failed()
     assert results.first_stale(SPEC) == "depth"
 
 

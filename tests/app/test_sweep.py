@@ -28,12 +28,12 @@ ROWS = (
 
 def run(job):
     """All that a job says, and what it answers."""
-    said = []
+    steps = []
     while True:
         try:
-            said.append(next(job))
+            steps.append(next(job))
         except StopIteration as stop:
-            return said, stop.value
+            return steps, stop.value
 
 
 def row(radius_mm, no_hit, accuracy=NAN, triangles=100):
@@ -50,13 +50,13 @@ def sweep(store):
 
 
 def test_the_sweep_grows_ball_by_ball_and_ends_complete(sweep):
-    said, view = sweep
-    partial = [one for one in said if isinstance(one, SweepView)]
+    steps, view = sweep
+    partial = [one for one in steps if isinstance(one, SweepView)]
     assert [len(one.points) for one in partial] == list(range(1, view.planned + 1))
     assert [one.done for one in partial] == [False] * (view.planned - 1) + [True]
     assert all(one.points == view.points[: len(one.points)] for one in partial)
     assert partial[-1] == view
-    rolling = [one.fraction for one in said if isinstance(one, Progress) and one.stage.startswith("a ball")]
+    rolling = [one.fraction for one in steps if isinstance(one, Progress) and one.stage.startswith("a ball")]
     assert rolling == sorted(rolling)
     assert len(rolling) == view.planned
 
@@ -97,8 +97,8 @@ def test_the_advice_is_for_the_cloud_after_fusion_and_is_kept(store):
 
 def test_the_radii_of_the_spec_do_not_matter_to_a_sweep(store, sweep):
     surface = replace(SPEC.config.surface, radius_rule="manual", radii_m=(0.5,))
-    said, view = run(sweep_job(store, replace(SPEC, config=replace(SPEC.config, surface=surface))))
-    assert said == []
+    steps, view = run(sweep_job(store, replace(SPEC, config=replace(SPEC.config, surface=surface))))
+    assert steps == []
     np.testing.assert_equal(view, sweep[1])
 
 
@@ -113,8 +113,8 @@ def test_the_sentence_finds_where_the_rays_level_off_and_what_accuracy_does():
 
 
 def test_the_sentence_says_when_the_widest_balls_miss_more_again():
-    said = sweep_sentence(swept(row(10, 0.60), row(28, 0.20), row(60, 0.30)))
-    assert said == (
+    sentence = sweep_sentence(swept(row(10, 0.60), row(28, 0.20), row(60, 0.30)))
+    assert sentence == (
         "From 28 mm on, larger balls close less than 1% more of the rays (20.0% miss); "
         "the widest, 60 mm, misses 30.0% again."
     )
@@ -211,8 +211,8 @@ def test_a_suggestion_is_taken_with_its_button(folder):
     for one in (ROWS[1], ROWS[0], ROWS[0]):
         press(folder._take, one.name)
     assert calls == [0.0312, 0.0246, 0.0246]
-    for said in ("finest", "24.6 mm", "49 %", "even", "31.2 mm", "88 %", ROWS[0].sentence):
-        assert said in folder._table.content
+    for part in ("finest", "24.6 mm", "49 %", "even", "31.2 mm", "88 %", ROWS[0].sentence):
+        assert part in folder._table.content
     folder.forget()
     press(folder._take, "even")
     assert len(calls) == 3

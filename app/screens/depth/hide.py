@@ -11,7 +11,7 @@ import viser
 from app.screens.depth.brush import BrushDrawing, clicked_disc
 from app.screens.depth.compare import CompareArea
 from app.screens.depth.labels import BLANK, MEASURED, OURS, PEER_NAMES
-from app.screens.depth.view import Disc, HiddenView, HideWish, SeenSample
+from app.screens.depth.view import Disc, HiddenView, HideRequest, SeenSample
 from app.tables import Row, number, table
 from pipeline.types import FloatArray
 
@@ -35,7 +35,7 @@ class HideFolder:
         scene: viser.SceneApi,
         post: Callable[..., None],
         changed: Callable[[Any, Callable[[], None]], None],
-        on_hide: Callable[[HideWish], None],
+        on_hide: Callable[[HideRequest], None],
     ) -> None:
         """Add the folder.
 
@@ -98,12 +98,12 @@ class HideFolder:
         else:
             self._paint((*self.discs, disc))
 
-    def ask(self, wish: HideWish) -> None:
+    def ask(self, request: HideRequest) -> None:
         """Paint the discs and press the button, as a person would."""
-        last = wish.discs[-1]
+        last = request.discs[-1]
         self._x.value, self._y.value = round(100.0 * last.x_share), round(100.0 * last.y_share)
         self._size.value = round(100.0 * last.size_share)
-        self._paint(wish.discs)
+        self._paint(request.discs)
         self._ask()
 
     def clear(self) -> None:
@@ -145,7 +145,7 @@ class HideFolder:
             self._add()
         self.forget()
         self._status.content = WAITING
-        self._on_hide(HideWish(0, self.discs))
+        self._on_hide(HideRequest(0, self.discs))
 
 
 def painted_line(discs: tuple[Disc, ...]) -> str:

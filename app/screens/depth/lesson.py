@@ -9,7 +9,7 @@ from typing import get_args
 
 from app.lesson import LESSONS, NUMBER, Lesson, Setting, choice, read_lesson, sets
 from app.screens.depth.labels import COLORINGS, DRAWN, HOLES, PHOTO, PICTURES, SENSOR, PointColoring
-from app.screens.depth.view import Disc, HideWish
+from app.screens.depth.view import Disc, HideRequest
 from pipeline.config import AlignmentMode, DepthConfig
 
 SHIPPED = LESSONS / "can-a-picture-measure.md"
@@ -31,7 +31,7 @@ class DepthLook:
     """One of ``app.screens.depth.labels.DRAWN``."""
     reach: float = _DEFAULT.reach
     least_confidence: float = _DEFAULT.least_confidence
-    hide: HideWish | None = None
+    hide: HideRequest | None = None
     """What is hidden and filled, of the node that is shown."""
 
 
@@ -66,7 +66,7 @@ def _hide(look: DepthLook, text: str) -> DepthLook:
     if found is None or any(float(value) > 100.0 for value in found.groups()):
         raise ValueError("try 'nothing' or such as '20 % wide at 50 % 40 %', from the left and the top")
     size, x, y = (float(value) / 100.0 for value in found.groups())
-    return replace(look, hide=HideWish(0, (Disc(x, y, size),)))
+    return replace(look, hide=HideRequest(0, (Disc(x, y, size),)))
 
 
 def _short(name: str) -> str:

@@ -17,11 +17,11 @@ from app.screens.depth.compare import CompareArea
 from app.screens.depth.hide import HideFolder
 from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PHOTO, PICTURES, SENSOR
 from app.screens.depth.lesson import DepthLook, depth_lesson
-from app.screens.depth.network import NetworkFolder
+from app.screens.depth.model import ModelFolder
 from app.screens.depth.numbers import confidence_table, depth_table, residual_table
 from app.screens.depth.residuals import residual_figure
-from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_network
-from app.screens.depth.view import HiddenView, HideWish, NetworkView, NetworkWish, SeenSample
+from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_model
+from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
 from app.state import Spec, Step
 
 TEXT = """**What you see.** Blue: points the sensor measured. Violet: points a neural network inferred
@@ -69,10 +69,8 @@ class DepthPanel(Panel):
             gui.add_markdown(CONFIDENCE_TEXT)
             self._controls.append(self._fields(CONFIDENCE_CONTROLS))
             self._confidence_table = gui.add_html("")
-        self._hide = HideFolder(gui, self.scene, session.post, self.when_changed, self._hidden_wish)
-        self._network = NetworkFolder(
-            gui, session.post, self.when_changed, session.folder, self._choose_network
-        )
+        self._hide = HideFolder(gui, self.scene, session.post, self.when_changed, self._ask_to_hide)
+        self._network = ModelFolder(gui, session.post, self.when_changed, session.folder, self._choose_model)
         with gui.add_folder("Advanced", expand_by_default=False):
             self._drawn = gui.add_dropdown(
                 "Inferred points", list(DRAWN), hint="Which of the inferred (violet) points are drawn."
@@ -187,31 +185,31 @@ class DepthPanel(Panel):
         if frame is not None and frame.visible:
             self._hide.clicked(np.array(event.ray_origin), np.array(event.ray_direction))
 
-    def _hidden_wish(self, wish: HideWish) -> None:
+    def _ask_to_hide(self, request: HideRequest) -> None:
         session, spec, shown = self.session, self.session.spec, self._shown()
         if shown is None or not session.results.fresh("depth", spec):
             self._hide.load(None)
             return
-        wish = replace(wish, node=shown[0])
+        request = replace(request, node=shown[0])
         session.quick_job(
-            "hide", session.store, spec, wish, on_end=lambda view: self._filled(spec, wish, view)
+            "hide", session.store, spec, request, on_end=lambda view: self._filled(spec, request, view)
         )
 
-    def _filled(self, spec: Spec, wish: HideWish, view: HiddenView | None) -> None:
+    def _filled(self, spec: Spec, request: HideRequest, view: HiddenView | None) -> None:
         shown = self._shown()
-        if spec != self.session.spec or wish.discs != self._hide.discs:
+        if spec != self.session.spec or request.discs != self._hide.discs:
             return
-        if shown is not None and shown[0] == wish.node:
+        if shown is not None and shown[0] == request.node:
             with self.session.target.atomic():
                 self._hide.load(view)
 
-    def _choose_network(self, wish: NetworkWish) -> None:
+    def _choose_model(self, choice: ModelChoice) -> None:
         """Try it first: a file that is no depth network is to change nothing."""
-        self.session.quick_job("network", wish, on_end=self._tried)
+        self.session.quick_job("model", choice, on_end=self._tried)
 
-    def _tried(self, view: NetworkView | None) -> None:
+    def _tried(self, view: ModelView | None) -> None:
         if view is not None:
-            self.session.edit(with_network(view.wish))
+            self.session.edit(with_model(view.choice))
         self._network.load(view)
 
     # The lesson.

@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from app.screens.network.labels import NETWORKS, ways
-from app.screens.network.view import NetworkWish
+from app.screens.network.view import NetworkRun
 from network_sim.config import PRESETS, NetworkConfig
 from packetmesh.errors import InputError
 from packetmesh.settings import differences, settings, with_settings
@@ -91,27 +91,27 @@ class NetworkSetup:
         self._preset.value = NETWORKS[FIRST].title
         self._load()
 
-    def wishes(self) -> tuple[NetworkWish, ...]:
+    def runs(self) -> tuple[NetworkRun, ...]:
         """The runs that the controls say.
 
         Raises:
             InputError: settings that do not go together.
         """
         way, beside = self._way.value, self._beside.value
-        first = NetworkWish(way, self._config(way, self._extra))
+        first = NetworkRun(way, self._config(way, self._extra))
         if beside == NOTHING and not self._beside_extra:
             return (first,)
         second_way = way if beside == NOTHING else beside
         label = " ".join((second_way, *self._beside_extra))
-        return first, NetworkWish(label, self._config(second_way, (*self._extra, *self._beside_extra)))
+        return first, NetworkRun(label, self._config(second_way, (*self._extra, *self._beside_extra)))
 
     def command(self) -> str:
         """The command lines that simulate the same."""
         base = PRESETS[self.preset]
         lines = []
-        for wish in self.wishes():
+        for run in self.runs():
             words = ["packetmesh", "simulate", "--preset", self.preset]
-            if changed := differences(wish.config, base):
+            if changed := differences(run.config, base):
                 words += ["--set", *changed]
             lines.append(shlex.join(words))
         return "\n".join(lines)
@@ -157,7 +157,7 @@ class NetworkSetup:
             tuple(self._beside_text.value.split()),
         )
         try:
-            self.wishes()
+            self.runs()
         except InputError:
             self._extra, self._beside_extra = before
             raise

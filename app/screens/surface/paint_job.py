@@ -20,7 +20,7 @@ from app.chain import (
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET
 from app.drawing.glb import lines_glb
 from app.drawing.meshes import rim_segments_m, surface_glb
-from app.records import Coloring, PaintedMesh, PaintedView, PaintWish, Which
+from app.records import Coloring, PaintedMesh, PaintedView, PaintRequest, Which
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
@@ -29,31 +29,31 @@ from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
 
 def paint_job(
-    store: Store, spec: Spec, wish: PaintWish
+    store: Store, spec: Spec, request: PaintRequest
 ) -> Generator[Progress | RolledBalls, None, PaintedView]:
     """The surfaces of a spec, or of one ball instead of the spec's, in colours."""
     rig = yield from rig_of(store, spec)
     places = yield from placed(store, spec)
     whole = yield from _clouds(store, spec)
-    if wish.radius_m is None:
+    if request.radius_m is None:
         balls = yield from rolled(store, spec)
         thin, roll_s = whole, balls.elapsed_s
         surfaces: dict[Which, Surface | None] = {"after": balls.after, "before": balls.before}
     else:
-        thin = yield from _thinned(store, spec, wish.most_points)
+        thin = yield from _thinned(store, spec, request.most_points)
         started = time.perf_counter()
-        surfaces = {name: rolled_over(thin[name], (wish.radius_m,)) for name in wish.which}
+        surfaces = {name: rolled_over(thin[name], (request.radius_m,)) for name in request.which}
         roll_s = time.perf_counter() - started
     cameras = cameras_of(rig, places)
     return PaintedView(
-        wish,
+        request,
         {
-            name: _painted(surface, wish, rig, cameras)
+            name: _painted(surface, request, rig, cameras)
             for name, surface in surfaces.items()
-            if surface is not None and name in wish.which
+            if surface is not None and name in request.which
         },
-        len(thin[wish.which[0]]),
-        len(whole[wish.which[0]]),
+        len(thin[request.which[0]]),
+        len(whole[request.which[0]]),
         roll_s,
     )
 
@@ -78,11 +78,11 @@ def _thinned(
     return (yield from store.remember(("quick", most_points, *cloud_key(spec)), thin))
 
 
-def _painted(surface: Surface, wish: PaintWish, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
+def _painted(surface: Surface, request: PaintRequest, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
     """The rims come when the radius rests: lines are costly to draw in software."""
-    colors = vertex_colors(surface, wish.coloring, rig, cameras)
-    glb = surface_glb(surface, colors, photographed=wish.coloring == "color")
-    rims_glb = b"" if wish.radius_m is not None else lines_glb(rim_segments_m(surface), LOSS)
+    colors = vertex_colors(surface, request.coloring, rig, cameras)
+    glb = surface_glb(surface, colors, photographed=request.coloring == "color")
+    rims_glb = b"" if request.radius_m is not None else lines_glb(rim_segments_m(surface), LOSS)
     return PaintedMesh(glb, rims_glb, len(surface.vertices_m), len(surface.triangles))
 
 

@@ -11,7 +11,7 @@ from app.controls import Controls
 from app.drawing.cameras import look_closely, stage_of
 from app.lesson_folder import LessonFolder
 from app.panel import Panel
-from app.records import MeshView, PaintedView, PaintWish, SceneView, Which
+from app.records import MeshView, PaintedView, PaintRequest, SceneView, Which
 from app.screens.surface.advice import SWEEP, AdviceFolder
 from app.screens.surface.baselines_view import BaselineView
 from app.screens.surface.holes import HolesFolder
@@ -26,7 +26,7 @@ from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
 from app.screens.surface.spacing_plot import spacing_figure
 from app.screens.surface.stage import SurfaceStage
 from app.screens.surface.view import SurfaceView
-from app.screens.surface.walk_view import WalkView, WalkWish
+from app.screens.surface.walk_view import WalkRequest, WalkView
 from app.state import Spec, Step
 from pipeline.config import RadiusRule
 
@@ -144,7 +144,7 @@ class SurfacePanel(Panel):
             self._shown.value = AFTER
             self._arrange()
         which, coloring = self._stage.which, COLORINGS[self._coloring.value]
-        self._look_quickly.want(PaintWish(which, coloring, self._radius.value / 1000.0))
+        self._look_quickly.want(PaintRequest(which, coloring, self._radius.value / 1000.0))
 
     def _drawn(self) -> None:
         """What was sent last stands on the screen; its numbers waited, as the page is slow to write them."""
@@ -179,7 +179,7 @@ class SurfacePanel(Panel):
             if self.session.spec.config.surface.radius_rule != "manual":
                 self._radius.min, self._radius.max = slider_range_mm(view.spacing, view.radii_m)
                 self._radius.value = round(2000.0 * view.radii_m[-1]) / 2.0
-            self._tell_numbers()
+            self._show_numbers()
             self._quick.content = ""
             self._arrange()
         if view.before is not None:
@@ -193,7 +193,7 @@ class SurfacePanel(Panel):
                 self._load_holes()
             self._show_look()
 
-    def _tell_numbers(self) -> None:
+    def _show_numbers(self) -> None:
         if self._view is not None:
             others: dict[str, MeshView] = {view.name: view.mesh for view in self._baselines.values()}
             self._table.content = quality_table(self._view, others, self._has_truth())
@@ -203,14 +203,14 @@ class SurfacePanel(Panel):
         coloring = COLORINGS[self._coloring.value]
         if coloring != "color" and self.session.results.view("fuse") is not None:
             session = self.session
-            wish = PaintWish(("after", "before"), coloring)
-            session.quick_job("paint", session.store, session.spec, wish, on_end=self._painted)
+            request = PaintRequest(("after", "before"), coloring)
+            session.quick_job("paint", session.store, session.spec, request, on_end=self._painted)
 
     def _painted(self, view: PaintedView | None) -> None:
         """Draw it, unless something else is wanted by now."""
-        if view is None or view.wish.coloring != COLORINGS[self._coloring.value]:
+        if view is None or view.request.coloring != COLORINGS[self._coloring.value]:
             return
-        quick = view.wish.radius_m is not None
+        quick = view.request.radius_m is not None
         if quick != self._look_quickly.moving:
             return
         with self.session.target.atomic():
@@ -247,7 +247,7 @@ class SurfacePanel(Panel):
         else:
             self._baselines[label] = view
             self._quick.content = note_html(view)
-            self._tell_numbers()
+            self._show_numbers()
             if self._shown.value == label:
                 self._stage.draw_baseline(view.mesh)
         self._arrange()
@@ -328,15 +328,17 @@ class SurfacePanel(Panel):
             elif self._view is not None:
                 self._take(self._view)
 
-    def _watch(self, wish: WalkWish | None) -> None:
+    def _watch(self, request: WalkRequest | None) -> None:
         session = self.session
-        if wish is None:
+        if request is None:
             session.cancel_side_job()
             self._close_walk()
             self._arrange()
         elif session.results.view("fuse") is not None:
             spec = session.spec
-            session.side_job("walk", session.store, spec, wish, on_end=lambda view: self._walked(spec, view))
+            session.side_job(
+                "walk", session.store, spec, request, on_end=lambda view: self._walked(spec, view)
+            )
 
     def _close_walk(self) -> None:
         """Take the walk away, and stand back again after a close-up."""

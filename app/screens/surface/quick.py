@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import viser
 
-from app.acknowledgement import Echo
-from app.debounce import Delay
-from app.records import PaintedView, PaintWish
+from app.acknowledgement import DrawAcknowledgement
+from app.debounce import Debounce
+from app.records import PaintedView, PaintRequest
 from app.screens.surface.detail import Detail
 
 if TYPE_CHECKING:
@@ -42,9 +42,9 @@ class QuickLook:
             on_rest: called when the radius rests.
         """
         self._session, self._on_view, self._on_drawn, self._on_rest = session, on_view, on_drawn, on_rest
-        self._settle = Delay(QUIET_S, lambda: session.post(self._rest))
-        self._echo = Echo(gui, session.post, self._drawn)
-        self._next: PaintWish | None = None
+        self._settle = Debounce(QUIET_S, lambda: session.post(self._rest))
+        self._acknowledgement = DrawAcknowledgement(gui, session.post, self._drawn)
+        self._next: PaintRequest | None = None
         self._rolling = False
         self._detail = Detail()
         self._asked_s: float | None = None
@@ -54,37 +54,37 @@ class QuickLook:
         """Whether the radius has not come to rest."""
         return self._settle.pending
 
-    def want(self, wish: PaintWish) -> None:
+    def want(self, request: PaintRequest) -> None:
         """The radius has moved."""
         if not self.moving:
-            self._echo.hold()
+            self._acknowledgement.hold()
         self._settle.restart()
-        self._next = wish
+        self._next = request
         self._go_on()
 
     def sent(self, vertices: Sequence[int] = ()) -> None:
         """Surfaces are on their way to the browser; quick ones, of so many vertices each."""
-        self._echo.ask(vertices, hold=self.moving)
+        self._acknowledgement.ask(vertices, hold=self.moving)
 
     def close(self) -> None:
         """End the timers."""
         self._settle.cancel()
-        self._echo.close()
+        self._acknowledgement.close()
 
     def _go_on(self) -> None:
-        session, wish = self._session, self._next
+        session, request = self._session, self._next
         ready = session.results.fresh("fuse", session.spec)
-        if ready and wish is not None and not self._rolling and not self._echo.waiting:
+        if ready and request is not None and not self._rolling and not self._acknowledgement.waiting:
             self._rolling, self._next = True, None
             self._asked_s = time.monotonic()
-            wish = replace(wish, most_points=self._detail.points)
-            session.quick_job("paint", session.store, session.spec, wish, on_end=self._came)
+            request = replace(request, most_points=self._detail.points)
+            session.quick_job("paint", session.store, session.spec, request, on_end=self._came)
 
     def _came(self, view: PaintedView | None) -> None:
         self._rolling = False
         if view is not None:
             self._on_view(view)
-        if not self._echo.waiting:
+        if not self._acknowledgement.waiting:
             self._go_on()
 
     def _drawn(self) -> None:

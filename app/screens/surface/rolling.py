@@ -12,7 +12,7 @@ from app.drawing.clouds import clear
 from app.player import Ticker, Timeline
 from app.screens.surface.draw_rolling import RollingDrawing
 from app.screens.surface.labels import AFTER, BEFORE
-from app.screens.surface.walk_view import Happening, WalkView, WalkWish, Which
+from app.screens.surface.walk_view import Happening, WalkRequest, WalkView, Which
 from pipeline.types import FloatArray
 
 BELOW = "/surface/rolling"
@@ -39,7 +39,7 @@ AWAY = 1.8
 
 
 class RollingFolder:
-    """Wishes for walks, and the player of the one that came."""
+    """Asks for walks, and plays the one that came."""
 
     def __init__(
         self,
@@ -48,7 +48,7 @@ class RollingFolder:
         post: Callable[..., None],
         changed: Callable[[Any, Callable[[], None]], None],
         atomic: Callable[[], AbstractContextManager[None]],
-        on_wish: Callable[[WalkWish | None], None],
+        on_request: Callable[[WalkRequest | None], None],
     ) -> None:
         """Add the folder.
 
@@ -58,10 +58,10 @@ class RollingFolder:
             post: runs a function on the session's thread.
             changed: registers an action for a change of a handle by a person.
             atomic: groups what is sent to the browser.
-            on_wish: called with the walk that is wanted, or None when it is closed.
+            on_request: called with the walk that is wanted, or None when it is closed.
         """
         self._scene, self._post, self._changed, self._atomic = scene, post, changed, atomic
-        self._on_wish = on_wish
+        self._on_request = on_request
         self._view: WalkView | None = None
         self._drawing: RollingDrawing | None = None
         self._drawn = 0
@@ -72,7 +72,7 @@ class RollingFolder:
             gui.add_markdown(TEXT)
             self._add_choices(gui)
             self._add_player(gui)
-            self._said = gui.add_markdown("")
+            self._status = gui.add_markdown("")
         self._arrange()
 
     def _add_choices(self, gui: viser.GuiApi) -> None:
@@ -123,30 +123,30 @@ class RollingFolder:
     @property
     def focus(self) -> tuple[FloatArray, FloatArray] | None:
         """(3,) centre of a close-up and (3,) where to stand to see it, world frame."""
-        if self._view is None or not self._view.wish.close_up:
+        if self._view is None or not self._view.request.close_up:
             return None
         view = self._view
         return view.center_m, view.center_m + AWAY * view.reach_m * view.outward
 
     def watch(self, close_up: bool) -> None:
-        """Wish for a walk, as a person would."""
+        """Ask for a walk, as a person would."""
         self._way.value = CLOSE_UP if close_up else WHOLE
-        self._wish()
+        self._request()
 
     def load(self, view: WalkView | None) -> None:
         """Play a walk from its start; None did not come."""
         self.forget()
         if view is None:
-            self._said.content = "Stopped."
+            self._status.content = "Stopped."
             return
         self._drawn += 1
         with self._atomic():
             self._view = view
-            self._way.value = CLOSE_UP if view.wish.close_up else WHOLE
-            self._cloud.value = next(name for name, which in CLOUDS.items() if which == view.wish.which)
+            self._way.value = CLOSE_UP if view.request.close_up else WHOLE
+            self._cloud.value = next(name for name, which in CLOUDS.items() if which == view.request.which)
             self._drawing = RollingDrawing(self._scene, f"{BELOW}/walk{self._drawn}", view)
             self._scrub.max = view.steps
-            self._speed.value = SPEEDS[view.wish.close_up]
+            self._speed.value = SPEEDS[view.request.close_up]
             self._hurry()
             self._arrange()
             self._timeline.reset(view.steps * self._places + 1)
@@ -161,7 +161,7 @@ class RollingFolder:
             if self._drawing is not None:
                 clear(self._scene, BELOW)
             self._view = self._drawing = None
-            self._said.content = ""
+            self._status.content = ""
             self._arrange()
 
     def close(self) -> None:
@@ -179,20 +179,20 @@ class RollingFolder:
 
     def _press(self, button: str) -> None:
         if button == ROLL:
-            self._wish()
+            self._request()
         else:
-            self._on_wish(None)
+            self._on_request(None)
             self.forget()
 
     def _chose(self) -> None:
         """Another choice takes effect at once while somebody watches, or waits."""
         if self.showing or self._waiting:
-            self._wish()
+            self._request()
 
-    def _wish(self) -> None:
+    def _request(self) -> None:
         self._waiting = True
-        self._said.content = WAITING
-        self._on_wish(WalkWish(CLOUDS[self._cloud.value], self._way.value == CLOSE_UP, None))
+        self._status.content = WAITING
+        self._on_request(WalkRequest(CLOUDS[self._cloud.value], self._way.value == CLOSE_UP, None))
 
     def _act(self, action: Callable[[], None]) -> None:
         action()
@@ -222,14 +222,14 @@ class RollingFolder:
             self._drawing.show(done, place)
             if done != self._scrub.value:
                 self._scrub.value = done
-            self._tell(said(self._view, done))
+            self._show_line(status_line(self._view, done))
 
-    def _tell(self, sentence: str) -> None:
-        if sentence != self._said.content:
-            self._said.content = sentence
+    def _show_line(self, sentence: str) -> None:
+        if sentence != self._status.content:
+            self._status.content = sentence
 
 
-def said(view: WalkView, done: int) -> str:
+def status_line(view: WalkView, done: int) -> str:
     """The line under the player after ``done`` steps."""
     front, dead = view.open_edges(done)
     ball = int(view.step_radius[max(done - 1, 0)])

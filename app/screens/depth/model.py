@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from app.screens.depth.labels import NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
-from app.screens.depth.view import NetworkView, NetworkWish
+from app.screens.depth.view import ModelChoice, ModelView
 from app.tables import Row, number, table
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
@@ -27,7 +27,7 @@ TRYING = "Trying the network …"
 KEPT = "The network before is kept. Say what this one expects, or choose another."
 
 
-class NetworkFolder:
+class ModelFolder:
     """A list of networks, an upload button, a preset, and what the network says about itself."""
 
     def __init__(
@@ -36,7 +36,7 @@ class NetworkFolder:
         post: Callable[..., None],
         changed: Callable[[Any, Callable[[], None]], None],
         folder: Path,
-        on_choose: Callable[[NetworkWish], None],
+        on_choose: Callable[[ModelChoice], None],
     ) -> None:
         """Add the folder.
 
@@ -109,13 +109,13 @@ class NetworkFolder:
         self._normalisation.value = config.normalisation or AS_IT_SAYS
         self._advanced.visible = config.model is not None
 
-    def load(self, view: NetworkView | None) -> None:
+    def load(self, view: ModelView | None) -> None:
         """Tell of the network that was tried; None could not be used, and the one before stays in use."""
         if view is None:
             self._status.content = KEPT
             return
         self._status.content = ADVICE[view.kind]
-        self._table.content = network_table(view)
+        self._table.content = model_table(view)
 
     def _picked(self) -> None:
         """Another file gets the input that it asks for itself."""
@@ -131,7 +131,7 @@ class NetworkFolder:
         normalisations: dict[str, Normalisation] = {name: name for name in NORMALISATIONS}
         width_px, height_px = (round(side) or None for side in self._size.value)
         self._on_choose(
-            NetworkWish(
+            ModelChoice(
                 model,
                 presets.get(self._preset.value),
                 kinds.get(self._kind.value),
@@ -161,7 +161,7 @@ class NetworkFolder:
         return name
 
 
-def network_table(view: NetworkView) -> str:
+def model_table(view: ModelView) -> str:
     """HTML: what was found when the network was tried, and what its file says."""
     rows = [
         Row("Answers", "What its numbers mean.", (f"{view.kind} depth",)),
