@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 from packetmesh.errors import InputError
@@ -36,6 +36,9 @@ Direction = Literal["q2p", "p2q", "both"]
 FusionMode = Literal["union", "fill"]
 RadiusRule = Literal["thesis", "thesis+", "manual"]
 NodePoints = Literal["sensor", "fused"]
+
+_AFTER_INFERENCE = ("alignment", "reach", "least_confidence")
+"""Fields of ``DepthConfig`` that say what is done with inferred depth."""
 
 
 def _at_least(key: str, value: float, least: float) -> None:
@@ -91,6 +94,11 @@ class DepthConfig:
     """How far from measured pixels inferred depth counts, as a share of the image's diagonal."""
     least_confidence: float = 0.0
     """Inferred depth that is believed less does not count, 0 to 1."""
+
+    def of_network(self) -> DepthConfig:
+        """Only the settings of the network itself, which is all that its inference depends on."""
+        rest = {field.name: field.default for field in fields(self) if field.name in _AFTER_INFERENCE}
+        return replace(self, **rest)
 
     def __post_init__(self) -> None:
         _above("depth.reach", self.reach, 0.0)

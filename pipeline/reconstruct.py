@@ -9,7 +9,8 @@ from pipeline.config import PRESETS, PipelineConfig
 from pipeline.merging import MergedClouds
 from pipeline.nodes import NodeClouds, Placement
 from pipeline.sources import LoadedRig
-from pipeline.stages import Cache, Spec, Steps, run
+from pipeline.spec import Spec
+from pipeline.stages import Cache, Steps, run
 from pipeline.types import Rig, SurfaceResult
 
 

@@ -14,7 +14,7 @@ from pipeline.io.meshes import write_mesh
 from pipeline.merging import MergedClouds
 from pipeline.nodes import NodeRegistration
 from pipeline.reconstruct import Reconstruction
-from pipeline.stages import Spec
+from pipeline.spec import Spec
 from pipeline.types import PointCloud, PointSource, SurfaceResult
 
 

@@ -1,4 +1,7 @@
-"""Where a rig comes from; every source names itself, loads itself, and knows its command-line arguments."""
+"""Where a rig comes from: every source has a title, loads its rig, and knows its command-line arguments.
+
+Reading images needs large libraries, so they are imported when a source is loaded and not before.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
-from pipeline.io.demos import load_demo
-from pipeline.io.rigs import load_frame, load_rig
 from pipeline.types import Rig
 
 MILLIMETRES = 1000.0
@@ -46,6 +47,8 @@ class Demo:
         return self.name
 
     def load(self) -> Rig:
+        from pipeline.io.demos import load_demo
+
         return load_demo(self.name)
 
     def arguments(self) -> list[str]:
@@ -63,6 +66,8 @@ class RigFolder:
         return self.path
 
     def load(self) -> Rig:
+        from pipeline.io.rigs import load_rig
+
         return load_rig(self.path)
 
     def arguments(self) -> list[str]:
@@ -85,6 +90,8 @@ class ImagePair:
         return f"{color.parent.name}/{color.name}"
 
     def load(self) -> Rig:
+        from pipeline.io.rigs import load_frame
+
         frame = load_frame(self.color, self.depth, self.intrinsics, self.depth_scale)
         return Rig(Path(self.color).stem, (frame,))
 

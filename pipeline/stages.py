@@ -1,62 +1,36 @@
 """The chain: every stage is a function of its own part of the settings and of the results before it.
 
-``STAGES`` is the whole chain as a table, and ``run`` goes down it. A cache keeps each result by
-``key``, which holds exactly what the result depends on; the command line passes none, the app its
-store. Whoever needs one result only (a screen, a moment of a delivery) asks for that stage.
+``pipeline.spec`` says what each depends on, ``STAGES`` what each does, and ``run`` goes down both. A
+cache keeps results by ``spec.key``; the command line passes none, the app its store. Whoever needs one
+result only (a screen, a moment of a delivery) asks for that stage.
 """
 
 from __future__ import annotations
 
-import shlex
 import time
 from collections.abc import Callable, Generator, Hashable, Iterable
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal, Protocol, TypeVar, get_args
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
 
 from packetmesh.progress import Progress
-from packetmesh.settings import differences
 from pipeline.config import (
-    PRESETS,
     AcquisitionConfig,
     DepthConfig,
     FusionMode,
     NodePoints,
-    PipelineConfig,
     RegistrationConfig,
     SurfaceConfig,
 )
-from pipeline.depth import DepthNetwork, Overrides
+from pipeline.depth import DepthNetwork
 from pipeline.merging import MergedClouds, merge_clouds
 from pipeline.nodes import InferredDepth, NodeClouds, Placement, infer_depth, place_nodes, prepare_node
 from pipeline.sources import Source
+from pipeline.spec import NEEDS, Spec, StageName, key
 from pipeline.surface import Camera, compare_with_truth, measured, radii, roll_or_nothing
 from pipeline.types import PointCloud, Rig, SurfaceResult
 
-StageName = Literal["rig", "inferred", "nodes", "placement", "clouds", "after", "before", "truth"]
 Result = TypeVar("Result")
 Steps = Generator[Progress, None, Result]
-
-
-@dataclass(frozen=True, slots=True)
-class Spec:
-    """Everything that decides what the chain computes."""
-
-    source: Source
-    preset: str = "packetmesh"
-    """The preset that ``config`` started from; it decides nothing but the command line."""
-    config: PipelineConfig = field(default_factory=PipelineConfig)
-
-    def with_preset(self, preset: str) -> Spec:
-        """The same source with a preset's config."""
-        return replace(self, preset=preset, config=PRESETS[preset])
-
-    def command(self, out: str = "runs/from-app") -> str:
-        """The command line that computes the same."""
-        words = ["packetmesh", "reconstruct", *self.source.arguments(), "--preset", self.preset]
-        changed = differences(self.config, PRESETS[self.preset])
-        if changed:
-            words += ["--set", *changed]
-        return shlex.join([*words, "--out", out])
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,24 +62,6 @@ class RunCache:
         return self._results[key]
 
 
-@dataclass(frozen=True, slots=True)
-class Stage:
-    """One row of the chain."""
-
-    compute: Callable[..., Steps[Any]]
-    """Called with its settings, then with the results of the stages before it."""
-    settings: Callable[[Spec], tuple[Any, ...]]
-    """The part of the spec that it depends on."""
-    after: tuple[StageName, ...] = ()
-    """The stages whose results it takes, in their order."""
-
-
-def key(spec: Spec, stage: StageName) -> tuple[Hashable, ...]:
-    """What a stage's result depends on; equal keys mean equal results."""
-    row = STAGES[stage]
-    return (stage, *row.settings(spec), *(key(spec, earlier) for earlier in row.after))
-
-
 def compute(spec: Spec, stage: StageName, cache: Cache) -> Steps[Done]:
     """The result of one stage, with whatever has to be computed before it.
 
@@ -114,17 +70,17 @@ def compute(spec: Spec, stage: StageName, cache: Cache) -> Steps[Done]:
     """
 
     def work() -> Steps[Done]:
-        row = STAGES[stage]
-        earlier = yield from run(spec, cache, row.after)
+        needs = NEEDS[stage]
+        earlier = yield from run(spec, cache, needs.after)
         started = time.perf_counter()
-        value = yield from row.compute(*row.settings(spec), *(done.value for done in earlier.values()))
+        value = yield from STAGES[stage](*needs.settings(spec), *(done.value for done in earlier.values()))
         return Done(value, time.perf_counter() - started)
 
     return (yield from cache.remember(key(spec, stage), work))
 
 
 def run(
-    spec: Spec, cache: Cache | None = None, stages: Iterable[StageName] = get_args(StageName)
+    spec: Spec, cache: Cache | None = None, stages: Iterable[StageName] = tuple(NEEDS)
 ) -> Steps[dict[StageName, Done]]:
     """All results of the chain, or those of some stages.
 
@@ -147,16 +103,14 @@ def open_rig(source: Source) -> Steps[Rig]:
     return source.load()
 
 
-def infer_depths(
-    model: str | None, preset: str | None, overrides: Overrides, crop: bool, rig: Rig
-) -> Steps[tuple[InferredDepth, ...]]:
+def infer_depths(depth: DepthConfig, rig: Rig) -> Steps[tuple[InferredDepth, ...]]:
     """The depth network's answer to every node's colour image."""
     yield Progress("loading the depth network", 0.05)
-    network = DepthNetwork(model, preset, overrides)
+    network = DepthNetwork.of(depth)
     inferred = []
     for index, frame in enumerate(rig.frames):
         yield Progress(f"inferring the depth of {frame.name}", 0.1 + 0.1 * index / len(rig.frames))
-        inferred.append(infer_depth(network, frame, crop))
+        inferred.append(infer_depth(network, frame, depth.crop))
     return tuple(inferred)
 
 
@@ -248,44 +202,14 @@ def cameras_of(rig: Rig, placement: Placement) -> list[Camera]:
     ]
 
 
-STAGES: dict[StageName, Stage] = {
-    "rig": Stage(open_rig, lambda spec: (spec.source,)),
-    "inferred": Stage(
-        infer_depths,
-        lambda spec: (
-            spec.config.depth.model,
-            spec.config.depth.preset,
-            Overrides.of(spec.config.depth),
-            spec.config.depth.crop,
-        ),
-        ("rig",),
-    ),
-    "nodes": Stage(
-        prepare_nodes,
-        lambda spec: (
-            spec.config.acquisition,
-            spec.config.depth,
-            spec.config.fusion.mode,
-            spec.config.inferred_registration if spec.config.fusion.register_inferred else None,
-        ),
-        ("rig", "inferred"),
-    ),
-    "placement": Stage(
-        register_nodes,
-        lambda spec: (spec.config.node_registration, spec.config.fusion.align_nodes_with),
-        ("rig", "nodes"),
-    ),
-    "clouds": Stage(
-        merge,
-        lambda spec: (
-            spec.config.fusion.mode,
-            spec.config.surface.max_points,
-            spec.config.surface.smoothing_passes,
-        ),
-        ("rig", "nodes", "placement"),
-    ),
-    "after": Stage(roll_after, lambda spec: (spec.config.surface,), ("rig", "placement", "clouds")),
-    "before": Stage(roll_before, lambda spec: (spec.config.surface,), ("rig", "placement", "clouds")),
-    "truth": Stage(compare, lambda spec: (), ("rig", "placement", "after", "before")),
+STAGES: dict[StageName, Callable[..., Steps[Any]]] = {
+    "rig": open_rig,
+    "inferred": infer_depths,
+    "nodes": prepare_nodes,
+    "placement": register_nodes,
+    "clouds": merge,
+    "after": roll_after,
+    "before": roll_before,
+    "truth": compare,
 }
-"""The chain, in the order in which a run computes it."""
+"""What each stage does with its settings and the results of the stages before it, as ``NEEDS`` names them."""

@@ -48,7 +48,7 @@ def reconstruct(
     from packetmesh.files import writable_folder
     from pipeline.reconstruct import iterate_reconstruction
     from pipeline.run_folder import metrics_of, write_run_folder
-    from pipeline.stages import Spec
+    from pipeline.spec import Spec
 
     writable_folder(out)
     result = drain(iterate_reconstruction(Spec(source, preset, config)), say_progress)

@@ -17,13 +17,15 @@ import numpy as np
 import psutil
 
 from packetmesh.memory import peak_memory_bytes
+from packetmesh.progress import drain
 from pipeline.config import PRESETS
 from pipeline.io.demos import load_demo
 from pipeline.merging import merge_clouds
 from pipeline.open3d_runtime import o3d
 from pipeline.rays import tensor, triangle_scene
 from pipeline.sources import LoadedRig
-from pipeline.stages import Spec, run
+from pipeline.spec import Spec
+from pipeline.stages import run
 from pipeline.surface import measure_quality, smooth, spacing, voxel_average, voxel_for_count
 from pipeline.surface.pivoting import roll
 from pipeline.types import FloatArray, IntArray, PointCloud

@@ -13,7 +13,7 @@ from pipeline.io.demos import load_demo
 from pipeline.reconstruct import iterate_reconstruction, reconstruct
 from pipeline.registration import point_error_m
 from pipeline.sources import LoadedRig
-from pipeline.stages import Spec
+from pipeline.spec import Spec
 from pipeline.types import DepthMap, PointSource, Rig
 
 pytestmark = pytest.mark.xdist_group("reconstruct")  # one worker makes the shared reconstruction once

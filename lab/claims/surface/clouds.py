@@ -8,7 +8,8 @@ from packetmesh.progress import drain
 from pipeline.config import PipelineConfig
 from pipeline.merging import MergedClouds
 from pipeline.sources import LoadedRig
-from pipeline.stages import Spec, run
+from pipeline.spec import Spec
+from pipeline.stages import run
 from pipeline.surface import Camera
 from pipeline.types import DepthMap, PointCloud, Rig, RigTruth
 
