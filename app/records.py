@@ -305,6 +305,8 @@ SUCCESS_M = 0.02
 
 Which = Literal["after", "before"]
 """Fusion."""
+Shown = Literal["after", "before", "poisson", "alpha"]
+"""A surface that can be drawn: the ball's, or a baseline's."""
 
 
 @dataclass(frozen=True, slots=True)

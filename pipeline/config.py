@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from packetmesh.errors import InputError
@@ -36,9 +36,6 @@ Direction = Literal["q2p", "p2q", "both"]
 FusionMode = Literal["union", "fill"]
 RadiusRule = Literal["thesis", "thesis+", "manual"]
 NodePoints = Literal["sensor", "fused"]
-
-_AFTER_INFERENCE = ("alignment", "reach", "least_confidence")
-"""Fields of ``DepthConfig`` that say what is done with inferred depth."""
 
 
 def _at_least(key: str, value: float, least: float) -> None:
@@ -97,8 +94,13 @@ class DepthConfig:
 
     def of_network(self) -> DepthConfig:
         """Only the settings of the network itself, which is all that its inference depends on."""
-        rest = {field.name: field.default for field in fields(self) if field.name in _AFTER_INFERENCE}
-        return replace(self, **rest)
+        plain = DepthConfig()
+        return replace(
+            self,
+            alignment=plain.alignment,
+            reach=plain.reach,
+            least_confidence=plain.least_confidence,
+        )
 
     def __post_init__(self) -> None:
         _above("depth.reach", self.reach, 0.0)

@@ -8,13 +8,15 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from packetmesh.settings import differences
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Source
 
-StageName = Literal["rig", "inferred", "nodes", "placement", "clouds", "after", "before", "truth"]
+StageName = Literal[
+    "rig", "inferred", "nodes", "placement", "clouds", "after", "before", "truth", "poisson", "alpha"
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +28,7 @@ class Spec:
     """The preset that ``config`` started from; it decides nothing but the command line."""
     config: PipelineConfig = field(default_factory=PipelineConfig)
 
-    def with_preset(self, preset: str) -> Spec:
+    def with_preset(self, preset: str) -> Self:
         """The same with a preset's config."""
         return replace(self, preset=preset, config=PRESETS[preset])
 
@@ -76,8 +78,21 @@ NEEDS: dict[StageName, Needs] = {
     "after": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "clouds")),
     "before": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "clouds")),
     "truth": Needs(lambda spec: (), ("rig", "placement", "after", "before")),
+    "poisson": Needs(lambda spec: (), ("rig", "placement", "clouds")),
+    "alpha": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "clouds")),
 }
-"""The stages in the order in which a run computes them (``pipeline.stages`` has what they do)."""
+"""All stages; ``pipeline.stages`` has what they do."""
+CHAIN: tuple[StageName, ...] = (
+    "rig",
+    "inferred",
+    "nodes",
+    "placement",
+    "clouds",
+    "after",
+    "before",
+    "truth",
+)
+"""The stages of a reconstruction, in their order; the others are baselines beside it."""
 
 
 def key(spec: Spec, stage: StageName) -> tuple[Hashable, ...]:

@@ -25,8 +25,9 @@ from pipeline.depth import DepthNetwork
 from pipeline.merging import MergedClouds, merge_clouds
 from pipeline.nodes import InferredDepth, NodeClouds, Placement, infer_depth, place_nodes, prepare_node
 from pipeline.sources import Source
-from pipeline.spec import NEEDS, Spec, StageName, key
+from pipeline.spec import CHAIN, NEEDS, Spec, StageName, key
 from pipeline.surface import Camera, compare_with_truth, measured, radii, roll_or_nothing
+from pipeline.surface.baselines import alpha_surface, poisson_surface
 from pipeline.types import PointCloud, Rig, SurfaceResult
 
 Result = TypeVar("Result")
@@ -80,7 +81,7 @@ def compute(spec: Spec, stage: StageName, cache: Cache) -> Steps[Done]:
 
 
 def run(
-    spec: Spec, cache: Cache | None = None, stages: Iterable[StageName] = tuple(NEEDS)
+    spec: Spec, cache: Cache | None = None, stages: Iterable[StageName] = CHAIN
 ) -> Steps[dict[StageName, Done]]:
     """All results of the chain, or those of some stages.
 
@@ -186,6 +187,28 @@ def compare(rig: Rig, placement: Placement, after: SurfaceResult, before: Surfac
     return compared(rig, placement, before), compared(rig, placement, after)
 
 
+def poisson(rig: Rig, placement: Placement, clouds: MergedClouds) -> Steps[SurfaceResult]:
+    """Screened Poisson reconstruction of the fused cloud, a baseline beside the ball."""
+    yield Progress("Poisson reconstruction", 0.7)
+    return with_rays(poisson_surface(clouds.fused, clouds.r_F_m), rig, placement)
+
+
+def alpha(
+    config: SurfaceConfig, rig: Rig, placement: Placement, clouds: MergedClouds
+) -> Steps[SurfaceResult]:
+    """The alpha shape of the fused cloud with the radius of the largest ball, a baseline beside the ball."""
+    yield Progress("the alpha shape", 0.7)
+    largest_m = radii(config, clouds.r_F_m, clouds.sigma_D_m)[-1]
+    return with_rays(alpha_surface(clouds.fused, largest_m), rig, placement)
+
+
+def with_rays(surface: SurfaceResult, rig: Rig, placement: Placement) -> SurfaceResult:
+    """The surface with what the registered cameras' rays measure of it."""
+    cameras, quality = cameras_of(rig, placement), surface.quality
+    points = len(surface.vertices_m) + quality.unused_points
+    return measured(surface, cameras, points, [frame.depth for frame in rig.frames])
+
+
 def compared(rig: Rig, placement: Placement, surface: SurfaceResult) -> dict[str, float] | None:
     """A surface against the truth of its rig; None without truth or without a triangle."""
     if rig.truth is None or not len(surface.triangles):
@@ -211,5 +234,7 @@ STAGES: dict[StageName, Callable[..., Steps[Any]]] = {
     "after": roll_after,
     "before": roll_before,
     "truth": compare,
+    "poisson": poisson,
+    "alpha": alpha,
 }
 """What each stage does with its settings and the results of the stages before it, as ``NEEDS`` names them."""

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from app.chain import network_for, prepared, rig_of
+
 from app.drawing.colors import HOLE
 from app.drawing.pictures import UNKNOWN, confidence_colors
 from app.screens.depth.discs import window_around

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from app.chain import ball_clouds, cameras_of, placed, rig_of, rolled
+
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET
 from app.records import QUICK_POINTS, PaintRequest
 from app.screens.surface.labels import COLORINGS

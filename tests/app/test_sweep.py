@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import viser
-
 from app.chain import ball_clouds
+
 from app.records import SpacingView
 from app.screens.surface.advice import STOP, STOPPED, SWEEP, WAITING, AdviceFolder, suggestions_html
 from app.screens.surface.spacing_plot import ADVISED, OF_THESIS, USED, spacing_figure

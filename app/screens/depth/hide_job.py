@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 
-from app.chain import prepared, rig_of
 from app.drawing.pictures import depth_picture, depth_range_m
 from app.records import Picture
 from app.screens.depth.discs import covered, window_around
@@ -36,16 +35,16 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
     Raises:
         InputError: the node does not exist, or hardly anything is measured in the discs.
     """
-    rig = yield from rig_of(store, spec)
-    work = yield from prepared(store, spec)
+    rig = yield from store.stage(spec, "rig")
+    nodes = yield from store.stage(spec, "nodes")
     if not 0 <= request.node < len(rig.frames):
         raise InputError(f"There is no node {request.node}, only {len(rig.frames)} of them; choose one anew.")
-    frame, node = rig.frames[request.node], work.nodes[request.node]
+    frame, node = rig.frames[request.node], nodes[request.node]
     hidden = hidden_pixels(frame.depth, request.discs)
     rest = DepthMap(np.where(hidden, np.float32(np.nan), frame.depth.z_m))
     ways: dict[str, Callable[[], DepthMap]] = {
         OURS: partial(
-            believed, node.inferred_depth, rest, frame.rgb, spec.config.depth, node.alignment.disparity
+            believed, node.network.depth, rest, frame.rgb, spec.config.depth, node.alignment.disparity
         ),
         **{PEER_NAMES.get(name, name): partial(peer, rest, frame.rgb) for name, peer in PEERS.items()},
     }

@@ -7,7 +7,6 @@ from collections.abc import Generator
 
 import numpy as np
 
-from app.chain import network_for
 from app.screens.depth.view import ModelChoice, ModelView
 from packetmesh.progress import Progress
 from pipeline.config import DepthConfig
@@ -25,10 +24,10 @@ def model_job(choice: ModelChoice) -> Generator[Progress, None, ModelView]:
         ReconstructionError: it answers without a depth.
     """
     yield Progress("loading the network", 0.3)
-    network = network_for(choice.put_into(DepthConfig()))
+    network = DepthNetwork.of(choice.put_into(DepthConfig()))
     yield Progress("asking the network", 0.6)
     started = time.perf_counter()
-    DepthNetwork.infer(network, TEST_IMAGE)
+    network.infer(TEST_IMAGE)
     return ModelView(
         choice=choice,
         kind=network.convention.kind,

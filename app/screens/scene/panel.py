@@ -13,20 +13,17 @@ from app.drawing.cameras import add_camera
 from app.drawing.clouds import add_cloud, clear
 from app.panel import Panel
 from app.records import SceneView
-from app.state import Source, Spec, Step
+from app.state import Spec, Step
 from app.tables import Row, number, table
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS
+from pipeline.io.demos import DEMO_SCENES
+from pipeline.sources import Demo, ImagePair
 
 TEXT = """**What you see.** Each camera node delivers a colour image and a depth image. The points are
 the depth pixels put where they belong in space; the gaps are what the sensor could not measure.
 Go on with **Depth**."""
-DEMOS = {
-    "living-room": "Living room",
-    "office": "Office",
-    "workshop": "Workshop",
-    "box-on-table": "Box on a table",
-}
+DEMOS = {name: scene.title for name, scene in DEMO_SCENES.items()}
 UPLOAD_LIMIT_BYTES = 32 << 20
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 
@@ -42,12 +39,12 @@ class ScenePanel(Panel):
         """Scene, preset, node, upload; the node's images and numbers."""
         gui, spec = self.gui, self.session.spec
         gui.add_markdown(TEXT)
-        name = spec.source.scene
-        options = [*DEMOS.values()] if name in DEMOS else [spec.source.title, *DEMOS.values()]
+        title = _title(spec)
+        options = [*DEMOS.values()] if title in DEMOS.values() else [title, *DEMOS.values()]
         self._demo = gui.add_dropdown(
             "Scene",
             options,
-            initial_value=DEMOS.get(name or "", options[0]),
+            initial_value=title,
             hint="Rendered rooms with known truth.",
         )
         self.when_changed(self._demo, self._picked_demo)
@@ -93,7 +90,7 @@ class ScenePanel(Panel):
     def on_spec(self, spec: Spec) -> None:
         """Show the preset and the scene that are wanted."""
         self._preset.value = spec.preset
-        title = DEMOS.get(spec.source.scene or "", spec.source.title)
+        title = _title(spec)
         if title not in self._demo.options:
             self._demo.options = (title, *DEMOS.values())
         self._demo.value = title
@@ -156,7 +153,7 @@ class ScenePanel(Panel):
     def _picked_demo(self) -> None:
         name = next((name for name, title in DEMOS.items() if title == self._demo.value), None)
         if name is not None:
-            self.session.want(dataclasses.replace(self.session.spec, source=Source(scene=name)))
+            self.session.want(dataclasses.replace(self.session.spec, source=Demo(name)))
 
     def _picked_preset(self) -> None:
         self.session.want(self.session.spec.with_preset(self._preset.value))
@@ -182,7 +179,11 @@ class ScenePanel(Panel):
     def _use_files(self) -> None:
         if len(self._files) < 3:
             raise InputError("A pair needs a colour image, a depth image and intrinsics; add all three.")
-        source = Source(
-            **{kind: str(path) for kind, path in self._files.items()}, depth_scale=float(self._scale.value)
-        )
+        files = {kind: str(path) for kind, path in self._files.items()}
+        source = ImagePair(**files, depth_scale=float(self._scale.value))
         self.session.want(dataclasses.replace(self.session.spec, source=source))
+
+
+def _title(spec: Spec) -> str:
+    """What to call the scene: a demo by its title."""
+    return DEMOS.get(spec.source.title, spec.source.title)

@@ -7,16 +7,6 @@ from collections.abc import Generator
 
 import numpy as np
 
-from app.chain import (
-    RolledBalls,
-    ball_clouds,
-    cameras_of,
-    cloud_key,
-    placed,
-    rig_of,
-    rolled,
-    rolled_over,
-)
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET
 from app.drawing.glb import lines_glb
 from app.drawing.meshes import rim_segments_m, surface_glb
@@ -24,34 +14,30 @@ from app.records import Coloring, PaintedMesh, PaintedView, PaintRequest, Which
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
-from pipeline.surface import Camera, distances_to_truth_m, voxel_average, voxel_for_count
+from pipeline.spec import key
+from pipeline.stages import cameras_of, run
+from pipeline.surface import Camera, distances_to_truth_m, roll_or_nothing, voxel_average, voxel_for_count
 from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
 
-def paint_job(
-    store: Store, spec: Spec, request: PaintRequest
-) -> Generator[Progress | RolledBalls, None, PaintedView]:
+def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Progress, None, PaintedView]:
     """The surfaces of a spec, or of one ball instead of the spec's, in colours."""
-    rig = yield from rig_of(store, spec)
-    places = yield from placed(store, spec)
+    rig = yield from store.stage(spec, "rig")
+    placement = yield from store.stage(spec, "placement")
     whole = yield from _clouds(store, spec)
     if request.radius_m is None:
-        balls = yield from rolled(store, spec)
-        thin, roll_s = whole, balls.elapsed_s
-        surfaces: dict[Which, Surface | None] = {"after": balls.after, "before": balls.before}
+        done = yield from run(spec, store, request.which)
+        thin, roll_s = whole, done[request.which[0]].elapsed_s
+        surfaces: dict[Which, Surface] = {name: done[name].value for name in request.which}
     else:
         thin = yield from _thinned(store, spec, request.most_points)
         started = time.perf_counter()
-        surfaces = {name: rolled_over(thin[name], (request.radius_m,)) for name in request.which}
+        surfaces = {name: roll_or_nothing(thin[name], (request.radius_m,)) for name in request.which}
         roll_s = time.perf_counter() - started
-    cameras = cameras_of(rig, places)
+    cameras = cameras_of(rig, placement)
     return PaintedView(
         request,
-        {
-            name: _painted(surface, request, rig, cameras)
-            for name, surface in surfaces.items()
-            if surface is not None and name in request.which
-        },
+        {name: _painted(surface, request, rig, cameras) for name, surface in surfaces.items()},
         len(thin[request.which[0]]),
         len(whole[request.which[0]]),
         roll_s,
@@ -59,7 +45,7 @@ def paint_job(
 
 
 def _clouds(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, PointCloud]]:
-    clouds = yield from ball_clouds(store, spec)
+    clouds = yield from store.stage(spec, "clouds")
     return {"after": clouds.fused, "before": clouds.sensor}
 
 
@@ -75,7 +61,7 @@ def _thinned(
         voxel_m = voxel_for_count(clouds["after"].points_m, most_points)
         return {name: voxel_average(cloud, voxel_m) for name, cloud in clouds.items()}
 
-    return (yield from store.remember(("quick", most_points, *cloud_key(spec)), thin))
+    return (yield from store.remember(("quick", most_points, key(spec, "clouds")), thin))
 
 
 def _painted(surface: Surface, request: PaintRequest, rig: Rig, cameras: list[Camera]) -> PaintedMesh:

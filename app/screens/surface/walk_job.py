@@ -6,12 +6,12 @@ from collections.abc import Generator
 
 import numpy as np
 
-from app.chain import ball_clouds
 from app.screens.surface.walk_view import Happening, WalkRequest, WalkView
 from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
+from pipeline.spec import key
 from pipeline.surface import radii
 from pipeline.surface.pivoting import roll
 from pipeline.surface.walk import Kind, Walk, ball_on_arc, hole_on_flat_ground, iterate_walk, nearest_rows
@@ -31,15 +31,15 @@ def walk_job(store: Store, spec: Spec, request: WalkRequest) -> Generator[Progre
         InputError: the cloud has no points, or the patch's centre is not finite.
         ReconstructionError: no ball finds three points to rest on.
     """
-    clouds = yield from ball_clouds(store, spec)
-    radii_m = radii(spec.config.surface, clouds.spacing.r_F_m, clouds.spacing.sigma_D_m)
+    clouds = yield from store.stage(spec, "clouds")
+    radii_m = radii(spec.config.surface, clouds.r_F_m, clouds.sigma_D_m)
     cloud = clouds.fused if request.which == "after" else clouds.sensor
 
     def walk() -> Generator[Progress, None, WalkView]:
         yield Progress("choosing where to look", 0.0)
         return (yield from walk_over(cloud, radii_m, request))
 
-    return (yield from store.remember(("walk", *spec.key("surface"), request), walk))
+    return (yield from store.remember(("walk", key(spec, "after"), request), walk))
 
 
 def walk_over(
