@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import viser
-
-from app.debounce import Debounce
 from app.page import running
+from app.ui import Ui
 
 TIMEOUT_S = 1.5
-"""Without an answer for so long, for want of a browser perhaps, it is taken as given. A page that draws
+"""Without an answer for so long, perhaps as there is no browser, it is taken as given. A page that draws
 answers within a second (page.js)."""
 
 
@@ -25,21 +23,15 @@ class DrawAcknowledgement:
     slider beside the button.
     """
 
-    def __init__(self, gui: viser.GuiApi, post: Callable[..., None], on_answer: Callable[[], None]) -> None:
-        """Add the hidden parts.
-
-        Args:
-            gui: where to add them.
-            post: runs a function on the session's thread.
-            on_answer: called there, once for each question.
-        """
+    def __init__(self, ui: Ui, on_answer: Callable[[], None]) -> None:
+        """Add the hidden parts; ``on_answer`` is called on the session's thread, once for each question."""
         self._on_answer = on_answer
         self._scripts_sent = 0
         self.waiting = False
-        self._html = gui.add_html("")
-        command = gui.add_command("Say that all is drawn", hotkey="insert", modifier="cmd/ctrl+alt+shift")
-        command.on_trigger(lambda _: post(self._answered))
-        self._timeout = Debounce(TIMEOUT_S, lambda: post(self._answered))
+        self._html = ui.gui.add_html("")
+        command = ui.gui.add_command("Say that all is drawn", hotkey="insert", modifier="cmd/ctrl+alt+shift")
+        command.on_trigger(lambda _: ui.post(self._answered))
+        self._timeout = ui.debounce(TIMEOUT_S, self._answered)
 
     def hold(self) -> None:
         """Have only new meshes drawn, until ``ask`` ends that, a hand turns the view, or 3 s have passed."""
@@ -56,10 +48,6 @@ class DrawAcknowledgement:
         self.waiting = True
         self._run_script(f"packetmesh.ask({list(vertices)}, {str(hold).lower()})")
         self._timeout.restart()
-
-    def close(self) -> None:
-        """End the timer."""
-        self._timeout.cancel()
 
     def _run_script(self, script: str) -> None:
         self._scripts_sent += 1

@@ -18,12 +18,12 @@ from app import jobs
 from app.drawing.cameras import look, stage_of
 from app.drawing.colors import BRAND, DELIVERED
 from app.page import add_script
-from app.panel import Panel
 from app.pool import ComputePool, LatestWins, Outcome
 from app.state import CHAIN, Results, SharedViews, Spec, Step
 from app.stepper import Stepper
 from app.store import Store
 from app.tables import command_html
+from app.ui import Panel, Ui
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig
@@ -52,6 +52,7 @@ class Session:
     ) -> None:
         self.target = target
         self.gui, self.scene = target.gui, target.scene
+        self.ui = Ui(target.gui, target.scene, self.post, target.atomic, target.flush)
         self.store = store
         self._shared = shared
         self.spec = spec
@@ -84,8 +85,7 @@ class Session:
         """Stop computing and forget everything; the browser is gone."""
         self._closed = True
         self._cancel()
-        for panel in self._panels:
-            panel.close()
+        self.ui.close()
         self._thread.shutdown(wait=False, cancel_futures=True)
         shutil.rmtree(self.folder, ignore_errors=True)
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from app.debounce import Debounce
 from app.drawing.clouds import clear
-from app.panel import Panel
 from app.screens.network.charts import NetworkCharts
 from app.screens.network.draw import NetworkDrawing, look_at_ground
 from app.screens.network.labels import NETWORKS
@@ -14,6 +12,7 @@ from app.screens.network.numbers import metric_tables, runs_summary
 from app.screens.network.player import NetworkPlayer
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import NetworkRun, NetworkView
+from app.ui import Panel
 
 TEXT = """**What you see.** Camera nodes (blue) send their images by radio to a sink or to access points
 (green); circles show how far a frame can be received. Every moving point is a frame on the air; a red one
@@ -38,21 +37,20 @@ class NetworkPanel(Panel):
 
     def build(self) -> None:
         """Settings, player, curves, timeline, numbers."""
-        gui, session = self.gui, self.session
+        gui = self.gui
         self._views: tuple[NetworkView, ...] = ()
         self._wanted: tuple[NetworkRun, ...] = ()
         self._drawing: NetworkDrawing | None = None
         self._drawn = 0
         self._framed: tuple[float, ...] = ()
         self._cancelled = False
-        self._resting = Debounce(REST_S, lambda: session.post(self._run))
+        self._resting = self.ui.debounce(REST_S, self._run)
         gui.add_markdown(TEXT)
-        self._setup = NetworkSetup(gui, session.post, self.when_changed, self._resting.restart)
+        self._setup = NetworkSetup(self.ui, self._resting.restart)
         self._about = gui.add_markdown(NETWORKS[self._setup.preset].sentence)
         self._status = gui.add_markdown("Nothing is simulated yet.")
-        self._player = NetworkPlayer(gui, session.post, self.when_changed, self._moved)
-        self._charts = NetworkCharts(gui, self.when_changed)
-        self._charts.add_timeline(gui, session.post, self._player)
+        self._player = NetworkPlayer(self.ui, self._moved)
+        self._charts = NetworkCharts(self.ui, self._player)
         self._table = gui.add_html("")
         with gui.add_folder("All other numbers", expand_by_default=False):
             self._others = gui.add_html("")
@@ -90,12 +88,6 @@ class NetworkPanel(Panel):
         """The command lines that simulate the same."""
         return self._setup.command()
 
-    def close(self) -> None:
-        """End the timers."""
-        if hasattr(self, "_resting"):
-            self._resting.cancel()
-            self._player.close()
-
     def _run(self) -> None:
         """Simulate what the controls say, unless it is what is shown."""
         preset = NETWORKS[self._setup.preset]
@@ -112,7 +104,7 @@ class NetworkPanel(Panel):
     def _ended(self, runs: tuple[NetworkRun, ...], views: tuple[NetworkView, ...] | None) -> None:
         if runs != self._wanted:
             return
-        with self.session.target.atomic():
+        with self.ui.atomic():
             if views is None:
                 self._forget()
                 self._status.content = CANCELLED if self._cancelled else FAILED
@@ -130,7 +122,7 @@ class NetworkPanel(Panel):
         self._drawing = NetworkDrawing(self.scene, f"{self.drawn_below}/runs/{self._drawn}", views)
         self._framed = ()
         self._charts.load(views)
-        self._player.load(views)
+        self._player.load_runs(views)
 
     def _forget(self) -> None:
         """Show nothing: what was there has other settings."""
@@ -144,6 +136,6 @@ class NetworkPanel(Panel):
         if self._drawing is None:
             return
         now_ns = self._player.now_ns
-        with self.session.target.atomic():
-            self._drawing.show(now_ns, round(SHOWN_S * self._player.speed * 1e9))
+        with self.ui.atomic():
+            self._drawing.show(now_ns, round(SHOWN_S * self._player.seconds_a_second * 1e9))
             self._charts.mark(now_ns)

@@ -11,10 +11,10 @@ import viser
 
 from app.drawing.cameras import add_camera
 from app.drawing.clouds import add_cloud, clear
-from app.panel import Panel
 from app.records import SceneView
 from app.state import Spec, Step
 from app.tables import Row, number, table
+from app.ui import Panel
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS
 from pipeline.io.demos import DEMO_SCENES
@@ -47,7 +47,7 @@ class ScenePanel(Panel):
             initial_value=title,
             hint="Rendered rooms with known truth.",
         )
-        self.when_changed(self._demo, self._picked_demo)
+        self.ui.when_changed(self._demo, self._picked_demo)
         self._preset = gui.add_dropdown(
             "Preset",
             list(PRESETS),
@@ -55,9 +55,9 @@ class ScenePanel(Panel):
             hint="packetmesh: align inferred depth pixel by pixel, fill only the holes, register nodes with "
             "CEICP-A. thesis: rigid CEICP-N of the inferred on the sensor cloud, plain union.",
         )
-        self.when_changed(self._preset, self._picked_preset)
+        self.ui.when_changed(self._preset, self._picked_preset)
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images are shown below.")
-        self.when_changed(self._node, self._show_node)
+        self.ui.when_changed(self._node, self._show_node)
         self._build_upload()
         self._color = gui.add_image(EMPTY, label="Colour image")
         self._depth = gui.add_image(EMPTY, label="Sensor depth", format="png")
@@ -84,7 +84,7 @@ class ScenePanel(Panel):
             )
             self._have = gui.add_markdown("Add all three files, then press the button.")
             gui.add_button("Reconstruct this pair", icon=viser.Icon.PLAYER_PLAY).on_click(
-                lambda _: self.session.post(self._use_files)
+                lambda _: self.ui.post(self._use_files)
             )
 
     def on_spec(self, spec: Spec) -> None:
@@ -100,7 +100,7 @@ class ScenePanel(Panel):
         if step != "scene":
             return
         self._view: SceneView = view
-        with self.session.target.atomic():
+        with self.ui.atomic():
             clear(self.scene, "/scene")
             for node in view.nodes:
                 add_cloud(self.scene, f"/scene/{node.name}/cloud", node.sensor, node.T_world_camera)
@@ -116,7 +116,7 @@ class ScenePanel(Panel):
         if view is None:
             return
         node = next((n for n in view.nodes if n.name == self._node.value), view.nodes[0])
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._color.image, self._color.label = node.color.rgb, node.color.caption
             self._depth.image, self._depth.label = node.depth.rgb, node.depth.caption
             self._numbers.content = table(
@@ -159,7 +159,7 @@ class ScenePanel(Panel):
         self.session.want(self.session.spec.with_preset(self._preset.value))
 
     def _uploaded(self, kind: str, event: viser.GuiEvent) -> None:
-        self.session.post(self._keep_file, kind, event.target.value)
+        self.ui.post(self._keep_file, kind, event.target.value)
 
     def _keep_file(self, kind: str, file: viser.UploadedFile) -> None:
         if len(file.content) > UPLOAD_LIMIT_BYTES:

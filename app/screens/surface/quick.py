@@ -5,17 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
-
-import viser
 
 from app.acknowledgement import DrawAcknowledgement
-from app.debounce import Debounce
 from app.records import PaintedView, PaintRequest
 from app.screens.surface.detail import Detail
-
-if TYPE_CHECKING:
-    from app.session import Session
+from app.ui import Workbench
 
 QUIET_S = 0.4
 """When the radius has not moved for so long, it rests."""
@@ -26,8 +20,7 @@ class QuickLook:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        session: Session,
+        session: Workbench,
         on_view: Callable[[PaintedView], None],
         on_drawn: Callable[[], None],
         on_rest: Callable[[], None],
@@ -35,15 +28,14 @@ class QuickLook:
         """Add the hidden parts to the current container.
 
         Args:
-            gui: where to add them.
-            session: runs the jobs.
+            session: where to add them and who runs the jobs.
             on_view: called with each surface; it is to draw it and to call ``sent``.
             on_drawn: called when what was sent last stands on the screen.
             on_rest: called when the radius rests.
         """
         self._session, self._on_view, self._on_drawn, self._on_rest = session, on_view, on_drawn, on_rest
-        self._settle = Debounce(QUIET_S, lambda: session.post(self._rest))
-        self._acknowledgement = DrawAcknowledgement(gui, session.post, self._drawn)
+        self._settle = session.ui.debounce(QUIET_S, self._rest)
+        self._acknowledgement = DrawAcknowledgement(session.ui, self._drawn)
         self._next: PaintRequest | None = None
         self._rolling = False
         self._detail = Detail()
@@ -65,11 +57,6 @@ class QuickLook:
     def sent(self, vertices: Sequence[int] = ()) -> None:
         """Surfaces are on their way to the browser; quick ones, of so many vertices each."""
         self._acknowledgement.ask(vertices, hold=self.moving)
-
-    def close(self) -> None:
-        """End the timers."""
-        self._settle.cancel()
-        self._acknowledgement.close()
 
     def _go_on(self) -> None:
         session, request = self._session, self._next
