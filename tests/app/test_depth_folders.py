@@ -15,10 +15,11 @@ from app.screens.depth.model import AS_IT_SAYS, LIMIT_BYTES, SHIPPED, ModelFolde
 from app.screens.depth.numbers import LINES, fitted_line
 from app.screens.depth.settings import with_model
 from app.screens.depth.view import Disc, FillRow, HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
-from app.state import Source, Spec
+from app.state import Spec
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig, PipelineConfig
 from pipeline.depth.alignment import ALIGNMENTS, align_depth
+from pipeline.sources import Demo
 from pipeline.types import DepthMap
 
 PICTURE = Picture(np.zeros((4, 6, 3), np.uint8), "x")
@@ -249,7 +250,7 @@ def test_the_edit_takes_the_network_and_nothing_else():
     request = ModelChoice("a.onnx", "midas-small", "inverse", 384, 256, "unit")
     config = with_model(request)(PipelineConfig())
     assert config.depth == DepthConfig("a.onnx", "midas-small", "inverse", 384, 256, "unit")
-    text = Spec(Source(scene="office"), config=config).command()
+    text = Spec(Demo("office"), config=config).command()
     assert "depth.input_width_px=384 depth.input_height_px=256 depth.normalisation=unit" in text
     assert with_model(ModelChoice())(config) == PipelineConfig()
 

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from app.chain import network_for, prepared, rig_of
 
 from app.drawing.colors import HOLE
 from app.drawing.pictures import UNKNOWN, confidence_colors
@@ -27,24 +26,26 @@ from app.screens.depth.labels import (
 )
 from app.screens.depth.model_job import model_job
 from app.screens.depth.view import Disc, HideRequest, ModelChoice, SeenSample
-from app.state import Source, Spec
+from app.state import Spec
 from packetmesh.errors import InputError
+from packetmesh.progress import drain as end
 from pipeline.config import DepthConfig
+from pipeline.depth import DepthNetwork
 from pipeline.depth.confidence import judge
 from pipeline.depth.conventions import PRESETS
 from pipeline.depth.fillers import PEERS
 from pipeline.depth.inference import SHIPPED_MODEL
+from pipeline.sources import Demo
 from pipeline.types import DepthMap
-from tests.app.answers import end
 
-SPEC = Spec(Source(scene="box-on-table"))
+SPEC = Spec(Demo("box-on-table"))
 FLAT = HideRequest(0, (Disc(0.15, 0.35, 0.2),))
 """On the wall, where depth is a plane."""
 
 
 @pytest.fixture(scope="module")
 def rig(store):
-    return end(rig_of(store, SPEC))
+    return end(store.stage(SPEC, "rig"))
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +72,7 @@ def test_every_node_has_all_five_pictures_of_one_size(rig, view):
 
 
 def test_what_is_unknown_is_marked_in_each_picture(store, rig, view):
-    for frame, clouds, node in zip(rig.frames, end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
+    for frame, clouds, node in zip(rig.frames, end(store.stage(SPEC, "nodes")), view.nodes, strict=True):
         measured, inferred = frame.depth.valid, clouds.alignment.depth.valid
         np.testing.assert_array_equal(colored(node.pictures[SENSOR], HOLE), ~measured)
         np.testing.assert_array_equal(colored(node.pictures[INFERRED], HOLE), ~inferred)
@@ -88,7 +89,7 @@ def test_wide_images_are_thinned_alike(store, rig, monkeypatch):
 
 def test_the_confidence_of_every_drawn_point_is_that_of_its_pixel(store, rig, view):
     config = SPEC.config.depth
-    for frame, clouds, node in zip(rig.frames, end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
+    for frame, clouds, node in zip(rig.frames, end(store.stage(SPEC, "nodes")), view.nodes, strict=True):
         judged = judge(clouds.alignment, frame.depth, frame.rgb, config.reach, config.least_confidence)
         rows = {tuple(point): row for row, point in enumerate(clouds.inferred.points_m.astype(np.float32))}
         for drawn, colors in (
@@ -111,7 +112,7 @@ def test_the_drawn_sensor_points_know_their_pixels(rig, view):
 
 
 def test_the_residuals_are_those_of_the_alignment(store, view):
-    for clouds, node in zip(end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
+    for clouds, node in zip(end(store.stage(SPEC, "nodes")), view.nodes, strict=True):
         assert node.residuals.rms_m == pytest.approx(clouds.alignment.residual_rms_m, rel=1e-5)
         assert abs(node.residuals.median_m) < node.residuals.rms_m
 
@@ -262,9 +263,8 @@ def test_a_chosen_model_is_fed_as_its_choice_says(tmp_path):
     file = networks.input_side(tmp_path / "n.onnx", 3)
     request = ModelChoice(str(file), None, "metric", 96, 64, "unit")
     assert end(model_job(request)).choice == request
-    convention = network_for(request.put_into(DepthConfig())).convention
+    convention = DepthNetwork.of(request.put_into(DepthConfig())).convention
     assert (convention.width_px, convention.height_px, convention.normalised_inside) == (96, 64, True)
-    assert network_for(replace(request.put_into(DepthConfig()), reach=0.3)).convention is convention
 
 
 @pytest.mark.parametrize(

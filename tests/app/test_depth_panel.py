@@ -13,10 +13,11 @@ from app.screens.depth.labels import COLORINGS, EVERYWHERE, HOLES, OURS, UNSEEN
 from app.screens.depth.lesson import depth_lesson
 from app.screens.depth.panel import DepthPanel
 from app.screens.depth.view import ModelChoice
-from app.state import Results, Source, Spec
+from app.state import Results, Spec
 from packetmesh.errors import PacketMeshError
+from packetmesh.progress import drain as end
 from pipeline.depth.inference import SHIPPED_MODEL
-from tests.app.answers import end
+from pipeline.sources import Demo
 
 pytestmark = pytest.mark.xdist_group("depth panel")
 
@@ -27,7 +28,7 @@ class Session:
     def __init__(self, server, store, folder):
         self.target, self.gui, self.scene = server, server.gui, server.scene
         self.store, self.folder = store, folder
-        self.spec = Spec(Source(scene="box-on-table"))
+        self.spec = Spec(Demo("box-on-table"))
         self.results, self.notices = Results(), []
         self.panel = DepthPanel(self)
         server.scene.add_frame("/depth", show_axes=False)
@@ -152,7 +153,7 @@ def test_discs_of_another_scene_are_cleared_and_those_of_other_settings_stay(ses
     panel._hide._add()
     panel.on_spec(spec.with_preset("thesis"))
     assert len(panel._hide.discs) == 1
-    panel.on_spec(replace(spec, source=Source(scene="office")))
+    panel.on_spec(replace(spec, source=Demo("office")))
     assert panel._hide.discs == ()
     panel.on_spec(spec)
 

@@ -12,11 +12,12 @@ from app import jobs
 from app.screens.network.labels import NETWORKS
 from app.screens.network.panel import CANCELLED, FAILED, ORIGIN, NetworkPanel
 from app.screens.network.view import What
-from app.state import Results, Source, Spec
+from app.state import Results, Spec
 from network_sim.config import PRESETS
 from packetmesh.errors import InputError, PacketMeshError
+from packetmesh.progress import drain as end
 from packetmesh.settings import with_settings
-from tests.app.answers import end
+from pipeline.sources import Demo
 
 pytestmark = pytest.mark.xdist_group("network panel")
 
@@ -29,7 +30,7 @@ class Session:
     def __init__(self, server, store):
         self.target, self.gui, self.scene = server, server.gui, server.scene
         self.store, self.notices, self.refuse = store, [], False
-        self.spec, self.results = Spec(Source(scene="box-on-table")), Results()
+        self.spec, self.results = Spec(Demo("box-on-table")), Results()
         camera = SimpleNamespace(aspect=1.5, fov=0.9, position=None, look_at=None)
         self.client = SimpleNamespace(camera=camera, atomic=contextlib.nullcontext)
         self.panel = NetworkPanel(self)

@@ -17,8 +17,8 @@ from network_sim.config import PRESETS, NetworkConfig, RunConfig
 from network_sim.trace import Recorder
 from network_sim.types import Cause, EventKind, PacketKind
 from packetmesh.progress import Progress
+from packetmesh.progress import drain as end
 from packetmesh.settings import with_settings
-from tests.app.answers import end
 
 MS = 1_000_000
 NAMES, ROLES = ("node 1", "node 2", "sink"), ("node", "node", "sink")

@@ -4,18 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from app.chain import ball_clouds, cameras_of, placed, rig_of, rolled
 
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET
 from app.records import QUICK_POINTS, PaintRequest
 from app.screens.surface.labels import COLORINGS
 from app.screens.surface.legend import legend_html
 from app.screens.surface.paint_job import paint_job, vertex_colors
-from app.state import Source, Spec
+from app.state import Spec
+from packetmesh.progress import drain as end
 from pipeline.config import PipelineConfig
+from pipeline.sources import Demo
+from pipeline.stages import cameras_of
 from pipeline.surface import distances_to_truth_m
 from pipeline.types import PointSource
-from tests.app.answers import end
 from tests.app.gltf import arrays
 
 CONFIG = PipelineConfig()
@@ -23,7 +24,7 @@ CONFIG = PipelineConfig()
 
 def spec_of(points):
     surface = replace(CONFIG.surface, max_points=points)
-    return Spec(Source(scene="box-on-table"), config=replace(CONFIG, surface=surface))
+    return Spec(Demo("box-on-table"), config=replace(CONFIG, surface=surface))
 
 
 SPEC = spec_of(8_000)
@@ -32,8 +33,8 @@ SPEC = spec_of(8_000)
 @pytest.fixture(scope="module")
 def made(store):
     """Rig, cameras and the surface after fusion."""
-    rig, places = end(rig_of(store, SPEC)), end(placed(store, SPEC))
-    return rig, cameras_of(rig, places), end(rolled(store, SPEC)).after
+    rig, placement = end(store.stage(SPEC, "rig")), end(store.stage(SPEC, "placement"))
+    return rig, cameras_of(rig, placement), end(store.stage(SPEC, "after"))
 
 
 def test_the_settings_own_surfaces_are_painted_whole_with_their_rims(store, made):
@@ -45,9 +46,9 @@ def test_the_settings_own_surfaces_are_painted_whole_with_their_rims(store, made
 
 
 def test_a_quick_look_rolls_one_ball_over_what_is_shown_alone(store):
-    clouds = end(ball_clouds(store, SPEC))
+    clouds = end(store.stage(SPEC, "clouds"))
     small, large = (
-        end(paint_job(store, SPEC, PaintRequest(("before",), "color", factor * clouds.spacing.r_F_m)))
+        end(paint_job(store, SPEC, PaintRequest(("before",), "color", factor * clouds.r_F_m)))
         for factor in (0.6, 2.0)
     )
     assert set(small.meshes) == {"before"}

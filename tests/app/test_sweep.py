@@ -6,19 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import viser
-from app.chain import ball_clouds
 
 from app.records import SpacingView
 from app.screens.surface.advice import STOP, STOPPED, SWEEP, WAITING, AdviceFolder, suggestions_html
 from app.screens.surface.spacing_plot import ADVISED, OF_THESIS, USED, spacing_figure
-from app.screens.surface.sweep_job import suggest_job, sweep_job
+from app.screens.surface.sweep_job import suggestions_of, sweep_job
 from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
 from app.screens.surface.sweep_view import SuggestionRow, SweepRow, SweepView
-from app.state import Source, Spec
+from app.state import Spec
 from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig, SurfaceConfig
+from pipeline.sources import Demo
 
-SPEC = Spec(Source(scene="box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))
+SPEC = Spec(Demo("box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))
 NAN = float("nan")
 ROWS = (
     SuggestionRow("finest", 0.0246, 0.49, "Wide enough for 50% of the surface; rolled, it closes 49%."),
@@ -66,7 +66,7 @@ def test_the_sweep_reaches_from_half_the_spacing_to_six_and_holds_the_advice(sto
     radii_m = [one.radius_m for one in view.points]
     assert radii_m == sorted(radii_m)
     assert (radii_m[0], radii_m[-1]) == pytest.approx((view.r_F_m / 2, 6 * view.r_F_m))
-    _, advice = run(suggest_job(store, SPEC))
+    _, advice = run(suggestions_of(store, SPEC))
     assert {one.radius_m for one in advice} <= set(radii_m)
     assert len(radii_m) == 12 + len(advice)
 
@@ -84,13 +84,13 @@ def test_larger_balls_leave_fewer_rays_until_they_no_longer_fit(sweep):
 
 
 def test_the_advice_is_for_the_cloud_after_fusion_and_is_kept(store):
-    _, advice = run(suggest_job(store, SPEC))
-    _, clouds = run(ball_clouds(store, SPEC))
+    _, advice = run(suggestions_of(store, SPEC))
+    _, clouds = run(store.stage(SPEC, "clouds"))
     assert [one.name for one in advice] == ["finest", "even", "widest"]
     assert [one.radius_m for one in advice] == sorted(one.radius_m for one in advice)
-    assert all(clouds.spacing.r_F_m / 2 < one.radius_m < 20 * clouds.spacing.r_F_m for one in advice)
+    assert all(clouds.r_F_m / 2 < one.radius_m < 20 * clouds.r_F_m for one in advice)
     assert all(0.0 < one.share <= 1.0 for one in advice)
-    again, same = run(suggest_job(store, SPEC))
+    again, same = run(suggestions_of(store, SPEC))
     assert same == advice
     assert again == []
 

@@ -15,16 +15,17 @@ from app.screens.surface.labels import BEFORE
 from app.screens.surface.rolling import CLOSE_UP, WHOLE, RollingFolder, status_line
 from app.screens.surface.walk_job import PATCH_POINTS, PLACES, walk_job, walk_over
 from app.screens.surface.walk_view import WalkRequest
-from app.state import Source, Spec
+from app.state import Spec
 from app.store import Store
 from packetmesh.errors import ReconstructionError
+from packetmesh.progress import drain as end
+from pipeline.sources import Demo
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import roll
-from tests.app.answers import end
 from tests.pipeline.surface.shapes import perforated_plane
 
 RADII_M = (0.016, 0.03)
-SPEC = Spec(Source(scene="box-on-table"))
+SPEC = Spec(Demo("box-on-table"))
 
 
 @pytest.fixture(scope="module")
