@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 Result = TypeVar("Result")
@@ -31,3 +31,15 @@ def drain(steps: Generator[Any, None, Result], on_step: Callable[[Any], None] = 
         except StopIteration as stop:
             return stop.value
         on_step(step)
+
+
+def part(
+    steps: Generator[Progress, None, Result], begin: float, end: float
+) -> Generator[Progress, None, Result]:
+    """The same computation as the part of a longer one that goes from ``begin`` to ``end`` of it."""
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        yield replace(step, fraction=begin + step.fraction * (end - begin))
