@@ -28,7 +28,7 @@ from pipeline.reconstruct import (
     prepare_node,
     register_nodes,
 )
-from pipeline.surface import Camera, compare_with_truth, measured, radii, roll_over, spacing
+from pipeline.surface import Camera, compare_with_truth, measured, radii, roll_ball, spacing
 from pipeline.types import ByteArray, DepthMap, FloatArray, PointCloud, Rig, Surface, SurfaceResult
 
 HISTOGRAM_BINS = 60
@@ -202,7 +202,7 @@ def rolled(store: Store, spec: Spec) -> Generator[Progress | RolledBalls, None, 
 def rolled_over(cloud: PointCloud, radii_m: tuple[float, ...]) -> Surface:
     """The surface of a cloud; without a triangle if the ball falls through everywhere."""
     try:
-        return roll_over(cloud, radii_m)
+        return roll_ball(cloud, radii_m)
     except ReconstructionError:
         return Surface(np.empty((0, 3)), np.empty((0, 3), np.int32), None, radii_m)
 

@@ -46,7 +46,7 @@ def write_run_folder(
     }
     for name, mesh in meshes.items():
         files.append(folder / name)
-        write_mesh(files[-1], mesh.vertices_m, mesh.triangles, mesh.colors)
+        write_mesh(files[-1], mesh)
     return files
 
 

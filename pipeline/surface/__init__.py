@@ -1,7 +1,7 @@
 """From an oriented cloud to a triangle mesh and its measures (SPEC 5)."""
 
 from pipeline.rays import Camera, hit_depth
-from pipeline.surface.ball_pivoting import reconstruct_surface, roll_over
+from pipeline.surface.ball_pivoting import reconstruct_surface, roll_ball
 from pipeline.surface.boundary import boundary_loops
 from pipeline.surface.normals import estimate_normals
 from pipeline.surface.quality import measure_quality, measured
@@ -22,7 +22,7 @@ __all__ = [
     "nearest_distances_m",
     "radii",
     "reconstruct_surface",
-    "roll_over",
+    "roll_ball",
     "smooth",
     "spacing",
     "voxel_average",

@@ -52,7 +52,7 @@ def export_job(store: Store, spec: Spec, name: str) -> Generator[Progress | Roll
             return path.read_bytes()
         balls = yield from rolled(store, spec)
         if name.startswith("surface."):
-            write_mesh(path, balls.after.vertices_m, balls.after.triangles, balls.after.colors)
+            write_mesh(path, balls.after)
             return path.read_bytes()
         if name == "scene.html":
             yield Progress("writing the page", 0.8)
