@@ -15,7 +15,7 @@ from app.screens.surface.sweep_job import suggest_job, sweep_job
 from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
 from app.screens.surface.sweep_view import SuggestionRow, SweepRow, SweepView
 from app.state import Source, Spec
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, drain
 from pipeline.config import PipelineConfig, SurfaceConfig
 
 SPEC = Spec(Source(scene="box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))
@@ -29,11 +29,8 @@ ROWS = (
 def run(job):
     """All that a job says, and what it answers."""
     said = []
-    while True:
-        try:
-            said.append(next(job))
-        except StopIteration as stop:
-            return said, stop.value
+    view = drain(job, said.append)
+    return said, view
 
 
 def row(radius_mm, no_hit, accuracy=NAN, triangles=100):
