@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import viser
-
-from app.debounce import Delay
 from app.page import running
+from app.ui import Ui
 
-PATIENCE_S = 1.5
-"""Without an answer for so long, for want of a browser perhaps, it is taken as given. A page that draws
+TIMEOUT_S = 1.5
+"""Without an answer for so long, perhaps as there is no browser, it is taken as given. A page that draws
 answers within a second (page.js)."""
 
 
-class Echo:
+class DrawAcknowledgement:
     """Asks the browser to answer once it has drawn everything sent so far.
 
     A hand can move a slider faster than a slow browser draws. Without an answer to wait for, what is
@@ -25,25 +23,19 @@ class Echo:
     slider beside the button.
     """
 
-    def __init__(self, gui: viser.GuiApi, post: Callable[..., None], on_answer: Callable[[], None]) -> None:
-        """Add the hidden parts.
-
-        Args:
-            gui: where to add them.
-            post: runs a function on the session's thread.
-            on_answer: called there, once for each question.
-        """
+    def __init__(self, ui: Ui, on_answer: Callable[[], None]) -> None:
+        """Add the hidden parts; ``on_answer`` is called on the session's thread, once for each question."""
         self._on_answer = on_answer
-        self._said = 0
+        self._scripts_sent = 0
         self.waiting = False
-        self._html = gui.add_html("")
-        command = gui.add_command("Say that all is drawn", hotkey="insert", modifier="cmd/ctrl+alt+shift")
-        command.on_trigger(lambda _: post(self._answered))
-        self._patience = Delay(PATIENCE_S, lambda: post(self._answered))
+        self._html = ui.gui.add_html("")
+        command = ui.gui.add_command("Say that all is drawn", hotkey="insert", modifier="cmd/ctrl+alt+shift")
+        command.on_trigger(lambda _: ui.post(self._answered))
+        self._timeout = ui.debounce(TIMEOUT_S, self._answered)
 
     def hold(self) -> None:
         """Have only new meshes drawn, until ``ask`` ends that, a hand turns the view, or 3 s have passed."""
-        self._say("packetmesh.hold()")
+        self._run_script("packetmesh.hold()")
 
     def ask(self, vertices: Sequence[int] = (), hold: bool = False) -> None:
         """Ask now; of two questions, only the last is answered.
@@ -54,19 +46,15 @@ class Echo:
             hold: whether to hold the view from now on.
         """
         self.waiting = True
-        self._say(f"packetmesh.ask({list(vertices)}, {str(hold).lower()})")
-        self._patience.restart()
+        self._run_script(f"packetmesh.ask({list(vertices)}, {str(hold).lower()})")
+        self._timeout.restart()
 
-    def close(self) -> None:
-        """End the timer."""
-        self._patience.cancel()
-
-    def _say(self, script: str) -> None:
-        self._said += 1
-        self._html.content = running(script, mark=self._said)
+    def _run_script(self, script: str) -> None:
+        self._scripts_sent += 1
+        self._html.content = running(script, mark=self._scripts_sent)
 
     def _answered(self) -> None:
         if self.waiting:
             self.waiting = False
-            self._patience.cancel()
+            self._timeout.cancel()
             self._on_answer()

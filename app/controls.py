@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import viser
 
+from app.ui import Ui
 from packetmesh.settings_help import field_docs
 from pipeline.config import PipelineConfig
 
@@ -106,7 +107,7 @@ class Controls:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
+        ui: Ui,
         controls: Sequence[Control],
         config: PipelineConfig,
         on_change: Callable[[Callable[[PipelineConfig], PipelineConfig]], None],
@@ -114,15 +115,15 @@ class Controls:
         """Add the controls to the current container.
 
         Args:
-            gui: where to add them.
+            ui: where to add them.
             controls: which fields.
             config: their first values.
             on_change: called with the edit that a person made.
         """
         self._controls = tuple(controls)
-        self._handles = [_add(gui, control, config) for control in controls]
+        self._handles = [_add(ui.gui, control, config) for control in controls]
         for control, handle in zip(self._controls, self._handles, strict=True):
-            handle.on_update(functools.partial(self._edited, control, handle, on_change))
+            ui.when_changed(handle, functools.partial(self._edited, control, handle, on_change))
 
     def write(self, config: PipelineConfig) -> None:
         """Show another config."""
@@ -136,10 +137,8 @@ class Controls:
         control: Control,
         handle: viser.GuiInputHandle,
         on_change: Callable[[Callable[[PipelineConfig], PipelineConfig]], None],
-        event: viser.GuiEvent,
     ) -> None:
-        if event.client is not None:
-            on_change(lambda config: stored(control, handle.value, config))
+        on_change(lambda config: stored(control, handle.value, config))
 
 
 def _add(gui: viser.GuiApi, control: Control, config: PipelineConfig) -> Any:

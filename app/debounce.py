@@ -1,4 +1,4 @@
-"""Something to be done once it has been quiet for a while."""
+"""A timer that starts again with every call: its action follows the last one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 
 
-class Delay:
+class Debounce:
     """Calls ``action`` when ``wait_s`` have passed since the last ``restart``."""
 
     def __init__(self, wait_s: float, action: Callable[[], None]) -> None:
@@ -15,18 +15,18 @@ class Delay:
 
     @property
     def pending(self) -> bool:
-        """Whether it is still to come."""
+        """Whether the action is still to come."""
         return self._timer is not None and self._timer.is_alive()
 
     def restart(self) -> None:
-        """Begin to wait anew."""
+        """Wait from now on."""
         self.cancel()
         self._timer = threading.Timer(self._wait_s, self._action)
         self._timer.daemon = True
         self._timer.start()
 
     def cancel(self) -> None:
-        """Do not do it."""
+        """Drop the action."""
         if self._timer is not None:
             self._timer.cancel()
         self._timer = None

@@ -6,12 +6,12 @@ import importlib
 from typing import Any
 
 JOBS = {
-    "scene": "app.views:scene_job",
+    "scene": "app.screens.scene.job:scene_job",
     "depth": "app.screens.depth.job:depth_job",
     "hide": "app.screens.depth.hide_job:hide_job",
-    "network": "app.screens.depth.network_job:network_job",
-    "fuse": "app.views:fuse_job",
-    "surface": "app.views:surface_job",
+    "model": "app.screens.depth.model_job:model_job",
+    "fuse": "app.screens.fuse.job:fuse_job",
+    "surface": "app.screens.surface.job:surface_job",
     "paint": "app.screens.surface.paint_job:paint_job",
     "sweep": "app.screens.surface.sweep_job:sweep_job",
     "walk": "app.screens.surface.walk_job:walk_job",

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
+from app.ui import Ui
 from packetmesh.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 LESSONS = Path(__file__).resolve().parents[1] / "assets" / "lessons"
 NUMBER = r"(\d+(?:\.\d+)?)"
+OFF, BEGIN = "not now", "Choose a stop, or press **Next**."
 Value = TypeVar("Value")
 Look = TypeVar("Look", bound="DataclassInstance")
 """What a screen is to show: a frozen record of all that a stop may set."""
@@ -99,3 +101,59 @@ def choice(options: Mapping[str, Value]) -> Callable[[str], Value]:
         return options[text]
 
     return read
+
+
+def quantity(
+    unit: str, most: float, per_unit: float = 1.0, above_zero: bool = False
+) -> Callable[[str], float]:
+    """Reads such as '2 cm' with unit cm, up to ``most``; ``per_unit`` units make one of the stored unit."""
+
+    def read(text: str) -> float:
+        found = re.fullmatch(rf"{NUMBER} ?{unit}", text)
+        if found is None or float(found[1]) > most or (above_zero and float(found[1]) == 0.0):
+            raise ValueError(f"try {'more than ' if above_zero else ''}0 to {most:g} {unit}")
+        return float(found[1]) / per_unit
+
+    return read
+
+
+def short(label: str) -> str:
+    """What stands on the screen, up to its explanation."""
+    return re.split(r" \(|[,:]", label)[0]
+
+
+class LessonFolder(Generic[Look]):
+    """Leads through a lesson stop by stop; every stop sets the screen's controls."""
+
+    def __init__(self, ui: Ui, lesson: Lesson[Look], on_stop: Callable[[Look], None]) -> None:
+        """Add the folder; ``on_stop`` is called with what the stop shows."""
+        self._lesson, self._on_stop = lesson, on_stop
+        self._names = [f"{i}. {stop.title}" for i, stop in enumerate(lesson.stops, 1)]
+        with ui.gui.add_folder(f"Lesson: {lesson.title}", expand_by_default=False):
+            self._stop = ui.gui.add_dropdown(
+                "Stop",
+                [OFF, *self._names],
+                hint="Shows what to look at and sets the controls below; change them as you like.",
+            )
+            ui.when_changed(self._stop, self._picked)
+            keys = {"Back": lambda: self._go(-1), "Next": lambda: self._go(1)}
+            ui.buttons("Go", keys, "To the stop before or after.")
+            self._text = ui.gui.add_markdown(BEGIN)
+
+    def _go(self, count: int) -> None:
+        index = self._index() + count
+        if 0 <= index < len(self._names):
+            self._stop.value = self._names[index]
+            self._picked()
+
+    def _index(self) -> int:
+        return -1 if self._stop.value == OFF else self._names.index(self._stop.value)
+
+    def _picked(self) -> None:
+        index = self._index()
+        if index < 0:
+            self._text.content = BEGIN
+            return
+        stop = self._lesson.stops[index]
+        self._text.content = f"**{stop.title}** ({index + 1} of {len(self._names)})\n\n{stop.text}"
+        self._on_stop(stop.look)

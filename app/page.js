@@ -2,10 +2,10 @@
 (() => {
   if (window.packetmesh) return;
 
-  // While it is told of anything new, viser draws one frame after another, most of them alike. Without a
+  // While anything new arrives, viser draws one frame after another, most of them alike. Without a
   // graphics card that takes the time in which the next mesh is made. A view that is held draws only frames
   // in which a mesh is new. And while a mesh is awaited, its place may be empty: then nothing is drawn.
-  const HELD_MS = 3000; // at most, since it was last said
+  const HELD_MS = 3000; // at most, since the last call
   const AWAITED_MS = 1000; // at most, before the answer is given without
   const POLL_MS = 4;
   const KEY = {key: "Insert", ctrlKey: true, altKey: true, shiftKey: true};

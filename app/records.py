@@ -305,6 +305,8 @@ SUCCESS_M = 0.02
 
 Which = Literal["after", "before"]
 """Fusion."""
+Shown = Literal["after", "before", "poisson", "alpha"]
+"""A surface that can be drawn: the ball's, or a baseline's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,7 +342,7 @@ QUICK_POINTS = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class PaintWish:
+class PaintRequest:
     """Surfaces to draw in certain colours; with a radius, a quick look while the ball is being chosen."""
 
     which: tuple[Which, ...]
@@ -363,9 +365,9 @@ class PaintedMesh:
 
 @dataclass(frozen=True, slots=True)
 class PaintedView:
-    """The answer to a ``PaintWish``."""
+    """The answer to a ``PaintRequest``."""
 
-    wish: PaintWish
+    request: PaintRequest
     meshes: dict[Which, PaintedMesh]
     points: int
     """That the ball rolled over, of the cloud after fusion or, if that is not shown, before."""

@@ -28,10 +28,11 @@ from app.screens.network.panel import NetworkPanel
 from app.screens.scene.panel import ScenePanel
 from app.screens.surface.panel import SurfacePanel
 from app.session import Session, Target
-from app.state import SharedViews, Source, Spec
+from app.state import SharedViews, Spec
 from app.store import Store
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
+from pipeline.sources import Demo, RigFolder
 
 logger = logging.getLogger(__name__)
 
@@ -145,7 +146,7 @@ def serve(
 def start_spec(scene: str, config: PipelineConfig) -> Spec:
     """What a session wants first: a demo scene by name or a rig folder, with these settings."""
     preset = next((name for name, known in PRESETS.items() if known == config), "packetmesh")
-    source = Source(rig=str(Path(scene).resolve())) if Path(scene).is_dir() else Source(scene=scene)
+    source = RigFolder(str(Path(scene).resolve())) if Path(scene).is_dir() else Demo(scene)
     return Spec(source, preset, config)
 
 

@@ -18,12 +18,12 @@ from app import jobs
 from app.drawing.cameras import look, stage_of
 from app.drawing.colors import BRAND, DELIVERED
 from app.page import add_script
-from app.panel import Panel
 from app.pool import ComputePool, LatestWins, Outcome
 from app.state import CHAIN, Results, SharedViews, Spec, Step
 from app.stepper import Stepper
 from app.store import Store
 from app.tables import command_html
+from app.ui import Panel, Ui
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig
@@ -52,6 +52,7 @@ class Session:
     ) -> None:
         self.target = target
         self.gui, self.scene = target.gui, target.scene
+        self.ui = Ui(target.gui, target.scene, self.post, target.atomic, target.flush)
         self.store = store
         self._shared = shared
         self.spec = spec
@@ -84,8 +85,7 @@ class Session:
         """Stop computing and forget everything; the browser is gone."""
         self._closed = True
         self._cancel()
-        for panel in self._panels:
-            panel.close()
+        self.ui.close()
         self._thread.shutdown(wait=False, cancel_futures=True)
         shutil.rmtree(self.folder, ignore_errors=True)
 
@@ -153,7 +153,7 @@ class Session:
             if outcome.kind == "error":
                 self.notify("That did not work", outcome.value)
             on_end(outcome.value if outcome.kind == "result" else None)
-            self._say()
+            self._show_status()
 
         lane.submit(
             jobs.run,
@@ -180,13 +180,13 @@ class Session:
             self._take(step, self.spec.key(step), view)
         if step is None:
             self._running = self._submitted = None
-            self._say()
+            self._show_status()
             return
         key = self.spec.key(step)
         if key == self._submitted:
             return
         self._running, self._submitted = step, key
-        self._say()
+        self._show_status()
         self._chain.submit(
             jobs.run,
             step,
@@ -261,7 +261,7 @@ class Session:
                     frame.visible = name == self._current.drawn_below
         self._current.on_show()
         self.frame_view()
-        self._say()
+        self._show_status()
 
     def frame_view(self, anew: bool = False) -> None:
         """Turn the view to the scene: a new one, two instead of one, or another shape of the window."""
@@ -288,7 +288,7 @@ class Session:
         if action == "Cancel":
             self._cancel()
         elif action == "Retry":
-            self.results.forgive()
+            self.results.retry_failed()
             self.advance()
         elif action == "Reset":
             self.want(self._start)
@@ -301,7 +301,7 @@ class Session:
             self.gui.add_html(command_html(self._current.command))
             self.gui.add_button("Close").on_click(lambda _: modal.close())
 
-    def _say(self) -> None:
+    def _show_status(self) -> None:
         """Bring the stepper and the status line up to date."""
         statuses = {
             panel.title: self.results.status(panel.step, self.spec, self._running)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
-import shlex
 import threading
 from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from packetmesh.settings import differences
-from pipeline.config import PRESETS, PipelineConfig
+from pipeline import spec
+from pipeline.spec import StageName
 
 Step = Literal["scene", "depth", "fuse", "surface"]
 CHAIN: tuple[Step, ...] = ("scene", "depth", "fuse", "surface")
@@ -19,71 +17,17 @@ CHAIN: tuple[Step, ...] = ("scene", "depth", "fuse", "surface")
 StepStatus = Literal["fresh", "stale", "running", "failed", "missing"]
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
-    """Where the images come from: a demo scene by name, a rig folder, or one uploaded RGB-D pair."""
-
-    scene: str | None = None
-    rig: str | None = None
-    color: str | None = None
-    depth: str | None = None
-    intrinsics: str | None = None
-    depth_scale: float = 1000.0
-    """Depth image units in one metre."""
-
-    @property
-    def title(self) -> str:
-        """What to call it."""
-        return self.scene or self.rig or "uploaded pair"
-
-    def arguments(self) -> list[str]:
-        """The arguments of ``packetmesh reconstruct`` that name it."""
-        if self.scene is not None:
-            return ["--scene", self.scene]
-        if self.rig is not None:
-            return ["--rig", self.rig]
-        arguments = ["--color", str(self.color), "--depth", str(self.depth)]
-        arguments += ["--intrinsics", str(self.intrinsics)]
-        return arguments + (["--depth-scale", f"{self.depth_scale:g}"] if self.depth_scale != 1000.0 else [])
+STAGE_OF: dict[Step, StageName] = {"scene": "rig", "depth": "nodes", "fuse": "placement", "surface": "after"}
+"""The stage of the chain whose result each step shows."""
 
 
 @dataclass(frozen=True, slots=True)
-class Spec:
-    """Everything that decides what the chain computes."""
-
-    source: Source
-    preset: str = "packetmesh"
-    config: PipelineConfig = field(default_factory=PipelineConfig)
+class Spec(spec.Spec):
+    """Everything that a session asks for."""
 
     def key(self, step: Step) -> tuple[Hashable, ...]:
         """What a step's result depends on; equal keys mean equal results."""
-        config = self.config
-        fusion = config.fusion
-        parts: dict[Step, tuple[Hashable, ...]] = {
-            "scene": (self.source,),
-            "depth": (
-                config.acquisition,
-                config.depth,
-                fusion.mode,
-                fusion.register_inferred and config.inferred_registration,
-            ),
-            "fuse": (config.node_registration, fusion.align_nodes_with),
-            "surface": (config.surface,),
-        }
-        reached = CHAIN[: CHAIN.index(step) + 1]
-        return (step, *(part for name in reached for part in parts[name]))
-
-    def with_preset(self, preset: str) -> Spec:
-        """The same source with a preset's config."""
-        return dataclasses.replace(self, preset=preset, config=PRESETS[preset])
-
-    def command(self, out: str = "runs/from-app") -> str:
-        """The command line that computes the same."""
-        words = ["packetmesh", "reconstruct", *self.source.arguments(), "--preset", self.preset]
-        changed = differences(self.config, PRESETS[self.preset])
-        if changed:
-            words += ["--set", *changed]
-        return shlex.join([*words, "--out", out])
+        return spec.key(self, STAGE_OF[step])
 
 
 class SharedViews:
@@ -126,7 +70,7 @@ class Results:
         """Remember that this cannot be computed, so that it is not tried again until something changes."""
         self._failures[step] = (key, sentence)
 
-    def forgive(self) -> None:
+    def retry_failed(self) -> None:
         """Try failed steps again."""
         self._failures.clear()
 

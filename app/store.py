@@ -1,4 +1,4 @@
-"""Results of stages by key, in a folder that the computing processes of one server share."""
+"""Results by what they depend on, in a folder that the computing processes of one server share."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-Said = TypeVar("Said")
+from pipeline.spec import Spec, StageName
 
-_recent: dict[str, tuple[str, Any]] = {}
-"""The last result of every stage that this process had in its hands."""
+Step = TypeVar("Step")
+
+_newest: dict[str, tuple[str, Any]] = {}
+"""By stage, the name of the newest result that this process has computed or read, and the result."""
 
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """A private folder of pickled results, the oldest dropped when it grows over its limit."""
+    """A private folder of pickled results; the ones unused for longest go when it grows over its limit."""
 
     folder: str
     limit_bytes: int = 3 << 30
@@ -28,44 +30,66 @@ class Store:
     def remember(
         self,
         key: tuple[Hashable, ...],
-        compute: Callable[[], Generator[Said, None, Any]],
-    ) -> Generator[Said, None, Any]:
-        """The result for ``key``, computed only if no process has it yet."""
+        compute: Callable[[], Generator[Step, None, Any]],
+    ) -> Generator[Step, None, Any]:
+        """The result for ``key``, computed only if no process has it yet.
+
+        Args:
+            key: the name of the stage, and all that its result depends on.
+            compute: yields reports of its progress and returns the result.
+        """
         stage = str(key[0])
         name = f"{stage}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}"
-        if stage in _recent and _recent[stage][0] == name:
-            return _recent[stage][1]
+        if stage in _newest and _newest[stage][0] == name:
+            return _newest[stage][1]
         path = Path(self.folder, name)
         value = _read(path)
         if value is None:
             value = yield from compute()
             self._write(path, value)
-        _recent[stage] = (name, value)
+        _newest[stage] = (name, value)
         return value
 
+    def stage(self, spec: Spec, stage: StageName) -> Generator[Any, None, Any]:
+        """The result of a stage of the chain, with whatever has to be computed before it."""
+        from pipeline.stages import compute  # computing needs large libraries, serving does not
+
+        return (yield from compute(spec, stage, self)).value
+
     def _write(self, path: Path, value: Any) -> None:
+        """Keep a result; a full disk costs only the time to compute it again."""
         with contextlib.suppress(OSError):
-            descriptor, temporary = tempfile.mkstemp(dir=self.folder)
-            with os.fdopen(descriptor, "wb") as file:
-                pickle.dump(value, file, protocol=pickle.HIGHEST_PROTOCOL)
-            os.replace(temporary, path)
+            descriptor, temporary = tempfile.mkstemp(dir=self.folder, prefix=".")
+            try:
+                with os.fdopen(descriptor, "wb") as file:
+                    pickle.dump(value, file, protocol=pickle.HIGHEST_PROTOCOL)
+                os.replace(temporary, path)
+            finally:
+                Path(temporary).unlink(missing_ok=True)
             self._prune(path)
 
     def _prune(self, newest: Path) -> None:
-        files = sorted(Path(self.folder).iterdir(), key=lambda file: file.stat().st_mtime)
-        excess = sum(file.stat().st_size for file in files) - self.limit_bytes
-        for file in files:
-            if excess <= 0 or file == newest:
+        """Delete the files unused for longest until the rest fits the limit; the newest stays."""
+        files = []
+        for path in Path(self.folder).iterdir():
+            with contextlib.suppress(OSError):  # another process may be deleting it
+                if path.is_file():
+                    files.append((path.stat().st_mtime_ns, path.stat().st_size, path))
+        excess = sum(size for _, size, _ in files) - self.limit_bytes
+        for _, size, path in sorted(files):
+            if excess <= 0:
                 return
-            excess -= file.stat().st_size
-            file.unlink(missing_ok=True)
+            if path != newest:
+                path.unlink(missing_ok=True)
+                excess -= size
 
 
 def _read(path: Path) -> Any:
+    """A kept result; None if there is none or it cannot be read, so that it is computed again."""
     try:
         with path.open("rb") as file:
             value = pickle.load(file)
         os.utime(path)
         return value
-    except (OSError, EOFError, pickle.UnpicklingError):
+    except (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError, IndexError, ValueError):
         return None

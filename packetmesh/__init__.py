@@ -4,7 +4,7 @@
 
     rig = pm.load_demo("living-room")
     result = pm.reconstruct(rig, pm.PRESETS["packetmesh"])
-    pm.write_mesh("room.glb", result.surfaces.after)
+    pm.write_mesh("room.glb", result.after)
 
 Lengths are in metres, times in seconds, angles in radians. A name's module is imported at its first use, so
 that ``import packetmesh`` itself imports no numpy.
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from pipeline.io.demos import DEMO_SCENES, load_demo
     from pipeline.io.meshes import read_mesh, write_mesh
     from pipeline.io.rigs import load_frame, load_rig, save_rig
-    from pipeline.reconstruct import Reconstruction, iterate_reconstruction, reconstruct
+    from pipeline.reconstruct import Reconstruction, reconstruct
     from pipeline.registration import iterate_registration, point_error_m, register
     from pipeline.surface.ball_pivoting import iterate_ball, roll_ball
     from pipeline.surface.normals import estimate_normals
@@ -113,7 +113,6 @@ _PLACES = {
     "load_rig": ("pipeline.io.rigs", "load_rig"),
     "save_rig": ("pipeline.io.rigs", "save_rig"),
     "Reconstruction": ("pipeline.reconstruct", "Reconstruction"),
-    "iterate_reconstruction": ("pipeline.reconstruct", "iterate_reconstruction"),
     "reconstruct": ("pipeline.reconstruct", "reconstruct"),
     "iterate_registration": ("pipeline.registration", "iterate_registration"),
     "point_error_m": ("pipeline.registration", "point_error_m"),
@@ -185,7 +184,6 @@ __all__ = [
     "estimate_normals",
     "image_delays_s",
     "iterate_ball",
-    "iterate_reconstruction",
     "iterate_registration",
     "iterate_simulation",
     "load_demo",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from packetmesh.errors import InputError
@@ -35,6 +35,7 @@ Metric = Literal["point", "plane"]
 Direction = Literal["q2p", "p2q", "both"]
 FusionMode = Literal["union", "fill"]
 RadiusRule = Literal["thesis", "thesis+", "manual"]
+NodePoints = Literal["sensor", "fused"]
 
 
 def _at_least(key: str, value: float, least: float) -> None:
@@ -90,6 +91,16 @@ class DepthConfig:
     """How far from measured pixels inferred depth counts, as a share of the image's diagonal."""
     least_confidence: float = 0.0
     """Inferred depth that is believed less does not count, 0 to 1."""
+
+    def of_network(self) -> DepthConfig:
+        """Only the settings of the network itself, which is all that its inference depends on."""
+        plain = DepthConfig()
+        return replace(
+            self,
+            alignment=plain.alignment,
+            reach=plain.reach,
+            least_confidence=plain.least_confidence,
+        )
 
     def __post_init__(self) -> None:
         _above("depth.reach", self.reach, 0.0)
@@ -161,7 +172,7 @@ class FusionConfig:
 
     mode: FusionMode = "fill"
     """union: all points of both; fill: inferred points only where the sensor has none."""
-    align_nodes_with: Literal["sensor", "fused"] = "sensor"
+    align_nodes_with: NodePoints = "sensor"
     """Which points register one node to another."""
     register_inferred: bool = False
     """Move each node's inferred cloud rigidly onto its sensor cloud, as the thesis does; without it

@@ -11,17 +11,17 @@ from packetmesh.memory import peak_memory_bytes
 from packetmesh.settings import settings
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
-from pipeline.reconstruct import NodeRegistration, Reconstruction
+from pipeline.merging import MergedClouds
+from pipeline.nodes import NodeRegistration
+from pipeline.reconstruct import Reconstruction
+from pipeline.spec import Spec
 from pipeline.types import PointCloud, PointSource, SurfaceResult
 
 
-def write_run_folder(
-    reconstruction: Reconstruction, metrics: dict[str, Any], folder: Path, commands: dict[str, str]
-) -> list[Path]:
+def write_run_folder(reconstruction: Reconstruction, metrics: dict[str, Any], folder: Path) -> list[Path]:
     """Write everything but the report into ``folder``, each file whole or not at all.
 
-    Args:
-        commands: what to record in ``config.json`` about how the run was asked for (scene, preset).
+    A surface without a triangle, where the ball falls through everywhere, leaves no mesh file.
 
     Returns:
         The files written.
@@ -29,43 +29,52 @@ def write_run_folder(
     Raises:
         InputError: the folder cannot be written.
     """
-    surfaces = reconstruction.surfaces
     files = [folder / "config.json", folder / "metrics.json"]
-    write_json(files[0], commands | {"settings": settings(reconstruction.config)})
+    write_json(files[0], config_of(reconstruction.spec))
     write_json(files[1], metrics)
-    fused = surfaces.fused
-    inferred = fused.select(fused.source == PointSource.INFERRED) if fused.source is not None else fused
-    clouds = {"sensor.ply": surfaces.sensor, "inferred.ply": inferred, "fused.ply": fused}
-    for name, cloud in clouds.items():
+    for name, cloud in clouds_of(reconstruction.clouds).items():
         files.append(folder / name)
         write_cloud(files[-1], cloud)
     meshes = {
-        "surface_before.ply": surfaces.before,
-        "surface_after.ply": surfaces.after,
-        "surface.glb": surfaces.after,
+        "surface_before.ply": reconstruction.before,
+        "surface_after.ply": reconstruction.after,
+        "surface.glb": reconstruction.after,
     }
     for name, mesh in meshes.items():
-        files.append(folder / name)
-        write_mesh(files[-1], mesh)
+        if len(mesh.triangles):
+            files.append(folder / name)
+            write_mesh(files[-1], mesh)
     return files
 
 
-def metrics_of(reconstruction: Reconstruction, scene: str, preset: str) -> dict[str, Any]:
+def config_of(spec: Spec) -> dict[str, Any]:
+    """What is recorded of how a run was asked for; as a file, it is itself a preset."""
+    return {"scene": spec.source.title, "preset": spec.preset, "settings": settings(spec.config)}
+
+
+def clouds_of(clouds: MergedClouds) -> dict[str, PointCloud]:
+    """The clouds of a run by the names of their files."""
+    fused = clouds.fused
+    inferred = fused.select(fused.source == PointSource.INFERRED) if fused.source is not None else fused
+    return {"sensor.ply": clouds.sensor, "inferred.ply": inferred, "fused.ply": fused}
+
+
+def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
     """The numbers of a run; every length in metres, every share from 0 to 1."""
-    surfaces = reconstruction.surfaces
+    before, after = reconstruction.before, reconstruction.after
     truth = None
-    if reconstruction.truth_before is not None:
+    if reconstruction.rig.truth is not None:
         truth = {"surface_before": reconstruction.truth_before, "surface_after": reconstruction.truth_after}
     return {
-        "scene": scene,
-        "preset": preset,
+        "scene": reconstruction.spec.source.title,
+        "preset": reconstruction.spec.preset,
         "nodes": [
             {
                 "name": node.name,
                 "sensor_points": len(node.sensor),
                 "sensor_coverage": frame.depth.coverage,
                 "outliers": len(node.filtered.outliers),
-                "provider": node.provider,
+                "provider": node.network.provider,
                 "alignment": {
                     "mode": node.alignment.mode,
                     "residual_rms_m": node.alignment.residual_rms_m,
@@ -75,10 +84,20 @@ def metrics_of(reconstruction: Reconstruction, scene: str, preset: str) -> dict[
             }
             for node, frame in zip(reconstruction.nodes, reconstruction.rig.frames, strict=True)
         ],
-        "registration": [_registration(item, reconstruction) for item in reconstruction.registrations],
-        "spacing": {"r_F_m": surfaces.r_F_m, "sigma_D_m": surfaces.sigma_D_m},
-        "surface_before": surface_metrics(surfaces.before),
-        "surface_after": surface_metrics(surfaces.after),
+        "registration": [
+            _registration(item, reconstruction) for item in reconstruction.placement.registrations
+        ],
+        "poses": {
+            node.name: pose
+            for node, pose in zip(reconstruction.nodes, reconstruction.placement.T_world_camera, strict=True)
+        },
+        "spacing": {"r_F_m": reconstruction.clouds.r_F_m, "sigma_D_m": reconstruction.clouds.sigma_D_m},
+        "surface_before": surface_metrics(before),
+        "surface_after": surface_metrics(after),
+        "measured": {
+            "within_2pct_before": before.quality.kept_measurement_share,
+            "within_2pct_after": after.quality.kept_measurement_share,
+        },
         "truth": truth,
         "timings_s": reconstruction.timings_s,
         "peak_memory_bytes": peak_memory_bytes(),
@@ -92,7 +111,7 @@ def inferred_points(cloud: PointCloud) -> int:
 
 def _registration(item: NodeRegistration, reconstruction: Reconstruction) -> dict[str, Any]:
     steps = item.result.steps
-    config = reconstruction.config.node_registration
+    config = reconstruction.spec.config.node_registration
     return {
         "source": item.source,
         "target": item.target,

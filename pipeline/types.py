@@ -230,6 +230,9 @@ class SurfaceQuality:
     area_m2: float
     unused_points: int
     """Input points that no triangle uses."""
+    kept_measurement_share: float = float("nan")
+    """Share of the pixels that the sensors have measured whose ray meets the mesh within 2 % of the
+    measurement, 0 to 1; NaN without sensor depth."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from app.cli.options import PresetName, Settings
 from app.cli.text import print_json, say, say_progress, wrong_use
 from packetmesh.progress import drain
 from packetmesh.settings import with_settings
 from pipeline.config import load_config
+
+if TYPE_CHECKING:
+    from pipeline.sources import FileSource
 
 
 def reconstruct(
@@ -38,52 +41,50 @@ def reconstruct(
         set: Settings to change, for example `--set depth.alignment=median surface.max_points=20000`.
         json: Print the metrics as one JSON object.
     """
+    source = _source(scene, rig, color, depth, intrinsics, depth_scale)
     config = with_settings(load_config(preset), set)
-    name, loaded = _load(scene, rig, color, depth, intrinsics, depth_scale)
 
     from app.reports.reconstruction import write_reconstruction_report
     from packetmesh.files import writable_folder
     from pipeline.reconstruct import iterate_reconstruction
     from pipeline.run_folder import metrics_of, write_run_folder
+    from pipeline.spec import Spec
 
     writable_folder(out)
-    steps = iterate_reconstruction(loaded, config)
-    result = drain(steps, say_progress)
-    metrics = metrics_of(result, name, preset)
-    write_run_folder(result, metrics, out, {"scene": name, "preset": preset})
+    result = drain(iterate_reconstruction(Spec(source, preset, config)), say_progress)
+    metrics = metrics_of(result)
+    write_run_folder(result, metrics, out)
     write_reconstruction_report(result, metrics, out / "report.html")
     before, after = metrics["surface_before"], metrics["surface_after"]
     say(
         f"100%  rays without a surface: {before['no_hit_ray_share']:.1%} before fusion, "
         f"{after['no_hit_ray_share']:.1%} after; see {out / 'report.html'}"
     )
+    if not after["triangles"]:
+        say("The ball falls through everywhere; try larger surface.radii_m")
     if json:
         print_json(metrics)
 
 
-def _load(
+def _source(
     scene: str | None,
     rig: Path | None,
     color: Path | None,
     depth: Path | None,
     intrinsics: Path | None,
     depth_scale: float,
-) -> tuple[str, Any]:
-    """The rig that the options name, and a name for it."""
+) -> FileSource:
+    """What the options name."""
     pair = (color, depth, intrinsics)
     ways = [scene is not None, rig is not None, any(part is not None for part in pair)]
     if sum(ways) != 1:
         wrong_use("say what to reconstruct: --scene NAME, --rig DIR, or --color C --depth D --intrinsics K")
-    from pipeline.io.demos import load_demo
-    from pipeline.io.rigs import load_frame, load_rig
-    from pipeline.types import Rig
+    from pipeline.sources import Demo, ImagePair, RigFolder
 
     if scene is not None:
-        return scene, load_demo(scene)
+        return Demo(scene)
     if rig is not None:
-        return str(rig), load_rig(rig)
+        return RigFolder(str(rig))
     if color is None or depth is None or intrinsics is None:
         wrong_use("a single pair needs all of --color, --depth and --intrinsics")
-    return f"{color.parent.name}/{color.name}", Rig(
-        color.stem, (load_frame(color, depth, intrinsics, depth_scale),)
-    )
+    return ImagePair(str(color), str(depth), str(intrinsics), depth_scale)

@@ -61,9 +61,9 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
         f'<p class="note">Ball radii {radii} mm on both. Magenta: a ray that hits nothing. '
         f"Seen from each node's camera.</p>"
     )
-    for frame, pose in zip(result.rig.frames, result.T_world_camera, strict=True):
+    for frame, pose in zip(result.rig.frames, result.placement.T_world_camera, strict=True):
         camera = Camera(frame.intrinsics, pose)
-        surfaces = (("before", result.surfaces.before), ("after", result.surfaces.after))
+        surfaces = (("before", result.before), ("after", result.after))
         figures = (
             picture(mesh_picture(surface, camera, colored), f"{frame.name}, {when} fusion{how}")
             for colored, how in ((True, ""), (False, ", shape only"))
@@ -116,7 +116,7 @@ def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
         inferred = depth_picture(
             node.alignment.depth,
             range_m,
-            f"inferred depth (alignment {node.alignment.mode}, {node.provider})",
+            f"inferred depth (alignment {node.alignment.mode}, {node.network.provider})",
         )
         figures = (
             picture(frame.rgb, f"{frame.name}, colour"),

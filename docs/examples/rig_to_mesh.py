@@ -22,10 +22,9 @@ rig = pm.load_demo(name) if name in pm.DEMO_SCENES else pm.load_rig(name)
 config = pm.with_settings(pm.PRESETS["packetmesh"], [f"surface.max_points={arguments.max_points}"])
 result = pm.reconstruct(rig, config)
 
-before, after = result.surfaces.before, result.surfaces.after
-print(f"rays without a surface before fusion: {before.quality.no_hit_ray_share:.1%}")
-print(f"rays without a surface after fusion: {after.quality.no_hit_ray_share:.1%}")
+print(f"rays without a surface before fusion: {result.before.quality.no_hit_ray_share:.1%}")
+print(f"rays without a surface after fusion: {result.after.quality.no_hit_ray_share:.1%}")
 
 file = arguments.out / "mesh.glb"
-pm.write_mesh(file, after)
-print(f"{len(after.triangles)} triangles in {file}")
+pm.write_mesh(file, result.after)
+print(f"{len(result.after.triangles)} triangles in {file}")

@@ -17,12 +17,15 @@ import numpy as np
 import psutil
 
 from packetmesh.memory import peak_memory_bytes
+from packetmesh.progress import drain
 from pipeline.config import PRESETS
-from pipeline.depth import DepthNetwork
 from pipeline.io.demos import load_demo
+from pipeline.merging import merge_clouds
 from pipeline.open3d_runtime import o3d
 from pipeline.rays import tensor, triangle_scene
-from pipeline.reconstruct import merged_clouds, prepare_node
+from pipeline.sources import LoadedRig
+from pipeline.spec import Spec
+from pipeline.stages import run
 from pipeline.surface import measure_quality, smooth, spacing, voxel_average, voxel_for_count
 from pipeline.surface.pivoting import roll
 from pipeline.types import FloatArray, IntArray, PointCloud
@@ -137,9 +140,12 @@ def room_cloud(points: int, smoothed: bool = True) -> PointCloud:
     assert rig.truth is not None
     config = PRESETS["packetmesh"]
     fine = replace(config, surface=replace(config.surface, max_points=3 * points, smoothing_passes=0))
-    network = DepthNetwork()
-    nodes = [prepare_node(frame, config, network) for frame in rig.frames]
-    _, fused = merged_clouds(nodes, rig.frames, rig.truth.T_world_camera, fine)
+    spec = Spec(LoadedRig(rig), config=fine)
+    nodes = drain(run(spec, stages=("nodes",)))["nodes"].value
+    surface = fine.surface
+    fused = merge_clouds(
+        rig.frames, nodes, rig.truth.T_world_camera, "fill", surface.max_points, surface.smoothing_passes
+    ).fused
     thin = voxel_average(fused, voxel_for_count(fused.points_m, points))
     return smooth(thin, config.surface.smoothing_passes if smoothed else 0)
 

@@ -9,6 +9,7 @@ import numpy as np
 import onnxruntime
 
 from packetmesh.errors import InputError, ReconstructionError
+from pipeline.config import DepthConfig
 from pipeline.depth.conventions import Convention, Overrides, convention_of
 from pipeline.depth.preprocessing import centre_crop, fitted, free_size, padded, resized, unpad
 from pipeline.depth.signature import signature_of
@@ -45,6 +46,11 @@ class DepthNetwork:
         self._session = open_session(self.model_path)
         self._signature = signature_of(self._session, str(self.model_path))
         self.convention = convention_of(self._session, preset, overrides, str(self.model_path))
+
+    @classmethod
+    def of(cls, config: DepthConfig) -> DepthNetwork:
+        """The network that the settings name; raises as the constructor."""
+        return cls(config.model, config.preset, Overrides.of(config))
 
     @property
     def provider(self) -> str:

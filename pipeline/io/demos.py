@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from packetmesh.errors import InputError
-from pipeline.io.rigs import load_rig
 from pipeline.types import Rig
 
 SCENES = Path(__file__).resolve().parents[2] / "assets" / "scenes"
@@ -52,4 +51,6 @@ def load_demo(name: str) -> Rig:
     """
     if name not in DEMO_SCENES:
         raise InputError(f"There is no demo scene {name!r}; try one of {', '.join(DEMO_SCENES)}")
+    from pipeline.io.rigs import load_rig  # large libraries; a list of the scenes needs none
+
     return load_rig(SCENES / name)

@@ -15,19 +15,22 @@ FAR_SPACINGS = 2.0
 _MAD_TO_SIGMA = 1.4826
 
 
-def fuse(sensor: PointCloud, inferred: PointCloud, mode: FusionMode) -> PointCloud:
+def fuse(
+    sensor: PointCloud, inferred: PointCloud, mode: FusionMode, measured: BoolArray | None = None
+) -> PointCloud:
     """All sensor points, then the inferred points that ``mode`` lets in, each labelled with its source.
 
-    ``union`` lets in all. ``fill`` lets in the inferred points of pixels that have no sensor point, so
-    that holes close up to their rim and no second layer grows over what the sensor saw, even where
-    the two disagree. Clouds that do not both know their pixels fall back to distance: an inferred
-    point is let in if it is farther from its nearest sensor point than twice the sensor cloud's
-    spacing there.
+    ``union`` lets in all. ``fill`` lets in the inferred points of pixels that the sensor has not
+    measured: holes close up to their rim, no second layer grows over what the sensor saw, and no
+    measurement is replaced by a guess, not even one that the outlier filter has dropped. Clouds that
+    do not both know their pixels fall back to distance: an inferred point is let in if it is farther
+    from its nearest sensor point than twice the sensor cloud's spacing there.
 
     Args:
         sensor: a node's sensor cloud, camera frame.
         inferred: the same node's inferred cloud on the same pixel grid and in the same frame.
         mode: ``union`` or ``fill``.
+        measured: (H, W) pixels that the sensor has measured; None takes those of ``sensor``.
 
     Returns:
         A cloud with the columns that both clouds have. An inferred cloud without ``sigma_m`` gets it
@@ -39,12 +42,14 @@ def fuse(sensor: PointCloud, inferred: PointCloud, mode: FusionMode) -> PointClo
         source=np.full(len(inferred), PointSource.INFERRED, dtype=np.uint8),
     )
     sensor = replace(sensor, source=np.full(len(sensor), PointSource.SENSOR, dtype=np.uint8))
-    admitted = inferred.select(_fills(sensor, inferred)) if mode == "fill" else inferred
+    admitted = inferred.select(_fills(sensor, inferred, measured)) if mode == "fill" else inferred
     return PointCloud.concatenate([sensor, admitted])
 
 
-def _fills(sensor: PointCloud, inferred: PointCloud) -> BoolArray:
+def _fills(sensor: PointCloud, inferred: PointCloud, measured: BoolArray | None) -> BoolArray:
     """(N,) True for the inferred points that lie where the sensor saw nothing."""
+    if measured is not None and inferred.pixels is not None:
+        return ~measured[inferred.pixels[:, 1], inferred.pixels[:, 0]]
     if not len(sensor):
         return np.ones(len(inferred), dtype=bool)
     if sensor.pixels is not None and inferred.pixels is not None:

@@ -101,6 +101,18 @@ def reconstruct_surface(
     return measured(roll_ball(cloud, radii_m), cameras, len(cloud))
 
 
+def roll_or_nothing(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
+    """``roll_ball``, with a surface of no triangle where the balls fall through everywhere.
+
+    Raises:
+        InputError: as ``roll_ball``.
+    """
+    try:
+        return roll_ball(cloud, radii_m)
+    except ReconstructionError:
+        return Surface(np.empty((0, 3)), np.empty((0, 3), np.int32), None, tuple(radii_m))
+
+
 def _why_nothing(cloud: PointCloud, radius_m: float) -> str:
     r_F_m, sigma_D_m = spacing(cloud.points_m)
     if radius_m < r_F_m / 2:

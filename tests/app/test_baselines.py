@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from app.chain import ball_clouds
 from app.screens.surface.baselines_job import baseline_job
-from app.state import Source, Spec
+from app.state import Spec
 from packetmesh.errors import InputError
+from packetmesh.progress import drain as end
 from packetmesh.settings import with_settings
+from pipeline.sources import Demo
 from pipeline.surface import radii
-from tests.app.answers import end
 from tests.app.gltf import arrays
 
-SPEC = Spec(Source(scene="box-on-table"))
+SPEC = Spec(Demo("box-on-table"))
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def views(store):
 
 @pytest.fixture(scope="module")
 def clouds(store):
-    return end(ball_clouds(store, SPEC))
+    return end(store.stage(SPEC, "clouds"))
 
 
 @pytest.mark.parametrize("name", ["poisson", "alpha"])
@@ -38,9 +38,9 @@ def test_a_baseline_is_measured_as_the_ball_is(views, name):
 
 
 def test_the_notes_are_one_sentence_with_the_parameters(views, clouds):
-    largest_m = radii(SPEC.config.surface, clouds.spacing.r_F_m, clouds.spacing.sigma_D_m)[-1]
+    largest_m = radii(SPEC.config.surface, clouds.r_F_m, clouds.sigma_D_m)[-1]
     assert f"alpha {100 * largest_m:.3g} cm, the radius of the largest ball" in views["alpha"].note
-    assert f"for a point spacing of {100 * clouds.spacing.r_F_m:.3g} cm" in views["poisson"].note
+    assert f"for a point spacing of {100 * clouds.r_F_m:.3g} cm" in views["poisson"].note
     for view in views.values():
         assert view.note.endswith(".")
         assert ". " not in view.note

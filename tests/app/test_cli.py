@@ -10,8 +10,9 @@ import pytest
 from app.cli import main
 from lab.benchmarks import cases as benchmarks
 from lab.benchmarks.benchmark import Benchmark
-from pipeline.io import read_cloud, read_mesh
+from pipeline.io.clouds import read_cloud
 from pipeline.io.demos import DEMO_SCENES
+from pipeline.io.meshes import read_mesh
 from tests.paths import ASSETS
 
 pytestmark = pytest.mark.xdist_group("cli")  # one worker makes the shared run once

@@ -9,7 +9,7 @@ import pytest
 from app.cli import main
 from app.drawing.colors import HOLE
 from pipeline.depth import DepthNetwork
-from pipeline.io import read_color
+from pipeline.io.images import read_color
 from tests.paths import ASSETS
 
 PAIR = ASSETS / "scenes" / "box-on-table" / "node_00"

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from app.cli import main
-from pipeline.io import read_mesh, write_cloud
+from pipeline.io.clouds import write_cloud
+from pipeline.io.meshes import read_mesh
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import perforated_plane, sphere
 

@@ -8,7 +8,7 @@ import pytest
 
 from app.cli import main
 from pipeline.geometry import apply, inverse, rigid, rotation_exp
-from pipeline.io import read_cloud, write_cloud
+from pipeline.io.clouds import read_cloud, write_cloud
 from pipeline.registration import point_error_m
 from pipeline.registration.methods import METHODS
 from pipeline.registration.peers import available_peers

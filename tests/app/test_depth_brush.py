@@ -62,7 +62,7 @@ def test_a_ray_beside_behind_or_without_a_cloud_means_nothing():
     assert picked_point(np.empty((0, 3)), np.zeros(3), FORWARD) is None
 
 
-def test_a_disc_is_where_it_was_put_and_as_large_as_wished():
+def test_a_disc_is_where_it_was_put_and_as_large_as_asked():
     assert disc_px(disc_at(31, 102, WIDTH_PX, HEIGHT_PX, 0.25), WIDTH_PX, HEIGHT_PX) == pytest.approx(
         (31.0, 102.0, 20.0)
     )

@@ -91,9 +91,9 @@ def test_confidence_is_bright_where_sure_and_marks_what_is_left_out():
 
 def test_captions_name_both_sides_and_only_what_has_colours_has_a_bar():
     bar = ColorBar((RED, BLUE), ("0 cm", "7 cm"))
-    told = captions_html(Picture(plain(RED), "A <b>"), Picture(plain(BLUE), "B", bar))
-    assert told.index("A &lt;b&gt;.") < told.index("Right:") < told.index("B.") < told.index("0 cm")
-    assert told.count("linear-gradient(to right, #c80a14, #053cbe)") == told.count("linear-gradient") == 1
+    text = captions_html(Picture(plain(RED), "A <b>"), Picture(plain(BLUE), "B", bar))
+    assert text.index("A &lt;b&gt;.") < text.index("Right:") < text.index("B.") < text.index("0 cm")
+    assert text.count("linear-gradient(to right, #c80a14, #053cbe)") == text.count("linear-gradient") == 1
 
 
 def test_residuals_have_their_median_and_rms_marked_in_centimetres():
@@ -197,5 +197,5 @@ def test_all_five_pictures_have_names():
 def test_the_screen_needs_nothing_heavy():
     heavy = "{'onnxruntime', 'open3d', 'numba', 'pipeline.surface', 'pipeline.depth'}"
     script = f"import sys, app.screens.depth; print({heavy} & set(sys.modules))"
-    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert told.stdout.strip() == "set()"
+    text = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert text.stdout.strip() == "set()"

@@ -11,21 +11,22 @@ from app.records import Picture
 from app.screens.depth import hide as hide_folder
 from app.screens.depth.hide import BESIDE, BUTTON, HideFolder, fills_table, painted_line
 from app.screens.depth.labels import BLANK, MEASURED, OURS, PEER_NAMES
-from app.screens.depth.network import AS_IT_SAYS, LIMIT_BYTES, SHIPPED, NetworkFolder, network_table
+from app.screens.depth.model import AS_IT_SAYS, LIMIT_BYTES, SHIPPED, ModelFolder, model_table
 from app.screens.depth.numbers import LINES, fitted_line
-from app.screens.depth.settings import with_network
-from app.screens.depth.view import Disc, FillRow, HiddenView, HideWish, NetworkView, NetworkWish, SeenSample
-from app.state import Source, Spec
+from app.screens.depth.settings import with_model
+from app.screens.depth.view import Disc, FillRow, HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
+from app.state import Spec
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig, PipelineConfig
 from pipeline.depth.alignment import ALIGNMENTS, align_depth
+from pipeline.sources import Demo
 from pipeline.types import DepthMap
 
 PICTURE = Picture(np.zeros((4, 6, 3), np.uint8), "x")
 NEAREST = PEER_NAMES["nearest"]
 ROWS = (FillRow(OURS, 0.0314, 0.81, 1.0, 0.2), FillRow(NEAREST, float("nan"), 0.0, 0.0, 0.004))
 ANSWER = HiddenView(
-    HideWish(), "node_01", 1234, ROWS, dict.fromkeys((MEASURED, BLANK, OURS, NEAREST), PICTURE)
+    HideRequest(), "node_01", 1234, ROWS, dict.fromkeys((MEASURED, BLANK, OURS, NEAREST), PICTURE)
 )
 
 
@@ -81,9 +82,9 @@ def painted(server):
 def test_the_sliders_say_in_percent_what_is_hidden(hide):
     folder, hand = hide
     disc = Disc(0.25, 0.4, 0.1)
-    folder.ask(HideWish(3, (Disc(), disc)))
+    folder.ask(HideRequest(3, (Disc(), disc)))
     assert (folder._x.value, folder._y.value, folder._size.value) == (25, 40, 10)
-    assert hand.asked == [HideWish(0, (Disc(), disc))]
+    assert hand.asked == [HideRequest(0, (Disc(), disc))]
     assert folder._status.content == hide_folder.WAITING
     folder._add()
     assert folder.discs == (Disc(), disc, disc)
@@ -93,7 +94,7 @@ def test_the_button_hides_the_disc_of_the_sliders_if_nothing_is_painted(hide):
     folder, hand = hide
     folder._ask()
     folder._ask()
-    assert hand.asked == [HideWish(0, (Disc(),)), HideWish(0, (Disc(),))]
+    assert hand.asked == [HideRequest(0, (Disc(),)), HideRequest(0, (Disc(),))]
 
 
 def test_clicks_with_the_brush_paint_where_the_point_is_seen(hide, server):
@@ -147,29 +148,29 @@ def test_the_answer_is_shown_and_forgotten_with_other_settings(hide):
 
 
 def test_the_table_has_every_way_with_its_errors():
-    told = fills_table(ANSWER)
-    assert all(text in told for text in (OURS, NEAREST, "0.031", "81 %", "100 %", "200 ms", "–", "0 %"))
+    text = fills_table(ANSWER)
+    assert all(part in text for part in (OURS, NEAREST, "0.031", "81 %", "100 %", "200 ms", "–", "0 %"))
 
 
 @pytest.fixture
 def network(server, tmp_path):
     hand = Hand()
-    return NetworkFolder(server.gui, hand.post, hand.changed, tmp_path, hand.asked.append), hand
+    return ModelFolder(server.gui, hand.post, hand.changed, tmp_path, hand.asked.append), hand
 
 
 def uploaded(name, content=b"onnx"):
     return SimpleNamespace(name=name, content=content)
 
 
-def test_a_preset_and_a_kind_are_wished_with_the_file(network):
+def test_a_preset_and_a_kind_are_chosen_with_the_file(network):
     _, hand = network
     hand.change("Preset", "midas-small")
     hand.change("Gives", "inverse")
     hand.change("Preset", AS_IT_SAYS)
     assert hand.asked == [
-        NetworkWish(None, "midas-small"),
-        NetworkWish(None, "midas-small", "inverse"),
-        NetworkWish(None, None, "inverse"),
+        ModelChoice(None, "midas-small"),
+        ModelChoice(None, "midas-small", "inverse"),
+        ModelChoice(None, None, "inverse"),
     ]
 
 
@@ -177,12 +178,12 @@ def test_an_upload_is_kept_in_the_folder_listed_and_tried(network, tmp_path):
     folder, hand = network
     folder._keep(uploaded("mine.onnx", b"1"))
     folder._keep(uploaded("../mine.onnx", b"2"))
-    paths = [Path(wish.model) for wish in hand.asked]
+    paths = [Path(request.model) for request in hand.asked]
     assert [path.read_bytes() for path in paths] == [b"1", b"2"]
     assert {path.parent for path in paths} == {tmp_path}
     assert folder._model.options == (SHIPPED, "mine.onnx", "mine.onnx′")
     hand.change("Network file", SHIPPED)
-    assert hand.asked[-1] == NetworkWish()
+    assert hand.asked[-1] == ModelChoice()
 
 
 def test_a_huge_upload_is_one_sentence_and_not_kept(network, tmp_path):
@@ -202,7 +203,7 @@ def test_what_cannot_be_used_waits_for_what_it_expects_to_be_said(network):
     assert "before is kept" in folder._status.content
     assert folder._model.value == "odd.onnx"
     hand.change("Preset", "midas-small")
-    assert hand.asked[-1] == NetworkWish(hand.asked[0].model, "midas-small")
+    assert hand.asked[-1] == ModelChoice(hand.asked[0].model, "midas-small")
     folder.write(DepthConfig())
     assert (folder._model.value, folder._preset.value) == (SHIPPED, AS_IT_SAYS)
 
@@ -214,9 +215,9 @@ def test_only_a_foreign_network_can_be_told_its_input(network):
     assert folder._advanced.visible
     folder._size.value, folder._normalisation.value = (384.0, 256.0), "unit"
     folder._chosen()
-    assert hand.asked[-1] == NetworkWish(hand.asked[0].model, None, None, 384, 256, "unit")
+    assert hand.asked[-1] == ModelChoice(hand.asked[0].model, None, None, 384, 256, "unit")
     hand.change("Network file", SHIPPED)
-    assert hand.asked[-1] == NetworkWish()
+    assert hand.asked[-1] == ModelChoice()
     assert not folder._advanced.visible
 
 
@@ -235,23 +236,23 @@ def test_a_network_from_the_command_line_is_listed_by_its_name(network):
 
 def test_the_network_tells_what_it_is(network):
     folder, _ = network
-    view = NetworkView(NetworkWish(), "inverse", "CPUExecutionProvider", 0.023, 5_000_000, {"licence": "MIT"})
+    view = ModelView(ModelChoice(), "inverse", "CPUExecutionProvider", 0.023, 5_000_000, {"licence": "MIT"})
     folder.load(view)
     assert "line of 1/depth" in folder._status.content
-    told = network_table(view)
+    text = model_table(view)
     assert all(
-        text in told
-        for text in ("inverse depth", "CPUExecutionProvider", "23 ms", "5.0 MB", "licence", "MIT")
+        part in text
+        for part in ("inverse depth", "CPUExecutionProvider", "23 ms", "5.0 MB", "licence", "MIT")
     )
 
 
 def test_the_edit_takes_the_network_and_nothing_else():
-    wish = NetworkWish("a.onnx", "midas-small", "inverse", 384, 256, "unit")
-    config = with_network(wish)(PipelineConfig())
+    request = ModelChoice("a.onnx", "midas-small", "inverse", 384, 256, "unit")
+    config = with_model(request)(PipelineConfig())
     assert config.depth == DepthConfig("a.onnx", "midas-small", "inverse", 384, 256, "unit")
-    told = Spec(Source(scene="office"), config=config).command()
-    assert "depth.input_width_px=384 depth.input_height_px=256 depth.normalisation=unit" in told
-    assert with_network(NetworkWish())(config) == PipelineConfig()
+    text = Spec(Demo("office"), config=config).command()
+    assert "depth.input_width_px=384 depth.input_height_px=256 depth.normalisation=unit" in text
+    assert with_model(ModelChoice())(config) == PipelineConfig()
 
 
 def test_the_local_mode_of_disparity_has_another_line():
@@ -263,9 +264,9 @@ def test_the_local_mode_of_disparity_has_another_line():
 def test_every_alignment_has_its_line_written_out(mode):
     z_m = np.linspace(1.0, 4.0, 400, dtype=np.float32).reshape(20, 20)
     result = align_depth(DepthMap(z_m, "relative"), DepthMap(2.0 * z_m), mode)
-    told = fitted_line(
+    text = fitted_line(
         SimpleNamespace(alignment_mode=mode, disparity=False, coefficients=result.coefficients)
     )
-    assert told == LINES[mode].format(**result.coefficients)
-    assert "2.000" in told or mode in ("none", "affine_inverse")
-    assert "0.500" in told or mode != "affine_inverse"
+    assert text == LINES[mode].format(**result.coefficients)
+    assert "2.000" in text or mode in ("none", "affine_inverse")
+    assert "0.500" in text or mode != "affine_inverse"

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.chain import network_for, prepared, rig_of
 from app.drawing.colors import HOLE
 from app.drawing.pictures import UNKNOWN, confidence_colors
 from app.screens.depth.discs import window_around
@@ -25,26 +24,28 @@ from app.screens.depth.labels import (
     PICTURES,
     SENSOR,
 )
-from app.screens.depth.network_job import network_job
-from app.screens.depth.view import Disc, HideWish, NetworkWish, SeenSample
-from app.state import Source, Spec
+from app.screens.depth.model_job import model_job
+from app.screens.depth.view import Disc, HideRequest, ModelChoice, SeenSample
+from app.state import Spec
 from packetmesh.errors import InputError
+from packetmesh.progress import drain as end
 from pipeline.config import DepthConfig
+from pipeline.depth import DepthNetwork
 from pipeline.depth.confidence import judge
 from pipeline.depth.conventions import PRESETS
 from pipeline.depth.fillers import PEERS
 from pipeline.depth.inference import SHIPPED_MODEL
+from pipeline.sources import Demo
 from pipeline.types import DepthMap
-from tests.app.answers import end
 
-SPEC = Spec(Source(scene="box-on-table"))
-FLAT = HideWish(0, (Disc(0.15, 0.35, 0.2),))
+SPEC = Spec(Demo("box-on-table"))
+FLAT = HideRequest(0, (Disc(0.15, 0.35, 0.2),))
 """On the wall, where depth is a plane."""
 
 
 @pytest.fixture(scope="module")
 def rig(store):
-    return end(rig_of(store, SPEC))
+    return end(store.stage(SPEC, "rig"))
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +72,7 @@ def test_every_node_has_all_five_pictures_of_one_size(rig, view):
 
 
 def test_what_is_unknown_is_marked_in_each_picture(store, rig, view):
-    for frame, clouds, node in zip(rig.frames, end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
+    for frame, clouds, node in zip(rig.frames, end(store.stage(SPEC, "nodes")), view.nodes, strict=True):
         measured, inferred = frame.depth.valid, clouds.alignment.depth.valid
         np.testing.assert_array_equal(colored(node.pictures[SENSOR], HOLE), ~measured)
         np.testing.assert_array_equal(colored(node.pictures[INFERRED], HOLE), ~inferred)
@@ -88,7 +89,7 @@ def test_wide_images_are_thinned_alike(store, rig, monkeypatch):
 
 def test_the_confidence_of_every_drawn_point_is_that_of_its_pixel(store, rig, view):
     config = SPEC.config.depth
-    for frame, clouds, node in zip(rig.frames, end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
+    for frame, clouds, node in zip(rig.frames, end(store.stage(SPEC, "nodes")), view.nodes, strict=True):
         judged = judge(clouds.alignment, frame.depth, frame.rgb, config.reach, config.least_confidence)
         rows = {tuple(point): row for row, point in enumerate(clouds.inferred.points_m.astype(np.float32))}
         for drawn, colors in (
@@ -111,7 +112,7 @@ def test_the_drawn_sensor_points_know_their_pixels(rig, view):
 
 
 def test_the_residuals_are_those_of_the_alignment(store, view):
-    for clouds, node in zip(end(prepared(store, SPEC)).nodes, view.nodes, strict=True):
+    for clouds, node in zip(end(store.stage(SPEC, "nodes")), view.nodes, strict=True):
         assert node.residuals.rms_m == pytest.approx(clouds.alignment.residual_rms_m, rel=1e-5)
         assert abs(node.residuals.median_m) < node.residuals.rms_m
 
@@ -206,7 +207,7 @@ def test_the_hidden_disc_is_blank_then_filled_and_nothing_else_changes(rig, hidd
 
 def test_the_pictures_show_the_region_around_all_discs(store, rig):
     discs = (Disc(0.15, 0.35, 0.1), Disc(0.45, 0.35, 0.1))
-    both = end(hide_job(store, SPEC, HideWish(0, discs)))
+    both = end(hide_job(store, SPEC, HideRequest(0, discs)))
     assert both.hidden_px == hidden_pixels(rig.frames[0].depth, discs).sum()
     rows, columns = window_around(discs, *rig.frames[0].rgb.shape[1::-1])
     shown = both.pictures[BLANK].rgb
@@ -250,21 +251,20 @@ def test_the_words_of_the_screen_are_those_of_the_pipeline():
 
 
 def test_the_network_that_ships_says_what_it_is():
-    view = end(network_job(NetworkWish()))
-    assert (view.wish, view.kind) == (NetworkWish(), "relative")
+    view = end(model_job(ModelChoice()))
+    assert (view.choice, view.kind) == (ModelChoice(), "relative")
     assert view.provider.endswith("ExecutionProvider")
     assert view.size_bytes == SHIPPED_MODEL.stat().st_size
     assert 0.0 < view.inference_s < 30.0
 
 
-def test_the_network_wished_is_fed_as_wished(tmp_path):
+def test_a_chosen_model_is_fed_as_its_choice_says(tmp_path):
     networks = pytest.importorskip("tests.pipeline.depth.networks")
     file = networks.input_side(tmp_path / "n.onnx", 3)
-    wish = NetworkWish(str(file), None, "metric", 96, 64, "unit")
-    assert end(network_job(wish)).wish == wish
-    convention = network_for(wish.put_into(DepthConfig())).convention
+    request = ModelChoice(str(file), None, "metric", 96, 64, "unit")
+    assert end(model_job(request)).choice == request
+    convention = DepthNetwork.of(request.put_into(DepthConfig())).convention
     assert (convention.width_px, convention.height_px, convention.normalised_inside) == (96, 64, True)
-    assert network_for(replace(wish.put_into(DepthConfig()), reach=0.3)).convention is convention
 
 
 @pytest.mark.parametrize(
@@ -280,7 +280,7 @@ def test_a_bad_input_size_is_one_sentence(tmp_path, width_px, height_px, sentenc
     networks = pytest.importorskip("tests.pipeline.depth.networks")
     file = networks.input_side(tmp_path / "n.onnx", 3)
     with pytest.raises(InputError, match=sentence) as refused:
-        end(network_job(NetworkWish(str(file), "midas-small", None, width_px, height_px)))
+        end(model_job(ModelChoice(str(file), "midas-small", None, width_px, height_px)))
     assert "\n" not in str(refused.value)
 
 
@@ -288,4 +288,4 @@ def test_a_file_that_is_no_network_is_one_sentence(tmp_path):
     path = tmp_path / "mine.onnx"
     path.write_bytes(b"not a network")
     with pytest.raises(InputError, match=r"mine\.onnx is not a readable ONNX network"):
-        end(network_job(NetworkWish(str(path))))
+        end(model_job(ModelChoice(str(path))))

@@ -6,7 +6,7 @@ import pytest
 from app.screens.depth.hide_job import hidden_pixels
 from app.screens.depth.labels import CONFIDENCE, DIFFERENCE, EVERYWHERE, INFERRED, PHOTO, SENSOR
 from app.screens.depth.lesson import DepthLook, depth_lesson
-from app.screens.depth.view import Disc, HideWish
+from app.screens.depth.view import Disc, HideRequest
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork, align_depth
@@ -41,7 +41,7 @@ def test_a_stop_sets_what_it_names_and_leaves_the_rest_as_the_screen_begins(tmp_
     begin = DepthConfig()
     assert (bare.look.alignment, bare.look.reach) == (begin.alignment, begin.reach)
     assert bare.look == DepthLook()
-    hide = HideWish(0, (Disc(0.3, 0.625, 0.2),))
+    hide = HideRequest(0, (Disc(0.3, 0.625, 0.2),))
     assert full.look == DepthLook(
         DIFFERENCE, CONFIDENCE, 0.3, "median", "confidence", EVERYWHERE, 0.07, 0.4, hide
     )
@@ -122,9 +122,9 @@ def test_confidence_and_what_is_left_out_are_as_the_lesson_says(room):
 
 @pytest.mark.parametrize("scene", ["living-room", "office", "workshop", "box-on-table"])
 def test_what_the_last_stop_hides_was_measured_in_every_scene(scene):
-    wish = look_at("Hide what you know").hide
+    request = look_at("Hide what you know").hide
     for frame in load_demo(scene).frames:
         columns = frame.depth.z_m.shape[1]
-        (disc,) = wish.discs
+        (disc,) = request.discs
         disc_px = np.pi * (0.5 * disc.size_share * columns) ** 2
-        assert hidden_pixels(frame.depth, wish.discs).sum() > 0.8 * disc_px
+        assert hidden_pixels(frame.depth, request.discs).sum() > 0.8 * disc_px

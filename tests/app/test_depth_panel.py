@@ -12,11 +12,12 @@ from app.screens.depth.brush import painted
 from app.screens.depth.labels import COLORINGS, EVERYWHERE, HOLES, OURS, UNSEEN
 from app.screens.depth.lesson import depth_lesson
 from app.screens.depth.panel import DepthPanel
-from app.screens.depth.view import NetworkWish
-from app.state import Results, Source, Spec
+from app.screens.depth.view import ModelChoice
+from app.state import Results, Spec
 from packetmesh.errors import PacketMeshError
+from packetmesh.progress import drain as end
 from pipeline.depth.inference import SHIPPED_MODEL
-from tests.app.answers import end
+from pipeline.sources import Demo
 
 pytestmark = pytest.mark.xdist_group("depth panel")
 
@@ -27,8 +28,8 @@ class Session:
     def __init__(self, server, store, folder):
         self.target, self.gui, self.scene = server, server.gui, server.scene
         self.store, self.folder = store, folder
-        self.spec = Spec(Source(scene="box-on-table"))
-        self.results, self.told = Results(), []
+        self.spec = Spec(Demo("box-on-table"))
+        self.results, self.notices = Results(), []
         self.panel = DepthPanel(self)
         server.scene.add_frame("/depth", show_axes=False)
         self.panel.build()
@@ -53,7 +54,7 @@ class Session:
         try:
             view = end(jobs.run(job, *arguments))
         except PacketMeshError as error:
-            self.told.append(str(error))
+            self.notices.append(str(error))
             view = None
         on_end(view)
 
@@ -103,17 +104,17 @@ def test_a_bad_network_is_one_sentence_and_the_settings_stay(session, tmp_path):
     path = tmp_path / "bad.onnx"
     path.write_bytes(b"nonsense")
     before = session.spec
-    session.panel._choose_network(NetworkWish(str(path)))
+    session.panel._choose_model(ModelChoice(str(path)))
     assert session.spec == before
-    assert "bad.onnx is not a readable ONNX network" in session.told.pop()
+    assert "bad.onnx is not a readable ONNX network" in session.notices.pop()
     assert "before is kept" in session.panel._network._status.content
 
 
 def test_the_network_that_ships_can_be_chosen_as_a_file(session):
-    session.panel._choose_network(NetworkWish(str(SHIPPED_MODEL), "packetmesh"))
+    session.panel._choose_model(ModelChoice(str(SHIPPED_MODEL), "packetmesh"))
     assert session.spec.config.depth.model == str(SHIPPED_MODEL)
     assert session.panel._network._model.value == SHIPPED_MODEL.name
-    session.panel._choose_network(NetworkWish())
+    session.panel._choose_model(ModelChoice())
     assert session.spec.config.depth.model is None
 
 
@@ -152,7 +153,7 @@ def test_discs_of_another_scene_are_cleared_and_those_of_other_settings_stay(ses
     panel._hide._add()
     panel.on_spec(spec.with_preset("thesis"))
     assert len(panel._hide.discs) == 1
-    panel.on_spec(replace(spec, source=Source(scene="office")))
+    panel.on_spec(replace(spec, source=Demo("office")))
     assert panel._hide.discs == ()
     panel.on_spec(spec)
 
@@ -173,7 +174,7 @@ def test_every_stop_of_the_lesson_sets_the_screen_as_it_says(session):
         assert COLORINGS[panel._coloring.value] == look.coloring
         assert panel._hide._area._image.visible == (look.hide is not None)
     assert OURS in panel._hide._table.content
-    assert not session.told
+    assert not session.notices
     session.edit(lambda config: replace(config, depth=replace(config.depth, alignment="median")))
     assert not panel._hide._area._image.visible
     assert panel._hide._table.content == ""

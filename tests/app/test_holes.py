@@ -5,37 +5,36 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from app.chain import ball_clouds, cameras_of, placed, prepared, rig_of, rolled
 from app.screens.surface.holes_job import explain_job, fill_job, hole_views, parts_of, views_of
-from app.state import Source, Spec
+from app.state import Spec
 from packetmesh.errors import InputError
+from packetmesh.progress import drain as end
 from pipeline.config import PipelineConfig
+from pipeline.sources import Demo
+from pipeline.stages import cameras_of
 from pipeline.surface.boundary import boundary_loops
 from pipeline.surface.hole_diagnosis import explain_hole
 from pipeline.surface.holes import find_holes
-from tests.app.answers import end
 from tests.app.gltf import arrays, srgb
 
 CONFIG = PipelineConfig()
-SPEC = Spec(
-    Source(scene="box-on-table"), config=replace(CONFIG, surface=replace(CONFIG.surface, max_points=8_000))
-)
+SPEC = Spec(Demo("box-on-table"), config=replace(CONFIG, surface=replace(CONFIG.surface, max_points=8_000)))
 LONGEST_CM = 60.0
 
 
 @pytest.fixture(scope="module")
 def rig(store):
-    return end(rig_of(store, SPEC))
+    return end(store.stage(SPEC, "rig"))
 
 
 @pytest.fixture(scope="module")
 def balls(store):
-    return end(rolled(store, SPEC))
+    return {which: end(store.stage(SPEC, which)) for which in ("after", "before")}
 
 
 @pytest.fixture(scope="module")
 def holes(balls):
-    return {"after": hole_views(balls.after), "before": hole_views(balls.before)}
+    return {which: hole_views(surface) for which, surface in balls.items()}
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +48,7 @@ def polygon_length_m(loop_m):
 
 @pytest.mark.parametrize("which", ["after", "before"])
 def test_every_boundary_loop_is_a_hole_or_a_rim(balls, holes, which):
-    surface, views = getattr(balls, which), holes[which]
+    surface, views = balls[which], holes[which]
     loops = boundary_loops(surface.triangles)
     assert len(views) == len(loops) > 3
     assert sum(len(view.loop_m) for view in views) == sum(map(len, loops))
@@ -67,10 +66,10 @@ def test_every_boundary_loop_is_a_hole_or_a_rim(balls, holes, which):
 
 
 def test_views_say_what_each_registered_camera_knows(store, rig):
-    work, places = end(prepared(store, SPEC)), end(placed(store, SPEC))
-    views = views_of(rig, work.nodes, places)
+    nodes, placement = end(store.stage(SPEC, "nodes")), end(store.stage(SPEC, "placement"))
+    views = views_of(rig, nodes, placement)
     assert len(views) == len(rig.frames)
-    for view, camera, frame, node in zip(views, cameras_of(rig, places), rig.frames, work.nodes, strict=True):
+    for view, camera, frame, node in zip(views, cameras_of(rig, placement), rig.frames, nodes, strict=True):
         np.testing.assert_array_equal(view.camera.T_world_camera, camera.T_world_camera)
         np.testing.assert_array_equal(view.sensor_valid, np.isfinite(frame.depth.z_m))
         np.testing.assert_array_equal(view.inferred_valid, np.isfinite(node.alignment.depth.z_m))
@@ -78,7 +77,7 @@ def test_views_say_what_each_registered_camera_knows(store, rig):
 
 @pytest.mark.parametrize("which", ["after", "before"])
 def test_the_parts_of_all_rays_add_up_and_agree_with_the_no_hit_share(store, balls, which):
-    surface = getattr(balls, which)
+    surface = balls[which]
     parts = end(parts_of(store, SPEC, surface))
     missed = parts.missed_measured + parts.missed_inferred + parts.missed_unknown
     assert missed == pytest.approx(surface.quality.no_hit_ray_share, abs=1e-9)
@@ -88,11 +87,11 @@ def test_the_parts_of_all_rays_add_up_and_agree_with_the_no_hit_share(store, bal
 
 @pytest.mark.parametrize(("which", "index"), [("after", 0), ("after", 3), ("before", 0), ("before", -1)])
 def test_a_hole_is_explained_by_its_own_surface_cloud_and_cameras(store, rig, balls, which, index):
-    surface = getattr(balls, which)
+    surface = balls[which]
     holes = find_holes(surface.vertices_m, surface.triangles)
     index %= len(holes)
-    clouds = end(ball_clouds(store, SPEC))
-    views = views_of(rig, end(prepared(store, SPEC)).nodes, end(placed(store, SPEC)))
+    clouds = end(store.stage(SPEC, "clouds"))
+    views = views_of(rig, end(store.stage(SPEC, "nodes")), end(store.stage(SPEC, "placement")))
     cloud = {"after": clouds.fused, "before": clouds.sensor}[which]
     expected = asdict(explain_hole(holes[index], surface, cloud, views))
     answer = asdict(end(explain_job(store, SPEC, which, index)))
@@ -114,9 +113,9 @@ def test_a_hole_that_is_not_there_is_one_sentence(store, index):
 def test_filling_closes_the_small_holes_and_leaves_the_rims(balls, holes, filled):
     small = [hole for hole in holes["after"] if not hole.rim and hole.length_m <= LONGEST_CM / 100.0]
     assert 0 < filled.holes <= len(small)
-    assert filled.mesh.triangles > len(balls.after.triangles)
-    assert filled.mesh.vertices == len(balls.after.vertices_m)
-    before, after = balls.after.quality, filled.mesh.quality
+    assert filled.mesh.triangles > len(balls["after"].triangles)
+    assert filled.mesh.vertices == len(balls["after"].vertices_m)
+    before, after = balls["after"].quality, filled.mesh.quality
     assert after.area_m2 == pytest.approx(before.area_m2 + filled.area_m2)
     assert after.hole_area_m2 < before.hole_area_m2
     assert after.no_hit_ray_share < before.no_hit_ray_share
@@ -140,5 +139,5 @@ def test_what_is_invented_is_drawn_in_its_own_colour_and_nothing_else(filled):
 def test_filling_nothing_changes_nothing(store, balls):
     view = end(fill_job(store, SPEC, 0.1))
     assert (view.holes, view.area_m2) == (0, 0.0)
-    assert view.mesh.triangles == len(balls.after.triangles)
-    assert view.mesh.quality == balls.after.quality
+    assert view.mesh.triangles == len(balls["after"].triangles)
+    assert view.mesh.quality == balls["after"].quality

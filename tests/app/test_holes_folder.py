@@ -148,14 +148,14 @@ class Screen:
     """The folder with what it asked for and what a person can do to it."""
 
     def __init__(self, server):
-        self.asked, self.wished, self.actions = [], [], {}
+        self.asked, self.requested, self.actions = [], [], {}
         self.folder = HolesFolder(
             server.gui,
             server.scene,
             lambda function, *arguments: function(*arguments),
             lambda handle, action: self.actions.__setitem__(handle.label, (handle, action)),
             lambda which, index: self.asked.append((which, index)),
-            self.wished.append,
+            self.requested.append,
         )
         self.list = self.actions["Hole"][0]
 
@@ -269,7 +269,7 @@ def test_side_by_side_invites_a_click_and_forgetting_empties(screen):
 def test_the_slider_asks_for_metres_and_nothing_at_zero(screen):
     screen.change("Fill small holes up to (cm)", 25.0)
     screen.change("Fill small holes up to (cm)", 0.0)
-    assert screen.wished == [0.25, None]
+    assert screen.requested == [0.25, None]
 
 
 def test_an_answer_that_comes_after_filling_was_turned_off_is_not_told(screen):
@@ -287,10 +287,10 @@ def test_an_answer_that_comes_after_filling_was_turned_off_is_not_told(screen):
 def test_sentences_carry_the_numbers(screen):
     assert parts_sentence(PartsView(0.5, 0.3, 0.05, 0.1, 0.05)).count("%") == 6
     assert " 20.0 % miss it: 5.0 % though" in parts_sentence(PartsView(0.5, 0.3, 0.05, 0.1, 0.05))
-    told = filled_sentence(FILLED)
-    assert "**3 holes filled, 123.0 cm².**" in told
-    assert "3.1 %" in told
-    assert "87.0 %" in told
+    text = filled_sentence(FILLED)
+    assert "**3 holes filled, 123.0 cm².**" in text
+    assert "3.1 %" in text
+    assert "87.0 %" in text
     assert "F-score" not in filled_sentence(replace(FILLED, mesh=replace(MESH, truth=None)))
     assert filled_sentence(FilledView(MESH, 0, 0.0)).startswith("No hole is that small")
 
@@ -298,5 +298,5 @@ def test_sentences_carry_the_numbers(screen):
 def test_the_folder_needs_nothing_heavy():
     heavy = "{'trimesh', 'open3d', 'numba', 'pipeline.surface'}"
     script = f"import sys, app.screens.surface.holes; print({heavy} & set(sys.modules))"
-    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert told.stdout.strip() == "set()"
+    text = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert text.stdout.strip() == "set()"

@@ -2,8 +2,8 @@
 
 import pytest
 import viser
-
 from app.lesson_folder import BEGIN, LessonFolder
+
 from app.records import Race, Start
 from app.screens.fuse.labels import STARTS
 from app.screens.fuse.lesson import race_lesson

@@ -12,11 +12,12 @@ from app import jobs
 from app.screens.network.labels import NETWORKS
 from app.screens.network.panel import CANCELLED, FAILED, ORIGIN, NetworkPanel
 from app.screens.network.view import What
-from app.state import Results, Source, Spec
+from app.state import Results, Spec
 from network_sim.config import PRESETS
 from packetmesh.errors import InputError, PacketMeshError
+from packetmesh.progress import drain as end
 from packetmesh.settings import with_settings
-from tests.app.answers import end
+from pipeline.sources import Demo
 
 pytestmark = pytest.mark.xdist_group("network panel")
 
@@ -28,8 +29,8 @@ class Session:
 
     def __init__(self, server, store):
         self.target, self.gui, self.scene = server, server.gui, server.scene
-        self.store, self.told, self.refuse = store, [], False
-        self.spec, self.results = Spec(Source(scene="box-on-table")), Results()
+        self.store, self.notices, self.refuse = store, [], False
+        self.spec, self.results = Spec(Demo("box-on-table")), Results()
         camera = SimpleNamespace(aspect=1.5, fov=0.9, position=None, look_at=None)
         self.client = SimpleNamespace(camera=camera, atomic=contextlib.nullcontext)
         self.panel = NetworkPanel(self)
@@ -53,7 +54,7 @@ class Session:
         try:
             views = None if self.refuse else end(jobs.run(job, *arguments))
         except PacketMeshError as error:
-            self.told.append(str(error))
+            self.notices.append(str(error))
             views = None
         on_end(views)
 
@@ -83,7 +84,7 @@ def test_the_first_visit_simulates_and_shows_nodes_numbers_and_timeline(session)
     assert view.config.nodes.image_bytes == 3000
     assert len(handle(session, "0/node").points) == 3
     assert len(handle(session, "0/sink").points) == 1
-    assert "simulated in" in panel._said.content
+    assert "simulated in" in panel._status.content
     assert "Image delivery ratio" in panel._table.content
     assert "<img" in panel._charts._rows[0].content
     assert session.client.camera.position[2] > 3.0
@@ -166,15 +167,15 @@ def test_a_second_run_gets_a_column_rows_and_a_place_beside(session):
 
 
 def test_a_wrong_key_names_the_nearest_and_keeps_what_was(session):
-    setup, before = session.panel._setup, session.panel._setup.wishes()
+    setup, before = session.panel._setup, session.panel._setup.runs()
     setup._text.value = "radio.shadow_db=3"
     with pytest.raises(InputError, match=r"try radio\.shadowing_db"):
         setup._use_text()
-    assert setup.wishes() == before
+    assert setup.runs() == before
     setup._text.value = "run.horizon_s=0"
     with pytest.raises(InputError, match=r"run\.horizon_s"):
         setup._use_text()
-    assert setup.wishes() == before
+    assert setup.runs() == before
 
 
 def test_cancelled_and_failed_runs_are_sentences_and_retry_runs_again(session):
@@ -183,12 +184,12 @@ def test_cancelled_and_failed_runs_are_sentences_and_retry_runs_again(session):
     panel._setup._seed.value = 7
     panel.on_action("Cancel")
     panel._run()
-    assert panel._said.content == FAILED
+    assert panel._status.content == FAILED
     assert panel._views == ()
-    panel._said.content = ""
+    panel._status.content = ""
     panel._cancelled = True
     panel._ended(panel._wanted, None)
-    assert panel._said.content == CANCELLED
+    assert panel._status.content == CANCELLED
     session.refuse = False
     panel.on_action("Retry")
     assert panel._views[0].config.run.seed == 7

@@ -11,14 +11,14 @@ from app.screens.network.draw import Flights, ground_of
 from app.screens.network.gantt import WIDTH_PX, Window, areas, cursor_html, gantt_html, paint, row_px, visible
 from app.screens.network.job import simulate_job, view_of
 from app.screens.network.labels import ACCESS, NETWORKS, SCHEMES, ways
-from app.screens.network.numbers import metric_tables, ran, value_text
-from app.screens.network.view import MetricRow, NetworkWish, Series, What
+from app.screens.network.numbers import metric_tables, runs_summary, value_text
+from app.screens.network.view import MetricRow, NetworkRun, Series, What
 from network_sim.config import PRESETS, NetworkConfig, RunConfig
 from network_sim.trace import Recorder
 from network_sim.types import Cause, EventKind, PacketKind
 from packetmesh.progress import Progress
+from packetmesh.progress import drain as end
 from packetmesh.settings import with_settings
-from tests.app.answers import end
 
 MS = 1_000_000
 NAMES, ROLES = ("node 1", "node 2", "sink"), ("node", "node", "sink")
@@ -165,7 +165,7 @@ def test_numbers_have_units_and_definitions(view):
     assert "Attempts lost channel" in others
     assert value_text(None) == "–"
     assert value_text(MetricRow("packet_delay_mean", 0.00137, "s", "")) == "1.37 ms"
-    assert "0.0 s of the network's time" in ran([view])
+    assert "0.0 s of the network's time" in runs_summary([view])
     assert all(metric.unit and metric.definition for metric in view.metrics)
 
 
@@ -182,24 +182,24 @@ def test_every_preset_can_be_run_in_every_way_that_is_offered(preset):
 
 def test_two_runs_are_simulated_with_progress_and_remembered(store):
     config = with_settings(NetworkConfig(), ("nodes.image_bytes=2000", "run.horizon_s=60"))
-    wishes = (NetworkWish("one", config), NetworkWish("other", with_settings(config, ("run.seed=1",))))
-    told = list(simulate_job(store, wishes))
-    assert all(isinstance(progress, Progress) for progress in told)
-    assert {progress.stage for progress in told} == {"simulating one", "simulating other"}
-    fractions = [progress.fraction for progress in told]
+    runs = (NetworkRun("one", config), NetworkRun("other", with_settings(config, ("run.seed=1",))))
+    steps = list(simulate_job(store, runs))
+    assert all(isinstance(progress, Progress) for progress in steps)
+    assert {progress.stage for progress in steps} == {"simulating one", "simulating other"}
+    fractions = [progress.fraction for progress in steps]
     assert fractions == sorted(fractions)
-    one, other = end(simulate_job(store, wishes))
+    one, other = end(simulate_job(store, runs))
     assert (one.label, other.label) == ("one", "other")
     assert (one.config.run.seed, other.config.run.seed) == (0, 1)
-    assert list(simulate_job(store, wishes[1:])) == []
+    assert list(simulate_job(store, runs[1:])) == []
     assert {PacketKind(int(kind)) for kind in one.pieces.carries} == {PacketKind.IMAGE}
 
 
 def test_a_run_without_a_log_has_numbers_and_says_that_nothing_is_drawn(store):
     config = with_settings(NetworkConfig(), ("nodes.image_bytes=2000", "run.keep=counters"))
-    (view,) = end(simulate_job(store, (NetworkWish("counted", config),)))
+    (view,) = end(simulate_job(store, (NetworkRun("counted", config),)))
     assert len(view.pieces) == 0
-    assert "no event was kept" in ran([view])
+    assert "no event was kept" in runs_summary([view])
     assert "Image delivery ratio" in metric_tables([view])[0]
     assert "<img" in gantt_html(view, Window(0, view.end_ns))
 

@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.chain import ball_clouds, cameras_of, placed, rig_of, rolled
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET
-from app.records import QUICK_POINTS, PaintWish
+from app.records import QUICK_POINTS, PaintRequest
 from app.screens.surface.labels import COLORINGS
 from app.screens.surface.legend import legend_html
 from app.screens.surface.paint_job import paint_job, vertex_colors
-from app.state import Source, Spec
+from app.state import Spec
+from packetmesh.progress import drain as end
 from pipeline.config import PipelineConfig
+from pipeline.sources import Demo
+from pipeline.stages import cameras_of
 from pipeline.surface import distances_to_truth_m
 from pipeline.types import PointSource
-from tests.app.answers import end
 from tests.app.gltf import arrays
 
 CONFIG = PipelineConfig()
@@ -23,7 +24,7 @@ CONFIG = PipelineConfig()
 
 def spec_of(points):
     surface = replace(CONFIG.surface, max_points=points)
-    return Spec(Source(scene="box-on-table"), config=replace(CONFIG, surface=surface))
+    return Spec(Demo("box-on-table"), config=replace(CONFIG, surface=surface))
 
 
 SPEC = spec_of(8_000)
@@ -32,12 +33,12 @@ SPEC = spec_of(8_000)
 @pytest.fixture(scope="module")
 def made(store):
     """Rig, cameras and the surface after fusion."""
-    rig, places = end(rig_of(store, SPEC)), end(placed(store, SPEC))
-    return rig, cameras_of(rig, places), end(rolled(store, SPEC)).after
+    rig, placement = end(store.stage(SPEC, "rig")), end(store.stage(SPEC, "placement"))
+    return rig, cameras_of(rig, placement), end(store.stage(SPEC, "after"))
 
 
 def test_the_settings_own_surfaces_are_painted_whole_with_their_rims(store, made):
-    view = end(paint_job(store, SPEC, PaintWish(("after", "before"), "source")))
+    view = end(paint_job(store, SPEC, PaintRequest(("after", "before"), "source")))
     assert set(view.meshes) == {"after", "before"}
     assert view.points == view.all_points
     assert view.meshes["after"].triangles == len(made[2].triangles)
@@ -45,27 +46,27 @@ def test_the_settings_own_surfaces_are_painted_whole_with_their_rims(store, made
 
 
 def test_a_quick_look_rolls_one_ball_over_what_is_shown_alone(store):
-    clouds = end(ball_clouds(store, SPEC))
+    clouds = end(store.stage(SPEC, "clouds"))
     small, large = (
-        end(paint_job(store, SPEC, PaintWish(("before",), "color", factor * clouds.spacing.r_F_m)))
+        end(paint_job(store, SPEC, PaintRequest(("before",), "color", factor * clouds.r_F_m)))
         for factor in (0.6, 2.0)
     )
     assert set(small.meshes) == {"before"}
     assert small.points == small.all_points == len(clouds.sensor)
     assert 0 < small.meshes["before"].triangles < 0.3 * large.meshes["before"].triangles
     assert not large.meshes["before"].rims_glb
-    none = end(paint_job(store, SPEC, PaintWish(("after",), "color", 1e-4)))
+    none = end(paint_job(store, SPEC, PaintRequest(("after",), "color", 1e-4)))
     assert (none.meshes["after"].glb, none.meshes["after"].triangles) == (b"", 0)
 
 
 def test_a_quick_look_at_a_large_cloud_thins_it(store):
     spec = spec_of(60_000)
-    view = end(paint_job(store, spec, PaintWish(("after",), "color", 0.02)))
+    view = end(paint_job(store, spec, PaintRequest(("after",), "color", 0.02)))
     assert view.all_points > 1.2 * QUICK_POINTS
     assert view.points == pytest.approx(QUICK_POINTS, rel=0.15)
     _, read = arrays(view.meshes["after"].glb)
     assert len(read["POSITION"]) <= view.points
-    fewer = end(paint_job(store, spec, PaintWish(("after",), "color", 0.02, QUICK_POINTS // 4)))
+    fewer = end(paint_job(store, spec, PaintRequest(("after",), "color", 0.02, QUICK_POINTS // 4)))
     assert fewer.points == pytest.approx(QUICK_POINTS // 4, rel=0.15)
 
 

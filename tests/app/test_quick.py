@@ -5,15 +5,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from app.debounce import Delay
-from app.records import QUICK_POINTS, PaintedView, PaintWish
+from app.debounce import Debounce
+from app.records import QUICK_POINTS, PaintedView, PaintRequest
 from app.screens.surface import quick
 from app.screens.surface.detail import FEWEST_POINTS, LOOKS, SLOW_S, Detail
 from app.screens.surface.quick import QuickLook
 
 
 class Browser:
-    """Stands for session and browser: keeps what is asked of both, and answers when told to."""
+    """Stands for session and browser: keeps what is asked of both, and answers when asked to."""
 
     def __init__(self):
         self.jobs, self.presses, self.questions = [], [], SimpleNamespace(content="")
@@ -23,8 +23,8 @@ class Browser:
     def post(self, function, *arguments):
         function(*arguments)
 
-    def quick_job(self, job, store, spec, wish, on_end):
-        self.jobs.append((wish, on_end))
+    def quick_job(self, job, store, spec, request, on_end):
+        self.jobs.append((request, on_end))
 
     def add_html(self, _):
         return self.questions
@@ -36,12 +36,12 @@ class Browser:
         self.presses[0](None)
 
     def finish(self):
-        wish, on_end = self.jobs[-1]
-        on_end(PaintedView(wish, {}, 1, 1, 0.0))
+        request, on_end = self.jobs[-1]
+        on_end(PaintedView(request, {}, 1, 1, 0.0))
 
 
-def wish(radius_m):
-    return PaintWish(("after",), "color", radius_m)
+def request(radius_m):
+    return PaintRequest(("after",), "color", radius_m)
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def scene(monkeypatch):
     browser, seen = Browser(), []
 
     def draw(view):
-        seen.append(view.wish.radius_m)
+        seen.append(view.request.radius_m)
         look.sent()
 
     look = QuickLook(browser, browser, draw, lambda: seen.append("drawn"), lambda: seen.append("rest"))
@@ -61,7 +61,7 @@ def scene(monkeypatch):
 def test_while_one_rolls_the_newest_of_many_waits(scene):
     browser, look, seen = scene
     for radius_m in (0.01, 0.02, 0.03):
-        look.want(wish(radius_m))
+        look.want(request(radius_m))
     assert [asked.radius_m for asked, _ in browser.jobs] == [0.01]
     browser.finish()
     assert seen == [0.01]
@@ -73,9 +73,9 @@ def test_while_one_rolls_the_newest_of_many_waits(scene):
 
 def test_nothing_is_rolled_while_the_browser_draws(scene):
     browser, look, _ = scene
-    look.want(wish(0.01))
+    look.want(request(0.01))
     browser.finish()
-    look.want(wish(0.02))
+    look.want(request(0.02))
     assert len(browser.jobs) == 1
     browser.answer()
     assert len(browser.jobs) == 2
@@ -83,9 +83,9 @@ def test_nothing_is_rolled_while_the_browser_draws(scene):
 
 def test_a_browser_that_does_not_answer_is_not_waited_for_for_ever(scene):
     browser, look, seen = scene
-    look.want(wish(0.01))
+    look.want(request(0.01))
     browser.finish()
-    look.want(wish(0.02))
+    look.want(request(0.02))
     for _ in range(40):
         time.sleep(0.1)
         if "drawn" in seen:
@@ -97,8 +97,8 @@ def test_a_browser_that_does_not_answer_is_not_waited_for_for_ever(scene):
 
 def test_a_job_that_fails_does_not_stop_the_next(scene):
     browser, look, seen = scene
-    look.want(wish(0.01))
-    look.want(wish(0.02))
+    look.want(request(0.01))
+    look.want(request(0.02))
     browser.jobs[0][1](None)
     assert [asked.radius_m for asked, _ in browser.jobs] == [0.01, 0.02]
     assert seen == []
@@ -107,25 +107,25 @@ def test_a_job_that_fails_does_not_stop_the_next(scene):
 def test_before_the_nodes_are_placed_nothing_is_rolled(scene):
     browser, look, _ = scene
     browser.results = SimpleNamespace(fresh=lambda step, spec: False)
-    look.want(wish(0.01))
+    look.want(request(0.01))
     assert browser.jobs == []
     assert look.moving
 
 
 def test_a_delay_comes_once_after_the_last_restart_and_not_when_cancelled():
     came = []
-    delay = Delay(0.15, lambda: came.append(time.monotonic()))
+    debounce = Debounce(0.15, lambda: came.append(time.monotonic()))
     for _ in range(3):
-        delay.restart()
+        debounce.restart()
         last = time.monotonic()
         time.sleep(0.05)
-        assert delay.pending
+        assert debounce.pending
     time.sleep(0.4)
     assert len(came) == 1
     assert came[0] - last >= 0.14
-    assert not delay.pending
-    delay.restart()
-    delay.cancel()
+    assert not debounce.pending
+    debounce.restart()
+    debounce.cancel()
     time.sleep(0.3)
     assert len(came) == 1
 
@@ -156,25 +156,25 @@ def test_the_detail_settles_whatever_the_speed(seconds_per_point):
 def test_what_is_asked_for_follows_the_browsers_answers(scene):
     browser, look, _ = scene
     for _ in range(2 * LOOKS):
-        look.want(wish(0.01))
+        look.want(request(0.01))
         look._asked_s -= 0.5
         browser.finish()
         browser.answer()
     for _ in range(LOOKS):
         look.sent()
         browser.answer()
-    look.want(wish(0.02))
+    look.want(request(0.02))
     asked = [asked.most_points for asked, _ in browser.jobs]
     assert asked == [QUICK_POINTS] * LOOKS + [QUICK_POINTS // 2] * LOOKS + [QUICK_POINTS // 4]
 
 
 def test_the_view_is_held_from_the_first_move_until_the_radius_rests(scene):
     browser, look, _ = scene
-    look.want(wish(0.01))
+    look.want(request(0.01))
     assert "packetmesh.hold()" in browser.questions.content
     look.sent([4, 5])
     assert "packetmesh.ask([4, 5], true)" in browser.questions.content
-    look.want(wish(0.02))
+    look.want(request(0.02))
     assert "packetmesh.ask([4, 5], true)" in browser.questions.content
     look.close()
     look.sent()

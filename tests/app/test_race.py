@@ -5,28 +5,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.chain import prepared, rig_of
 from app.records import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, Race, Start
 from app.screens.fuse.capture_job import capture_job
 from app.screens.fuse.race_job import contest_of, race_job
-from app.state import Source, Spec
+from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError
-from pipeline.config import PipelineConfig
-from tests.app.answers import end
+from packetmesh.progress import drain as end
+from pipeline.io.rigs import save_rig
+from pipeline.sources import Demo, RigFolder
 
-SPEC = Spec(Source(scene="box-on-table"))
+SPEC = Spec(Demo("box-on-table"))
 SLIGHT = Race(start=Start.towards(3.0, 6.0, seed=0))
 
 
 @pytest.fixture(scope="module")
 def rig(store):
-    return end(rig_of(store, SPEC))
+    return end(store.stage(SPEC, "rig"))
 
 
 @pytest.fixture(scope="module")
-def work(store):
-    return end(prepared(store, SPEC))
+def nodes(store):
+    return end(store.stage(SPEC, "nodes"))
 
 
 @pytest.fixture(scope="module")
@@ -77,8 +77,8 @@ def test_the_weight_of_a_ceicp_pair_falls_with_its_distance(view):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_start_is_as_far_off_as_it_says(rig, work, seed):
-    contest = contest_of(rig, work, Race())
+def test_a_start_is_as_far_off_as_it_says(rig, nodes, seed):
+    contest = contest_of(rig, nodes, Race())
     start = Start.towards(20.0, 40.0, seed)
     motion = contest.start_pose(start) @ np.linalg.inv(contest.T_aligned)
     turn_deg = np.degrees(np.arccos((np.trace(motion[:3, :3]) - 1) / 2))
@@ -87,14 +87,14 @@ def test_a_start_is_as_far_off_as_it_says(rig, work, seed):
     assert 100 * np.linalg.norm(moved_m) == pytest.approx(40.0, abs=0.02)
 
 
-def test_aligned_is_the_truth(rig, work):
-    contest = contest_of(rig, work, Race())
+def test_aligned_is_the_truth(rig, nodes):
+    contest = contest_of(rig, nodes, Race())
     assert contest.error_m(contest.start_pose(Start())) == 0.0
 
 
-def test_degrading_changes_the_source_only(rig, work):
+def test_degrading_changes_the_source_only(rig, nodes):
     plain, worse = (
-        contest_of(rig, work, race)
+        contest_of(rig, nodes, race)
         for race in (Race(), Race(noise_m=0.03, hole_share=0.4, outlier_share=0.1))
     )
     np.testing.assert_array_equal(worse.target.points_m, plain.target.points_m)
@@ -102,19 +102,19 @@ def test_degrading_changes_the_source_only(rig, work):
     np.testing.assert_array_equal(worse.start_pose(SLIGHT.start), plain.start_pose(SLIGHT.start))
     np.testing.assert_array_equal(worse.error_points_m, plain.error_points_m)
     assert len(worse.source) == pytest.approx(0.6 * len(plain.source), rel=0.05)
-    assert plain.source is work.nodes[1].sensor
+    assert plain.source is nodes[1].sensor
 
 
-def test_an_inferred_cloud_belongs_where_it_is(rig, work):
-    contest = contest_of(rig, work, Race(mode="inferred", source=2, target=2))
+def test_an_inferred_cloud_belongs_where_it_is(rig, nodes):
+    contest = contest_of(rig, nodes, Race(mode="inferred", source=2, target=2))
     np.testing.assert_array_equal(contest.T_true, np.eye(4))
-    assert contest.source is work.nodes[2].inferred
-    assert contest.target is work.nodes[2].sensor
+    assert contest.source is nodes[2].inferred
+    assert contest.target is nodes[2].sensor
 
 
-def test_a_node_is_not_moved_onto_itself(rig, work):
+def test_a_node_is_not_moved_onto_itself(rig, nodes):
     with pytest.raises(InputError, match="cannot be moved onto itself"):
-        contest_of(rig, work, Race(source=1, target=1))
+        contest_of(rig, nodes, Race(source=1, target=1))
 
 
 def test_a_method_that_finds_no_pair_stays_at_its_start(store):
@@ -143,8 +143,8 @@ def test_the_capture_range_is_the_same_again_and_from_any_start(capture, tmp_pat
     np.testing.assert_array_equal(again.errors_m, capture.errors_m)
 
 
-def test_without_truth_there_is_no_capture_range(tmp_path, monkeypatch, rig):
-    monkeypatch.setattr("app.chain.load_demo", lambda name: replace(rig, truth=None))
-    spec = replace(SPEC, config=PipelineConfig())
+def test_without_truth_there_is_no_capture_range(tmp_path, rig):
+    save_rig(tmp_path / "rig", replace(rig, truth=None))
+    spec = replace(SPEC, source=RigFolder(str(tmp_path / "rig")))
     with pytest.raises(InputError, match="truth of this scene is not known"):
-        end(capture_job(Store(str(tmp_path)), replace(spec, source=Source(scene="nowhere")), Race()))
+        end(capture_job(Store(str(tmp_path)), spec, Race()))

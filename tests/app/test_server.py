@@ -5,9 +5,9 @@ import socket
 import pytest
 
 from app.server import build_server, start_spec
-from app.state import Source
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
+from pipeline.sources import Demo, RigFolder
 
 
 def test_a_taken_port_is_one_sentence():
@@ -33,6 +33,6 @@ def test_an_address_that_cannot_be_used_is_one_sentence(host, port, sentence):
 
 
 def test_a_folder_is_a_rig_and_a_name_is_a_demo(tmp_path):
-    assert start_spec(str(tmp_path), PipelineConfig()).source == Source(rig=str(tmp_path))
-    assert start_spec("office", PRESETS["thesis"]).source == Source(scene="office")
+    assert start_spec(str(tmp_path), PipelineConfig()).source == RigFolder(str(tmp_path))
+    assert start_spec("office", PRESETS["thesis"]).source == Demo("office")
     assert start_spec("office", PRESETS["thesis"]).preset == "thesis"

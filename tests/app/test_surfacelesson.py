@@ -8,11 +8,14 @@ import pytest
 from app.screens.surface.labels import BEFORE, BOTH, POISSON
 from app.screens.surface.lesson import SurfaceLook, surface_lesson
 from packetmesh.errors import InputError
+from packetmesh.progress import drain as end
 from pipeline.config import PRESETS, SurfaceConfig
-from pipeline.depth import DepthNetwork
-from pipeline.io.demos import load_demo
-from pipeline.reconstruct import NodeClouds, merged_clouds, prepare_node, register_nodes
-from pipeline.surface import Camera, compare_with_truth, radii, reconstruct_surface, spacing
+from pipeline.merging import merge_clouds
+from pipeline.nodes import NodeClouds
+from pipeline.sources import Demo
+from pipeline.spec import Spec
+from pipeline.stages import run
+from pipeline.surface import Camera, compare_with_truth, radii, reconstruct_surface
 from pipeline.surface.baselines import poisson_surface
 from pipeline.surface.quality import no_hit_ray_share
 from pipeline.surface.ray_parts import View, ray_parts
@@ -122,17 +125,15 @@ class Room:
 
 
 def clouds(rig, nodes, poses, passes):
-    config = replace(CONFIG, surface=replace(CONFIG.surface, smoothing_passes=passes))
-    sensor, fused = merged_clouds(nodes, rig.frames, poses, config)
-    return Room(rig, nodes, poses, sensor, fused, *spacing(fused.points_m))
+    merged = merge_clouds(rig.frames, nodes, poses, CONFIG.fusion.mode, CONFIG.surface.max_points, passes)
+    return Room(rig, nodes, poses, merged.sensor, merged.fused, merged.r_F_m, merged.sigma_D_m)
 
 
 @pytest.fixture(scope="module")
 def room():
-    rig = load_demo("living-room")
-    network = DepthNetwork(CONFIG.depth.model)
-    nodes = tuple(prepare_node(frame, CONFIG, network) for frame in rig.frames)
-    return clouds(rig, nodes, register_nodes(rig.frames, nodes, CONFIG)[1], CONFIG.surface.smoothing_passes)
+    done = end(run(Spec(Demo("living-room"), config=CONFIG), stages=("rig", "nodes", "placement")))
+    rig, nodes, placement = (result.value for result in done.values())
+    return clouds(rig, nodes, placement.T_world_camera, CONFIG.surface.smoothing_passes)
 
 
 @pytest.fixture(scope="module")

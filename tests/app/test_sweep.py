@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 import viser
 
-from app.chain import ball_clouds
 from app.records import SpacingView
 from app.screens.surface.advice import STOP, STOPPED, SWEEP, WAITING, AdviceFolder, suggestions_html
 from app.screens.surface.spacing_plot import ADVISED, OF_THESIS, USED, spacing_figure
-from app.screens.surface.sweep_job import suggest_job, sweep_job
+from app.screens.surface.sweep_job import suggestions_of, sweep_job
 from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
 from app.screens.surface.sweep_view import SuggestionRow, SweepRow, SweepView
-from app.state import Source, Spec
+from app.state import Spec
 from packetmesh.progress import Progress, drain
 from pipeline.config import PipelineConfig, SurfaceConfig
+from pipeline.sources import Demo
 
-SPEC = Spec(Source(scene="box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))
+SPEC = Spec(Demo("box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))
 NAN = float("nan")
 ROWS = (
     SuggestionRow("finest", 0.0246, 0.49, "Wide enough for 50% of the surface; rolled, it closes 49%."),
@@ -28,9 +28,9 @@ ROWS = (
 
 def run(job):
     """All that a job says, and what it answers."""
-    said = []
-    view = drain(job, said.append)
-    return said, view
+    steps = []
+    view = drain(job, steps.append)
+    return steps, view
 
 
 def row(radius_mm, no_hit, accuracy=NAN, triangles=100):
@@ -47,13 +47,13 @@ def sweep(store):
 
 
 def test_the_sweep_grows_ball_by_ball_and_ends_complete(sweep):
-    said, view = sweep
-    partial = [one for one in said if isinstance(one, SweepView)]
+    steps, view = sweep
+    partial = [one for one in steps if isinstance(one, SweepView)]
     assert [len(one.points) for one in partial] == list(range(1, view.planned + 1))
     assert [one.done for one in partial] == [False] * (view.planned - 1) + [True]
     assert all(one.points == view.points[: len(one.points)] for one in partial)
     assert partial[-1] == view
-    rolling = [one.fraction for one in said if isinstance(one, Progress) and one.stage.startswith("a ball")]
+    rolling = [one.fraction for one in steps if isinstance(one, Progress) and one.stage.startswith("a ball")]
     assert rolling == sorted(rolling)
     assert len(rolling) == view.planned
 
@@ -63,7 +63,7 @@ def test_the_sweep_reaches_from_half_the_spacing_to_six_and_holds_the_advice(sto
     radii_m = [one.radius_m for one in view.points]
     assert radii_m == sorted(radii_m)
     assert (radii_m[0], radii_m[-1]) == pytest.approx((view.r_F_m / 2, 6 * view.r_F_m))
-    _, advice = run(suggest_job(store, SPEC))
+    _, advice = run(suggestions_of(store, SPEC))
     assert {one.radius_m for one in advice} <= set(radii_m)
     assert len(radii_m) == 12 + len(advice)
 
@@ -81,21 +81,21 @@ def test_larger_balls_leave_fewer_rays_until_they_no_longer_fit(sweep):
 
 
 def test_the_advice_is_for_the_cloud_after_fusion_and_is_kept(store):
-    _, advice = run(suggest_job(store, SPEC))
-    _, clouds = run(ball_clouds(store, SPEC))
+    _, advice = run(suggestions_of(store, SPEC))
+    _, clouds = run(store.stage(SPEC, "clouds"))
     assert [one.name for one in advice] == ["finest", "even", "widest"]
     assert [one.radius_m for one in advice] == sorted(one.radius_m for one in advice)
-    assert all(clouds.spacing.r_F_m / 2 < one.radius_m < 20 * clouds.spacing.r_F_m for one in advice)
+    assert all(clouds.r_F_m / 2 < one.radius_m < 20 * clouds.r_F_m for one in advice)
     assert all(0.0 < one.share <= 1.0 for one in advice)
-    again, same = run(suggest_job(store, SPEC))
+    again, same = run(suggestions_of(store, SPEC))
     assert same == advice
     assert again == []
 
 
 def test_the_radii_of_the_spec_do_not_matter_to_a_sweep(store, sweep):
     surface = replace(SPEC.config.surface, radius_rule="manual", radii_m=(0.5,))
-    said, view = run(sweep_job(store, replace(SPEC, config=replace(SPEC.config, surface=surface))))
-    assert said == []
+    steps, view = run(sweep_job(store, replace(SPEC, config=replace(SPEC.config, surface=surface))))
+    assert steps == []
     np.testing.assert_equal(view, sweep[1])
 
 
@@ -110,8 +110,8 @@ def test_the_sentence_finds_where_the_rays_level_off_and_what_accuracy_does():
 
 
 def test_the_sentence_says_when_the_widest_balls_miss_more_again():
-    said = sweep_sentence(swept(row(10, 0.60), row(28, 0.20), row(60, 0.30)))
-    assert said == (
+    sentence = sweep_sentence(swept(row(10, 0.60), row(28, 0.20), row(60, 0.30)))
+    assert sentence == (
         "From 28 mm on, larger balls close less than 1% more of the rays (20.0% miss); "
         "the widest, 60 mm, misses 30.0% again."
     )
@@ -208,8 +208,8 @@ def test_a_suggestion_is_taken_with_its_button(folder):
     for one in (ROWS[1], ROWS[0], ROWS[0]):
         press(folder._take, one.name)
     assert calls == [0.0312, 0.0246, 0.0246]
-    for said in ("finest", "24.6 mm", "49 %", "even", "31.2 mm", "88 %", ROWS[0].sentence):
-        assert said in folder._table.content
+    for part in ("finest", "24.6 mm", "49 %", "even", "31.2 mm", "88 %", ROWS[0].sentence):
+        assert part in folder._table.content
     folder.forget()
     press(folder._take, "even")
     assert len(calls) == 3

@@ -12,19 +12,20 @@ import viser
 
 from app.screens.surface.draw_rolling import RollingDrawing, pieces
 from app.screens.surface.labels import BEFORE
-from app.screens.surface.rolling import CLOSE_UP, WHOLE, RollingFolder, said
+from app.screens.surface.rolling import CLOSE_UP, WHOLE, RollingFolder, status_line
 from app.screens.surface.walk_job import PATCH_POINTS, PLACES, walk_job, walk_over
-from app.screens.surface.walk_view import WalkWish
-from app.state import Source, Spec
+from app.screens.surface.walk_view import WalkRequest
+from app.state import Spec
 from app.store import Store
 from packetmesh.errors import ReconstructionError
+from packetmesh.progress import drain as end
+from pipeline.sources import Demo
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import roll
-from tests.app.answers import end
 from tests.pipeline.surface.shapes import perforated_plane
 
 RADII_M = (0.016, 0.03)
-SPEC = Spec(Source(scene="box-on-table"))
+SPEC = Spec(Demo("box-on-table"))
 
 
 @pytest.fixture(scope="module")
@@ -34,12 +35,12 @@ def cloud():
 
 @pytest.fixture(scope="module")
 def close_up(cloud):
-    return end(walk_over(cloud, RADII_M, WalkWish("after", True, None)))
+    return end(walk_over(cloud, RADII_M, WalkRequest("after", True, None)))
 
 
 @pytest.fixture(scope="module")
 def whole(cloud):
-    return end(walk_over(cloud, RADII_M, WalkWish("before", False, None)))
+    return end(walk_over(cloud, RADII_M, WalkRequest("before", False, None)))
 
 
 @pytest.fixture(scope="module")
@@ -96,20 +97,20 @@ def test_front_and_dead_edges_are_together_the_rims_of_the_mesh(name, request):
 
 def test_the_job_remembers_its_walk_and_looks_where_it_is_told(tmp_path):
     store = Store(str(tmp_path))
-    view = end(walk_job(store, SPEC, WalkWish("after", True, None)))
-    assert view is end(walk_job(store, SPEC, WalkWish("after", True, None)))
+    view = end(walk_job(store, SPEC, WalkRequest("after", True, None)))
+    assert view is end(walk_job(store, SPEC, WalkRequest("after", True, None)))
     assert len(pickle.dumps(view)) < 300_000
     corner_m = tuple(view.points_m[0].tolist())
-    other = end(walk_job(store, SPEC, WalkWish("after", True, corner_m)))
+    other = end(walk_job(store, SPEC, WalkRequest("after", True, corner_m)))
     assert np.linalg.norm(other.center_m - corner_m) < other.reach_m
-    sensor = end(walk_job(store, SPEC, WalkWish("before", False, None)))
-    assert sensor.wish.which == "before"
+    sensor = end(walk_job(store, SPEC, WalkRequest("before", False, None)))
+    assert sensor.request.which == "before"
     assert len(pickle.dumps(sensor)) < 5_000_000
 
 
 def test_a_ball_that_falls_through_is_told(cloud):
     with pytest.raises(ReconstructionError, match="try a larger radius"):
-        end(walk_over(cloud, (0.001,), WalkWish("after", False, None)))
+        end(walk_over(cloud, (0.001,), WalkRequest("after", False, None)))
 
 
 # What is drawn.
@@ -173,7 +174,7 @@ class Room:
     """A folder in a control panel nobody sees, with what happened to it."""
 
     def __init__(self, server):
-        self.wishes = []
+        self.requests = []
         self.actions = {}
         self.lock = threading.RLock()
         self.scene = server.scene
@@ -184,7 +185,7 @@ class Room:
             self.post,
             lambda handle, action: self.actions.update({handle.label: action}),
             contextlib.nullcontext,
-            self.wishes.append,
+            self.requests.append,
         )
         inputs = server.gui._gui_input_handle_from_uuid
         self.inputs = {handle.label: handle for key, handle in inputs.items() if key not in before}
@@ -217,23 +218,23 @@ def room(server):
     room.folder.close()
 
 
-def test_wishes_are_what_is_chosen_and_change_while_somebody_watches(room, close_up):
+def test_requests_are_what_is_chosen_and_change_while_somebody_watches(room, close_up):
     room.set("Cloud", BEFORE)
-    assert room.wishes == []
+    assert room.requests == []
     room.press("Ball", "Roll")
     room.set("Watch", WHOLE)
-    assert room.wishes == [WalkWish("before", True, None), WalkWish("before", False, None)]
+    assert room.requests == [WalkRequest("before", True, None), WalkRequest("before", False, None)]
     room.folder.load(close_up)
     assert room.folder.showing
     assert (room.inputs["Watch"].value, room.inputs["Cloud"].value) == (CLOSE_UP, "after fusion")
     room.set("Cloud", BEFORE)
-    assert room.wishes[-1] == WalkWish("before", True, None)
+    assert room.requests[-1] == WalkRequest("before", True, None)
     room.press("Ball", "Close")
-    assert room.wishes[-1] is None
+    assert room.requests[-1] is None
     assert not room.folder.showing
     assert room.drawn == []
     room.set("Watch", WHOLE)
-    assert room.wishes[-1] is None
+    assert room.requests[-1] is None
 
 
 def test_the_player_steps_scrubs_and_plays(room, close_up):
@@ -247,7 +248,7 @@ def test_the_player_steps_scrubs_and_plays(room, close_up):
     room.press("Player", "Step back")
     assert room.inputs["Step"].value == 1
     room.set("Step", 200)
-    assert room.folder._said.content == said(close_up, 200)
+    assert room.folder._status.content == status_line(close_up, 200)
     room.set("Speed (1/s)", 60.0)
     room.press("Player", "Play")
     time.sleep(0.5)
@@ -274,9 +275,11 @@ def test_a_close_up_has_a_focus_and_the_whole_has_none(room, close_up, whole):
 
 
 def test_the_line_tells_step_triangles_front_radius_and_what_happened(close_up, whole):
-    line = said(close_up, 1)
+    line = status_line(close_up, 1)
     assert line.startswith(f"**Step 1 of {close_up.steps}** · 1 triangles · front 3 edges · 0 found nothing")
     assert line.endswith("ball 16.0 mm (1 of 2) · **put down on three points**")
-    assert "ball 30.0 mm (2 of 2) · **no edge is left to turn about**" in said(close_up, close_up.steps)
-    assert said(whole, whole.steps).endswith("ball 30.0 mm (2 of 2)")
-    assert said(close_up, 0).endswith("front 0 edges · 0 found nothing · ball 16.0 mm (1 of 2)")
+    assert "ball 30.0 mm (2 of 2) · **no edge is left to turn about**" in status_line(
+        close_up, close_up.steps
+    )
+    assert status_line(whole, whole.steps).endswith("ball 30.0 mm (2 of 2)")
+    assert status_line(close_up, 0).endswith("front 0 edges · 0 found nothing · ball 16.0 mm (1 of 2)")

@@ -115,7 +115,7 @@ class Watched:
 
         def noted(panel: SurfacePanel, view: PaintedView) -> None:
             self.shown.append(
-                (round(1000.0 * (view.wish.radius_m or 0.0), 3), view.meshes["after"].triangles)
+                (round(1000.0 * (view.request.radius_m or 0.0), 3), view.meshes["after"].triangles)
             )
             self.rolls_s.append(view.roll_s)
             self.points.append(view.points)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from app import acknowledgement as echo
+from app import acknowledgement
 from app.screens.surface.labels import BOTH, COLORINGS, POISSON
 from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, pick, press, slider, unfold
 
@@ -81,10 +81,12 @@ def test_a_hole_is_chosen_from_the_list_and_explained(surface):
 
 
 def test_no_answer_is_lost_beside_a_fast_hand(browser, app, monkeypatch):
-    monkeypatch.setattr(echo, "PATIENCE_S", 600.0)
-    asked, ask = [], echo.Echo.ask
+    monkeypatch.setattr(acknowledgement, "TIMEOUT_S", 600.0)
+    asked, ask = [], acknowledgement.DrawAcknowledgement.ask
     monkeypatch.setattr(
-        echo.Echo, "ask", lambda self, *of, **how: (asked.append(self), ask(self, *of, **how))
+        acknowledgement.DrawAcknowledgement,
+        "ask",
+        lambda self, *of, **how: (asked.append(self), ask(self, *of, **how)),
     )
     context = browser.new_context(viewport={"width": 900, "height": 640})
     page = context.new_page()
@@ -118,13 +120,13 @@ def all_answered(page, asked):
 
 def test_a_clicked_hole_says_why_it_is_there(surface):
     picture = surface.locator("canvas").first.bounding_box()
-    told = surface.locator(".mantine-Notification-root")
+    notice = surface.locator(".mantine-Notification-root")
     for row in range(3, 9):
         for column in range(3, 9):
             spot = (picture["width"] * column / 12, picture["height"] * row / 12)
             surface.mouse.click(picture["x"] + spot[0], picture["y"] + spot[1])
             surface.wait_for_timeout(150)
-            if told.filter(has_text=re.compile("mm|cm|camera|view")).count():
+            if notice.filter(has_text=re.compile("mm|cm|camera|view")).count():
                 return
     raise AssertionError("no click met a hole")
 
@@ -146,18 +148,18 @@ def test_the_ball_rolls_steps_back_and_leaves(surface):
     meshed = canvas(surface)
     unfold(surface, "Watch the ball roll")
     press(surface, "Roll")
-    said = surface.get_by_text(re.compile(r"Step \d+ of \d+"))
+    line = surface.get_by_text(re.compile(r"Step \d+ of \d+"))
     surface.get_by_text(re.compile(r"Step ([3-9]|\d\d+) of")).wait_for()
     press(surface, "Pause")
     press(surface, "Step")
     surface.wait_for_timeout(1500)
-    step = int(re.search(r"Step (\d+)", said.inner_text())[1])
+    step = int(re.search(r"Step (\d+)", line.inner_text())[1])
     assert step >= 3
     assert differing(canvas(surface), meshed) > ALIKE
     press(surface, "Step back")
     surface.get_by_text(re.compile(rf"Step {step - 1} of")).wait_for()
     press(surface, "Close")
-    expect(said).to_have_count(0)
+    expect(line).to_have_count(0)
     assert differing(canvas(surface, still=6), meshed) <= ALIKE
 
 

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from pipeline.io import read_mesh
+from pipeline.io.meshes import read_mesh
 from tests.paths import ROOT
 
 EXAMPLES = ROOT / "docs" / "examples"

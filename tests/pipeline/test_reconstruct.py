@@ -12,6 +12,8 @@ from pipeline.config import PRESETS, AcquisitionConfig, SurfaceConfig
 from pipeline.io.demos import load_demo
 from pipeline.reconstruct import iterate_reconstruction, reconstruct
 from pipeline.registration import point_error_m
+from pipeline.sources import LoadedRig
+from pipeline.spec import Spec
 from pipeline.types import DepthMap, PointSource, Rig
 
 pytestmark = pytest.mark.xdist_group("reconstruct")  # one worker makes the shared reconstruction once
@@ -28,7 +30,7 @@ def ours(rig):
 
 
 def test_fusion_fills_holes_and_keeps_what_the_sensor_measured(ours):
-    before, after = ours.surfaces.before.quality, ours.surfaces.after.quality
+    before, after = ours.before.quality, ours.after.quality
     assert after.no_hit_ray_share < before.no_hit_ray_share
     for node in ours.nodes:
         from_sensor = node.fused.select(node.fused.source == PointSource.SENSOR)
@@ -40,20 +42,20 @@ def test_registration_corrects_the_poses_that_the_nodes_believe_in(rig, ours):
         points_m = ours.nodes[index].sensor.points_m
         truth = rig.truth.T_world_camera[index]
         believed = point_error_m(rig.frames[index].T_world_camera, truth, points_m)
-        assert point_error_m(ours.T_world_camera[index], truth, points_m) < 0.5 * believed
+        assert point_error_m(ours.placement.T_world_camera[index], truth, points_m) < 0.5 * believed
 
 
 def test_moving_the_whole_rig_moves_the_answer(rig, ours):
     motion = geometry.rigid(geometry.rotation_exp([0.1, -0.4, 0.8]), [1.0, -2.0, 0.5])
     moved_frames = tuple(replace(f, T_world_camera=motion @ f.T_world_camera) for f in rig.frames)
     moved = reconstruct(replace(rig, frames=moved_frames, truth=None), PRESETS["packetmesh"])
-    for pose, moved_pose in zip(ours.T_world_camera, moved.T_world_camera, strict=True):
+    for pose, moved_pose in zip(ours.placement.T_world_camera, moved.placement.T_world_camera, strict=True):
         np.testing.assert_allclose(moved_pose, motion @ pose, atol=1e-9)
 
 
 def test_the_same_input_gives_the_same_bits(rig):
     pair = Rig("pair", rig.frames[:1])
-    first, second = (reconstruct(pair, PRESETS["thesis"]).surfaces.after for _ in range(2))
+    first, second = (reconstruct(pair, PRESETS["thesis"]).after for _ in range(2))
     assert first.vertices_m.tobytes() == second.vertices_m.tobytes()
     assert first.triangles.tobytes() == second.triangles.tobytes()
 
@@ -65,7 +67,7 @@ def test_the_thesis_preset_joins_both_clouds_whole(rig):
 
 
 def test_progress_rises_and_an_abandoned_run_stops(rig):
-    steps = iterate_reconstruction(Rig("pair", rig.frames[:1]), PRESETS["packetmesh"])
+    steps = iterate_reconstruction(Spec(LoadedRig(Rig("pair", rig.frames[:1]))))
     fractions = []
     for progress in steps:
         assert isinstance(progress, Progress)
@@ -80,8 +82,8 @@ def test_a_node_that_overlaps_nothing_keeps_its_believed_pose(rig):
     away = geometry.rigid(np.eye(3), [500.0, 0.0, 0.0])
     frames = (rig.frames[0], replace(rig.frames[1], T_world_camera=away))
     result = reconstruct(Rig("apart", frames), PRESETS["packetmesh"])
-    assert not result.registrations[0].result.converged
-    np.testing.assert_allclose(result.T_world_camera[1], away, atol=1e-9)
+    assert not result.placement.registrations[0].result.converged
+    np.testing.assert_allclose(result.placement.T_world_camera[1], away, atol=1e-9)
 
 
 def test_depth_without_a_value_is_one_sentence(rig):
@@ -92,10 +94,14 @@ def test_depth_without_a_value_is_one_sentence(rig):
     assert "\n" not in str(error.value)
 
 
-def test_a_ball_too_small_for_the_points_is_one_sentence(rig):
+def test_a_ball_that_falls_through_leaves_an_empty_surface_and_all_rays_miss(rig):
     config = replace(PRESETS["packetmesh"], surface=SurfaceConfig("manual", (1e-5,)))
-    with pytest.raises(PacketMeshError, match="radius"):
-        reconstruct(Rig("pair", rig.frames[:1]), config)
+    result = reconstruct(rig, config)
+    for surface in (result.before, result.after):
+        assert len(surface.triangles) == 0
+        assert surface.quality.no_hit_ray_share == 1.0
+        assert surface.quality.kept_measurement_share == 0.0
+    assert result.truth_after is None
 
 
 def test_a_harsher_filter_keeps_fewer_points(rig):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.io import load_frame, load_rig, save_rig
+from pipeline.io.rigs import load_frame, load_rig, save_rig
 from pipeline.types import RgbdFrame, Rig
 
 

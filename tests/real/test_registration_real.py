@@ -11,8 +11,9 @@ from app.cli import main
 from pipeline.acquisition import back_project, filter_outliers
 from pipeline.config import AcquisitionConfig, RegistrationConfig
 from pipeline.geometry import apply, inverse, rigid, rotation_exp
-from pipeline.io import load_frame, read_cloud
+from pipeline.io.clouds import read_cloud
 from pipeline.io.poses import read_pose
+from pipeline.io.rigs import load_frame
 from pipeline.registration import point_error_m, register, rotation_error_rad
 from pipeline.types import PointCloud
 

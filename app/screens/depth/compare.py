@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import viser
 
 from app.records import Picture
 from app.screens.depth.colorbar import captions_html
 from app.screens.depth.split import split
+from app.ui import Ui
 
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 QUALITY = 92
@@ -22,8 +22,7 @@ class CompareArea:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        changed: Callable[[Any, Callable[[], None]], None],
+        ui: Ui,
         names: Sequence[str],
         left: str,
         right: str,
@@ -32,8 +31,7 @@ class CompareArea:
         """Add the area to the current container.
 
         Args:
-            gui: where to add it.
-            changed: registers an action for a change of a handle by a person.
+            ui: where to add it.
             names: of the pictures that can be chosen.
             left: the name shown left of the line at first.
             right: the name shown right of it.
@@ -41,6 +39,7 @@ class CompareArea:
         """
         self._pictures: Mapping[str, Picture] = {}
         self._drawn: tuple[Any, ...] = ()
+        gui = ui.gui
         self._left = gui.add_dropdown(
             "Left", list(names), initial_value=left, hint="What is shown left of the line.", visible=visible
         )
@@ -59,7 +58,7 @@ class CompareArea:
         self._image = gui.add_image(EMPTY, format="jpeg", jpeg_quality=QUALITY, visible=visible)
         self._captions = gui.add_html("", visible=visible)
         for handle in (self._left, self._right, self._split):
-            changed(handle, self._draw)
+            ui.when_changed(handle, self._draw)
 
     def load(self, pictures: Mapping[str, Picture] | None) -> None:
         """Show others, of one size and by the names that were promised; None shows nothing."""

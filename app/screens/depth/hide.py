@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import viser
@@ -11,14 +10,14 @@ import viser
 from app.screens.depth.brush import BrushDrawing, clicked_disc
 from app.screens.depth.compare import CompareArea
 from app.screens.depth.labels import BLANK, MEASURED, OURS, PEER_NAMES
-from app.screens.depth.view import Disc, HiddenView, HideWish, SeenSample
+from app.screens.depth.view import Disc, HiddenView, HideRequest, SeenSample
 from app.tables import Row, number, table
+from app.ui import Ui
 from pipeline.types import FloatArray
 
 TEXT = """Where the sensor is blind, nobody can tell how good a guess is. So **hide a part of what it did
 measure**, have it filled without that knowledge, and compare. **Tick the brush and click points in the
 picture**, or place discs with the sliders."""
-ADD, UNDO, CLEAR = "Add", "Undo", "Clear"
 BUTTON = "Hide and fill"
 WAITING = "Filling …"
 SILENT = "No answer came. Press the button again."
@@ -31,37 +30,33 @@ class HideFolder:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        scene: viser.SceneApi,
-        post: Callable[..., None],
-        changed: Callable[[Any, Callable[[], None]], None],
-        on_hide: Callable[[HideWish], None],
+        ui: Ui,
+        on_hide: Callable[[HideRequest], None],
     ) -> None:
         """Add the folder.
 
         Args:
-            gui: where to add it.
-            scene: where to draw what is painted.
-            post: runs a function on the session's thread.
-            changed: registers an action for a change of a handle by a person.
+            ui: where to add it.
             on_hide: called with what to hide, of the node that is shown.
         """
         self._on_hide = on_hide
-        self._drawing = BrushDrawing(scene, "/depth/painted")
+        self._drawing = BrushDrawing(ui.scene, "/depth/painted")
         self._cloud: SeenSample | None = None
         self._T_world_camera: FloatArray = np.eye(4)
         self.discs: tuple[Disc, ...] = ()
+        gui = ui.gui
         with gui.add_folder("Hide a region and see it filled", expand_by_default=False):
             gui.add_markdown(TEXT)
-            self._add_brush(gui, post)
+            self._add_brush(ui)
             gui.add_button(BUTTON, icon=viser.Icon.ERASER, hint="It takes some seconds.").on_click(
-                lambda _: post(self._ask)
+                lambda _: ui.post(self._ask)
             )
             self._status = gui.add_markdown("")
-            self._area = CompareArea(gui, changed, NAMES, BLANK, OURS, visible=False)
+            self._area = CompareArea(ui, NAMES, BLANK, OURS, visible=False)
             self._table = gui.add_html("")
 
-    def _add_brush(self, gui: viser.GuiApi, post: Callable[..., None]) -> None:
+    def _add_brush(self, ui: Ui) -> None:
+        gui = ui.gui
         self._brush = gui.add_checkbox(
             "Brush", False, hint="Each click on a measured point in the 3-D scene hides a disc around it."
         )
@@ -74,13 +69,11 @@ class HideFolder:
         self._y = gui.add_slider(
             "Centre y (%)", 0.0, 100.0, 1.0, 50.0, hint="Of the disc that Add puts, from the top."
         )
-        keys = gui.add_button_group(
+        ui.buttons(
             "Discs",
-            (ADD, UNDO, CLEAR),
-            hint="Add: a disc where the sliders say. Undo: takes the last one away. Clear: all of them.",
+            {"Add": self._add, "Undo": self._undo, "Clear": self.clear},
+            "Add: a disc where the sliders say. Undo: takes the last one away. Clear: all of them.",
         )
-        actions = {ADD: self._add, UNDO: self._undo, CLEAR: self.clear}
-        keys.on_click(lambda event: post(actions[event.target.value]))
 
     def show(self, cloud: SeenSample, T_world_camera: FloatArray) -> None:
         """Paint on this node's points, which have just been drawn."""
@@ -98,12 +91,12 @@ class HideFolder:
         else:
             self._paint((*self.discs, disc))
 
-    def ask(self, wish: HideWish) -> None:
+    def ask(self, request: HideRequest) -> None:
         """Paint the discs and press the button, as a person would."""
-        last = wish.discs[-1]
+        last = request.discs[-1]
         self._x.value, self._y.value = round(100.0 * last.x_share), round(100.0 * last.y_share)
         self._size.value = round(100.0 * last.size_share)
-        self._paint(wish.discs)
+        self._paint(request.discs)
         self._ask()
 
     def clear(self) -> None:
@@ -145,7 +138,7 @@ class HideFolder:
             self._add()
         self.forget()
         self._status.content = WAITING
-        self._on_hide(HideWish(0, self.discs))
+        self._on_hide(HideRequest(0, self.discs))
 
 
 def painted_line(discs: tuple[Disc, ...]) -> str:

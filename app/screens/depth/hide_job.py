@@ -8,12 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from app.chain import prepared, rig_of
 from app.drawing.pictures import depth_picture, depth_range_m
 from app.records import Picture
 from app.screens.depth.discs import covered, window_around
 from app.screens.depth.labels import BLANK, MEASURED, OURS, PEER_NAMES
-from app.screens.depth.view import Disc, FillRow, HiddenView, HideWish
+from app.screens.depth.view import Disc, FillRow, HiddenView, HideRequest
 from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError
@@ -30,22 +29,22 @@ WITHIN = 0.05
 SHOWN_PX = 480
 
 
-def hide_job(store: Store, spec: Spec, wish: HideWish) -> Generator[Progress, None, HiddenView]:
+def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progress, None, HiddenView]:
     """Hide discs of one node's sensor depth, align without them, fill them, and measure.
 
     Raises:
         InputError: the node does not exist, or hardly anything is measured in the discs.
     """
-    rig = yield from rig_of(store, spec)
-    work = yield from prepared(store, spec)
-    if not 0 <= wish.node < len(rig.frames):
-        raise InputError(f"There is no node {wish.node}, only {len(rig.frames)} of them; choose one anew.")
-    frame, node = rig.frames[wish.node], work.nodes[wish.node]
-    hidden = hidden_pixels(frame.depth, wish.discs)
+    rig = yield from store.stage(spec, "rig")
+    nodes = yield from store.stage(spec, "nodes")
+    if not 0 <= request.node < len(rig.frames):
+        raise InputError(f"There is no node {request.node}, only {len(rig.frames)} of them; choose one anew.")
+    frame, node = rig.frames[request.node], nodes[request.node]
+    hidden = hidden_pixels(frame.depth, request.discs)
     rest = DepthMap(np.where(hidden, np.float32(np.nan), frame.depth.z_m))
     ways: dict[str, Callable[[], DepthMap]] = {
         OURS: partial(
-            believed, node.inferred_depth, rest, frame.rgb, spec.config.depth, node.alignment.disparity
+            believed, node.network.depth, rest, frame.rgb, spec.config.depth, node.alignment.disparity
         ),
         **{PEER_NAMES.get(name, name): partial(peer, rest, frame.rgb) for name, peer in PEERS.items()},
     }
@@ -58,7 +57,7 @@ def hide_job(store: Store, spec: Spec, wish: HideWish) -> Generator[Progress, No
         maps[name] = DepthMap(np.where(hidden, filled_m, frame.depth.z_m).astype(np.float32))
         rows.append(fill_row(name, filled_m[hidden], frame.depth.z_m[hidden], elapsed_s))
     return HiddenView(
-        wish, frame.name, int(hidden.sum()), tuple(rows), _pictures(maps, frame.depth, wish.discs)
+        request, frame.name, int(hidden.sum()), tuple(rows), _pictures(maps, frame.depth, request.discs)
     )
 
 

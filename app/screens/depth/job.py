@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.chain import prepared, rig_of
 from app.drawing.pictures import (
     confidence_colors,
     confidence_picture,
@@ -31,7 +30,7 @@ from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.depth.confidence import JudgedDepth
-from pipeline.reconstruct import NodeClouds
+from pipeline.nodes import NodeClouds
 from pipeline.types import BoolArray, DepthMap, PointCloud, PointSource, RgbdFrame, Rig
 
 PICTURE_WIDTH_PX = 640
@@ -42,16 +41,16 @@ LEAST_RANGE_M = 0.01
 
 def depth_job(store: Store, spec: Spec) -> Generator[Progress, None, DepthView]:
     """Every node's depth, sensed, inferred and fused."""
-    rig = yield from rig_of(store, spec)
-    work = yield from prepared(store, spec)
-    nodes = []
-    for index, (clouds, elapsed_s) in enumerate(zip(work.nodes, work.inference_s, strict=True)):
-        yield Progress(f"pictures of {clouds.name}", 0.9 + 0.1 * index / len(work.nodes))
-        nodes.append(_depth_node(rig, index, clouds, elapsed_s))
-    return DepthView(tuple(nodes))
+    rig = yield from store.stage(spec, "rig")
+    nodes = yield from store.stage(spec, "nodes")
+    views = []
+    for index, clouds in enumerate(nodes):
+        yield Progress(f"pictures of {clouds.name}", 0.9 + 0.1 * index / len(nodes))
+        views.append(_depth_node(rig, index, clouds))
+    return DepthView(tuple(views))
 
 
-def _depth_node(rig: Rig, index: int, clouds: NodeClouds, elapsed_s: float | None) -> DepthNode:
+def _depth_node(rig: Rig, index: int, clouds: NodeClouds) -> DepthNode:
     drawn = SCREEN_POINTS / len(rig.frames) / max(1, len(clouds.fused))
     frame, alignment, judged = rig.frames[index], clouds.alignment, clouds.judged
     filled = clouds.fused.select(_inferred_rows(clouds.fused))
@@ -72,8 +71,8 @@ def _depth_node(rig: Rig, index: int, clouds: NodeClouds, elapsed_s: float | Non
         inlier_share=alignment.inliers,
         judged=judged_view(judged, alignment.depth.valid & ~frame.depth.valid),
         truth_error_m=_filled_error_m(rig, index, judged),
-        provider=clouds.provider,
-        inference_s=elapsed_s,
+        provider=clouds.network.provider,
+        inference_s=clouds.network.elapsed_s,
     )
 
 

@@ -82,12 +82,12 @@ def confidence_table(node: DepthNode) -> str:
 
 
 def _network_rows(node: DepthNode) -> list[Row]:
-    ran = "remembered" if node.inference_s is None else number(node.inference_s, 0, "ms", 1000)
+    duration = "remembered" if node.inference_s is None else number(node.inference_s, 0, "ms", 1000)
     return [
         Row(
             "Network ran on",
             "The execution provider that onnxruntime really used, and its time.",
-            (f"{node.provider}, {ran}",),
+            (f"{node.provider}, {duration}",),
         ),
         Row(
             "Alignment",

@@ -5,24 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, ClassVar
 
-import numpy as np
-
 from app.controls import Controls
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import INFERRED, LOSS, TARGET
-from app.lesson_folder import LessonFolder
-from app.panel import Panel
+from app.lesson import LessonFolder, read_lesson
 from app.records import DepthNode, DepthView, Sample, SceneView
 from app.screens.depth.compare import CompareArea
 from app.screens.depth.hide import HideFolder
 from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PHOTO, PICTURES, SENSOR
-from app.screens.depth.lesson import DepthLook, depth_lesson
-from app.screens.depth.network import NetworkFolder
+from app.screens.depth.lesson import SETTINGS, SHIPPED, DepthLook
+from app.screens.depth.model import ModelFolder
 from app.screens.depth.numbers import confidence_table, depth_table, residual_table
 from app.screens.depth.residuals import residual_figure
-from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_network
-from app.screens.depth.view import HiddenView, HideWish, NetworkView, NetworkWish, SeenSample
+from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_model
+from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
 from app.state import Spec, Step
+from app.ui import Panel
 
 TEXT = """**What you see.** Blue: points the sensor measured. Violet: points a neural network inferred
 from the colour image alone, made metric by comparing it with the sensor where both know a depth. Red:
@@ -46,15 +44,15 @@ class DepthPanel(Panel):
         self._look: DepthLook | None = None
         self._source = session.spec.source
         gui.add_markdown(TEXT)
-        self._lesson = LessonFolder(gui, depth_lesson(), session.post, self.when_changed, self._take_look)
+        self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, DepthLook()), self._take_look)
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images and numbers are shown below.")
-        self.when_changed(self._node, self._picked_node)
-        self._area = CompareArea(gui, self.when_changed, PICTURES, PHOTO, SENSOR)
+        self.ui.when_changed(self._node, self._picked_node)
+        self._area = CompareArea(self.ui, PICTURES, PHOTO, SENSOR)
         self._controls = [self._fields(FIRST)]
         self._coloring = gui.add_dropdown(
             "Colours", list(COLORINGS), hint="What the colours of the points in the 3-D scene mean."
         )
-        self.when_changed(self._coloring, self._draw)
+        self.ui.when_changed(self._coloring, self._draw)
         self._numbers = gui.add_html("")
         self._build_folders()
 
@@ -69,10 +67,8 @@ class DepthPanel(Panel):
             gui.add_markdown(CONFIDENCE_TEXT)
             self._controls.append(self._fields(CONFIDENCE_CONTROLS))
             self._confidence_table = gui.add_html("")
-        self._hide = HideFolder(gui, self.scene, session.post, self.when_changed, self._hidden_wish)
-        self._network = NetworkFolder(
-            gui, session.post, self.when_changed, session.folder, self._choose_network
-        )
+        self._hide = HideFolder(self.ui, self._ask_to_hide)
+        self._model = ModelFolder(self.ui, session.folder, self._choose_model)
         with gui.add_folder("Advanced", expand_by_default=False):
             self._drawn = gui.add_dropdown(
                 "Inferred points", list(DRAWN), hint="Which of the inferred (violet) points are drawn."
@@ -81,21 +77,18 @@ class DepthPanel(Panel):
                 "Outliers", True, hint="Draw the points the filter rejects, in red."
             )
             for handle in (self._drawn, self._rejected):
-                self.when_changed(handle, self._draw)
+                self.ui.when_changed(handle, self._draw)
             self._controls.append(self._fields(ADVANCED))
-        self.scene.on_click()(lambda event: session.post(self._clicked, event))
+        self.ui.when_clicked(self.drawn_below, self._hide.clicked)
 
     def _fields(self, fields: Any) -> Controls:
-        session = self.session
-        return Controls(
-            self.gui, fields, session.spec.config, lambda change: session.post(session.edit, change)
-        )
+        return Controls(self.ui, fields, self.session.spec.config, self.session.edit)
 
     def on_spec(self, spec: Spec) -> None:
         """Show the settings that are wanted; what was hidden with others is out of date."""
         for controls in self._controls:
             controls.write(spec.config)
-        self._network.write(spec.config.depth)
+        self._model.write(spec.config.depth)
         if spec.source != self._source:
             self._source = spec.source
             self._hide.clear()
@@ -120,7 +113,7 @@ class DepthPanel(Panel):
         if scene is None or depth is None or len(scene.nodes) != len(depth.nodes):
             return
         own = COLORINGS[self._coloring.value] == "photo"
-        with self.session.target.atomic():
+        with self.ui.atomic():
             clear(self.scene, "/depth")
             for place, node in zip(scene.nodes, depth.nodes, strict=True):
                 below, T = f"/depth/{node.name}", place.T_world_camera
@@ -164,7 +157,7 @@ class DepthPanel(Panel):
         if shown is None:
             return
         node = shown[1]
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._area.load(node.pictures)
             self._numbers.content = depth_table(node)
             self._residuals.content = residual_table(node)
@@ -182,44 +175,39 @@ class DepthPanel(Panel):
             assert isinstance(node.sensor, SeenSample)
             self._hide.show(node.sensor, scene.nodes[index].T_world_camera)
 
-    def _clicked(self, event: Any) -> None:
-        frame = self.scene.get_handle_by_name(self.drawn_below)
-        if frame is not None and frame.visible:
-            self._hide.clicked(np.array(event.ray_origin), np.array(event.ray_direction))
-
-    def _hidden_wish(self, wish: HideWish) -> None:
+    def _ask_to_hide(self, request: HideRequest) -> None:
         session, spec, shown = self.session, self.session.spec, self._shown()
         if shown is None or not session.results.fresh("depth", spec):
             self._hide.load(None)
             return
-        wish = replace(wish, node=shown[0])
+        request = replace(request, node=shown[0])
         session.quick_job(
-            "hide", session.store, spec, wish, on_end=lambda view: self._filled(spec, wish, view)
+            "hide", session.store, spec, request, on_end=lambda view: self._filled(spec, request, view)
         )
 
-    def _filled(self, spec: Spec, wish: HideWish, view: HiddenView | None) -> None:
+    def _filled(self, spec: Spec, request: HideRequest, view: HiddenView | None) -> None:
         shown = self._shown()
-        if spec != self.session.spec or wish.discs != self._hide.discs:
+        if spec != self.session.spec or request.discs != self._hide.discs:
             return
-        if shown is not None and shown[0] == wish.node:
-            with self.session.target.atomic():
+        if shown is not None and shown[0] == request.node:
+            with self.ui.atomic():
                 self._hide.load(view)
 
-    def _choose_network(self, wish: NetworkWish) -> None:
+    def _choose_model(self, choice: ModelChoice) -> None:
         """Try it first: a file that is no depth network is to change nothing."""
-        self.session.quick_job("network", wish, on_end=self._tried)
+        self.session.quick_job("model", choice, on_end=self._tried)
 
-    def _tried(self, view: NetworkView | None) -> None:
+    def _tried(self, view: ModelView | None) -> None:
         if view is not None:
-            self.session.edit(with_network(view.wish))
-        self._network.load(view)
+            self.session.edit(with_model(view.choice))
+        self._model.load(view)
 
     # The lesson.
 
     def _take_look(self, look: DepthLook) -> None:
         """Set the controls as a stop of the lesson says; what is to be hidden waits for the depth."""
         session = self.session
-        with session.target.atomic():
+        with self.ui.atomic():
             self._area.set(look.left, look.right, look.split_share)
             self._coloring.value = next(name for name, key in COLORINGS.items() if key == look.coloring)
             self._drawn.value = look.drawn

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from app.controls import Choice, Number, Toggle
-from app.screens.depth.view import NetworkWish
+from app.screens.depth.view import ModelChoice
 from pipeline.config import PipelineConfig
 
 FIRST = (
@@ -56,6 +56,6 @@ ADVANCED = (
 )
 
 
-def with_network(wish: NetworkWish) -> Callable[[PipelineConfig], PipelineConfig]:
+def with_model(choice: ModelChoice) -> Callable[[PipelineConfig], PipelineConfig]:
     """The edit that takes another network."""
-    return lambda config: replace(config, depth=wish.put_into(config.depth))
+    return lambda config: replace(config, depth=choice.put_into(config.depth))

@@ -33,7 +33,7 @@ class Disc:
 
 
 @dataclass(frozen=True, slots=True)
-class HideWish:
+class HideRequest:
     """The part of one node's sensor depth that is to be hidden and filled again: all discs together."""
 
     node: int = 0
@@ -61,7 +61,7 @@ class FillRow:
 class HiddenView:
     """A part of the sensor's depth before, while and after it was hidden."""
 
-    wish: HideWish
+    request: HideRequest
     node: str
     hidden_px: int
     """Measured pixels that were hidden."""
@@ -71,7 +71,7 @@ class HiddenView:
 
 
 @dataclass(frozen=True, slots=True)
-class NetworkWish:
+class ModelChoice:
     """The depth network that is to be used: the fields of ``DepthConfig`` by the same names."""
 
     model: str | None = None
@@ -91,10 +91,10 @@ class NetworkWish:
 
 
 @dataclass(frozen=True, slots=True)
-class NetworkView:
+class ModelView:
     """A depth network that could be loaded and answered."""
 
-    wish: NetworkWish
+    choice: ModelChoice
     kind: ModelKind
     """What it gives."""
     provider: str

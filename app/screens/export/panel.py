@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 import viser
 
-from app.panel import Panel
 from app.state import Spec
 from app.tables import command_html
+from app.ui import Panel
 from packetmesh.errors import InputError
 
 TEXT = """**Take it along.** Files hold metres, Z up. The HTML file needs no server: it opens in any
@@ -57,7 +57,7 @@ class ExportPanel(Panel):
         self._command.content = command_html(spec.command())
 
     def _clicked(self, name: str, client: viser.ClientHandle | None) -> None:
-        self.session.post(self._export, name, client)
+        self.ui.post(self._export, name, client)
 
     def _export(self, name: str, client: viser.ClientHandle | None) -> None:
         session = self.session

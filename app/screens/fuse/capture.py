@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from typing import Any
-
-import viser
 
 from app.records import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, CaptureView
-from app.screens.fuse.capture_plot import CELLS, capture_html, cell_name
+from app.screens.fuse.capture_plot import capture_html, cell_name
 from app.screens.fuse.draw import MARKS
+from app.ui import Ui
 
 COMPUTE, STOP = "Compute the map", "Stop the map"
 TEXT = """Which starts does a method come home from? 25 of them, on 2000 points of each cloud, with the
@@ -22,37 +21,35 @@ class CaptureFolder:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        post: Callable[..., None],
-        changed: Callable[[Any, Callable[[], None]], None],
-        on_press: Callable[[str], None],
+        ui: Ui,
+        on_compute: Callable[[], None],
+        on_stop: Callable[[], None],
         on_cell: Callable[[float, float], None],
     ) -> None:
         """Add the folder.
 
         Args:
-            gui: where to add it.
-            post: runs a function on the session's thread.
-            changed: registers an action for a change of a handle by a person.
-            on_press: called with ``COMPUTE`` or ``STOP``.
+            ui: where to add it.
+            on_compute: called when the map is wanted.
+            on_stop: called when it is no longer wanted.
             on_cell: called with the rotation in degrees and the translation in metres of a cell.
         """
         self._view: CaptureView | None = None
+        gui = ui.gui
         with gui.add_folder("Capture range", expand_by_default=False):
             gui.add_markdown(TEXT)
-            keys = gui.add_button_group("Map", (COMPUTE, STOP), hint="It takes seconds; Stop ends it.")
-            keys.on_click(lambda event: post(on_press, event.target.value))
+            ui.buttons("Map", {COMPUTE: on_compute, STOP: on_stop}, "It takes seconds; Stop ends it.")
             self._status = gui.add_markdown("")
             self._lane = gui.add_dropdown("Map of", [f"{MARKS[0]} first"], hint="Method whose map is shown.")
-            changed(self._lane, self._show)
+            ui.when_changed(self._lane, self._show)
             self._map = gui.add_html("")
             with gui.add_folder("The cells as buttons", expand_by_default=False):
                 for turn_deg in CAPTURE_TURNS_DEG:
-                    names = tuple(cell_name(turn_deg, shift_m) for shift_m in CAPTURE_SHIFTS_M)
-                    row = gui.add_button_group(
-                        f"Turn {turn_deg:.0f}°", names, hint="Start so far from aligned, and race."
-                    )
-                    row.on_click(lambda event: post(on_cell, *CELLS[event.target.value]))
+                    cells = {
+                        cell_name(turn_deg, shift_m): functools.partial(on_cell, turn_deg, shift_m)
+                        for shift_m in CAPTURE_SHIFTS_M
+                    }
+                    ui.buttons(f"Turn {turn_deg:.0f}°", cells, "Start so far from aligned, and race.")
         self.forget()
 
     def forget(self) -> None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.chain import prepared, rig_of
 from app.records import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, CaptureView, Race, Start
 from app.screens.fuse.race_job import Contest, config_of, contest_of, label_of, race_key
 from app.state import Spec
@@ -23,12 +22,12 @@ MAP_POINTS = 2_000
 
 def capture_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, CaptureView]:
     """Register from every start of the map with every rival; the race's own start does not matter."""
-    rig = yield from rig_of(store, spec)
-    work = yield from prepared(store, spec)
+    rig = yield from store.stage(spec, "rig")
+    nodes = yield from store.stage(spec, "nodes")
     race = replace(race, start=Start())
 
     def run() -> Generator[Progress, None, CaptureView]:
-        contest = contest_of(rig, work, race)
+        contest = contest_of(rig, nodes, race)
         if contest.T_true is None:
             raise InputError(
                 "The truth of this scene is not known, so nothing tells which starts arrive; "

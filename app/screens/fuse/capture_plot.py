@@ -18,13 +18,6 @@ def cell_name(turn_deg: float, shift_m: float) -> str:
     return f"{turn_deg:.0f}° {100 * shift_m:.0f} cm"
 
 
-CELLS = {
-    cell_name(turn_deg, shift_m): (turn_deg, shift_m)
-    for turn_deg in CAPTURE_TURNS_DEG
-    for shift_m in CAPTURE_SHIFTS_M
-}
-
-
 def capture_html(view: CaptureView, lane: int) -> str:
     """Rows of rotations, columns of translations; each cell says how far from the truth it ends."""
     heads = "".join(f"<th>{100 * shift_m:.0f} cm</th>" for shift_m in CAPTURE_SHIFTS_M)

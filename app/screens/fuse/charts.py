@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
-import viser
 
 from app.records import RaceView
 from app.screens.fuse.clock import RaceClock
 from app.screens.fuse.curves import LANE_COLORS, Curves
 from app.screens.fuse.draw import MARKS
 from app.screens.fuse.histogram import HistogramChart
+from app.ui import Ui
 
 FIRST = f"{MARKS[0]} first"
 
@@ -20,8 +17,8 @@ FIRST = f"{MARKS[0]} first"
 class RaceCharts:
     """Four charts in tabs, all with the player's place marked."""
 
-    def __init__(self, gui: viser.GuiApi, changed: Callable[[Any, Callable[[], None]], None]) -> None:
-        """Add the tabs; ``changed`` registers an action for a change of a handle by a person."""
+    def __init__(self, ui: Ui) -> None:
+        gui = ui.gui
         self._view: RaceView | None = None
         self._rows: tuple[int, ...] = ()
         tabs = gui.add_tab_group()
@@ -35,7 +32,7 @@ class RaceCharts:
             self._without = gui.add_markdown("None of these methods has an entropy.", visible=False)
         with tabs.add_tab("Pairs"):
             self._lane = gui.add_dropdown("Lane", [FIRST], hint="Method whose pairs are counted.")
-            changed(self._lane, self._show_pairs)
+            ui.when_changed(self._lane, self._show_pairs)
             self._pairs = HistogramChart(gui)
         self._legend = gui.add_html("")
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
-from app.lesson import LESSONS, NUMBER, Lesson, Setting, choice, read_lesson, sets
+from app.lesson import LESSONS, NUMBER, Setting, choice, quantity, sets, short
 from app.records import Race, Rival, Start
 from app.screens.fuse.labels import DIRECTIONS, MODES, MOST_LANES, RIVALS, STARTS
 
@@ -31,30 +30,9 @@ class RaceLook:
     """Whose pairs the histogram shows."""
 
 
-def race_lesson(path: Path = SHIPPED) -> Lesson[RaceLook]:
-    """A lesson about races.
-
-    Raises:
-        InputError: the file is no lesson or sets what no race has.
-    """
-    return read_lesson(path, SETTINGS, RaceLook())
-
-
 def _races(key: str, read: Callable[[str], Any]) -> Setting[RaceLook]:
     """The setting that puts what ``read`` makes of the text into one field of the race."""
     return lambda look, text: replace(look, race=replace(look.race, **{key: read(text)}))
-
-
-def _quantity(unit: str, per_unit: float, most: float) -> Callable[[str], float]:
-    """Reads '2 cm' with unit cm; ``per_unit`` units make one of the stored unit."""
-
-    def read(text: str) -> float:
-        found = re.fullmatch(rf"{NUMBER} ?{unit}", text)
-        if found is None or float(found[1]) > most:
-            raise ValueError(f"try 0 to {most:g} {unit}")
-        return float(found[1]) / per_unit
-
-    return read
 
 
 def _methods(text: str) -> tuple[Rival, ...]:
@@ -66,7 +44,7 @@ def _methods(text: str) -> tuple[Rival, ...]:
 
 
 def _start(text: str) -> Start:
-    names = {name.partition(" (")[0]: error for name, error in STARTS.items()}
+    names = {short(name): error for name, error in STARTS.items()}
     found = re.fullmatch(rf"{NUMBER} deg {NUMBER} cm", text)
     if found is not None:
         return Start.towards(float(found[1]), float(found[2]), seed=0)
@@ -88,11 +66,11 @@ SETTINGS: dict[str, Setting[RaceLook]] = {
     "methods": _races("rivals", _methods),
     "pairs": _races("direction", choice(DIRECTIONS)),
     "start": _races("start", _start),
-    "noise": _races("noise_m", _quantity("cm", 100.0, 10.0)),
-    "outliers": _races("outlier_share", _quantity("%", 100.0, 60.0)),
-    "holes": _races("hole_share", _quantity("%", 100.0, 80.0)),
-    "cut off": _races("crop_share", _quantity("%", 100.0, 80.0)),
-    "depth bias": _races("depth_bias", _quantity("%", 100.0, 15.0)),
+    "noise": _races("noise_m", quantity("cm", 10.0, 100.0)),
+    "outliers": _races("outlier_share", quantity("%", 60.0, 100.0)),
+    "holes": _races("hole_share", quantity("%", 80.0, 100.0)),
+    "cut off": _races("crop_share", quantity("%", 80.0, 100.0)),
+    "depth bias": _races("depth_bias", quantity("%", 15.0, 100.0)),
     "axis": sets("in_ms", choice({"iterations": False, "milliseconds": True})),
     "position": sets("place", _place),
     "lane": sets("lane", choice({str(index + 1): index for index in range(MOST_LANES)})),

@@ -11,18 +11,18 @@ from app.controls import Choice, Controls
 from app.drawing.cameras import Stage, stage_of
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.poses import move, place
-from app.lesson_folder import LessonFolder
-from app.panel import Panel
+from app.lesson import LessonFolder, read_lesson
 from app.records import CaptureView, DepthView, FuseView, Race, RaceView, Start
-from app.screens.fuse.capture import COMPUTE, CaptureFolder
+from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
 from app.screens.fuse.draw import RaceDrawing, gizmo_pose, look_at_lanes
 from app.screens.fuse.labels import MODES
-from app.screens.fuse.lesson import RaceLook, race_lesson
+from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.numbers import places_table, race_table, verdict
 from app.screens.fuse.player import RacePlayer
 from app.screens.fuse.setup import RaceSetup
 from app.state import Spec, Step
+from app.ui import Panel
 from pipeline.config import Method
 
 TEXT = """**What you see.** Methods move the orange cloud onto the blue one, all from the same start. Lines
@@ -64,7 +64,7 @@ class FusePanel(Panel):
 
     def build(self) -> None:
         """Lesson, what races, the player, charts and table; the rest in folders."""
-        gui, session = self.gui, self.session
+        gui = self.gui
         self._raced = self._arrived = self._mapped = None
         self._view: RaceView | None = None
         self._drawing: RaceDrawing | None = None
@@ -74,15 +74,14 @@ class FusePanel(Panel):
         self._lanes = 0
         gui.add_markdown(TEXT)
         self._single = gui.add_markdown(SINGLE, visible=False)
-        self._lesson = LessonFolder(gui, race_lesson(), session.post, self.when_changed, self._take_stop)
+        self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, RaceLook()), self._take_stop)
         self._shown = gui.add_dropdown("Show", [*RACES, RESULT, BEFORE], hint="What the 3-D view shows.")
-        self.when_changed(self._shown, self._picked_shown)
-        self._setup = RaceSetup(gui, self.when_changed)
-        self._setup.on_change = self._start
+        self.ui.when_changed(self._shown, self._picked_shown)
+        self._setup = RaceSetup(self.ui, self._start)
         self._setup.add_methods(("Method ①", "Method ②"))
         self._setup.add_preset()
-        self._player = RacePlayer(gui, session.post, self.when_changed, self._moved, self._clocked)
-        self._charts = RaceCharts(gui, self.when_changed)
+        self._player = RacePlayer(self.ui, self._moved, self._clocked)
+        self._charts = RaceCharts(self.ui)
         self._verdict = gui.add_markdown("")
         self._table = gui.add_html("")
         self._build_folders()
@@ -99,29 +98,20 @@ class FusePanel(Panel):
                 False,
                 hint="Arrows and rings in the first lane move the start of all lanes.",
             )
-            self.when_changed(self._dragging, self._place_gizmo)
+            self.ui.when_changed(self._dragging, self._place_gizmo)
             self._setup.add_numbers()
         with gui.add_folder("Make the moving cloud worse", expand_by_default=False):
             self._setup.add_degradations()
         with gui.add_folder("Axis, speed and loop", expand_by_default=False):
             self._player.add_options()
-        self._capture = CaptureFolder(
-            gui, session.post, self.when_changed, self._pressed_capture, self._picked_cell
-        )
+        self._capture = CaptureFolder(self.ui, self._map, session.cancel_side_job, self._picked_cell)
         with gui.add_folder("Chain", expand_by_default=False):
-            self._controls = Controls(
-                gui, ADVANCED, session.spec.config, lambda change: session.post(session.edit, change)
-            )
+            self._controls = Controls(self.ui, ADVANCED, session.spec.config, session.edit)
 
     @property
     def wide(self) -> bool:
         """Whether lanes stand beside each other."""
         return self._view is not None and len(self._view.lanes) > 1 and self._shown.value in RACES
-
-    def close(self) -> None:
-        """End the player's thread."""
-        if hasattr(self, "_player"):
-            self._player.close()
 
     def on_spec(self, spec: Spec) -> None:
         """Show the settings that are wanted."""
@@ -141,14 +131,14 @@ class FusePanel(Panel):
     def on_show(self) -> None:
         """Race at the latest when somebody looks."""
         self._start()
-        self.session.post(self._stand_back, True)
+        self.ui.post(self._stand_back, True)
 
     # What races.
 
     def _choose_nodes(self, names: list[str]) -> None:
         single = len(names) == 1
         options = tuple(name for name, mode in RACES.items() if mode == "inferred" or not single)
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._single.visible = single
             if self._shown.options != (*options, RESULT, BEFORE):
                 self._shown.options = (*options, RESULT, BEFORE)
@@ -168,7 +158,7 @@ class FusePanel(Panel):
         """Set the controls as a stop of the lesson says, and race."""
         single = RACE_NAMES["nodes"] not in self._shown.options
         race = replace(stop.race, mode="inferred") if single else stop.race
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._shown.value = RACE_NAMES[race.mode]
             self._setup.write(race)
             self._player.choose(stop.in_ms)
@@ -178,7 +168,7 @@ class FusePanel(Panel):
         self._charts.choose_lane(stop.lane)
 
     def _picked_cell(self, turn_deg: float, shift_m: float) -> None:
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._setup.write_start(Start.towards(turn_deg, 100.0 * shift_m, self._setup.race.seed))
         self._start()
 
@@ -205,7 +195,7 @@ class FusePanel(Panel):
         """Take the race of another scene away."""
         self._raced = self._arrived = self._view = self._drawing = self._gizmo = None
         self._lanes = 0
-        with self.session.target.atomic():
+        with self.ui.atomic():
             clear(self.scene, "/fuse/race")
             self._verdict.content = self._table.content = self._rows.content = ""
             self._capture.forget()
@@ -221,14 +211,14 @@ class FusePanel(Panel):
 
     def _take_race(self, view: RaceView) -> None:
         self._view = view
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._drawing = RaceDrawing(self.scene, "/fuse/race", view, self._stage())
             self._gizmo = None
             self._place_gizmo()
             self._verdict.content = verdict(view.lanes)
             self._table.content = race_table(view.lanes)
-            self._player.load(view.lanes)
-            self._player.seek(self._seek_at)
+            self._player.load_race(view.lanes)
+            self._player.seek_at(self._seek_at)
             self._seek_at = 0
             self._arrange()
         self._stand_back()
@@ -241,7 +231,7 @@ class FusePanel(Panel):
         clock = self._player.clock
         if self._drawing is None or clock is None:
             return
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._drawing.show(clock.rows(at))
             self._charts.mark(at, clock.rows(at))
 
@@ -253,7 +243,7 @@ class FusePanel(Panel):
             return
         if self._gizmo is None and self._dragging.value:
             self._gizmo = self._drawing.add_gizmo(
-                self._drawn, lambda start, ended: self.session.post(self._dragged, start, ended)
+                self._drawn, lambda start, ended: self.ui.post(self._dragged, start, ended)
             )
         if self._gizmo is not None:
             place(self._gizmo, gizmo_pose(self._drawn, self._view.center_m))
@@ -262,19 +252,16 @@ class FusePanel(Panel):
     def _dragged(self, start: Start, ended: bool) -> None:
         if self._drawing is None:
             return
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._drawing.preview(self._drawn, start)
             self._setup.write_start(start)
         if ended and not self._start():
-            self._moved(self._player.place)
+            self._moved(self._player.position)
 
     # The capture range.
 
-    def _pressed_capture(self, button: str) -> None:
+    def _map(self) -> None:
         session = self.session
-        if button != COMPUTE:
-            session.cancel_side_job()
-            return
         if session.results.view("depth") is None:
             return
         self._capture.wait()
@@ -283,7 +270,7 @@ class FusePanel(Panel):
         session.side_job("capture", session.store, session.spec, wanted[1], on_end=ended)
 
     def _take_capture(self, wanted: _Wanted, view: CaptureView | None) -> None:
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._capture.load(view if wanted == _anywhere(self._wanted()) else None)
         self._start()
 
@@ -294,8 +281,7 @@ class FusePanel(Panel):
 
     def _stand_back(self, anew: bool = False) -> None:
         """Have more than two lanes in the picture; the session sees to one or two."""
-        frame = self.scene.get_handle_by_name(self.drawn_below)
-        if frame is None or not frame.visible:
+        if not self.ui.shows(self.drawn_below):
             return
         lanes = len(self._view.lanes) if self._view is not None and self._shown.value in RACES else 1
         if (anew or lanes != self._lanes) and max(lanes, self._lanes) > 2:
@@ -306,7 +292,7 @@ class FusePanel(Panel):
         depth: DepthView | None = self.session.results.view("depth")
         if depth is None or len(depth.nodes) != len(view.registered):
             return
-        with self.session.target.atomic():
+        with self.ui.atomic():
             clear(self.scene, "/fuse/result")
             self._placed = [
                 add_cloud(self.scene, f"/fuse/result/{node.name}", node.fused, T)

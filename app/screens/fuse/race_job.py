@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.chain import PreparedNodes, prepared, rig_of
 from app.records import (
     PairHistogram,
     Race,
@@ -18,15 +17,17 @@ from app.records import (
     Start,
     sample,
 )
+from app.screens.fuse.job import true_pose
 from app.state import Spec
 from app.store import Store
-from app.views import true_pose
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import Progress
 from pipeline import geometry
 from pipeline.config import Method, RegistrationConfig
+from pipeline.nodes import NodeClouds
 from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
 from pipeline.registration.degradation import Degradation, degrade
+from pipeline.spec import key
 from pipeline.types import FloatArray, PointCloud, RegistrationStep, Rig
 
 LANE_POINTS = 15_000
@@ -66,11 +67,11 @@ class Contest:
 
 def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, RaceView]:
     """Run every rival from the same start."""
-    rig = yield from rig_of(store, spec)
-    work = yield from prepared(store, spec)
+    rig = yield from store.stage(spec, "rig")
+    nodes = yield from store.stage(spec, "nodes")
 
     def run() -> Generator[Progress, None, RaceView]:
-        contest = contest_of(rig, work, race)
+        contest = contest_of(rig, nodes, race)
         runs = []
         for index, rival in enumerate(race.rivals):
             yield Progress(f"race: {label_of(rival)}", index / len(race.rivals))
@@ -93,23 +94,23 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
 
 def race_key(spec: Spec) -> tuple[object, ...]:
     """What a race depends on beside itself."""
-    return (*spec.key("depth"), spec.config.node_registration)
+    return (key(spec, "nodes"), spec.config.node_registration)
 
 
-def contest_of(rig: Rig, work: PreparedNodes, race: Race) -> Contest:
+def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
     """The clouds of a race.
 
     Raises:
         InputError: a node cannot be moved onto itself.
     """
-    moving = work.nodes[race.source]
+    moving = nodes[race.source]
     if race.mode == "inferred":
         source, target = moving.inferred, moving.sensor
         T_true: FloatArray | None = np.eye(4)
     else:
         if race.source == race.target:
             raise InputError(f"{moving.name} cannot be moved onto itself; choose another node.")
-        source, target = moving.sensor, work.nodes[race.target].sensor
+        source, target = moving.sensor, nodes[race.target].sensor
         T_true = true_pose(rig, race.source, race.target)
     poses = [frame.T_world_camera for frame in rig.frames]
     T_aligned = geometry.inverse(poses[race.target]) @ poses[race.source] if T_true is None else T_true

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import viser
 
 from app.records import Race, RaceMode, Start
 from app.screens.fuse.labels import BY_HAND, DIRECTIONS, MOST_LANES, NOBODY, RIVAL_NAMES, RIVALS, STARTS
+from app.ui import Ui
 
 SLIGHTLY = list(STARTS)[1]
 METHOD_HINT = "Method and what it minimises: distance to the paired point, or to the plane at it."
@@ -24,47 +24,46 @@ DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
 
 
 class RaceSetup:
-    """The controls of a ``Race``; says when a person changes one."""
+    """The controls of a ``Race``."""
 
-    def __init__(self, gui: viser.GuiApi, changed: Callable[[Any, Callable[[], None]], None]) -> None:
+    def __init__(self, ui: Ui, on_change: Callable[[], object]) -> None:
         """Set up without controls, which the panel adds where it wants them.
 
         Args:
-            gui: where to add them.
-            changed: registers an action for a change of a handle by a person.
+            ui: where to add them.
+            on_change: called when a person has changed one.
         """
-        self._gui, self._changed = gui, changed
+        self._ui, self._on_change = ui, on_change
         self._race = Race(start=Start.towards(*STARTS[SLIGHTLY], seed=0))
-        self.on_change: Callable[[], object] = lambda: None
         self._slots: list[viser.GuiDropdownHandle[str]] = []
 
     def add_methods(self, labels: Sequence[str]) -> None:
         """The next drop-downs of methods; all but the first may stay empty."""
         for label in labels:
             index, rivals = len(self._slots), self._race.rivals
-            handle = self._gui.add_dropdown(
+            handle = self._ui.gui.add_dropdown(
                 label,
                 list(RIVALS) if index == 0 else [NOBODY, *RIVALS],
                 initial_value=RIVAL_NAMES[rivals[index]] if index < len(rivals) else NOBODY,
                 hint=METHOD_HINT,
             )
             self._slots.append(handle)
-            self._changed(handle, self._picked)
+            self._ui.when_changed(handle, self._picked)
 
     def add_preset(self) -> None:
         """Where the moving cloud starts, by name."""
-        self._preset = self._gui.add_dropdown(
+        self._preset = self._ui.gui.add_dropdown(
             "Start",
             [*STARTS, BY_HAND],
             initial_value=SLIGHTLY,
             hint="How far from aligned the orange cloud starts. Aligned is the truth where it is known, "
             "otherwise what the nodes believe.",
         )
-        self._changed(self._preset, self._picked_preset)
+        self._ui.when_changed(self._preset, self._picked_preset)
 
     def add_nodes(self) -> None:
         """Who moves onto whom, and who asks whom for the nearest point."""
-        gui, names = self._gui, ["node_00", "node_01"]
+        gui, names = self._ui.gui, ["node_00", "node_01"]
         self._source = gui.add_dropdown(
             "Move", names, initial_value=names[1], hint="Node whose cloud moves (orange)."
         )
@@ -73,11 +72,11 @@ class RaceSetup:
             "Pairs", list(DIRECTIONS), hint="Whose points look for their nearest counterpart."
         )
         for handle in (self._source, self._target, self._direction):
-            self._changed(handle, self._picked)
+            self._ui.when_changed(handle, self._picked)
 
     def add_numbers(self) -> None:
         """The start in numbers."""
-        gui, start = self._gui, self._race.start
+        gui, start = self._ui.gui, self._race.start
         self._turn = gui.add_vector3(
             "Turn (°)",
             start.turn_deg,
@@ -88,24 +87,24 @@ class RaceSetup:
             "Shift (cm)", start.shift_cm, step=0.5, hint="Translation along the same axes, centimetres."
         )
         for handle in (self._turn, self._shift):
-            self._changed(handle, self._picked_numbers)
+            self._ui.when_changed(handle, self._picked_numbers)
         self._seed = gui.add_slider(
             "Seed", 0, 20, 1, 0, hint="Draws the directions of the start error and what is done to the cloud."
         )
-        self._changed(self._seed, self._picked_preset)
+        self._ui.when_changed(self._seed, self._picked_preset)
 
     def add_degradations(self) -> None:
         """What is done to the moving cloud."""
         self._worse = {
-            name: self._gui.add_slider(label, 0.0, most, step, 0.0, hint=hint)
+            name: self._ui.gui.add_slider(label, 0.0, most, step, 0.0, hint=hint)
             for name, (label, most, step, _, hint) in DEGRADATIONS.items()
         }
         for handle in self._worse.values():
-            self._changed(handle, self._picked)
+            self._ui.when_changed(handle, self._picked)
 
     @property
     def race(self) -> Race:
-        """What the controls say."""
+        """The race that the controls show."""
         return self._race
 
     def choose_nodes(self, names: Sequence[str]) -> None:
@@ -159,15 +158,15 @@ class RaceSetup:
 
     def _picked(self) -> None:
         self._race = self._read(self._race)
-        self.on_change()
+        self._on_change()
 
     def _picked_preset(self) -> None:
         self._race = self._read(self._race)
         if self._preset.value != BY_HAND:
             self.write_start(Start.towards(*STARTS[self._preset.value], self._race.seed))
-        self.on_change()
+        self._on_change()
 
     def _picked_numbers(self) -> None:
         turn, shift = ((float(x), float(y), float(z)) for x, y, z in (self._turn.value, self._shift.value))
         self.write_start(Start(turn, shift))
-        self.on_change()
+        self._on_change()

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-import viser
 
 from app.screens.network.curves import RUN_COLORS, NetworkCurves
 from app.screens.network.gantt import Window, cursor_html, gantt_html, legend_html
 from app.screens.network.labels import CURVE_HINTS, CURVES
 from app.screens.network.player import RUN_S, NetworkPlayer, short_time
 from app.screens.network.view import NetworkView, What
+from app.ui import Ui
 from network_sim.types import PacketKind
 
 NARROWEST = -3.0
 """Power of ten of the shortest window in seconds."""
 PAGE = 0.9
 """The window moves on when the player is past so much of it."""
-EARLIER, LATER, FRAMES, ALL = "Earlier", "Later", "Frames", "All"
 FRAMES_SHOWN = 20
 FRAMES_S = 15.0
 """How long they take to play."""
@@ -29,8 +27,9 @@ FRAMES_S = 15.0
 class NetworkCharts:
     """Four curves in tabs, and below them a row for each node."""
 
-    def __init__(self, gui: viser.GuiApi, changed: Callable[[Any, Callable[[], None]], None]) -> None:
-        """Add the tabs; ``changed`` registers an action for a change of a handle by a person."""
+    def __init__(self, ui: Ui, player: NetworkPlayer) -> None:
+        """Add the tabs, the rows of nodes and what moves their window, and the ``player`` with it."""
+        gui = ui.gui
         self._curves: dict[str, NetworkCurves] = {}
         tabs = gui.add_tab_group()
         for name, (unit, top) in CURVES.items():
@@ -40,10 +39,6 @@ class NetworkCharts:
                     f"<div style='padding: 0 0.8em 0.5em; font-size: 12px'>{CURVE_HINTS[name]}</div>"
                 )
         self._labels = gui.add_html("")
-        self._changed = changed
-
-    def add_timeline(self, gui: viser.GuiApi, post: Callable[..., None], player: NetworkPlayer) -> None:
-        """Add the rows of nodes and what moves their window, and the ``player`` with it."""
         self._player = player
         self._views: Sequence[NetworkView] = ()
         self._whole = self._window = Window(0, 1_000_000_000)
@@ -57,13 +52,15 @@ class NetworkCharts:
             0.0,
             hint="Length of the timeline below, as a power of ten of seconds; it follows the player.",
         )
-        self._changed(self._zoom, self._zoomed)
-        keys = gui.add_button_group(
-            "Timeline",
-            (EARLIER, LATER, FRAMES, ALL),
-            hint=f"Move the window; go to the next {FRAMES_SHOWN} frames, in slow motion; show everything.",
-        )
-        keys.on_click(lambda event: post(self._press, event.target.value))
+        ui.when_changed(self._zoom, self._zoomed)
+        actions = {
+            "Earlier": lambda: self._turn(-1),
+            "Later": lambda: self._turn(1),
+            "Frames": self._show_frames,
+            "All": self._show_all,
+        }
+        about = f"Move the window; go to the next {FRAMES_SHOWN} frames, in slow motion; show everything."
+        ui.buttons("Timeline", actions, about)
         self._rows = [gui.add_html("") for _ in range(4)]
         self._legend = gui.add_html("")
 
@@ -119,20 +116,27 @@ class NetworkCharts:
         self._look(round(self._now_ns - share * span_ns), span_ns)
         self._paint()
 
-    def _press(self, key: str) -> None:
-        window = self._window
-        if key in (EARLIER, LATER):
-            step_ns = round(0.8 * window.span_ns)
-            self._look(window.start_ns + (step_ns if key == LATER else -step_ns), window.span_ns)
-        elif key == ALL:
-            self._window = self._whole
-            self._player.pace(self._whole.span_ns / 1e9 / RUN_S)
-        else:
-            first_ns, last_ns = self._next_frames_ns()
-            self._player.seek(first_ns)
-            span_ns = max(round(1.2 * (last_ns - first_ns)), 1_000_000)
-            self._player.pace(span_ns / 1e9 / FRAMES_S)
-            self._look(first_ns - span_ns // 10, span_ns)
+    def _turn(self, by: int) -> None:
+        """Move the window by most of its length."""
+        self._look(self._window.start_ns + by * round(0.8 * self._window.span_ns), self._window.span_ns)
+        self._follow_window()
+
+    def _show_all(self) -> None:
+        self._window = self._whole
+        self._player.pace(self._whole.span_ns / 1e9 / RUN_S)
+        self._follow_window()
+
+    def _show_frames(self) -> None:
+        """Go to the next frames, in slow motion."""
+        first_ns, last_ns = self._next_frames_ns()
+        self._player.seek_time(first_ns)
+        span_ns = max(round(1.2 * (last_ns - first_ns)), 1_000_000)
+        self._player.pace(span_ns / 1e9 / FRAMES_S)
+        self._look(first_ns - span_ns // 10, span_ns)
+        self._follow_window()
+
+    def _follow_window(self) -> None:
+        """Have the slider and the rows show the window."""
         span_s = self._window.span_ns / 1e9
         self._zoom.value = round(min(max(math.log10(span_s), NARROWEST), self._zoom.max), 2)
         self._paint()

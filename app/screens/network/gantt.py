@@ -132,7 +132,7 @@ def _blend(paper: FloatArray, share: FloatArray, color: tuple[int, int, int]) ->
     paper += strength * (np.array(color) - paper)
 
 
-# What the pointer is told.
+# What the pointer shows.
 
 
 def areas(view: NetworkView, pieces: Pieces, window: Window) -> list[tuple[float, int, float, str]]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.screens.network.view import MetricRow, NetworkView, NetworkWish, Pieces, Series, What
+from app.screens.network.view import MetricRow, NetworkRun, NetworkView, Pieces, Series, What
 from app.store import Store
 from network_sim.metrics import CAMERA_ROLES, metrics
 from network_sim.simulate import iterate_simulation, street_of
@@ -37,24 +37,24 @@ NOT_HEARD = (Cause.COLLISION, Cause.NOISE, Cause.RANGE, Cause.NODE_DOWN, Cause.U
 
 
 def simulate_job(
-    store: Store, wishes: tuple[NetworkWish, ...]
+    store: Store, runs: tuple[NetworkRun, ...]
 ) -> Generator[Progress, None, tuple[NetworkView, ...]]:
-    """All runs that are wished for, one after the other."""
+    """All runs, one after the other."""
     views = []
-    for index, wish in enumerate(wishes):
+    for index, run in enumerate(runs):
 
-        def run(wish: NetworkWish = wish, index: int = index) -> Generator[Progress, None, NetworkView]:
+        def simulate(run: NetworkRun = run, index: int = index) -> Generator[Progress, None, NetworkView]:
             started_s = time.perf_counter()
-            steps = iterate_simulation(wish.config)
+            steps = iterate_simulation(run.config)
             while True:
                 try:
                     progress = next(steps)
                 except StopIteration as stop:
-                    return view_of(stop.value, wish.label, time.perf_counter() - started_s)
-                yield Progress(f"simulating {wish.label}", (index + progress.fraction) / len(wishes))
+                    return view_of(stop.value, run.label, time.perf_counter() - started_s)
+                yield Progress(f"simulating {run.label}", (index + progress.fraction) / len(runs))
 
-        view = yield from store.remember(("simulate", wish.config), run)
-        views.append(replace(view, label=wish.label))
+        view = yield from store.remember(("simulate", run.config), simulate)
+        views.append(replace(view, label=run.label))
     return tuple(views)
 
 
@@ -62,9 +62,9 @@ def view_of(trace: NetworkTrace, label: str, elapsed_s: float) -> NetworkView:
     """What the screen shows of a run that took so long to simulate."""
     start_ns = min(to_ns(trace.config.run.warmup_s), trace.horizon_ns)
     pieces = pieces_of(trace, start_ns)
-    told_until_ns = trace.horizon_ns
+    kept_until_ns = trace.horizon_ns
     if len(pieces) > MOST_PIECES:
-        told_until_ns = int(pieces.start_ns[MOST_PIECES])
+        kept_until_ns = int(pieces.start_ns[MOST_PIECES])
         pieces = pieces.where(np.arange(MOST_PIECES))
     track_s, tracks_m = _tracks(trace)
     return NetworkView(
@@ -77,7 +77,7 @@ def view_of(trace: NetworkTrace, label: str, elapsed_s: float) -> NetworkView:
         start_ns=start_ns,
         end_ns=trace.horizon_ns,
         pieces=pieces,
-        told_until_ns=told_until_ns,
+        kept_until_ns=kept_until_ns,
         series=series_of(trace, start_ns),
         metrics=tuple(
             MetricRow(name, metric.value, metric.unit, metric.definition)

@@ -1,4 +1,4 @@
-"""The numbers of one run or two, each with its unit and its definition, and what is said of them."""
+"""The numbers of one run or two, each with its unit and its definition, and a sentence on each run."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def value_text(metric: MetricRow | None) -> str:
     return digits if unit == "1" else f"{digits} {unit}"
 
 
-def ran(views: Sequence[NetworkView]) -> str:
+def runs_summary(views: Sequence[NetworkView]) -> str:
     """What was simulated, and whether the timeline holds all of it."""
     sentences = []
     for view in views:
@@ -76,9 +76,9 @@ def ran(views: Sequence[NetworkView]) -> str:
             f"{name}{shown_s:,.1f} s of the network's time, {view.packets:,} packets in all, simulated in "
             f"{view.elapsed_s:.1f} s."
         )
-        if view.told_until_ns < view.end_ns:
+        if view.kept_until_ns < view.end_ns:
             sentences.append(
-                f"The timeline shows the first {(view.told_until_ns - view.start_ns) / 1e9:,.1f} s, the "
+                f"The timeline shows the first {(view.kept_until_ns - view.start_ns) / 1e9:,.1f} s, the "
                 "numbers and curves all."
             )
         if not len(view.pieces):

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from app.debounce import Delay
 from app.drawing.clouds import clear
-from app.panel import Panel
 from app.screens.network.charts import NetworkCharts
 from app.screens.network.draw import NetworkDrawing, look_at_ground
 from app.screens.network.labels import NETWORKS
-from app.screens.network.numbers import metric_tables, ran
+from app.screens.network.numbers import metric_tables, runs_summary
 from app.screens.network.player import NetworkPlayer
 from app.screens.network.setup import NetworkSetup
-from app.screens.network.view import NetworkView, NetworkWish
+from app.screens.network.view import NetworkRun, NetworkView
+from app.ui import Panel
 
 TEXT = """**What you see.** Camera nodes (blue) send their images by radio to a sink or to access points
 (green); circles show how far a frame can be received. Every moving point is a frame on the air; a red one
@@ -38,21 +37,20 @@ class NetworkPanel(Panel):
 
     def build(self) -> None:
         """Settings, player, curves, timeline, numbers."""
-        gui, session = self.gui, self.session
+        gui = self.gui
         self._views: tuple[NetworkView, ...] = ()
-        self._wanted: tuple[NetworkWish, ...] = ()
+        self._wanted: tuple[NetworkRun, ...] = ()
         self._drawing: NetworkDrawing | None = None
         self._drawn = 0
         self._framed: tuple[float, ...] = ()
         self._cancelled = False
-        self._resting = Delay(REST_S, lambda: session.post(self._run))
+        self._resting = self.ui.debounce(REST_S, self._run)
         gui.add_markdown(TEXT)
-        self._setup = NetworkSetup(gui, session.post, self.when_changed, self._resting.restart)
+        self._setup = NetworkSetup(self.ui, self._resting.restart)
         self._about = gui.add_markdown(NETWORKS[self._setup.preset].sentence)
-        self._said = gui.add_markdown("Nothing is simulated yet.")
-        self._player = NetworkPlayer(gui, session.post, self.when_changed, self._moved)
-        self._charts = NetworkCharts(gui, self.when_changed)
-        self._charts.add_timeline(gui, session.post, self._player)
+        self._status = gui.add_markdown("Nothing is simulated yet.")
+        self._player = NetworkPlayer(self.ui, self._moved)
+        self._charts = NetworkCharts(self.ui, self._player)
         self._table = gui.add_html("")
         with gui.add_folder("All other numbers", expand_by_default=False):
             self._others = gui.add_html("")
@@ -90,32 +88,26 @@ class NetworkPanel(Panel):
         """The command lines that simulate the same."""
         return self._setup.command()
 
-    def close(self) -> None:
-        """End the timers."""
-        if hasattr(self, "_resting"):
-            self._resting.cancel()
-            self._player.close()
-
     def _run(self) -> None:
         """Simulate what the controls say, unless it is what is shown."""
         preset = NETWORKS[self._setup.preset]
         self._about.content = preset.sentence + (f" {ORIGIN}" if preset.schemes else "")
-        wishes = self._setup.wishes()
-        if wishes == self._wanted and self._views:
+        runs = self._setup.runs()
+        if runs == self._wanted and self._views:
             return
-        self._wanted, self._cancelled = wishes, False
-        self._said.content = RUNNING
+        self._wanted, self._cancelled = runs, False
+        self._status.content = RUNNING
         self.session.apart_job(
-            "simulate", self.session.store, wishes, on_end=lambda views: self._ended(wishes, views)
+            "simulate", self.session.store, runs, on_end=lambda views: self._ended(runs, views)
         )
 
-    def _ended(self, wishes: tuple[NetworkWish, ...], views: tuple[NetworkView, ...] | None) -> None:
-        if wishes != self._wanted:
+    def _ended(self, runs: tuple[NetworkRun, ...], views: tuple[NetworkView, ...] | None) -> None:
+        if runs != self._wanted:
             return
-        with self.session.target.atomic():
+        with self.ui.atomic():
             if views is None:
                 self._forget()
-                self._said.content = CANCELLED if self._cancelled else FAILED
+                self._status.content = CANCELLED if self._cancelled else FAILED
             else:
                 self._take(views)
         if views is not None:
@@ -123,14 +115,14 @@ class NetworkPanel(Panel):
 
     def _take(self, views: tuple[NetworkView, ...]) -> None:
         self._views = views
-        self._said.content = ran(views)
+        self._status.content = runs_summary(views)
         self._table.content, self._others.content = metric_tables(views)
         self._drawn += 1
         clear(self.scene, f"{self.drawn_below}/runs")
         self._drawing = NetworkDrawing(self.scene, f"{self.drawn_below}/runs/{self._drawn}", views)
         self._framed = ()
         self._charts.load(views)
-        self._player.load(views)
+        self._player.load_runs(views)
 
     def _forget(self) -> None:
         """Show nothing: what was there has other settings."""
@@ -144,6 +136,6 @@ class NetworkPanel(Panel):
         if self._drawing is None:
             return
         now_ns = self._player.now_ns
-        with self.session.target.atomic():
-            self._drawing.show(now_ns, round(SHOWN_S * self._player.speed * 1e9))
+        with self.ui.atomic():
+            self._drawing.show(now_ns, round(SHOWN_S * self._player.seconds_a_second * 1e9))
             self._charts.mark(now_ns)

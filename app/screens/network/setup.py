@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable
-from typing import Any
 
 import viser
 
 from app.screens.network.labels import NETWORKS, ways
-from app.screens.network.view import NetworkWish
+from app.screens.network.view import NetworkRun
+from app.ui import Ui
 from network_sim.config import PRESETS, NetworkConfig
 from packetmesh.errors import InputError
 from packetmesh.settings import differences, settings, with_settings
@@ -30,20 +30,17 @@ class NetworkSetup:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        post: Callable[..., None],
-        changed: Callable[[Any, Callable[[], None]], None],
+        ui: Ui,
         on_change: Callable[[], None],
     ) -> None:
         """Add the controls of the first screen.
 
         Args:
-            gui: where to add them.
-            post: runs a function on the session's thread.
-            changed: registers an action for a change of a handle by a person.
+            ui: where to add them.
             on_change: called when something else is wanted.
         """
-        self._gui, self._post, self._on_change = gui, post, on_change
+        gui = ui.gui
+        self._ui, self._on_change = ui, on_change
         self._extra: tuple[str, ...] = ()
         self._beside_extra: tuple[str, ...] = ()
         self._ways = ways(FIRST)
@@ -64,21 +61,21 @@ class NetworkSetup:
         self._beside = gui.add_dropdown(
             "Beside", [NOTHING, *self._ways], hint="A second run with the same settings but this one."
         )
-        changed(self._preset, self._picked)
+        ui.when_changed(self._preset, self._picked)
         for handle in (self._count, self._shadowing, self._way, self._seed, self._beside):
-            changed(handle, on_change)
+            ui.when_changed(handle, on_change)
         self.reset()
 
     def add_advanced(self) -> None:
         """Free text for every other setting."""
-        gui = self._gui
+        gui = self._ui.gui
         gui.add_markdown(FREE)
         self._text = gui.add_text("Setting key=value", "", hint="For example nodes.images=2")
         self._beside_text = gui.add_text(
             "Second run", "", hint="Settings that only a second run has; it is added if there is none."
         )
-        gui.add_button("Use these settings", icon=viser.Icon.CHECK, hint="Simulates anew.").on_click(
-            lambda _: self._post(self._use_text)
+        gui.add_button("Use these settings", icon=viser.Icon.CHECK, hint="Simulates again.").on_click(
+            lambda _: self._ui.post(self._use_text)
         )
 
     @property
@@ -91,27 +88,27 @@ class NetworkSetup:
         self._preset.value = NETWORKS[FIRST].title
         self._load()
 
-    def wishes(self) -> tuple[NetworkWish, ...]:
+    def runs(self) -> tuple[NetworkRun, ...]:
         """The runs that the controls say.
 
         Raises:
             InputError: settings that do not go together.
         """
         way, beside = self._way.value, self._beside.value
-        first = NetworkWish(way, self._config(way, self._extra))
+        first = NetworkRun(way, self._config(way, self._extra))
         if beside == NOTHING and not self._beside_extra:
             return (first,)
         second_way = way if beside == NOTHING else beside
         label = " ".join((second_way, *self._beside_extra))
-        return first, NetworkWish(label, self._config(second_way, (*self._extra, *self._beside_extra)))
+        return first, NetworkRun(label, self._config(second_way, (*self._extra, *self._beside_extra)))
 
     def command(self) -> str:
         """The command lines that simulate the same."""
         base = PRESETS[self.preset]
         lines = []
-        for wish in self.wishes():
+        for run in self.runs():
             words = ["packetmesh", "simulate", "--preset", self.preset]
-            if changed := differences(wish.config, base):
+            if changed := differences(run.config, base):
                 words += ["--set", *changed]
             lines.append(shlex.join(words))
         return "\n".join(lines)
@@ -157,7 +154,7 @@ class NetworkSetup:
             tuple(self._beside_text.value.split()),
         )
         try:
-            self.wishes()
+            self.runs()
         except InputError:
             self._extra, self._beside_extra = before
             raise

@@ -39,7 +39,7 @@ FAILURES = (What.LOSS, What.DROP, What.EXPIRE)
 
 
 @dataclass(frozen=True, slots=True)
-class NetworkWish:
+class NetworkRun:
     """A run that is asked for."""
 
     label: str
@@ -113,7 +113,7 @@ class NetworkView:
     """End of the warm-up, where the timeline begins."""
     end_ns: int
     pieces: Pieces
-    told_until_ns: int
+    kept_until_ns: int
     """The pieces end here if the run had more of them than are kept; otherwise ``end_ns``."""
     series: dict[str, Series]
     """By ``app.screens.network.labels.CURVES``."""

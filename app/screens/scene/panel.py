@@ -11,22 +11,19 @@ import viser
 
 from app.drawing.cameras import add_camera
 from app.drawing.clouds import add_cloud, clear
-from app.panel import Panel
 from app.records import SceneView
-from app.state import Source, Spec, Step
+from app.state import Spec, Step
 from app.tables import Row, number, table
+from app.ui import Panel
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS
+from pipeline.io.demos import DEMO_SCENES
+from pipeline.sources import Demo, ImagePair
 
 TEXT = """**What you see.** Each camera node delivers a colour image and a depth image. The points are
 the depth pixels put where they belong in space; the gaps are what the sensor could not measure.
 Go on with **Depth**."""
-DEMOS = {
-    "living-room": "Living room",
-    "office": "Office",
-    "workshop": "Workshop",
-    "box-on-table": "Box on a table",
-}
+DEMOS = {name: scene.title for name, scene in DEMO_SCENES.items()}
 UPLOAD_LIMIT_BYTES = 32 << 20
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 
@@ -42,15 +39,15 @@ class ScenePanel(Panel):
         """Scene, preset, node, upload; the node's images and numbers."""
         gui, spec = self.gui, self.session.spec
         gui.add_markdown(TEXT)
-        name = spec.source.scene
-        options = [*DEMOS.values()] if name in DEMOS else [spec.source.title, *DEMOS.values()]
+        title = _title(spec)
+        options = [*DEMOS.values()] if title in DEMOS.values() else [title, *DEMOS.values()]
         self._demo = gui.add_dropdown(
             "Scene",
             options,
-            initial_value=DEMOS.get(name or "", options[0]),
+            initial_value=title,
             hint="Rendered rooms with known truth.",
         )
-        self.when_changed(self._demo, self._picked_demo)
+        self.ui.when_changed(self._demo, self._picked_demo)
         self._preset = gui.add_dropdown(
             "Preset",
             list(PRESETS),
@@ -58,9 +55,9 @@ class ScenePanel(Panel):
             hint="packetmesh: align inferred depth pixel by pixel, fill only the holes, register nodes with "
             "CEICP-A. thesis: rigid CEICP-N of the inferred on the sensor cloud, plain union.",
         )
-        self.when_changed(self._preset, self._picked_preset)
+        self.ui.when_changed(self._preset, self._picked_preset)
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images are shown below.")
-        self.when_changed(self._node, self._show_node)
+        self.ui.when_changed(self._node, self._show_node)
         self._build_upload()
         self._color = gui.add_image(EMPTY, label="Colour image")
         self._depth = gui.add_image(EMPTY, label="Sensor depth", format="png")
@@ -87,13 +84,13 @@ class ScenePanel(Panel):
             )
             self._have = gui.add_markdown("Add all three files, then press the button.")
             gui.add_button("Reconstruct this pair", icon=viser.Icon.PLAYER_PLAY).on_click(
-                lambda _: self.session.post(self._use_files)
+                lambda _: self.ui.post(self._use_files)
             )
 
     def on_spec(self, spec: Spec) -> None:
         """Show the preset and the scene that are wanted."""
         self._preset.value = spec.preset
-        title = DEMOS.get(spec.source.scene or "", spec.source.title)
+        title = _title(spec)
         if title not in self._demo.options:
             self._demo.options = (title, *DEMOS.values())
         self._demo.value = title
@@ -103,7 +100,7 @@ class ScenePanel(Panel):
         if step != "scene":
             return
         self._view: SceneView = view
-        with self.session.target.atomic():
+        with self.ui.atomic():
             clear(self.scene, "/scene")
             for node in view.nodes:
                 add_cloud(self.scene, f"/scene/{node.name}/cloud", node.sensor, node.T_world_camera)
@@ -119,7 +116,7 @@ class ScenePanel(Panel):
         if view is None:
             return
         node = next((n for n in view.nodes if n.name == self._node.value), view.nodes[0])
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._color.image, self._color.label = node.color.rgb, node.color.caption
             self._depth.image, self._depth.label = node.depth.rgb, node.depth.caption
             self._numbers.content = table(
@@ -156,13 +153,13 @@ class ScenePanel(Panel):
     def _picked_demo(self) -> None:
         name = next((name for name, title in DEMOS.items() if title == self._demo.value), None)
         if name is not None:
-            self.session.want(dataclasses.replace(self.session.spec, source=Source(scene=name)))
+            self.session.want(dataclasses.replace(self.session.spec, source=Demo(name)))
 
     def _picked_preset(self) -> None:
         self.session.want(self.session.spec.with_preset(self._preset.value))
 
     def _uploaded(self, kind: str, event: viser.GuiEvent) -> None:
-        self.session.post(self._keep_file, kind, event.target.value)
+        self.ui.post(self._keep_file, kind, event.target.value)
 
     def _keep_file(self, kind: str, file: viser.UploadedFile) -> None:
         if len(file.content) > UPLOAD_LIMIT_BYTES:
@@ -182,7 +179,11 @@ class ScenePanel(Panel):
     def _use_files(self) -> None:
         if len(self._files) < 3:
             raise InputError("A pair needs a colour image, a depth image and intrinsics; add all three.")
-        source = Source(
-            **{kind: str(path) for kind, path in self._files.items()}, depth_scale=float(self._scale.value)
-        )
+        files = {kind: str(path) for kind, path in self._files.items()}
+        source = ImagePair(**files, depth_scale=float(self._scale.value))
         self.session.want(dataclasses.replace(self.session.spec, source=source))
+
+
+def _title(spec: Spec) -> str:
+    """What to call the scene: a demo by its title."""
+    return DEMOS.get(spec.source.title, spec.source.title)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
-
-import viser
 
 from app.screens.surface.sweep_plot import BELOW, sweep_figure, sweep_sentence
 from app.screens.surface.sweep_view import SuggestionRow, SweepView
 from app.tables import Row, number, table
+from app.ui import Ui
 
-SWEEP, STOP = "Sweep the radius", "Stop the sweep"
 TEXT = """A ball bridges the triangles around a point if it is as wide as the largest of their circumcircles.
 How wide that is can be read off the points before any ball rolls."""
 NO_ADVICE = "No point has neighbours on all sides, so no radius can be read off this cloud; try more points."
@@ -26,42 +23,40 @@ class AdviceFolder:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        post: Callable[..., None],
-        changed: Callable[[Any, Callable[[], None]], None],
-        on_press: Callable[[str], None],
+        ui: Ui,
+        on_sweep: Callable[[], None],
+        on_stop: Callable[[], None],
         on_radius_m: Callable[[float], None],
     ) -> None:
         """Add the folder.
 
         Args:
-            gui: where to add it.
-            post: runs a function on the session's thread.
-            changed: registers an action for a change of a handle by a person.
-            on_press: called with ``SWEEP`` or ``STOP``.
+            ui: where to add it.
+            on_sweep: called when a sweep is wanted.
+            on_stop: called when it is no longer wanted.
             on_radius_m: called with a suggested radius that is taken.
         """
-        self._on_press, self._on_radius_m = on_press, on_radius_m
+        self._on_sweep, self._on_radius_m = on_sweep, on_radius_m
         self._radii_m: dict[str, float] = {}
         self._view: SweepView | None = None
+        gui = ui.gui
         with gui.add_folder("Which radius?", expand_by_default=False):
             gui.add_markdown(TEXT)
             self._table = gui.add_html("")
             self._take = gui.add_button_group(
                 "Take", (UNNAMED,), hint="Roll one ball of this radius.", visible=False
             )
-            self._take.on_click(lambda event: post(self._taken, event.target.value))
-            self._keys = gui.add_button_group(
+            self._take.on_click(lambda event: ui.post(self._taken, event.target.value))
+            ui.buttons(
                 "All radii",
-                (SWEEP, STOP),
-                hint="One ball after another, each alone over the cloud after fusion; it takes some seconds.",
+                {"Sweep the radius": self._sweep, "Stop the sweep": on_stop},
+                "One ball after another, each alone over the cloud after fusion; it takes some seconds.",
             )
-            self._keys.on_click(lambda event: post(self._pressed, event.target.value))
             self._status = gui.add_markdown("")
             self._below = gui.add_dropdown(
                 "Lower plot", list(BELOW), hint="What the lower of the two plots shows.", visible=False
             )
-            changed(self._below, self._draw)
+            ui.when_changed(self._below, self._draw)
             self._plot = gui.add_plotly(
                 sweep_figure(None), aspect=0.95, config={"displayModeBar": False}, visible=False
             )
@@ -101,12 +96,11 @@ class AdviceFolder:
         if name in self._radii_m:
             self._on_radius_m(self._radii_m[name])
 
-    def _pressed(self, key: str) -> None:
-        if key == SWEEP:
-            self._view = None
-            self._draw()
-            self._status.content = WAITING
-        self._on_press(key)
+    def _sweep(self) -> None:
+        self._view = None
+        self._draw()
+        self._status.content = WAITING
+        self._on_sweep()
 
 
 def suggestions_html(rows: tuple[SuggestionRow, ...]) -> str:

@@ -111,7 +111,7 @@ class RollingDrawing:
         mesh = self._scene.add_mesh_simple(
             name, points_m, faces, color=_shade(ball), flat_shading=True, side="double", visible=False
         )
-        if not self._view.wish.close_up:
+        if not self._view.request.close_up:
             return [mesh]
         wire = self._scene.add_mesh_simple(f"{name}/wire", points_m, faces, color=WIRE, wireframe=True)
         return [mesh, wire]

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
-import viser
 
 from app.records import Which
 from app.screens.surface.draw_holes import HoleDrawing, picked_hole
 from app.screens.surface.holes_view import ExplainView, FilledView, HoleView, PartsView
 from app.tables import Row, number, table
+from app.ui import Ui
 from pipeline.types import FloatArray
 
 TEXT = """**Click a red rim in the picture, or choose one here**, and read why it is there. A *hole* has
 surface all around it; at a *rim* the surface ends."""
-NONE, PREVIOUS, NEXT = "none", "Previous", "Next"
+NONE = "none"
 LISTED_HOLES, LISTED_RIMS = 30, 10
 ASKING = "Looking for the reason …"
 SILENT = "No answer came, since something else was computed instead. Click the hole again to ask once more."
@@ -33,20 +32,14 @@ class HolesFolder:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        scene: viser.SceneApi,
-        post: Callable[..., None],
-        changed: Callable[[Any, Callable[[], None]], None],
+        ui: Ui,
         on_ask: Callable[[Which, int], None],
         on_fill: Callable[[float | None], None],
     ) -> None:
         """Add the folder.
 
         Args:
-            gui: where to add it.
-            scene: where to draw the chosen hole.
-            post: runs a function on the session's thread.
-            changed: registers an action for a change of a handle by a person.
+            ui: where to add it.
             on_ask: called with a surface and the index of its hole that is to be explained.
             on_fill: called with the length in metres of the longest hole to fill; None for none.
         """
@@ -56,23 +49,24 @@ class HolesFolder:
         self._which: Which | None = None
         self._index: int | None = None
         self._offset_m: FloatArray = np.zeros(3)
-        self._drawing = HoleDrawing(scene, "/surface/hole")
+        self._drawing = HoleDrawing(ui.scene, "/surface/hole")
+        gui = ui.gui
         with gui.add_folder("Holes", expand_by_default=False):
             gui.add_markdown(TEXT)
             self._list = gui.add_dropdown(
                 "Hole", [NONE], hint="Holes by area, the largest first, then rims by length, at the end."
             )
-            changed(self._list, self._listed)
-            keys = gui.add_button_group("Go to", (PREVIOUS, NEXT), hint="The hole before or after this one.")
-            keys.on_click(lambda event: post(self._step, 1 if event.target.value == NEXT else -1))
+            ui.when_changed(self._list, self._listed)
+            steps = {"Previous": lambda: self._step(-1), "Next": lambda: self._step(1)}
+            ui.buttons("Go to", steps, "The hole before or after this one.")
             self._why = gui.add_markdown("")
             self._shares = gui.add_html("")
             self._parts = gui.add_markdown("")
-            self._add_filling(gui, changed)
+            self._add_filling(ui)
         self.forget()
 
-    def _add_filling(self, gui: viser.GuiApi, changed: Callable[[Any, Callable[[], None]], None]) -> None:
-        self._fill = gui.add_slider(
+    def _add_filling(self, ui: Ui) -> None:
+        self._fill = ui.gui.add_slider(
             "Fill small holes up to (cm)",
             0.0,
             FILL_MOST_CM,
@@ -81,8 +75,8 @@ class HolesFolder:
             hint="Closes the holes of the surface after fusion whose loop is no longer than this with as "
             "little area as possible. 0 is off. Rims, where the surface ends, are left alone.",
         )
-        changed(self._fill, self._dragged)
-        self._filled = gui.add_markdown(FILL_OFF)
+        ui.when_changed(self._fill, self._dragged)
+        self._filled = ui.gui.add_markdown(FILL_OFF)
 
     def load(self, holes: Mapping[Which, tuple[HoleView, ...]], shown: Which | None) -> None:
         """Take the holes of the surfaces, and list those of the one that is shown alone.

@@ -7,17 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.chain import (
-    PlacedNodes,
-    RolledBalls,
-    ball_clouds,
-    cameras_of,
-    compared,
-    placed,
-    prepared,
-    rig_of,
-    rolled,
-)
 from app.drawing.colors import HOLE, NEUTRAL
 from app.drawing.meshes import mesh_view, surface_glb
 from app.records import Which
@@ -26,7 +15,9 @@ from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
-from pipeline.reconstruct import NodeClouds
+from pipeline.nodes import NodeClouds, Placement
+from pipeline.spec import key
+from pipeline.stages import cameras_of, compared
 from pipeline.surface.fill import Filled, fill_holes
 from pipeline.surface.hole_diagnosis import explain_hole
 from pipeline.surface.holes import find_holes
@@ -49,11 +40,11 @@ def hole_views(surface: SurfaceResult) -> tuple[HoleView, ...]:
     )
 
 
-def views_of(rig: Rig, nodes: Sequence[NodeClouds], places: PlacedNodes) -> list[View]:
+def views_of(rig: Rig, nodes: Sequence[NodeClouds], placement: Placement) -> list[View]:
     """What every registered camera knows of its pixels."""
     return [
         View(camera, frame.depth.valid, node.alignment.depth.valid)
-        for camera, frame, node in zip(cameras_of(rig, places), rig.frames, nodes, strict=True)
+        for camera, frame, node in zip(cameras_of(rig, placement), rig.frames, nodes, strict=True)
     ]
 
 
@@ -70,18 +61,14 @@ def parts_of(store: Store, spec: Spec, surface: SurfaceResult) -> Generator[Prog
     )
 
 
-def explain_job(
-    store: Store, spec: Spec, which: Which, index: int
-) -> Generator[Progress | RolledBalls, None, ExplainView]:
+def explain_job(store: Store, spec: Spec, which: Which, index: int) -> Generator[Progress, None, ExplainView]:
     """Why one hole of the surface after or before fusion is there."""
 
-    def explain() -> Generator[Progress | RolledBalls, None, ExplainView]:
+    def explain() -> Generator[Progress, None, ExplainView]:
         views = yield from _views(store, spec)
-        clouds = yield from ball_clouds(store, spec)
-        balls = yield from rolled(store, spec)
+        clouds = yield from store.stage(spec, "clouds")
+        surface = yield from store.stage(spec, which)
         yield Progress("looking for the reason of the hole", 0.8)
-        surface = balls.after if which == "after" else balls.before
-        assert surface is not None
         holes = find_holes(surface.vertices_m, surface.triangles)
         if not 0 <= index < len(holes):
             raise InputError(
@@ -102,31 +89,29 @@ def explain_job(
             unknown_share=why.unknown_share,
         )
 
-    return (yield from store.remember(("explain", *spec.key("surface"), which, index), explain))
+    return (yield from store.remember(("explain", key(spec, which), which, index), explain))
 
 
-def fill_job(
-    store: Store, spec: Spec, longest_cm: float
-) -> Generator[Progress | RolledBalls, None, FilledView]:
+def fill_job(store: Store, spec: Spec, longest_cm: float) -> Generator[Progress, None, FilledView]:
     """The surface after fusion with its holes up to so long a rim filled, and what that makes of it."""
-    rig = yield from rig_of(store, spec)
-    places = yield from placed(store, spec)
-    balls = yield from rolled(store, spec)
+    rig = yield from store.stage(spec, "rig")
+    placement = yield from store.stage(spec, "placement")
+    after = yield from store.stage(spec, "after")
     yield Progress("filling small holes", 0.6)
-    filled = fill_holes(balls.after, longest_cm / 100.0)
+    filled = fill_holes(after, longest_cm / 100.0)
     yield Progress("measuring the filled surface", 0.8)
-    surface, cameras = filled.surface, cameras_of(rig, places)
+    surface, cameras = filled.surface, cameras_of(rig, placement)
     missed = no_hit_ray_share(surface.vertices_m, surface.triangles, cameras)
     surface = replace(surface, quality=replace(surface.quality, no_hit_ray_share=missed))
-    view = mesh_view(surface, compared(rig, surface, cameras))
+    view = mesh_view(surface, compared(rig, placement, surface))
     return FilledView(replace(view, glb=_marked_glb(filled)), filled.holes, filled.area_m2)
 
 
 def _views(store: Store, spec: Spec) -> Generator[Progress, None, list[View]]:
-    rig = yield from rig_of(store, spec)
-    work = yield from prepared(store, spec)
-    places = yield from placed(store, spec)
-    return views_of(rig, work.nodes, places)
+    rig = yield from store.stage(spec, "rig")
+    nodes = yield from store.stage(spec, "nodes")
+    placement = yield from store.stage(spec, "placement")
+    return views_of(rig, nodes, placement)
 
 
 def _marked_glb(filled: Filled) -> bytes:

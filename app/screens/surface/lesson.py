@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
-from app.lesson import LESSONS, NUMBER, Lesson, Setting, choice, read_lesson, sets
+from app.lesson import LESSONS, NUMBER, Setting, choice, sets, short
 from app.screens.surface.labels import AFTER, COLORINGS, RULES, SHOWN, Coloring
 from pipeline.config import RadiusRule, SurfaceConfig
 
@@ -40,15 +39,6 @@ class SurfaceLook:
     """Whether the largest hole is chosen and explained."""
 
 
-def surface_lesson(path: Path = SHIPPED) -> Lesson[SurfaceLook]:
-    """A lesson about surfaces.
-
-    Raises:
-        InputError: the file is no lesson or sets what no surface has.
-    """
-    return read_lesson(path, SETTINGS, SurfaceLook())
-
-
 def _radii(look: SurfaceLook, text: str) -> SurfaceLook:
     if text in _RULES:
         return replace(look, rule=_RULES[text], radius_in_r_F=None)
@@ -72,15 +62,10 @@ def _count(least: int, most: int) -> Callable[[str], int]:
     return read
 
 
-def _short(name: str) -> str:
-    """What stands on the screen, up to its explanation."""
-    return re.split(r" \(|[,:]", name)[0]
-
-
 SETTINGS: dict[str, Setting[SurfaceLook]] = {
-    "show": sets("shown", choice({_short(name): name for name in SHOWN})),
+    "show": sets("shown", choice({short(name): name for name in SHOWN})),
     "radii": _radii,
-    "colours": sets("coloring", choice({_short(name): coloring for name, coloring in COLORINGS.items()})),
+    "colours": sets("coloring", choice({short(name): coloring for name, coloring in COLORINGS.items()})),
     "rims": sets("rims", choice(_ON_OFF)),
     "smoothing": sets("smoothing_passes", _count(0, 5)),
     "points": sets("max_points", _count(2_000, 60_000)),

@@ -65,10 +65,10 @@ def note_html(view: BaselineView) -> str:
 
 def quick_line(view: PaintedView) -> str:
     """What the quick look shows, while the numbers below are still those before it."""
-    mesh = next(iter(view.meshes.values()))
+    mesh, radius_mm = next(iter(view.meshes.values())), 1000 * (view.request.radius_m or 0.0)
     part = "" if view.points == view.all_points else f" of {view.all_points:,}; the rest when you let go"
     return (
-        f"<div style='padding: 0 0.8em; font-size: 13px'><b>{1000 * (view.wish.radius_m or 0.0):.1f} mm</b>: "
+        f"<div style='padding: 0 0.8em; font-size: 13px'><b>{radius_mm:.1f} mm</b>: "
         f"{mesh.triangles:,} triangles over {view.points:,} points{part}; rolled in "
         f"{1000 * view.roll_s:.0f} ms</div>"
     )

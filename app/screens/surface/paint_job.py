@@ -7,59 +7,45 @@ from collections.abc import Generator
 
 import numpy as np
 
-from app.chain import (
-    RolledBalls,
-    ball_clouds,
-    cameras_of,
-    cloud_key,
-    placed,
-    rig_of,
-    rolled,
-    rolled_over,
-)
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET
 from app.drawing.glb import lines_glb
 from app.drawing.meshes import rim_segments_m, surface_glb
-from app.records import Coloring, PaintedMesh, PaintedView, PaintWish, Which
+from app.records import Coloring, PaintedMesh, PaintedView, PaintRequest, Which
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
-from pipeline.surface import Camera, distances_to_truth_m, voxel_average, voxel_for_count
+from pipeline.spec import key
+from pipeline.stages import cameras_of, run
+from pipeline.surface import Camera, distances_to_truth_m, roll_or_nothing, voxel_average, voxel_for_count
 from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
 
-def paint_job(
-    store: Store, spec: Spec, wish: PaintWish
-) -> Generator[Progress | RolledBalls, None, PaintedView]:
+def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Progress, None, PaintedView]:
     """The surfaces of a spec, or of one ball instead of the spec's, in colours."""
-    rig = yield from rig_of(store, spec)
-    places = yield from placed(store, spec)
+    rig = yield from store.stage(spec, "rig")
+    placement = yield from store.stage(spec, "placement")
     whole = yield from _clouds(store, spec)
-    if wish.radius_m is None:
-        balls = yield from rolled(store, spec)
-        thin, roll_s = whole, balls.elapsed_s
-        surfaces: dict[Which, Surface | None] = {"after": balls.after, "before": balls.before}
+    if request.radius_m is None:
+        done = yield from run(spec, store, request.which)
+        thin, roll_s = whole, done[request.which[0]].elapsed_s
+        surfaces: dict[Which, Surface] = {name: done[name].value for name in request.which}
     else:
-        thin = yield from _thinned(store, spec, wish.most_points)
+        thin = yield from _thinned(store, spec, request.most_points)
         started = time.perf_counter()
-        surfaces = {name: rolled_over(thin[name], (wish.radius_m,)) for name in wish.which}
+        surfaces = {name: roll_or_nothing(thin[name], (request.radius_m,)) for name in request.which}
         roll_s = time.perf_counter() - started
-    cameras = cameras_of(rig, places)
+    cameras = cameras_of(rig, placement)
     return PaintedView(
-        wish,
-        {
-            name: _painted(surface, wish, rig, cameras)
-            for name, surface in surfaces.items()
-            if surface is not None and name in wish.which
-        },
-        len(thin[wish.which[0]]),
-        len(whole[wish.which[0]]),
+        request,
+        {name: _painted(surface, request, rig, cameras) for name, surface in surfaces.items()},
+        len(thin[request.which[0]]),
+        len(whole[request.which[0]]),
         roll_s,
     )
 
 
 def _clouds(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, PointCloud]]:
-    clouds = yield from ball_clouds(store, spec)
+    clouds = yield from store.stage(spec, "clouds")
     return {"after": clouds.fused, "before": clouds.sensor}
 
 
@@ -75,14 +61,14 @@ def _thinned(
         voxel_m = voxel_for_count(clouds["after"].points_m, most_points)
         return {name: voxel_average(cloud, voxel_m) for name, cloud in clouds.items()}
 
-    return (yield from store.remember(("quick", most_points, *cloud_key(spec)), thin))
+    return (yield from store.remember(("quick", most_points, key(spec, "clouds")), thin))
 
 
-def _painted(surface: Surface, wish: PaintWish, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
+def _painted(surface: Surface, request: PaintRequest, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
     """The rims come when the radius rests: lines are costly to draw in software."""
-    colors = vertex_colors(surface, wish.coloring, rig, cameras)
-    glb = surface_glb(surface, colors, photographed=wish.coloring == "color")
-    rims_glb = b"" if wish.radius_m is not None else lines_glb(rim_segments_m(surface), LOSS)
+    colors = vertex_colors(surface, request.coloring, rig, cameras)
+    glb = surface_glb(surface, colors, photographed=request.coloring == "color")
+    rims_glb = b"" if request.radius_m is not None else lines_glb(rim_segments_m(surface), LOSS)
     return PaintedMesh(glb, rims_glb, len(surface.vertices_m), len(surface.triangles))
 
 

@@ -5,20 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, ClassVar
 
-import numpy as np
-
 from app.controls import Controls
 from app.drawing.cameras import look_closely, stage_of
-from app.lesson_folder import LessonFolder
-from app.panel import Panel
-from app.records import MeshView, PaintedView, PaintWish, SceneView, Which
-from app.screens.surface.advice import SWEEP, AdviceFolder
+from app.lesson import LessonFolder, read_lesson
+from app.records import MeshView, PaintedView, PaintRequest, SceneView, Which
+from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.baselines_view import BaselineView
 from app.screens.surface.holes import HolesFolder
 from app.screens.surface.holes_view import ExplainView, FilledView
 from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN
 from app.screens.surface.legend import legend_html
-from app.screens.surface.lesson import SurfaceLook, surface_lesson
+from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook
 from app.screens.surface.numbers import WAIT, note_html, quality_table, quick_line
 from app.screens.surface.quick import QuickLook
 from app.screens.surface.rolling import RollingFolder
@@ -26,9 +23,11 @@ from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
 from app.screens.surface.spacing_plot import spacing_figure
 from app.screens.surface.stage import SurfaceStage
 from app.screens.surface.view import SurfaceView
-from app.screens.surface.walk_view import WalkView, WalkWish
+from app.screens.surface.walk_view import WalkRequest, WalkView
 from app.state import Spec, Step
+from app.ui import Panel
 from pipeline.config import RadiusRule
+from pipeline.types import FloatArray
 
 TEXT = """**What you see.** A ball rolls over the points and leaves a triangle wherever it rests on three.
 Too small, and it falls through between the points; too large, and it skips detail. Red lines are the rims
@@ -53,11 +52,11 @@ class SurfacePanel(Panel):
         self._by_click = False
         self._thinning: tuple[int, int] | None = None
         gui.add_markdown(TEXT)
-        self._lesson = LessonFolder(gui, surface_lesson(), session.post, self.when_changed, self._take_look)
+        self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, SurfaceLook()), self._take_look)
         self._radius = gui.add_slider(
-            "Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint="Radius of the ball; drag to roll it anew."
+            "Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint="Radius of the ball; drag to roll another."
         )
-        self.when_changed(self._radius, self._dragged)
+        self.ui.when_changed(self._radius, self._dragged)
         self._rule = gui.add_dropdown(
             "Radii",
             list(RULES),
@@ -65,7 +64,7 @@ class SurfacePanel(Panel):
             hint="r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the "
             "fused cloud. Several balls roll one after the other, the small ones first.",
         )
-        self.when_changed(self._rule, self._picked_rule)
+        self.ui.when_changed(self._rule, self._picked_rule)
         self._shown = gui.add_dropdown(
             "Show",
             list(SHOWN),
@@ -75,40 +74,31 @@ class SurfacePanel(Panel):
             "Colours", list(COLORINGS), hint="What the colours of the surface mean."
         )
         self._legend = gui.add_html("", visible=False)
-        self.when_changed(self._coloring, self._picked_coloring)
+        self.ui.when_changed(self._coloring, self._picked_coloring)
         self._loops = gui.add_checkbox("Hole rims", True, hint="Edges with one triangle only, in red.")
-        self.when_changed(self._shown, self._picked_shown)
-        self.when_changed(self._loops, self._arrange)
+        self.ui.when_changed(self._shown, self._picked_shown)
+        self.ui.when_changed(self._loops, self._arrange)
         self._quick = gui.add_html("")
         self._table = gui.add_html("")
         self._histogram = gui.add_plotly(spacing_figure(None), aspect=0.62, config={"displayModeBar": False})
         self._build_folders()
         self._stage = SurfaceStage(self.scene)
-        self.scene.on_click()(lambda event: session.post(self._clicked, event))
+        self.ui.when_clicked(self.drawn_below, self._clicked)
 
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session
-        self._advice = AdviceFolder(gui, session.post, self.when_changed, self._sweep, self._take_radius)
-        self._holes = HolesFolder(gui, self.scene, session.post, self.when_changed, self._explain, self._fill)
-        self._rolling = RollingFolder(
-            gui, self.scene, session.post, self.when_changed, session.target.atomic, self._watch
-        )
+        stop = session.cancel_side_job
+        self._advice = AdviceFolder(self.ui, self._sweep, stop, self._take_radius)
+        self._holes = HolesFolder(self.ui, self._explain, self._fill)
+        self._rolling = RollingFolder(self.ui, self._watch)
         with gui.add_folder("Advanced", expand_by_default=False):
-            self._controls = Controls(
-                gui, ADVANCED, session.spec.config, lambda change: session.post(session.edit, change)
-            )
-            self._look_quickly = QuickLook(gui, session, self._painted, self._drawn, self._rested)
+            self._controls = Controls(self.ui, ADVANCED, session.spec.config, session.edit)
+            self._look_quickly = QuickLook(session, self._painted, self._drawn, self._rested)
 
     @property
     def wide(self) -> bool:
         """Whether both surfaces are shown."""
         return self._shown.value == BOTH
-
-    def close(self) -> None:
-        """End the timers."""
-        if hasattr(self, "_look_quickly"):
-            self._look_quickly.close()
-            self._rolling.close()
 
     def on_spec(self, spec: Spec) -> None:
         """Show the settings that are wanted; what was made with others goes."""
@@ -144,11 +134,11 @@ class SurfacePanel(Panel):
             self._shown.value = AFTER
             self._arrange()
         which, coloring = self._stage.which, COLORINGS[self._coloring.value]
-        self._look_quickly.want(PaintWish(which, coloring, self._radius.value / 1000.0))
+        self._look_quickly.want(PaintRequest(which, coloring, self._radius.value / 1000.0))
 
     def _drawn(self) -> None:
         """What was sent last stands on the screen; its numbers waited, as the page is slow to write them."""
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._stage.drop_old()
             if self._look_quickly.moving:
                 self._quick.content = self._quick_line
@@ -170,7 +160,7 @@ class SurfacePanel(Panel):
 
     def _take(self, view: SurfaceView) -> None:
         """Show a view of the chain."""
-        with self.session.target.atomic():
+        with self.ui.atomic():
             if COLORINGS[self._coloring.value] == "color":
                 self._stage.draw("after", view.after)
                 if view.before is not None:
@@ -179,7 +169,7 @@ class SurfacePanel(Panel):
             if self.session.spec.config.surface.radius_rule != "manual":
                 self._radius.min, self._radius.max = slider_range_mm(view.spacing, view.radii_m)
                 self._radius.value = round(2000.0 * view.radii_m[-1]) / 2.0
-            self._tell_numbers()
+            self._show_numbers()
             self._quick.content = ""
             self._arrange()
         if view.before is not None:
@@ -187,13 +177,13 @@ class SurfacePanel(Panel):
             self._histogram.figure = spacing_figure(view.spacing, view.radii_m, suggested_m)
             self._repaint()
         if view.holes:
-            with self.session.target.atomic():
+            with self.ui.atomic():
                 self._advice.suggest(view.suggestions)
                 self._holes.parts(view.parts)
                 self._load_holes()
             self._show_look()
 
-    def _tell_numbers(self) -> None:
+    def _show_numbers(self) -> None:
         if self._view is not None:
             others: dict[str, MeshView] = {view.name: view.mesh for view in self._baselines.values()}
             self._table.content = quality_table(self._view, others, self._has_truth())
@@ -203,21 +193,21 @@ class SurfacePanel(Panel):
         coloring = COLORINGS[self._coloring.value]
         if coloring != "color" and self.session.results.view("fuse") is not None:
             session = self.session
-            wish = PaintWish(("after", "before"), coloring)
-            session.quick_job("paint", session.store, session.spec, wish, on_end=self._painted)
+            request = PaintRequest(("after", "before"), coloring)
+            session.quick_job("paint", session.store, session.spec, request, on_end=self._painted)
 
     def _painted(self, view: PaintedView | None) -> None:
         """Draw it, unless something else is wanted by now."""
-        if view is None or view.wish.coloring != COLORINGS[self._coloring.value]:
+        if view is None or view.request.coloring != COLORINGS[self._coloring.value]:
             return
-        quick = view.wish.radius_m is not None
+        quick = view.request.radius_m is not None
         if quick != self._look_quickly.moving:
             return
-        with self.session.target.atomic():
+        with self.ui.atomic():
             drawn = [mesh for which, mesh in view.meshes.items() if self._stage.draw(which, mesh, quick)]
             self._look_quickly.sent([mesh.vertices for mesh in drawn if mesh.triangles] if quick else ())
         self._quick_line = quick_line(view) if quick else ""
-        self.session.target.flush()
+        self.ui.flush()
 
     def _picked_shown(self) -> None:
         """Show another surface; that of a baseline is made first."""
@@ -247,7 +237,7 @@ class SurfacePanel(Panel):
         else:
             self._baselines[label] = view
             self._quick.content = note_html(view)
-            self._tell_numbers()
+            self._show_numbers()
             if self._shown.value == label:
                 self._stage.draw_baseline(view.mesh)
         self._arrange()
@@ -264,7 +254,7 @@ class SurfacePanel(Panel):
 
     def _arrange(self) -> None:
         scene: SceneView | None = self.session.results.view("scene")
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._stage.shown = self._shown.value
             place = None if scene is None else stage_of(scene.nodes)
             self._stage.arrange(place, bool(self._loops.value), self._rolling.showing)
@@ -275,11 +265,9 @@ class SurfacePanel(Panel):
 
     # The folders.
 
-    def _sweep(self, button: str) -> None:
+    def _sweep(self) -> None:
         session = self.session
-        if button != SWEEP:
-            session.cancel_side_job()
-        elif session.results.view("fuse") is not None:
+        if session.results.view("fuse") is not None:
             load = self._advice.load
             session.side_job("sweep", session.store, session.spec, on_partial=load, on_end=load)
 
@@ -288,12 +276,10 @@ class SurfacePanel(Panel):
             shown = None if self.wide or self._shown.value in BASELINES else self._stage.which[0]
             self._holes.load(self._view.holes, shown)
 
-    def _clicked(self, event: Any) -> None:
+    def _clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
         """Explain the hole that was clicked."""
-        frame = self.scene.get_handle_by_name(self.drawn_below)
-        if frame is None or not frame.visible or self._rolling.showing or self._shown.value in BASELINES:
+        if self._rolling.showing or self._shown.value in BASELINES:
             return
-        origin_m, direction = np.array(event.ray_origin), np.array(event.ray_direction)
         for which in self._stage.which:
             if self._holes.picked(origin_m, direction, which, self._stage.offset_m(which)):
                 self._by_click = True
@@ -320,7 +306,7 @@ class SurfacePanel(Panel):
             session.side_job("fill", session.store, session.spec, 100.0 * longest_m, on_end=self._filled)
 
     def _filled(self, view: FilledView | None) -> None:
-        with self.session.target.atomic():
+        with self.ui.atomic():
             self._holes.filled(view)
             if view is not None and self._holes.filling:
                 self._stage.draw("after", view.mesh)
@@ -328,15 +314,17 @@ class SurfacePanel(Panel):
             elif self._view is not None:
                 self._take(self._view)
 
-    def _watch(self, wish: WalkWish | None) -> None:
+    def _watch(self, request: WalkRequest | None) -> None:
         session = self.session
-        if wish is None:
+        if request is None:
             session.cancel_side_job()
             self._close_walk()
             self._arrange()
         elif session.results.view("fuse") is not None:
             spec = session.spec
-            session.side_job("walk", session.store, spec, wish, on_end=lambda view: self._walked(spec, view))
+            session.side_job(
+                "walk", session.store, spec, request, on_end=lambda view: self._walked(spec, view)
+            )
 
     def _close_walk(self) -> None:
         """Take the walk away, and stand back again after a close-up."""
@@ -358,7 +346,7 @@ class SurfacePanel(Panel):
     def _take_look(self, look: SurfaceLook) -> None:
         """Set the controls as a stop of the lesson says; what needs the surface waits for it."""
         session = self.session
-        with session.target.atomic():
+        with self.ui.atomic():
             self._shown.value = look.shown
             self._coloring.value = next(name for name, key in COLORINGS.items() if key == look.coloring)
             self._loops.value = look.rims

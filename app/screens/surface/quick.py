@@ -5,17 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-import viser
-
-from app.acknowledgement import Echo
-from app.debounce import Delay
-from app.records import PaintedView, PaintWish
+from app.acknowledgement import DrawAcknowledgement
+from app.records import PaintedView, PaintRequest
 from app.screens.surface.detail import Detail
-
-if TYPE_CHECKING:
-    from app.session import Session
+from app.ui import Workbench
 
 QUIET_S = 0.4
 """When the radius has not moved for so long, it rests."""
@@ -26,8 +20,7 @@ class QuickLook:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        session: Session,
+        session: Workbench,
         on_view: Callable[[PaintedView], None],
         on_drawn: Callable[[], None],
         on_rest: Callable[[], None],
@@ -35,16 +28,15 @@ class QuickLook:
         """Add the hidden parts to the current container.
 
         Args:
-            gui: where to add them.
-            session: runs the jobs.
+            session: where to add them and who runs the jobs.
             on_view: called with each surface; it is to draw it and to call ``sent``.
             on_drawn: called when what was sent last stands on the screen.
             on_rest: called when the radius rests.
         """
         self._session, self._on_view, self._on_drawn, self._on_rest = session, on_view, on_drawn, on_rest
-        self._settle = Delay(QUIET_S, lambda: session.post(self._rest))
-        self._echo = Echo(gui, session.post, self._drawn)
-        self._next: PaintWish | None = None
+        self._settle = session.ui.debounce(QUIET_S, self._rest)
+        self._acknowledgement = DrawAcknowledgement(session.ui, self._drawn)
+        self._next: PaintRequest | None = None
         self._rolling = False
         self._detail = Detail()
         self._asked_s: float | None = None
@@ -54,37 +46,32 @@ class QuickLook:
         """Whether the radius has not come to rest."""
         return self._settle.pending
 
-    def want(self, wish: PaintWish) -> None:
+    def want(self, request: PaintRequest) -> None:
         """The radius has moved."""
         if not self.moving:
-            self._echo.hold()
+            self._acknowledgement.hold()
         self._settle.restart()
-        self._next = wish
+        self._next = request
         self._go_on()
 
     def sent(self, vertices: Sequence[int] = ()) -> None:
         """Surfaces are on their way to the browser; quick ones, of so many vertices each."""
-        self._echo.ask(vertices, hold=self.moving)
-
-    def close(self) -> None:
-        """End the timers."""
-        self._settle.cancel()
-        self._echo.close()
+        self._acknowledgement.ask(vertices, hold=self.moving)
 
     def _go_on(self) -> None:
-        session, wish = self._session, self._next
+        session, request = self._session, self._next
         ready = session.results.fresh("fuse", session.spec)
-        if ready and wish is not None and not self._rolling and not self._echo.waiting:
+        if ready and request is not None and not self._rolling and not self._acknowledgement.waiting:
             self._rolling, self._next = True, None
             self._asked_s = time.monotonic()
-            wish = replace(wish, most_points=self._detail.points)
-            session.quick_job("paint", session.store, session.spec, wish, on_end=self._came)
+            request = replace(request, most_points=self._detail.points)
+            session.quick_job("paint", session.store, session.spec, request, on_end=self._came)
 
     def _came(self, view: PaintedView | None) -> None:
         self._rolling = False
         if view is not None:
             self._on_view(view)
-        if not self._echo.waiting:
+        if not self._acknowledgement.waiting:
             self._go_on()
 
     def _drawn(self) -> None:

@@ -5,37 +5,38 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import asdict
 
-from app.chain import ball_clouds, cameras_of, cloud_key, placed, rig_of
 from app.screens.surface.sweep_view import SuggestionRow, SweepRow, SweepView
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
+from pipeline.spec import key
+from pipeline.stages import cameras_of
 from pipeline.surface.advice import suggest_radii
 from pipeline.surface.sweep import iterate_sweep, sweep_radii_m
 
 
-def suggest_job(store: Store, spec: Spec) -> Generator[Progress, None, tuple[SuggestionRow, ...]]:
+def suggestions_of(store: Store, spec: Spec) -> Generator[Progress, None, tuple[SuggestionRow, ...]]:
     """The radii that the cloud after fusion suggests; none if it has no inner point."""
-    clouds = yield from ball_clouds(store, spec)
+    clouds = yield from store.stage(spec, "clouds")
 
     def suggest() -> Generator[Progress, None, tuple[SuggestionRow, ...]]:
         yield Progress("reading the ball radius off the points", 0.4)
         return tuple(SuggestionRow(**asdict(suggestion)) for suggestion in suggest_radii(clouds.fused))
 
-    return (yield from store.remember(("suggest", *cloud_key(spec)), suggest))
+    return (yield from store.remember(("suggest", key(spec, "clouds")), suggest))
 
 
 def sweep_job(store: Store, spec: Spec) -> Generator[Progress | SweepView, None, SweepView]:
     """Roll one ball after another over the cloud after fusion, each alone; yields what there is so far."""
-    rig = yield from rig_of(store, spec)
-    places = yield from placed(store, spec)
-    clouds = yield from ball_clouds(store, spec)
-    suggested = yield from suggest_job(store, spec)
+    rig = yield from store.stage(spec, "rig")
+    placement = yield from store.stage(spec, "placement")
+    clouds = yield from store.stage(spec, "clouds")
+    suggested = yield from suggestions_of(store, spec)
 
     def sweep() -> Generator[Progress | SweepView, None, SweepView]:
-        radii_m = sweep_radii_m(clouds.spacing.r_F_m, [row.radius_m for row in suggested])
-        view = SweepView((), clouds.spacing.r_F_m, clouds.spacing.sigma_D_m, len(radii_m))
-        points = iterate_sweep(clouds.fused, radii_m, cameras_of(rig, places), rig.truth)
+        radii_m = sweep_radii_m(clouds.r_F_m, [row.radius_m for row in suggested])
+        view = SweepView((), clouds.r_F_m, clouds.sigma_D_m, len(radii_m))
+        points = iterate_sweep(clouds.fused, radii_m, cameras_of(rig, placement), rig.truth)
         for done, radius_m in enumerate(radii_m):
             yield Progress(f"a ball of {1000 * radius_m:.1f} mm", done / len(radii_m))
             row = SweepRow(**asdict(next(points)))
@@ -43,4 +44,4 @@ def sweep_job(store: Store, spec: Spec) -> Generator[Progress | SweepView, None,
             yield view
         return view
 
-    return (yield from store.remember(("sweep", *cloud_key(spec)), sweep))
+    return (yield from store.remember(("sweep", key(spec, "clouds")), sweep))

@@ -94,7 +94,7 @@ def _mm(row: SweepRow) -> str:
 
 
 def _went(first: float, last: float) -> str:
-    """Compared as they are written, so that no rise from 93 % to 93 % is told."""
+    """Compared as they are written, so that no rise from 93 % to 93 % is claimed."""
     before, after = round(100 * first), round(100 * last)
     if before == after:
         return f"stays at {after} %"

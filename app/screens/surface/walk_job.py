@@ -6,12 +6,12 @@ from collections.abc import Generator
 
 import numpy as np
 
-from app.chain import ball_clouds
-from app.screens.surface.walk_view import Happening, WalkView, WalkWish
+from app.screens.surface.walk_view import Happening, WalkRequest, WalkView
 from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
+from pipeline.spec import key
 from pipeline.surface import radii
 from pipeline.surface.pivoting import roll
 from pipeline.surface.walk import Kind, Walk, ball_on_arc, hole_on_flat_ground, iterate_walk, nearest_rows
@@ -24,48 +24,48 @@ BATCHES = 170
 HAPPENINGS: dict[int, Happening] = {Kind.SEED: "seed", Kind.JOIN: "join", Kind.GLUE: "glue"}
 
 
-def walk_job(store: Store, spec: Spec, wish: WalkWish) -> Generator[Progress, None, WalkView]:
+def walk_job(store: Store, spec: Spec, request: WalkRequest) -> Generator[Progress, None, WalkView]:
     """Roll the spec's balls and keep every step.
 
     Raises:
         InputError: the cloud has no points, or the patch's centre is not finite.
         ReconstructionError: no ball finds three points to rest on.
     """
-    clouds = yield from ball_clouds(store, spec)
-    radii_m = radii(spec.config.surface, clouds.spacing.r_F_m, clouds.spacing.sigma_D_m)
-    cloud = clouds.fused if wish.which == "after" else clouds.sensor
+    clouds = yield from store.stage(spec, "clouds")
+    radii_m = radii(spec.config.surface, clouds.r_F_m, clouds.sigma_D_m)
+    cloud = clouds.fused if request.which == "after" else clouds.sensor
 
     def walk() -> Generator[Progress, None, WalkView]:
         yield Progress("choosing where to look", 0.0)
-        return (yield from walk_over(cloud, radii_m, wish))
+        return (yield from walk_over(cloud, radii_m, request))
 
-    return (yield from store.remember(("walk", *spec.key("surface"), wish), walk))
+    return (yield from store.remember(("walk", key(spec, "after"), request), walk))
 
 
 def walk_over(
-    cloud: PointCloud, radii_m: tuple[float, ...], wish: WalkWish
+    cloud: PointCloud, radii_m: tuple[float, ...], request: WalkRequest
 ) -> Generator[Progress, None, WalkView]:
     """The walk over a cloud with normals, or over a patch of it; raises as ``walk_job``."""
-    if wish.close_up:
-        cloud = cloud.select(nearest_rows(cloud.points_m, _center_m(cloud, radii_m, wish), PATCH_POINTS))
-    batch = 1 if wish.close_up else max(1, 2 * len(cloud) // BATCHES)
+    if request.close_up:
+        cloud = cloud.select(nearest_rows(cloud.points_m, _center_m(cloud, radii_m, request), PATCH_POINTS))
+    batch = 1 if request.close_up else max(1, 2 * len(cloud) // BATCHES)
     walk = yield from iterate_walk(cloud.points_m, cloud.normals, radii_m, batch)
-    return _view_of(cloud, walk, wish)
+    return _view_of(cloud, walk, request)
 
 
-def _center_m(cloud: PointCloud, radii_m: tuple[float, ...], wish: WalkWish) -> FloatArray:
-    if wish.center_m is not None:
-        return np.array(wish.center_m)
+def _center_m(cloud: PointCloud, radii_m: tuple[float, ...], request: WalkRequest) -> FloatArray:
+    if request.center_m is not None:
+        return np.array(request.center_m)
     triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
     assert cloud.normals is not None  # or the ball would not have rolled
     return hole_on_flat_ground(cloud.points_m, cloud.normals, triangles, PATCH_POINTS)
 
 
-def _view_of(cloud: PointCloud, walk: Walk, wish: WalkWish) -> WalkView:
+def _view_of(cloud: PointCloud, walk: Walk, request: WalkRequest) -> WalkView:
     if cloud.normals is None:
         raise InputError("Ball pivoting needs normals and the cloud has none; try to estimate them first")
     last = walk.step_ends - 1
-    if wish.close_up:
+    if request.close_up:
         shares = np.arange(1, PLACES + 1) / PLACES
         places_m = np.stack([ball_on_arc(walk, last, share) for share in shares], axis=1)
         idle = np.diff(walk.step_ends, prepend=0) == 0
@@ -77,7 +77,7 @@ def _view_of(cloud: PointCloud, walk: Walk, wish: WalkWish) -> WalkView:
     center_m = np.median(cloud.points_m, axis=0)
     outward = cloud.normals.mean(axis=0)
     return WalkView(
-        wish,
+        request,
         cloud.points_m.astype(np.float32),
         cloud.colors,
         walk.triangles.astype(np.int32),

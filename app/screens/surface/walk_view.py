@@ -17,7 +17,7 @@ end because no edge is left to turn about."""
 
 
 @dataclass(frozen=True, slots=True)
-class WalkWish:
+class WalkRequest:
     """Which walk to watch."""
 
     which: Which
@@ -31,7 +31,7 @@ class WalkWish:
 class WalkView:
     """The walk of one ball, or of several after each other, step by step."""
 
-    wish: WalkWish
+    request: WalkRequest
     points_m: FloatArray
     """(N, 3) float32."""
     colors: ByteArray | None

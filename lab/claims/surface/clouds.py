@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from packetmesh.progress import drain
 from pipeline.config import PipelineConfig
-from pipeline.depth import DepthNetwork
-from pipeline.reconstruct import merged_clouds, prepare_node
-from pipeline.surface import Camera, spacing
+from pipeline.merging import MergedClouds
+from pipeline.sources import LoadedRig
+from pipeline.spec import Spec
+from pipeline.stages import run
+from pipeline.surface import Camera
 from pipeline.types import DepthMap, PointCloud, Rig, RigTruth
 
 CHAINS = {"thesis": "the thesis's union", "packetmesh": "filling only the holes"}
@@ -38,12 +41,14 @@ def single_node(rig: Rig, index: int) -> Rig:
     return Rig(f"{rig.name}/{frame.name}", (frame,), truth)
 
 
-def chain_clouds(rig: Rig, index: int, config: PipelineConfig, network: DepthNetwork) -> ChainClouds:
+def chain_clouds(rig: Rig, index: int, config: PipelineConfig) -> ChainClouds:
     """Node ``index`` of a rig with known truth by a chain, up to the ball."""
     alone = single_node(rig, index)
     assert alone.truth is not None
     frame = alone.frames[0]
-    node = prepare_node(frame, config, network)
-    sensor, fused = merged_clouds([node], alone.frames, [frame.T_world_camera], config)
+    results = drain(run(Spec(LoadedRig(alone), config=config), stages=("clouds",)))
     camera = Camera(frame.intrinsics, frame.T_world_camera)
-    return ChainClouds(alone.name, sensor, fused, *spacing(fused.points_m), camera, alone.truth.depth[0])
+    merged: MergedClouds = results["clouds"].value
+    return ChainClouds(
+        alone.name, merged.sensor, merged.fused, merged.r_F_m, merged.sigma_D_m, camera, alone.truth.depth[0]
+    )

@@ -12,7 +12,6 @@ from lab.claims.exhibits import Exhibit, Table
 from lab.claims.surface.clouds import CHAINS, ChainClouds, chain_clouds
 from lab.claims.surface.figures import thesis_figures
 from pipeline.config import PRESETS
-from pipeline.depth import DepthNetwork
 from pipeline.io.demos import DEMO_SCENES, load_demo
 from pipeline.surface import hit_depth, reconstruct_surface
 from pipeline.surface.radii import SIGMAS
@@ -68,14 +67,13 @@ def seen(clouds: ChainClouds, when: str, sigmas: tuple[float, ...]) -> Seen:
 
 def study(scenes: Iterable[str] = tuple(DEMO_SCENES)) -> tuple[Measured, tuple[Exhibit, ...]]:
     """Every node of the scenes as a rig of its own, by both chains; pictures of the very first."""
-    network = DepthNetwork()
     measured: Measured = {}
     pictures: list[Exhibit] = []
     for place, scene in enumerate(scenes):
         rig = load_demo(scene)
         for index in range(len(rig.frames)):
             for preset, how in CHAINS.items():
-                clouds = chain_clouds(rig, index, PRESETS[preset], network)
+                clouds = chain_clouds(rig, index, PRESETS[preset])
                 measure(clouds, preset, measured)
                 if (place, index) == (0, 0):
                     pictures.append(thesis_figures(clouds, how))

@@ -10,7 +10,6 @@ from lab.claims.claim import Claim, Outcome
 from lab.claims.exhibits import Table
 from lab.claims.surface.clouds import CHAINS, chain_clouds
 from pipeline.config import PRESETS, SurfaceConfig
-from pipeline.depth import DepthNetwork
 from pipeline.io.demos import DEMO_SCENES, load_demo
 from pipeline.surface import radii, spacing
 from pipeline.surface.radii import SIGMAS
@@ -72,12 +71,11 @@ def readings_table() -> Table:
 
 def scenes_table(scenes: Iterable[str] = tuple(DEMO_SCENES)) -> Table:
     """Our own r_F, sigma_D and radii, before and after fusion, of the first node of each scene."""
-    network = DepthNetwork()
     rows: list[tuple[str | float, ...]] = []
     for scene in scenes:
         rig = load_demo(scene)
         for preset, how in CHAINS.items():
-            clouds = chain_clouds(rig, 0, PRESETS[preset], network)
+            clouds = chain_clouds(rig, 0, PRESETS[preset])
             for when, cloud in (("before", clouds.sensor), ("after", clouds.fused)):
                 spacing_m = spacing(cloud.points_m)
                 radii_m = predicted_radii_m(SIGMAS["thesis"], *spacing_m)

@@ -24,7 +24,6 @@ from lab.claims.surface.stairs import (
 )
 from packetmesh.files import finite
 from pipeline.config import PRESETS
-from pipeline.depth import DepthNetwork
 from pipeline.io.demos import load_demo
 from pipeline.rays import tensor, triangle_areas_m2, triangle_scene
 from pipeline.surface import spacing
@@ -71,7 +70,7 @@ def small_clouds():
     """The thesis's chain on a node, thinned to few points."""
     config = PRESETS["thesis"]
     config = replace(config, surface=replace(config.surface, max_points=3000))
-    return chain_clouds(load_demo("box-on-table"), 0, config, DepthNetwork())
+    return chain_clouds(load_demo("box-on-table"), 0, config)
 
 
 def test_a_chain_s_clouds_have_the_spacing_of_the_fused_one(small_clouds):

@@ -8,20 +8,12 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.io import (
-    load_rig,
-    read_cloud,
-    read_color,
-    read_depth,
-    read_intrinsics,
-    read_mesh,
-    save_rig,
-    write_cloud,
-    write_color,
-    write_depth_mm,
-    write_mesh,
-)
+from pipeline.io.clouds import read_cloud, write_cloud
+from pipeline.io.images import read_color, read_depth, write_color, write_depth_mm
+from pipeline.io.intrinsics import read_intrinsics
+from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.io.poses import read_pose
+from pipeline.io.rigs import load_rig, save_rig
 from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RgbdFrame, Rig, Surface
 
 CAMERA = {"width": 16, "height": 12, "fx": 14.0, "fy": 14.0, "cx": 7.5, "cy": 5.5}

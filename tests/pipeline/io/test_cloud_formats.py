@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.io import read_cloud
+from pipeline.io.clouds import read_cloud
 from pipeline.open3d_runtime import o3d
 
 RNG = np.random.default_rng(11)

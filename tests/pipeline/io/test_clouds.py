@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from pipeline.io import read_cloud, write_cloud
+from pipeline.io.clouds import read_cloud, write_cloud
 from pipeline.open3d_runtime import o3d
 from pipeline.types import PointCloud
 

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.io import read_color, read_depth, write_color, write_depth_mm
+from pipeline.io.images import read_color, read_depth, write_color, write_depth_mm
 from pipeline.types import DepthMap
 
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.io import read_intrinsics, write_intrinsics
+from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.types import CameraIntrinsics
 
 FX, FY, CX, CY = 529.741370000001, 529.57155, 312.57382, 257.05061

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from pipeline.io import read_mesh, write_mesh
+from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.types import Surface
 
 

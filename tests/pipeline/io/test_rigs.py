@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.geometry import look_at
-from pipeline.io import load_frame, load_rig, save_rig
-from pipeline.io.rigs import LEVEL_POSE
+from pipeline.io.rigs import LEVEL_POSE, load_frame, load_rig, save_rig
 from pipeline.types import CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
 

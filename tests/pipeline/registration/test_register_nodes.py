@@ -7,15 +7,15 @@ import pytest
 
 from lab.worlds import box_room
 from lab.worlds.demos import disturbed
-from pipeline import reconstruct
+from pipeline import nodes
 from pipeline.config import PRESETS, RegistrationConfig
 from pipeline.geometry import inverse, rigid, rotation_exp
-from pipeline.reconstruct import NodeClouds, register_nodes
+from pipeline.nodes import NodeClouds, place_nodes
 from pipeline.registration import point_error_m, register
 from pipeline.types import DepthMap, RgbdFrame
 from tests.pipeline.registration.rooms import seen_by
 
-CONFIG = PRESETS["packetmesh"]
+CONFIG = PRESETS["packetmesh"].node_registration
 
 
 def rig_of(nodes: int):
@@ -27,13 +27,18 @@ def rig_of(nodes: int):
         image = np.zeros((240, 320, 3), np.uint8)
         depth = DepthMap(np.ones((240, 320), np.float32))
         frames.append(RgbdFrame(f"node_{index:02d}", image, depth, scene.intrinsics, believed))
-        works.append(NodeClouds(frames[-1].name, cloud, *[None] * 7, fused=cloud))
+        works.append(NodeClouds(frames[-1].name, cloud, *[None] * 6, fused=cloud))
     return scene, frames, works
 
 
 @pytest.fixture(scope="module")
 def six():
     return rig_of(6)
+
+
+def placed(frames, works, config=CONFIG):
+    placement = place_nodes(frames, works, config)
+    return placement.registrations, placement.T_world_camera
 
 
 def worst_error_m(scene, works, poses) -> float:
@@ -45,7 +50,7 @@ def worst_error_m(scene, works, poses) -> float:
 
 def test_six_nodes_find_their_places_by_more_pairs_than_a_tree_has(six):
     scene, frames, works = six
-    registrations, poses = register_nodes(frames, works, CONFIG)
+    registrations, poses = placed(frames, works)
     assert len(registrations) > 5
     assert {row.source for row in registrations[:5]} == {work.name for work in works[1:]}
     assert all(row.used for row in registrations)
@@ -63,8 +68,8 @@ def test_a_registration_that_went_wrong_is_left_out(six, monkeypatch):
         wrong = source is works[3].sensor and target is works[2].sensor
         return replace(result, T_target_source=damage @ result.T_target_source) if wrong else result
 
-    monkeypatch.setattr(reconstruct, "register_from_anywhere", misled)
-    registrations, poses = register_nodes(frames, works, CONFIG)
+    monkeypatch.setattr(nodes, "register_from_anywhere", misled)
+    registrations, poses = placed(frames, works)
     assert [(row.source, row.target) for row in registrations if not row.used] == [("node_03", "node_02")]
     assert max(row.loop_error_m for row in registrations) > 0.1
     assert worst_error_m(scene, works, poses) < 0.02
@@ -72,9 +77,9 @@ def test_a_registration_that_went_wrong_is_left_out(six, monkeypatch):
 
 def test_two_nodes_are_where_their_registration_says():
     _, frames, works = rig_of(2)
-    (row,), poses = register_nodes(frames, works, CONFIG)
+    (row,), poses = placed(frames, works)
     T_init = inverse(frames[0].T_world_camera) @ frames[1].T_world_camera
-    alone = register(works[1].sensor, works[0].sensor, CONFIG.node_registration, T_init)
+    alone = register(works[1].sensor, works[0].sensor, CONFIG, T_init)
     np.testing.assert_array_equal(row.result.T_target_source, alone.T_target_source)
     np.testing.assert_allclose(poses[1], poses[0] @ alone.T_target_source, atol=1e-12)
     assert row.used
@@ -84,7 +89,6 @@ def test_two_nodes_are_where_their_registration_says():
 def test_nodes_that_do_not_know_where_they_are_find_out():
     scene, frames, works = rig_of(3)
     lost = [frames[0], *(replace(frame, T_world_camera=frames[0].T_world_camera) for frame in frames[1:])]
-    config = replace(CONFIG, node_registration=RegistrationConfig(start="global"))
-    registrations, poses = register_nodes(lost, works, config)
+    registrations, poses = placed(lost, works, RegistrationConfig(start="global"))
     assert len(registrations) == 3
     assert worst_error_m(scene, works, poses) < 0.02

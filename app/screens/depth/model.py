@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import viser
 
 from app.screens.depth.labels import NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
-from app.screens.depth.view import NetworkView, NetworkWish
+from app.screens.depth.view import ModelChoice, ModelView
 from app.tables import Row, number, table
+from app.ui import Ui
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
 
@@ -27,29 +27,26 @@ TRYING = "Trying the network …"
 KEPT = "The network before is kept. Say what this one expects, or choose another."
 
 
-class NetworkFolder:
+class ModelFolder:
     """A list of networks, an upload button, a preset, and what the network says about itself."""
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        post: Callable[..., None],
-        changed: Callable[[Any, Callable[[], None]], None],
+        ui: Ui,
         folder: Path,
-        on_choose: Callable[[NetworkWish], None],
+        on_choose: Callable[[ModelChoice], None],
     ) -> None:
         """Add the folder.
 
         Args:
-            gui: where to add it.
-            post: runs a function on the session's thread.
-            changed: registers an action for a change of a handle by a person.
+            ui: where to add it.
             folder: where uploaded files are kept.
             on_choose: called with the network that is wanted.
         """
         self._folder, self._on_choose = folder, on_choose
         self._models: dict[str, str | None] = {SHIPPED: None}
         self._config = DepthConfig()
+        gui = ui.gui
         with gui.add_folder("Neural network", expand_by_default=False):
             gui.add_markdown(TEXT)
             self._model = gui.add_dropdown("Network file", [SHIPPED], hint="Which network infers the depth.")
@@ -64,19 +61,20 @@ class NetworkFolder:
                 hint="What the network's numbers mean: metric: metres; relative: depth up to a scale; "
                 "inverse: 1/depth up to scale and shift, as MiDaS and Depth Anything have it.",
             )
-            changed(self._model, self._picked)
+            ui.when_changed(self._model, self._picked)
             for handle in (self._preset, self._kind):
-                changed(handle, self._chosen)
+                ui.when_changed(handle, self._chosen)
             button = gui.add_upload_button(
                 "Add an ONNX file …", icon=viser.Icon.UPLOAD, mime_type=".onnx", hint="At most 128 MB."
             )
-            button.on_upload(lambda event: post(self._keep, event.target.value))
-            self._add_input(gui, post)
+            button.on_upload(lambda event: ui.post(self._keep, event.target.value))
+            self._add_input(ui)
             self._status = gui.add_markdown("")
             self._table = gui.add_html("")
 
-    def _add_input(self, gui: viser.GuiApi, post: Callable[..., None]) -> None:
+    def _add_input(self, ui: Ui) -> None:
         """What only somebody who knows the network can say, for one that is not ours."""
+        gui = ui.gui
         self._advanced = gui.add_folder("Advanced: its input", expand_by_default=False, visible=False)
         with self._advanced:
             self._size = gui.add_vector2(
@@ -92,8 +90,8 @@ class NetworkFolder:
                 [AS_IT_SAYS, *NORMALISATIONS],
                 hint="imagenet: with ImageNet's mean and deviation; unit: from 0 to 1; bytes: from 0 to 255.",
             )
-            gui.add_button("Use this input", icon=viser.Icon.CHECK, hint="Tries the network anew.").on_click(
-                lambda _: post(self._chosen)
+            gui.add_button("Use this input", icon=viser.Icon.CHECK, hint="Tries the network again.").on_click(
+                lambda _: ui.post(self._chosen)
             )
 
     def write(self, config: DepthConfig) -> None:
@@ -109,13 +107,13 @@ class NetworkFolder:
         self._normalisation.value = config.normalisation or AS_IT_SAYS
         self._advanced.visible = config.model is not None
 
-    def load(self, view: NetworkView | None) -> None:
+    def load(self, view: ModelView | None) -> None:
         """Tell of the network that was tried; None could not be used, and the one before stays in use."""
         if view is None:
             self._status.content = KEPT
             return
         self._status.content = ADVICE[view.kind]
-        self._table.content = network_table(view)
+        self._table.content = model_table(view)
 
     def _picked(self) -> None:
         """Another file gets the input that it asks for itself."""
@@ -131,7 +129,7 @@ class NetworkFolder:
         normalisations: dict[str, Normalisation] = {name: name for name in NORMALISATIONS}
         width_px, height_px = (round(side) or None for side in self._size.value)
         self._on_choose(
-            NetworkWish(
+            ModelChoice(
                 model,
                 presets.get(self._preset.value),
                 kinds.get(self._kind.value),
@@ -161,7 +159,7 @@ class NetworkFolder:
         return name
 
 
-def network_table(view: NetworkView) -> str:
+def model_table(view: ModelView) -> str:
     """HTML: what was found when the network was tried, and what its file says."""
     rows = [
         Row("Answers", "What its numbers mean.", (f"{view.kind} depth",)),

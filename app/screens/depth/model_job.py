@@ -7,8 +7,7 @@ from collections.abc import Generator
 
 import numpy as np
 
-from app.chain import network_for
-from app.screens.depth.view import NetworkView, NetworkWish
+from app.screens.depth.view import ModelChoice, ModelView
 from packetmesh.progress import Progress
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork
@@ -17,7 +16,7 @@ TEST_IMAGE = np.dstack(np.broadcast_arrays(*np.ogrid[0:240, 0:320], 128)).astype
 """(240, 320, 3) a ramp of colours; any network has something to say to it."""
 
 
-def network_job(wish: NetworkWish) -> Generator[Progress, None, NetworkView]:
+def model_job(choice: ModelChoice) -> Generator[Progress, None, ModelView]:
     """Load a network and infer one image.
 
     Raises:
@@ -25,12 +24,12 @@ def network_job(wish: NetworkWish) -> Generator[Progress, None, NetworkView]:
         ReconstructionError: it answers without a depth.
     """
     yield Progress("loading the network", 0.3)
-    network = network_for(wish.put_into(DepthConfig()))
+    network = DepthNetwork.of(choice.put_into(DepthConfig()))
     yield Progress("asking the network", 0.6)
     started = time.perf_counter()
-    DepthNetwork.infer(network, TEST_IMAGE)
-    return NetworkView(
-        wish=wish,
+    network.infer(TEST_IMAGE)
+    return ModelView(
+        choice=choice,
         kind=network.convention.kind,
         provider=network.provider,
         inference_s=time.perf_counter() - started,

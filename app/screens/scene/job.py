@@ -1,0 +1,41 @@
+"""What the Scene screen shows of a rig."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+
+from app.drawing.pictures import depth_picture, depth_range_m
+from app.records import SCREEN_POINTS, Picture, SceneNode, SceneView, sample
+from app.state import Spec
+from app.store import Store
+from packetmesh.progress import Progress
+from pipeline.acquisition import back_project
+from pipeline.types import RgbdFrame
+
+
+def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
+    """The rig as it was loaded."""
+    rig = yield from store.stage(spec, "rig")
+    most = SCREEN_POINTS // len(rig.frames)
+    nodes = tuple(_scene_node(frame, most) for frame in rig.frames)
+    return SceneView(spec.source.title, nodes, rig.truth is not None)
+
+
+def _scene_node(frame: RgbdFrame, most: int) -> SceneNode:
+    cloud = back_project(frame)
+    range_m = depth_range_m(frame.depth)
+    camera = frame.intrinsics
+    return SceneNode(
+        name=frame.name,
+        color=Picture(frame.rgb, f"Colour image of {frame.name}"),
+        depth=depth_picture(frame.depth, range_m, "Sensor depth"),
+        sensor=sample(cloud.points_m, cloud.colors, most),
+        T_world_camera=frame.T_world_camera,
+        fov_rad=2.0 * float(np.arctan2(camera.height_px / 2, camera.fy_px)),
+        aspect=camera.width_px / camera.height_px,
+        coverage=frame.depth.coverage,
+        nearest_m=range_m[0],
+        farthest_m=range_m[1],
+    )

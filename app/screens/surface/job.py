@@ -1,0 +1,53 @@
+"""What the Surface screen shows of the surfaces before and after fusion."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+
+import numpy as np
+
+from app.drawing.meshes import mesh_view
+from app.records import SpacingView
+from app.screens.surface.holes_job import hole_views, parts_of
+from app.screens.surface.sweep_job import suggestions_of
+from app.screens.surface.view import SurfaceView
+from app.state import Spec
+from app.store import Store
+from packetmesh.progress import Progress
+from pipeline.merging import MergedClouds
+from pipeline.stages import compute
+from pipeline.surface import nearest_distances_m
+
+HISTOGRAM_BINS = 60
+
+
+def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, None, SurfaceView]:
+    """The surfaces and everything about them; yielded as far as they are there."""
+    clouds = yield from store.stage(spec, "clouds")
+    rolled = yield from compute(spec, "after", store)
+    after = rolled.value
+    view = SurfaceView(spacing_of(clouds), after.radii_m, mesh_view(after, None), None, rolled.elapsed_s)
+    yield view
+    before = yield from store.stage(spec, "before")
+    view = replace(view, before=mesh_view(before, None))
+    yield view
+    truth_before, truth_after = yield from store.stage(spec, "truth")
+    if truth_before or truth_after:
+        view = replace(view, before=mesh_view(before, truth_before), after=mesh_view(after, truth_after))
+        yield view
+    yield Progress("looking for holes", 0.9)
+    return replace(
+        view,
+        holes={"after": hole_views(after), "before": hole_views(before)},
+        parts=(yield from parts_of(store, spec, after)),
+        suggestions=(yield from suggestions_of(store, spec)),
+    )
+
+
+def spacing_of(clouds: MergedClouds) -> SpacingView:
+    """The histogram of the distances of nearest points, up to five standard deviations over their mean."""
+    r_F_m, sigma_D_m = clouds.r_F_m, clouds.sigma_D_m
+    distances_m = nearest_distances_m(clouds.fused.points_m)
+    counts, edges_m = np.histogram(distances_m, bins=HISTOGRAM_BINS, range=(0.0, r_F_m + 5 * sigma_D_m))
+    return SpacingView(r_F_m, sigma_D_m, edges_m, counts, len(clouds.sensor), len(clouds.fused))

@@ -1,0 +1,187 @@
+"""What every screen is made of: where its controls and drawings go, and the session it asks for work."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, TypeVar
+
+import numpy as np
+import viser
+
+from app.debounce import Debounce
+from app.state import Results, Spec, Step
+from app.store import Store
+from pipeline.config import PipelineConfig
+from pipeline.types import FloatArray
+
+Input = TypeVar("Input", bound="viser.GuiInputHandle[Any]")
+
+
+@dataclass(frozen=True, slots=True)
+class Ui:
+    """A browser's control panel and scene; what a person does there is answered on the session's thread."""
+
+    gui: viser.GuiApi
+    scene: viser.SceneApi
+    post: Callable[..., None]
+    """Runs a function on the session's thread."""
+    atomic: Callable[[], AbstractContextManager[None]]
+    """Groups what is sent to the browser."""
+    flush: Callable[[], None]
+    """Sends it now."""
+    closers: list[Callable[[], None]] = field(default_factory=list)
+    """What ends the timers and threads of the screens."""
+
+    def when_changed(self, handle: Input, action: Callable[[], object]) -> Input:
+        """The handle, whose changes by a person, not by the program, cause ``action``."""
+
+        def changed(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                self.post(action)
+
+        handle.on_update(changed)
+        return handle
+
+    def buttons(
+        self, label: str, actions: Mapping[str, Callable[[], object]], hint: str, visible: bool = True
+    ) -> viser.GuiButtonGroupHandle[str]:
+        """A row of buttons with what each of them does."""
+        group = self.gui.add_button_group(label, tuple(actions), hint=hint, visible=visible)
+        group.on_click(lambda event: self.post(actions[event.target.value]))
+        return group
+
+    def when_clicked(self, below: str, action: Callable[[FloatArray, FloatArray], object]) -> None:
+        """Answer a click while the node ``below`` is shown: ``action`` gets its ray, origin and direction."""
+
+        def clicked(event: Any) -> None:
+            if self.shows(below):
+                action(np.array(event.ray_origin), np.array(event.ray_direction))
+
+        self.scene.on_click()(lambda event: self.post(clicked, event))
+
+    def shows(self, name: str) -> bool:
+        """Whether a scene node is there and visible."""
+        frame = self.scene.get_handle_by_name(name)
+        return frame is not None and frame.visible
+
+    def debounce(self, wait_s: float, action: Callable[[], object]) -> Debounce:
+        """A timer whose ``action`` runs on the session's thread."""
+        timer = Debounce(wait_s, lambda: self.post(action))
+        self.closers.append(timer.cancel)
+        return timer
+
+    def close(self) -> None:
+        """End all timers and threads of the screens."""
+        for close in self.closers:
+            close()
+
+
+class Workbench(Protocol):
+    """What a panel needs of its session; all but ``notify`` on the session's thread."""
+
+    @property
+    def ui(self) -> Ui:
+        """Where to put controls and drawings."""
+
+    @property
+    def spec(self) -> Spec:
+        """What is wanted now."""
+
+    @property
+    def results(self) -> Results:
+        """What is there."""
+
+    @property
+    def store(self) -> Store:
+        """Where jobs keep results."""
+
+    @property
+    def folder(self) -> Path:
+        """Where uploaded files go."""
+
+    def want(self, spec: Spec) -> None:
+        """Want something else; whatever is still right is kept."""
+
+    def edit(self, change: Callable[[PipelineConfig], PipelineConfig]) -> None:
+        """Change the settings and recompute what depends on them."""
+
+    def side_job(
+        self,
+        job: str,
+        *arguments: Any,
+        on_end: Callable[[Any], None],
+        on_partial: Callable[[Any], None] = ...,
+    ) -> None:
+        """Run a job after the chain's, in place of the one before; ``on_end`` gets its result or None."""
+
+    def quick_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
+        """Run a job of a fraction of a second, even beside one of the chain; of many, the latest."""
+
+    def apart_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
+        """Run a job that needs nothing of the chain beside it, in place of the one before."""
+
+    def cancel_side_job(self) -> None:
+        """End the side job now."""
+
+    def notify(self, title: str, sentence: str, color: Any = ...) -> None:
+        """Show a notice to the people who watch."""
+
+    def clients(self) -> Iterable[viser.ClientHandle]:
+        """The browsers that show this session."""
+
+    def frame_view(self, anew: bool = ...) -> None:
+        """Turn the view to the scene if it does not show it yet; with ``anew`` in any case."""
+
+
+class Panel(ABC):
+    """A step: its controls in the control panel and its nodes in the 3-D scene.
+
+    All methods run on the session's thread.
+    """
+
+    title: ClassVar[str]
+    step: ClassVar[Step | None] = None
+    """The step of the chain whose result it shows."""
+    drawn_below: ClassVar[str]
+    """Scene node under which it draws; only the current step's is visible."""
+
+    def __init__(self, session: Workbench) -> None:
+        self.session, self.ui = session, session.ui
+        self.gui, self.scene = session.ui.gui, session.ui.scene
+
+    @abstractmethod
+    def build(self) -> None:
+        """Add the controls to the current container."""
+
+    def on_spec(self, spec: Spec) -> None:
+        """The settings or the source changed."""
+
+    def on_view(self, step: Step, view: Any) -> None:
+        """A step of the chain, this or another, has a new view."""
+
+    def on_partial(self, view: Any) -> None:
+        """This panel's step shows what it has so far."""
+
+    def on_show(self) -> None:
+        """This became the current step."""
+
+    def on_action(self, action: str) -> None:
+        """A button for all steps was pressed."""
+
+    def look(self) -> bool:
+        """Turn the view to what it draws; False leaves that to the session, which turns it to the scene."""
+        return False
+
+    @property
+    def command(self) -> str:
+        """The command line that computes what it shows."""
+        return self.session.spec.command()
+
+    @property
+    def wide(self) -> bool:
+        """Whether it shows two things side by side."""
+        return False

@@ -1,0 +1,92 @@
+"""The clouds of all nodes as one, thinned and with normals, ready for the ball."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline import geometry
+from pipeline.config import FusionMode
+from pipeline.nodes import NodeClouds
+from pipeline.registration import hidden_from
+from pipeline.surface import estimate_normals, smooth, spacing, voxel_average, voxel_for_count
+from pipeline.types import FloatArray, PointCloud, PointSource, RgbdFrame
+
+
+@dataclass(frozen=True, slots=True)
+class MergedClouds:
+    """All nodes' clouds in the world frame, thinned alike, with normals."""
+
+    sensor: PointCloud
+    fused: PointCloud
+    r_F_m: float
+    """Mean nearest-neighbour distance of the fused cloud."""
+    sigma_D_m: float
+    """Its standard deviation."""
+
+
+def merge_clouds(
+    frames: Sequence[RgbdFrame],
+    nodes: Sequence[NodeClouds],
+    T_world_camera: Sequence[FloatArray],
+    mode: FusionMode,
+    max_points: int,
+    smoothing_passes: int,
+) -> MergedClouds:
+    """The sensor cloud and the fused cloud of all nodes.
+
+    Args:
+        frames: the nodes' images.
+        nodes: their clouds.
+        T_world_camera: (4, 4) registered pose of each node.
+        mode: ``fill`` drops inferred points that another node's sensor can judge.
+        max_points: both clouds are averaged over the voxels that leave the fused one about so many points.
+        smoothing_passes: how often every point is moved onto the plane of its neighbours.
+    """
+    joint = without_guesses_in_view(frames, nodes, T_world_camera) if mode == "fill" else _fused(nodes)
+    everything = PointCloud.concatenate(_placed(joint, T_world_camera))
+    voxel_m = voxel_for_count(everything.points_m, max_points)
+
+    def merged(clouds: Sequence[PointCloud]) -> PointCloud:
+        thin = [
+            replace(estimate_normals(voxel_average(cloud, voxel_m), np.zeros(3)), pixels=None)
+            for cloud in clouds
+        ]
+        placed = _placed(thin, T_world_camera)
+        whole = placed[0] if len(placed) == 1 else voxel_average(PointCloud.concatenate(placed), voxel_m)
+        return smooth(whole, smoothing_passes)
+
+    fused = merged(joint)
+    return MergedClouds(merged([node.sensor for node in nodes]), fused, *spacing(fused.points_m))
+
+
+def without_guesses_in_view(
+    frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], T_world_camera: Sequence[FloatArray]
+) -> list[PointCloud]:
+    """Each node's fused cloud, in its own frame, without inferred points that another sensor can judge.
+
+    What one node had to infer, another may have measured: an inferred point stands only where it is
+    hidden from every other node's sensor.
+    """
+    clouds = []
+    for index, node in enumerate(nodes):
+        keep = np.ones(len(node.fused), dtype=bool)
+        inferred = np.flatnonzero(node.fused.source == PointSource.INFERRED)
+        for other, frame in enumerate(frames):
+            if other != index:
+                T_other_node = geometry.inverse(T_world_camera[other]) @ T_world_camera[index]
+                cloud = node.fused.select(inferred)
+                keep[inferred] &= hidden_from(cloud, T_other_node, frame.intrinsics, frame.depth)
+        clouds.append(node.fused.select(keep))
+    return clouds
+
+
+def _fused(nodes: Sequence[NodeClouds]) -> list[PointCloud]:
+    return [node.fused for node in nodes]
+
+
+def _placed(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray]) -> list[PointCloud]:
+    """Clouds in their own frames, moved to the world frame."""
+    return [cloud.transformed(pose) for cloud, pose in zip(clouds, T_world_camera, strict=True)]

@@ -1,0 +1,212 @@
+"""What each node sees and infers, and where the nodes stand beside each other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from packetmesh.errors import ReconstructionError
+from pipeline import geometry
+from pipeline.acquisition import FilterResult, back_project, filter_outliers
+from pipeline.config import AcquisitionConfig, DepthConfig, FusionMode, NodePoints, RegistrationConfig
+from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, judge
+from pipeline.registration import fuse, register
+from pipeline.registration.global_start import register_from_anywhere
+from pipeline.registration.pose_graph import graph_points, pose_edge, solve_pose_graph
+from pipeline.types import DepthMap, FloatArray, PointCloud, PointSource, RegistrationResult, RgbdFrame
+
+SHARED_VIEW = 0.25
+"""Share of a node's points in another's image from which on the two are worth registering."""
+
+
+@dataclass(frozen=True, slots=True)
+class InferredDepth:
+    """The depth network's answer to one colour image, before it is made metric."""
+
+    depth: DepthMap
+    disparity: bool
+    """Whether the network gives 1/depth up to scale and shift."""
+    provider: str
+    """The execution provider that ran the network."""
+    elapsed_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class NodeClouds:
+    """What one node's images give, in its own camera frame."""
+
+    name: str
+    sensor: PointCloud
+    filtered: FilterResult
+    network: InferredDepth
+    alignment: AlignmentResult
+    judged: JudgedDepth
+    """The aligned depth that is believed in the sensor's holes, and with what confidence."""
+    inferred: PointCloud
+    """The believed depth, or in ``union`` mode all of it, as in the thesis."""
+    inferred_registration: RegistrationResult | None
+    fused: PointCloud
+
+
+@dataclass(frozen=True, slots=True)
+class NodeRegistration:
+    """How one node found its place beside another."""
+
+    source: str
+    target: str
+    result: RegistrationResult
+    loop_error_m: float = float("nan")
+    """How far it is from what the other registrations say about these two nodes; NaN where they say
+    nothing."""
+    used: bool = True
+    """False if it degenerated, or contradicts the loops and was left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """The nodes beside each other."""
+
+    registrations: tuple[NodeRegistration, ...]
+    """Those that place each node beside an earlier one first."""
+    T_world_camera: tuple[FloatArray, ...]
+    """Corrected poses."""
+
+
+def infer_depth(network: DepthNetwork, frame: RgbdFrame, crop: bool = False) -> InferredDepth:
+    """Run the depth network on a frame's colour image."""
+    started = time.perf_counter()
+    depth = network.infer(frame.rgb, crop=crop)
+    elapsed_s = time.perf_counter() - started
+    return InferredDepth(depth, network.convention.kind == "inverse", network.provider, elapsed_s)
+
+
+def prepare_node(
+    frame: RgbdFrame,
+    inferred: InferredDepth,
+    acquisition: AcquisitionConfig,
+    depth: DepthConfig,
+    mode: FusionMode,
+    registration: RegistrationConfig | None = None,
+) -> NodeClouds:
+    """One node's sensor cloud, inferred cloud and their fusion, in the node's camera frame.
+
+    Args:
+        frame: the node's images.
+        inferred: what the depth network gives for its colour image.
+        acquisition: which sensor points are outliers.
+        depth: how inferred depth is made metric, and how much of it is believed.
+        mode: ``fill`` lets inferred points in only at pixels that the sensor has not measured.
+        registration: moves the inferred cloud rigidly onto the sensor cloud, as the thesis does; None
+            leaves its points where their pixels are.
+    """
+    filtered = filter_outliers(back_project(frame), acquisition, frame.intrinsics.fx_px)
+    sensor = filtered.kept
+    alignment = align_depth(inferred.depth, frame.depth, depth.alignment, inferred.disparity)
+    judged = judge(alignment, frame.depth, frame.rgb, depth.reach, depth.least_confidence)
+    believed = judged.depth if mode == "fill" else alignment.depth
+    cloud = back_project(frame, believed, PointSource.INFERRED)
+    result = None
+    if registration is not None:
+        result = register(cloud, sensor, registration)
+        cloud = cloud.transformed(result.T_target_source)
+    return NodeClouds(
+        name=frame.name,
+        sensor=sensor,
+        filtered=filtered,
+        network=inferred,
+        alignment=alignment,
+        judged=judged,
+        inferred=cloud,
+        inferred_registration=result,
+        fused=fuse(sensor, cloud, mode, frame.depth.valid),
+    )
+
+
+def place_nodes(
+    frames: Sequence[RgbdFrame],
+    nodes: Sequence[NodeClouds],
+    config: RegistrationConfig,
+    align_with: NodePoints = "sensor",
+) -> Placement:
+    """Place the nodes beside each other by all pairs that share enough of their view.
+
+    The first node keeps the pose it believes in. Registrations that contradict the loops they are part
+    of are left out, and the rest make the poses by least squares. A node that no good registration
+    reaches is placed beside the earlier node that it shares most of its view with; where their
+    registration degenerates, as it believes.
+
+    Args:
+        frames: the nodes' images with their believed poses.
+        nodes: their clouds.
+        config: how a pair is registered.
+        align_with: which of a node's clouds is registered.
+    """
+    clouds = [getattr(node, align_with) for node in nodes]
+    partners, others = _node_pairs(frames, nodes, config.start == "global")
+    pairs = [*partners, *others]
+    results = [_register_pair(frames, clouds, config, *pair) for pair in pairs]
+    points_m = [graph_points(cloud) for cloud in clouds]
+    good = [place for place, result in enumerate(results) if _succeeded(result)]
+    edges = [pose_edge(*pairs[place], points_m, results[place].T_target_source) for place in good]
+    graph = solve_pose_graph(points_m, edges)
+    found = {place: (graph.loop_error_m[k], graph.used[k]) for k, place in enumerate(good)}
+    registrations = tuple(
+        NodeRegistration(
+            nodes[source].name, nodes[target].name, result, *found.get(place, (float("nan"), False))
+        )
+        for place, ((source, target), result) in enumerate(zip(pairs, results, strict=True))
+    )
+    poses = [frames[0].T_world_camera]
+    for (index, partner), result in zip(partners, results, strict=False):
+        T = graph.T_reference_node[index]
+        placed = poses[0] @ T if np.isfinite(T).all() else poses[partner] @ result.T_target_source
+        poses.append(placed)
+    return Placement(registrations, tuple(poses))
+
+
+def _node_pairs(
+    frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], unknown: bool
+) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """(later, earlier) node: every node's best partner, and the other pairs that share enough.
+
+    Where poses are ``unknown``, so is what is shared, and all pairs are tried.
+    """
+    partners, others = [], []
+    for index in range(1, len(nodes)):
+        shares = [_shared_view(frames[index], nodes[index].sensor, frames[k]) for k in range(index)]
+        partner = index - 1 if unknown else int(np.argmax(shares))
+        partners.append((index, partner))
+        others += [(index, k) for k in range(index) if k != partner and (unknown or shares[k] >= SHARED_VIEW)]
+    return partners, others
+
+
+def _register_pair(
+    frames: Sequence[RgbdFrame],
+    clouds: Sequence[PointCloud],
+    config: RegistrationConfig,
+    index: int,
+    partner: int,
+) -> RegistrationResult:
+    """One node's cloud onto another's, from the believed poses or from anywhere."""
+    T_init = geometry.inverse(frames[partner].T_world_camera) @ frames[index].T_world_camera
+    try:
+        return register_from_anywhere(clouds[index], clouds[partner], config, T_init)
+    except ReconstructionError as error:
+        return RegistrationResult(T_init, (), False, str(error))
+
+
+def _succeeded(result: RegistrationResult) -> bool:
+    return bool(result.steps) and not result.stop_reason.startswith("degenerate")
+
+
+def _shared_view(frame: RgbdFrame, cloud: PointCloud, other: RgbdFrame) -> float:
+    """Share of a node's points that fall into another node's image, by the believed poses."""
+    T_other_camera = geometry.inverse(other.T_world_camera) @ frame.T_world_camera
+    points_m = geometry.apply(T_other_camera, cloud.points_m[::50])
+    points_m = points_m[points_m[:, 2] > 0.1]
+    uv = geometry.project(other.intrinsics, points_m)
+    size_px = (other.intrinsics.width_px, other.intrinsics.height_px)
+    return float(np.all((uv >= 0) & (uv < size_px), axis=1).sum()) / max(1, len(cloud) // 50)

@@ -1,0 +1,240 @@
+"""The chain: every stage is a function of its own part of the settings and of the results before it.
+
+``pipeline.spec`` says what each depends on, ``STAGES`` what each does, and ``run`` goes down both. A
+cache keeps results by ``spec.key``; the command line passes none, the app its store. Whoever needs one
+result only (a screen, a moment of a delivery) asks for that stage.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Hashable, Iterable
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from packetmesh.progress import Progress
+from pipeline.config import (
+    AcquisitionConfig,
+    DepthConfig,
+    FusionMode,
+    NodePoints,
+    RegistrationConfig,
+    SurfaceConfig,
+)
+from pipeline.depth import DepthNetwork
+from pipeline.merging import MergedClouds, merge_clouds
+from pipeline.nodes import InferredDepth, NodeClouds, Placement, infer_depth, place_nodes, prepare_node
+from pipeline.sources import Source
+from pipeline.spec import CHAIN, NEEDS, Spec, StageName, key
+from pipeline.surface import Camera, compare_with_truth, measured, radii, roll_or_nothing
+from pipeline.surface.baselines import alpha_surface, poisson_surface
+from pipeline.types import PointCloud, Rig, SurfaceResult
+
+Result = TypeVar("Result")
+Steps = Generator[Progress, None, Result]
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The result of a stage, and the time it took when it was computed, without the stages before it."""
+
+    value: Any
+    elapsed_s: float
+
+
+class Cache(Protocol):
+    """Keeps results of stages."""
+
+    def remember(self, key: tuple[Hashable, ...], compute: Callable[[], Steps[Done]]) -> Steps[Done]:
+        """The result for ``key``, computed only if it is not there; ``key[0]`` names the stage."""
+        ...
+
+
+class RunCache:
+    """Keeps what one run computes, in memory."""
+
+    def __init__(self) -> None:
+        self._results: dict[tuple[Hashable, ...], Done] = {}
+
+    def remember(self, key: tuple[Hashable, ...], compute: Callable[[], Steps[Done]]) -> Steps[Done]:
+        """As ``Cache.remember``."""
+        if key not in self._results:
+            self._results[key] = yield from compute()
+        return self._results[key]
+
+
+def compute(spec: Spec, stage: StageName, cache: Cache) -> Steps[Done]:
+    """The result of one stage, with whatever has to be computed before it.
+
+    Raises:
+        PacketMeshError: a stage cannot work with what it was given; the message says why.
+    """
+
+    def work() -> Steps[Done]:
+        needs = NEEDS[stage]
+        earlier = yield from run(spec, cache, needs.after)
+        started = time.perf_counter()
+        value = yield from STAGES[stage](*needs.settings(spec), *(done.value for done in earlier.values()))
+        return Done(value, time.perf_counter() - started)
+
+    return (yield from cache.remember(key(spec, stage), work))
+
+
+def run(
+    spec: Spec, cache: Cache | None = None, stages: Iterable[StageName] = CHAIN
+) -> Steps[dict[StageName, Done]]:
+    """All results of the chain, or those of some stages.
+
+    Raises:
+        PacketMeshError: as ``compute``.
+    """
+    cache = cache or RunCache()
+    results: dict[StageName, Done] = {}
+    for stage in stages:
+        results[stage] = yield from compute(spec, stage, cache)
+    return results
+
+
+# The stages.
+
+
+def open_rig(source: Source) -> Steps[Rig]:
+    """The images and, where it is known, the truth."""
+    yield Progress(f"loading {source.title}", 0.0)
+    return source.load()
+
+
+def infer_depths(depth: DepthConfig, rig: Rig) -> Steps[tuple[InferredDepth, ...]]:
+    """The depth network's answer to every node's colour image."""
+    yield Progress("loading the depth network", 0.05)
+    network = DepthNetwork.of(depth)
+    inferred = []
+    for index, frame in enumerate(rig.frames):
+        yield Progress(f"inferring the depth of {frame.name}", 0.1 + 0.1 * index / len(rig.frames))
+        inferred.append(infer_depth(network, frame, depth.crop))
+    return tuple(inferred)
+
+
+def prepare_nodes(
+    acquisition: AcquisitionConfig,
+    depth: DepthConfig,
+    mode: FusionMode,
+    registration: RegistrationConfig | None,
+    rig: Rig,
+    inferred: tuple[InferredDepth, ...],
+) -> Steps[tuple[NodeClouds, ...]]:
+    """The clouds of every node."""
+    nodes = []
+    for index, (frame, answer) in enumerate(zip(rig.frames, inferred, strict=True)):
+        yield Progress(f"clouds of {frame.name}", 0.2 + 0.25 * index / len(rig.frames))
+        nodes.append(prepare_node(frame, answer, acquisition, depth, mode, registration))
+    return tuple(nodes)
+
+
+def register_nodes(
+    config: RegistrationConfig, align_with: NodePoints, rig: Rig, nodes: tuple[NodeClouds, ...]
+) -> Steps[Placement]:
+    """Where the nodes stand."""
+    yield Progress("registering the nodes", 0.45)
+    return place_nodes(rig.frames, nodes, config, align_with)
+
+
+def merge(
+    mode: FusionMode,
+    max_points: int,
+    smoothing_passes: int,
+    rig: Rig,
+    nodes: tuple[NodeClouds, ...],
+    placement: Placement,
+) -> Steps[MergedClouds]:
+    """The clouds that the ball rolls over."""
+    yield Progress("merging the clouds", 0.6)
+    return merge_clouds(rig.frames, nodes, placement.T_world_camera, mode, max_points, smoothing_passes)
+
+
+def roll_after(
+    config: SurfaceConfig, rig: Rig, placement: Placement, clouds: MergedClouds
+) -> Steps[SurfaceResult]:
+    """The surface of the fused cloud; without a triangle where the ball falls through everywhere."""
+    yield Progress("rolling the ball over the fused cloud", 0.7)
+    return _rolled(config, rig, placement, clouds, clouds.fused)
+
+
+def roll_before(
+    config: SurfaceConfig, rig: Rig, placement: Placement, clouds: MergedClouds
+) -> Steps[SurfaceResult]:
+    """The surface of the sensor cloud, by the same balls."""
+    yield Progress("rolling the ball over the sensor cloud", 0.8)
+    return _rolled(config, rig, placement, clouds, clouds.sensor)
+
+
+def _rolled(
+    config: SurfaceConfig, rig: Rig, placement: Placement, clouds: MergedClouds, cloud: PointCloud
+) -> SurfaceResult:
+    surface = roll_or_nothing(cloud, radii(config, clouds.r_F_m, clouds.sigma_D_m))
+    return measured(surface, cameras_of(rig, placement), len(cloud), [frame.depth for frame in rig.frames])
+
+
+Truth = tuple[dict[str, float] | None, dict[str, float] | None]
+"""The surfaces before and after fusion compared with the truth; None where it or the surface is missing."""
+
+
+def compare(rig: Rig, placement: Placement, after: SurfaceResult, before: SurfaceResult) -> Steps[Truth]:
+    """Both surfaces against the truth."""
+    if rig.truth is None:
+        return None, None
+    yield Progress("comparing with the truth", 0.9)
+    return compared(rig, placement, before), compared(rig, placement, after)
+
+
+def poisson(rig: Rig, placement: Placement, clouds: MergedClouds) -> Steps[SurfaceResult]:
+    """Screened Poisson reconstruction of the fused cloud, a baseline beside the ball."""
+    yield Progress("Poisson reconstruction", 0.7)
+    return with_rays(poisson_surface(clouds.fused, clouds.r_F_m), rig, placement)
+
+
+def alpha(
+    config: SurfaceConfig, rig: Rig, placement: Placement, clouds: MergedClouds
+) -> Steps[SurfaceResult]:
+    """The alpha shape of the fused cloud with the radius of the largest ball, a baseline beside the ball."""
+    yield Progress("the alpha shape", 0.7)
+    largest_m = radii(config, clouds.r_F_m, clouds.sigma_D_m)[-1]
+    return with_rays(alpha_surface(clouds.fused, largest_m), rig, placement)
+
+
+def with_rays(surface: SurfaceResult, rig: Rig, placement: Placement) -> SurfaceResult:
+    """The surface with what the registered cameras' rays measure of it."""
+    cameras, quality = cameras_of(rig, placement), surface.quality
+    points = len(surface.vertices_m) + quality.unused_points
+    return measured(surface, cameras, points, [frame.depth for frame in rig.frames])
+
+
+def compared(rig: Rig, placement: Placement, surface: SurfaceResult) -> dict[str, float] | None:
+    """A surface against the truth of its rig; None without truth or without a triangle."""
+    if rig.truth is None or not len(surface.triangles):
+        return None
+    cameras = cameras_of(rig, placement)
+    return compare_with_truth(surface.vertices_m, surface.triangles, rig.truth, cameras)
+
+
+def cameras_of(rig: Rig, placement: Placement) -> list[Camera]:
+    """The registered cameras, whose rays measure a surface."""
+    return [
+        Camera(frame.intrinsics, pose)
+        for frame, pose in zip(rig.frames, placement.T_world_camera, strict=True)
+    ]
+
+
+STAGES: dict[StageName, Callable[..., Steps[Any]]] = {
+    "rig": open_rig,
+    "inferred": infer_depths,
+    "nodes": prepare_nodes,
+    "placement": register_nodes,
+    "clouds": merge,
+    "after": roll_after,
+    "before": roll_before,
+    "truth": compare,
+    "poisson": poisson,
+    "alpha": alpha,
+}
+"""What each stage does with its settings and the results of the stages before it, as ``NEEDS`` names them."""
