@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import dataclasses
 import functools
-import inspect
-import textwrap
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +12,7 @@ from typing import Any, Literal
 import viser
 
 from app.ui import Ui
+from packetmesh.settings_help import field_docs
 from pipeline.config import PipelineConfig
 
 
@@ -79,7 +77,7 @@ def hint_of(control: Control) -> str:
     if control.hint is not None:
         return control.hint
     owner, name = _owner(control.path)
-    return _field_docs(owner).get(name, "")
+    return field_docs(owner).get(name, "")
 
 
 def shown(control: Control, config: PipelineConfig) -> Any:
@@ -169,17 +167,3 @@ def _owner(path: str) -> tuple[type, str]:
     parents, _, name = path.rpartition(".")
     owner: type = type(get(PipelineConfig(), parents))
     return owner, name
-
-
-@functools.cache
-def _field_docs(owner: type) -> dict[str, str]:
-    """The docstrings under the fields of a dataclass, read from its source."""
-    body = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
-    assert isinstance(body, ast.ClassDef)
-    docs = {}
-    for statement, following in zip(body.body, body.body[1:], strict=False):
-        if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
-            text = following.value if isinstance(following, ast.Expr) else None
-            if isinstance(text, ast.Constant) and isinstance(text.value, str):
-                docs[statement.target.id] = " ".join(text.value.split())
-    return docs

@@ -18,6 +18,7 @@ from network_sim.ledger import Outcomes
 from network_sim.states import State
 from network_sim.trace import NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns, to_s
+from packetmesh.errors import InputError
 
 CAMERA_ROLES = ("node", "vehicle")
 """Those with a camera and a battery; sinks, access points and the cloud have mains."""
@@ -37,7 +38,13 @@ Rows = Iterator[tuple[str, float, str, str]]
 
 
 def metrics(trace: NetworkTrace) -> dict[str, Metric]:
-    """All metrics that the trace can give, by name; none if the run ended within the warm-up."""
+    """All metrics that the trace can give, by name; none if the run ended within the warm-up.
+
+    >>> import packetmesh as pm
+    >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
+    >>> pm.network_metrics(pm.simulate(config))["image_delivery_ratio"].value
+    1.0
+    """
     if trace.horizon_ns <= to_ns(trace.config.run.warmup_s):
         return {}
     groups = (_outcomes, _rates, _losses, _airtime, _queue, _energy, _overheads, _coverage)
@@ -47,6 +54,30 @@ def metrics(trace: NetworkTrace) -> dict[str, Metric]:
         for name, value, unit, definition in group(trace)
         if np.isfinite(value)
     }
+
+
+def image_delays_s(trace: NetworkTrace) -> NDArray[np.float64]:
+    """(A,) seconds from capture to arrival of each image that arrived, in the order of arrival.
+
+    As in the metrics, images that were captured during the warm-up do not count.
+
+    Raises:
+        InputError: the run kept no events.
+
+    >>> import packetmesh as pm
+    >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
+    >>> delays_s = pm.image_delays_s(pm.simulate(config))
+    >>> len(delays_s), bool((delays_s > 0.0).all())
+    (3, True)
+    """
+    if trace.config.run.keep == "counters":
+        raise InputError("The run kept counters only, not its images' delays; try run.keep=images")
+    captured, arrived = trace.events.of(EventKind.CAPTURE), trace.events.of(EventKind.ARRIVE)
+    by_image = np.argsort(captured.image)
+    of_arrived = by_image[np.searchsorted(captured.image, arrived.image, sorter=by_image)]
+    captured_ns = captured.t_ns[of_arrived]
+    counts = captured_ns >= to_ns(trace.config.run.warmup_s)
+    return (arrived.t_ns - captured_ns)[counts] / NS_PER_S
 
 
 def elapsed_s(trace: NetworkTrace) -> float:

@@ -19,7 +19,7 @@ from network_sim.radio import Radio
 from network_sim.street import start_street, street_places
 from network_sim.trace import NetworkTrace, Recorder
 from network_sim.types import Packet, to_ns
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, drain
 
 REPORTS = 100
 """Reports of progress in a run."""
@@ -28,18 +28,31 @@ STREET_STREAMS = 4
 
 
 def simulate(config: NetworkConfig) -> NetworkTrace:
-    """The trace of one run; the same config gives the same trace to the byte."""
-    steps = iterate_simulation(config)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            trace: NetworkTrace = stop.value
-            return trace
+    """The fold of ``iterate_simulation``; the same config gives the same trace to the byte.
+
+    Args:
+        config: topology, radio, medium access, images, and how long the run takes.
+
+    Returns:
+        The trace: events with times in nanoseconds, counters, and the nodes' places in metres.
+
+    Raises:
+        InternalError: the trace contradicts itself.
+
+    >>> import packetmesh as pm
+    >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
+    >>> trace = pm.simulate(config)
+    >>> trace.counters.images.arrived, trace.names
+    (3, ('node 1', 'node 2', 'node 3', 'sink'))
+    """
+    return drain(iterate_simulation(config))
 
 
 def iterate_simulation(config: NetworkConfig) -> Generator[Progress, None, NetworkTrace]:
-    """The same, with reports on the way.
+    """One run of the network, with a report of progress about every hundredth of it.
+
+    Args:
+        config: topology, radio, medium access, images, and how long the run takes.
 
     Returns:
         The trace, in which every packet is received, given up or on its way. It ends at the horizon, or when
@@ -47,6 +60,12 @@ def iterate_simulation(config: NetworkConfig) -> Generator[Progress, None, Netwo
 
     Raises:
         InternalError: the trace contradicts itself.
+
+    >>> import packetmesh as pm
+    >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
+    >>> fractions = [progress.fraction for progress in pm.iterate_simulation(config)]
+    >>> fractions == sorted(fractions) and fractions[-1] == 1.0
+    True
     """
     env, rng = simpy.Environment(), np.random.default_rng(config.run.seed)
     run = _collect if config.scenario == "collection" else _drive

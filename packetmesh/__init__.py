@@ -1,1 +1,219 @@
-"""PacketMesh: from camera nodes and their packets to a surface mesh."""
+"""PacketMesh for scripts and notebooks: from camera nodes and their packets to a surface mesh.
+
+    import packetmesh as pm
+
+    rig = pm.load_demo("living-room")
+    result = pm.reconstruct(rig, pm.PRESETS["packetmesh"])
+    pm.write_mesh("room.glb", result.after)
+
+Lengths are in metres, times in seconds, angles in radians. A name's module is imported at its first use, so
+that ``import packetmesh`` itself imports no numpy.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from network_sim.config import PRESETS as NETWORK_PRESETS
+    from network_sim.config import (
+        EnergyConfig,
+        MacConfig,
+        NetworkConfig,
+        NodesConfig,
+        RadioConfig,
+        RunConfig,
+        SchemeConfig,
+        StreetConfig,
+        UplinkConfig,
+    )
+    from network_sim.metrics import Metric, image_delays_s
+    from network_sim.metrics import metrics as network_metrics
+    from network_sim.simulate import iterate_simulation, simulate
+    from network_sim.trace import Events, NetworkTrace
+    from network_sim.types import Cause, EventKind
+    from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
+    from packetmesh.progress import Progress, drain
+    from packetmesh.settings import with_settings
+    from pipeline.acquisition import back_project
+    from pipeline.config import (
+        PRESETS,
+        AcquisitionConfig,
+        DepthConfig,
+        FusionConfig,
+        PipelineConfig,
+        RegistrationConfig,
+        SurfaceConfig,
+    )
+    from pipeline.io.clouds import read_cloud, write_cloud
+    from pipeline.io.demos import DEMO_SCENES, load_demo
+    from pipeline.io.meshes import read_mesh, write_mesh
+    from pipeline.io.rigs import load_frame, load_rig, save_rig
+    from pipeline.reconstruct import Reconstruction, reconstruct
+    from pipeline.registration import iterate_registration, point_error_m, register
+    from pipeline.surface.ball_pivoting import iterate_ball, roll_ball
+    from pipeline.surface.normals import estimate_normals
+    from pipeline.surface.pivoting import BallPivotStep
+    from pipeline.surface.radii import spacing
+    from pipeline.types import (
+        CameraIntrinsics,
+        DepthMap,
+        PointCloud,
+        PointSource,
+        RegistrationResult,
+        RegistrationStep,
+        RgbdFrame,
+        Rig,
+        RigTruth,
+        Surface,
+        SurfaceQuality,
+        SurfaceResult,
+    )
+
+_PLACES = {
+    "NETWORK_PRESETS": ("network_sim.config", "PRESETS"),
+    "EnergyConfig": ("network_sim.config", "EnergyConfig"),
+    "MacConfig": ("network_sim.config", "MacConfig"),
+    "NetworkConfig": ("network_sim.config", "NetworkConfig"),
+    "NodesConfig": ("network_sim.config", "NodesConfig"),
+    "RadioConfig": ("network_sim.config", "RadioConfig"),
+    "RunConfig": ("network_sim.config", "RunConfig"),
+    "SchemeConfig": ("network_sim.config", "SchemeConfig"),
+    "StreetConfig": ("network_sim.config", "StreetConfig"),
+    "UplinkConfig": ("network_sim.config", "UplinkConfig"),
+    "Metric": ("network_sim.metrics", "Metric"),
+    "image_delays_s": ("network_sim.metrics", "image_delays_s"),
+    "network_metrics": ("network_sim.metrics", "metrics"),
+    "iterate_simulation": ("network_sim.simulate", "iterate_simulation"),
+    "simulate": ("network_sim.simulate", "simulate"),
+    "Events": ("network_sim.trace", "Events"),
+    "NetworkTrace": ("network_sim.trace", "NetworkTrace"),
+    "Cause": ("network_sim.types", "Cause"),
+    "EventKind": ("network_sim.types", "EventKind"),
+    "InputError": ("packetmesh.errors", "InputError"),
+    "PacketMeshError": ("packetmesh.errors", "PacketMeshError"),
+    "ReconstructionError": ("packetmesh.errors", "ReconstructionError"),
+    "Progress": ("packetmesh.progress", "Progress"),
+    "drain": ("packetmesh.progress", "drain"),
+    "with_settings": ("packetmesh.settings", "with_settings"),
+    "back_project": ("pipeline.acquisition", "back_project"),
+    "PRESETS": ("pipeline.config", "PRESETS"),
+    "AcquisitionConfig": ("pipeline.config", "AcquisitionConfig"),
+    "DepthConfig": ("pipeline.config", "DepthConfig"),
+    "FusionConfig": ("pipeline.config", "FusionConfig"),
+    "PipelineConfig": ("pipeline.config", "PipelineConfig"),
+    "RegistrationConfig": ("pipeline.config", "RegistrationConfig"),
+    "SurfaceConfig": ("pipeline.config", "SurfaceConfig"),
+    "read_cloud": ("pipeline.io.clouds", "read_cloud"),
+    "write_cloud": ("pipeline.io.clouds", "write_cloud"),
+    "DEMO_SCENES": ("pipeline.io.demos", "DEMO_SCENES"),
+    "load_demo": ("pipeline.io.demos", "load_demo"),
+    "read_mesh": ("pipeline.io.meshes", "read_mesh"),
+    "write_mesh": ("pipeline.io.meshes", "write_mesh"),
+    "load_frame": ("pipeline.io.rigs", "load_frame"),
+    "load_rig": ("pipeline.io.rigs", "load_rig"),
+    "save_rig": ("pipeline.io.rigs", "save_rig"),
+    "Reconstruction": ("pipeline.reconstruct", "Reconstruction"),
+    "reconstruct": ("pipeline.reconstruct", "reconstruct"),
+    "iterate_registration": ("pipeline.registration", "iterate_registration"),
+    "point_error_m": ("pipeline.registration", "point_error_m"),
+    "register": ("pipeline.registration", "register"),
+    "iterate_ball": ("pipeline.surface.ball_pivoting", "iterate_ball"),
+    "roll_ball": ("pipeline.surface.ball_pivoting", "roll_ball"),
+    "estimate_normals": ("pipeline.surface.normals", "estimate_normals"),
+    "BallPivotStep": ("pipeline.surface.pivoting", "BallPivotStep"),
+    "spacing": ("pipeline.surface.radii", "spacing"),
+    "CameraIntrinsics": ("pipeline.types", "CameraIntrinsics"),
+    "DepthMap": ("pipeline.types", "DepthMap"),
+    "PointCloud": ("pipeline.types", "PointCloud"),
+    "PointSource": ("pipeline.types", "PointSource"),
+    "RegistrationResult": ("pipeline.types", "RegistrationResult"),
+    "RegistrationStep": ("pipeline.types", "RegistrationStep"),
+    "RgbdFrame": ("pipeline.types", "RgbdFrame"),
+    "Rig": ("pipeline.types", "Rig"),
+    "RigTruth": ("pipeline.types", "RigTruth"),
+    "Surface": ("pipeline.types", "Surface"),
+    "SurfaceQuality": ("pipeline.types", "SurfaceQuality"),
+    "SurfaceResult": ("pipeline.types", "SurfaceResult"),
+}
+"""Module and attribute of every public name."""
+
+__all__ = [
+    "DEMO_SCENES",
+    "NETWORK_PRESETS",
+    "PRESETS",
+    "AcquisitionConfig",
+    "BallPivotStep",
+    "CameraIntrinsics",
+    "Cause",
+    "DepthConfig",
+    "DepthMap",
+    "EnergyConfig",
+    "EventKind",
+    "Events",
+    "FusionConfig",
+    "InputError",
+    "MacConfig",
+    "Metric",
+    "NetworkConfig",
+    "NetworkTrace",
+    "NodesConfig",
+    "PacketMeshError",
+    "PipelineConfig",
+    "PointCloud",
+    "PointSource",
+    "Progress",
+    "RadioConfig",
+    "Reconstruction",
+    "ReconstructionError",
+    "RegistrationConfig",
+    "RegistrationResult",
+    "RegistrationStep",
+    "RgbdFrame",
+    "Rig",
+    "RigTruth",
+    "RunConfig",
+    "SchemeConfig",
+    "StreetConfig",
+    "Surface",
+    "SurfaceConfig",
+    "SurfaceQuality",
+    "SurfaceResult",
+    "UplinkConfig",
+    "back_project",
+    "drain",
+    "estimate_normals",
+    "image_delays_s",
+    "iterate_ball",
+    "iterate_registration",
+    "iterate_simulation",
+    "load_demo",
+    "load_frame",
+    "load_rig",
+    "network_metrics",
+    "point_error_m",
+    "read_cloud",
+    "read_mesh",
+    "reconstruct",
+    "register",
+    "roll_ball",
+    "save_rig",
+    "simulate",
+    "spacing",
+    "with_settings",
+    "write_cloud",
+    "write_mesh",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+if not TYPE_CHECKING:  # a checker would take any name for one that this gives
+
+    def __getattr__(name: str) -> object:
+        if name not in _PLACES:
+            raise AttributeError(f"packetmesh has no {name!r}; dir(packetmesh) lists its names")
+        module, attribute = _PLACES[name]
+        globals()[name] = getattr(import_module(module), attribute)
+        return globals()[name]

@@ -1,30 +1,48 @@
-"""What a long computation says about itself while it runs, and how to run it to its end."""
+"""Progress of a long computation, and the fold over a generator of steps."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
+Step = TypeVar("Step")
 Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """One report of a running computation; generators yield it between units of work.
+    """One report of a running computation; its generator yields it between units of work.
 
-    Whoever consumes the generator decides what to do with it: draw a bar, log a line, or stop
-    iterating, which cancels the computation.
+    The consumer draws a bar, logs a line, or closes the generator, which cancels the computation.
     """
 
     stage: str
-    """Name of the stage, in words a person reads (``"depth inference"``)."""
+    """Name of the stage, in words for people (``"depth inference"``)."""
     fraction: float
     """Share of the whole computation that is done, 0 to 1."""
 
 
-def drain(steps: Generator[Any, None, Result], on_step: Callable[[Any], None] = lambda step: None) -> Result:
-    """Run a generator to its end and give what it returns; ``on_step`` gets everything that it yields."""
+def drain(
+    steps: Generator[Step, None, Result], on_step: Callable[[Step], object] = lambda step: None
+) -> Result:
+    """Run a generator to its end.
+
+    Args:
+        steps: any ``iterate_...`` function's generator.
+        on_step: called with each step it yields.
+
+    Returns:
+        What the generator returns.
+
+    >>> import packetmesh as pm
+    >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
+    >>> reports = []
+    >>> pm.drain(pm.iterate_simulation(config), reports.append).names
+    ('node 1', 'node 2', 'node 3', 'sink')
+    >>> reports[-1].fraction
+    1.0
+    """
     while True:
         try:
             step = next(steps)

@@ -47,8 +47,13 @@ def with_settings(config: Config, settings: Iterable[str]) -> Config:
     """``config`` with settings such as ``"depth.alignment=median"`` applied.
 
     Raises:
-        InputError: an unknown key (the nearest known ones are offered) or a value that the key does not
-            take.
+        InputError: an unknown key (the message offers the nearest known ones) or a value that the key does
+            not take.
+
+    >>> import packetmesh as pm
+    >>> config = pm.with_settings(pm.PRESETS["packetmesh"], ["surface.max_points=5000"])
+    >>> config.surface.max_points
+    5000
     """
     values = {}
     for setting in settings:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import functools
 import inspect
-import sys
+import textwrap
 from typing import Any, NamedTuple
 
 from packetmesh.settings import settings
@@ -27,7 +28,7 @@ UNITS = {
     "images": "images",
     "per_h": "1/h",
 }
-"""What the last part of a setting's name says of its unit."""
+"""Unit by the last part of a setting's name."""
 
 UNITLESS = {"nakagami_m"}
 """Names that end like a unit and have none."""
@@ -60,7 +61,8 @@ def unit_of(key: str) -> str:
 
 def _docs(config: Any, prefix: str = "") -> dict[str, str]:
     docs: dict[str, str] = {}
-    own = _field_docs(type(config))
+    kind: type = type(config)
+    own = field_docs(kind)
     for field in dataclasses.fields(config):
         value = getattr(config, field.name)
         if dataclasses.is_dataclass(value):
@@ -70,16 +72,14 @@ def _docs(config: Any, prefix: str = "") -> dict[str, str]:
     return docs
 
 
-def _field_docs(kind: type) -> dict[str, str]:
-    """The strings that stand directly under the fields of a dataclass, each as one line."""
-    tree = ast.parse(inspect.getsource(sys.modules[kind.__module__]))
-    bodies = [
-        node.body for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == kind.__name__
-    ]
+@functools.cache
+def field_docs(kind: type) -> dict[str, str]:
+    """The docstrings under the fields of a dataclass, each as one line; read from its source."""
+    definition = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
+    assert isinstance(definition, ast.ClassDef)
     docs = {}
-    for field, below in zip(bodies[0], bodies[0][1:], strict=False):
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
-            match below:
-                case ast.Expr(value=ast.Constant(value=str(text))):
-                    docs[field.target.id] = " ".join(text.split())
+    for field, below in zip(definition.body, definition.body[1:], strict=False):
+        match field, below:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                docs[name] = " ".join(text.split())
     return docs

@@ -102,7 +102,7 @@ def iterate_mesh_file(
     if suffix == ".stl" and meshed.surface.colors is not None:
         _log.warning("STL has no place for the colours; a .ply, .obj or .glb keeps them")
     yield Progress(f"writing {out}", 0.95)
-    write_mesh(out, meshed.surface.vertices_m, meshed.surface.triangles, meshed.surface.colors)
+    write_mesh(out, meshed.surface)
     files = {"input": str(path), "out": str(out)}
     return files | mesh_report(meshed) | {"elapsed_s": time.perf_counter() - started}
 

@@ -43,7 +43,7 @@ def write_run_folder(reconstruction: Reconstruction, metrics: dict[str, Any], fo
     for name, mesh in meshes.items():
         if len(mesh.triangles):
             files.append(folder / name)
-            write_mesh(files[-1], mesh.vertices_m, mesh.triangles, mesh.colors)
+            write_mesh(files[-1], mesh)
     return files
 
 

@@ -237,16 +237,16 @@ class SurfaceQuality:
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """A triangle mesh grown from a point cloud."""
+    """A triangle mesh, grown from a point cloud or read from a file."""
 
     vertices_m: FloatArray
     """(V, 3)."""
     triangles: IntArray
     """(F, 3) int32, counter-clockwise seen from outside."""
-    colors: ByteArray | None
+    colors: ByteArray | None = None
     """(V, 3) RGB."""
-    radii_m: tuple[float, ...]
-    """Ball radii used, ascending; none for a surface that no ball made."""
+    radii_m: tuple[float, ...] = ()
+    """Radii of the balls that made it, ascending; none for a surface that no ball made."""
     normals: FloatArray | None = None
     """(V, 3) of the points that the vertices were."""
     source: ByteArray | None = None

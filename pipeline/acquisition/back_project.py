@@ -22,6 +22,12 @@ def back_project(
 
     Raises:
         InputError: depth that is not metric, not on the grid of image and intrinsics, or all unknown.
+
+    >>> import numpy as np, packetmesh as pm
+    >>> camera = pm.CameraIntrinsics.pinhole(100.0, 100.0, 1.0, 0.0, width_px=2, height_px=1)
+    >>> rgb, depth = np.zeros((1, 2, 3), np.uint8), pm.DepthMap(np.array([[2.0, 3.0]], np.float32))
+    >>> pm.back_project(pm.RgbdFrame("node", rgb, depth, camera, np.eye(4))).points_m.round(6).tolist()
+    [[-0.02, 0.0, 2.0], [0.0, 0.0, 3.0]]
     """
     depth = frame.depth if depth is None else depth
     _check_grid(frame, depth)

@@ -30,8 +30,16 @@ def read_cloud(path: Path) -> PointCloud:
     The suffix tells the format: .ply (also without a suffix), .pcd, .npz, or text in .xyz, .txt, .asc and
     .csv. Further elements (faces) and points that are not finite are left out.
 
+    Returns:
+        (N, 3) points in the file's unit, which should be metres.
+
     Raises:
         InputError: missing, truncated, too large, of another format or without points.
+
+    >>> from pathlib import Path; import packetmesh as pm
+    >>> _ = Path("corners.csv").write_text("x,y,z\\n0,0,1\\n0.5,0,1\\n0,0.5,1\\n")
+    >>> pm.read_cloud("corners.csv").points_m[1].tolist()
+    [0.5, 0.0, 1.0]
     """
     suffix = PurePath(path).suffix.lower() or ".ply"
     if suffix not in _PARSERS:
@@ -46,6 +54,11 @@ def write_cloud(path: Path, cloud: PointCloud) -> None:
 
     Raises:
         InputError: not a .ply name, or the folder cannot be written.
+
+    >>> import numpy as np, packetmesh as pm
+    >>> pm.write_cloud("corners.ply", pm.PointCloud(np.eye(3)))
+    >>> len(pm.read_cloud("corners.ply"))
+    3
     """
     if not str(path).endswith(".ply"):
         raise InputError(f"{path} is no name for a point cloud; try one that ends in .ply")

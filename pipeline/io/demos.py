@@ -17,7 +17,7 @@ class DemoScene:
     """A place that ships."""
 
     title: str
-    """What to call it on a screen."""
+    """Its name on a screen."""
     description: str
     seed: int
     """Of its sensor noise and of its nodes' pose errors, together with its name."""
@@ -38,8 +38,16 @@ DEMO_SCENES: dict[str, DemoScene] = _described()
 def load_demo(name: str) -> Rig:
     """The shipped rig of a demo, with its truth: the scene's mesh, the nodes' poses and hole-free depth.
 
+    Args:
+        name: a key of ``DEMO_SCENES``.
+
     Raises:
         InputError: there is no demo of that name, or its files are missing.
+
+    >>> import packetmesh as pm
+    >>> rig = pm.load_demo("office")
+    >>> len(rig.frames), rig.truth.T_world_camera[0].shape
+    (3, (4, 4))
     """
     if name not in DEMO_SCENES:
         raise InputError(f"There is no demo scene {name!r}; try one of {', '.join(DEMO_SCENES)}")

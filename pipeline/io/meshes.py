@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import trimesh
@@ -13,7 +12,7 @@ import trimesh
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
 from pipeline.geometry import rigid
-from pipeline.types import ByteArray, FloatArray, IntArray
+from pipeline.types import Surface
 
 MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")
 _T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.zeros(3))
@@ -22,35 +21,26 @@ _T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.
 AnyPath = str | os.PathLike[str]
 
 
-class Mesh(NamedTuple):
-    """What a mesh file holds."""
-
-    vertices_m: FloatArray
-    """(V, 3) float64."""
-    triangles: IntArray
-    """(F, 3) int32."""
-    colors: ByteArray | None
-    """(V, 3) RGB."""
-
-
-def write_mesh(
-    path: AnyPath, vertices_m: FloatArray, triangles: IntArray, colors: ByteArray | None = None
-) -> None:
-    """Write a mesh in the format of the suffix.
+def write_mesh(path: AnyPath, surface: Surface) -> None:
+    """Write the triangles of a surface, with its colours, in the format of the suffix.
 
     Args:
         path: ends in .ply (binary), .glb, .obj or .stl (binary, which has no place for colours).
-        vertices_m: (V, 3), Z up.
-        triangles: (F, 3).
-        colors: (V, 3) RGB or None.
+        surface: in metres, Z up; a .glb file is turned to Y up, as glTF wants it.
 
     Raises:
         InputError: another suffix, no triangle, or a folder that cannot be written.
+
+    >>> import numpy as np, packetmesh as pm
+    >>> surface = pm.Surface(np.eye(3), np.array([[0, 1, 2]]))
+    >>> pm.write_mesh("triangle.glb", surface)
+    >>> pm.read_mesh("triangle.glb").triangles.tolist()
+    [[0, 1, 2]]
     """
     suffix = mesh_suffix(path)
-    if not len(triangles):
+    if not len(surface.triangles):
         raise InputError(f"There is no triangle to write into {path}; try a larger ball radius")
-    mesh = trimesh.Trimesh(vertices_m, triangles, vertex_colors=colors, process=False)
+    mesh = trimesh.Trimesh(surface.vertices_m, surface.triangles, vertex_colors=surface.colors, process=False)
     with atomic_path(path) as sibling:
         if suffix == ".glb":
             scene = trimesh.Scene()
@@ -60,13 +50,22 @@ def write_mesh(
             mesh.export(str(sibling))
 
 
-def read_mesh(path: AnyPath) -> Mesh:
+def read_mesh(path: AnyPath) -> Surface:
     """The triangles of a PLY, GLB, OBJ or STL file, everything in it joined to one mesh, Z up.
 
     STL repeats a vertex for each of its triangles; equal ones are joined again.
 
+    Returns:
+        (V, 3) float64 vertices in the file's unit (metres in glTF), (F, 3) int32 triangles, and colours
+        where the vertices have them.
+
     Raises:
         InputError: missing, damaged, too large, of another format or without triangles.
+
+    >>> import numpy as np, packetmesh as pm
+    >>> pm.write_mesh("triangle.stl", pm.Surface(np.eye(3), np.array([[0, 1, 2]])))
+    >>> pm.read_mesh("triangle.stl").vertices_m.shape
+    (3, 3)
     """
     suffix = mesh_suffix(path)
     data = read_bytes(path, MAX_GEOMETRY_BYTES, "mesh")
@@ -86,7 +85,7 @@ def read_mesh(path: AnyPath) -> Mesh:
         raise InputError(f"The mesh {path} holds no triangle with finite corners; try another file")
     colored = mesh.visual.kind == "vertex"
     colors = np.asarray(mesh.visual.vertex_colors, dtype=np.uint8)[:, :3] if colored else None
-    return Mesh(vertices_m, triangles, colors)
+    return Surface(vertices_m, triangles, colors)
 
 
 def mesh_suffix(path: AnyPath) -> str:

@@ -29,10 +29,24 @@ def load_frame(
     depth_scale: float = 1000.0,
     name: str = "node_00",
 ) -> RgbdFrame:
-    """One registered RGB-D pair, placed at ``LEVEL_POSE``.
+    """One registered RGB-D pair, at the origin, upright, looking along +y.
+
+    Args:
+        color: (H, W) image.
+        depth: (H, W) 16-bit image, 0 where the depth is unknown.
+        intrinsics: JSON with fx, fy, cx and cy, Open3D JSON or ROS camera_info, pixels.
+        depth_scale: depth units in a metre.
+        name: what the node is called.
 
     Raises:
         InputError: a file that cannot be used, or images and intrinsics of different sizes.
+
+    >>> import packetmesh as pm
+    >>> pm.save_rig("office", pm.load_demo("office"))
+    >>> node = "office/node_00"
+    >>> frame = pm.load_frame(f"{node}/color.png", f"{node}/depth.png", f"{node}/intrinsics.json")
+    >>> frame.rgb.shape[:2] == frame.depth.z_m.shape
+    True
     """
     camera = read_intrinsics(intrinsics)
     rgb = read_color(color)
@@ -53,8 +67,17 @@ def load_frame(
 def load_rig(directory: AnyPath) -> Rig:
     """The nodes below ``directory`` in the order of their folders' names.
 
+    Args:
+        directory: holds node_00/{color.png, depth.png, intrinsics.json}, node_01/... and, where the poses
+            are known, node_NN/pose.txt with a 4 x 4 T_world_camera, metres.
+
     Raises:
         InputError: no folder, no node or more than six, or a file of a node that cannot be used.
+
+    >>> import packetmesh as pm
+    >>> pm.save_rig("office", pm.load_demo("office"))
+    >>> [frame.name for frame in pm.load_rig("office").frames]
+    ['node_00', 'node_01', 'node_02']
     """
     directory = Path(directory)
     if not directory.is_dir():
@@ -79,6 +102,11 @@ def save_rig(directory: AnyPath, rig: Rig) -> None:
 
     Raises:
         InputError: the folder cannot be written, or holds nodes of a larger rig.
+
+    >>> import packetmesh as pm
+    >>> pm.save_rig("copy", pm.Rig("first node", pm.load_demo("office").frames[:1]))
+    >>> len(pm.load_rig("copy").frames)
+    1
     """
     directory = Path(directory)
     names = [f"node_{index:02d}" for index in range(len(rig.frames))]

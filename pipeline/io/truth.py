@@ -9,7 +9,7 @@ from packetmesh.errors import InputError
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.io.poses import read_pose, write_pose
 from pipeline.rays import Camera, hit_depths
-from pipeline.types import RgbdFrame, RigTruth
+from pipeline.types import RgbdFrame, RigTruth, Surface
 
 MESH_NAME = "truth.ply"
 POSE_NAME = "true_pose.txt"
@@ -44,6 +44,6 @@ def write_truth(directory: Path, names: Sequence[str], truth: RigTruth) -> None:
     Raises:
         InputError: the folder cannot be written.
     """
-    write_mesh(directory / MESH_NAME, truth.vertices_m, truth.triangles)
+    write_mesh(directory / MESH_NAME, Surface(truth.vertices_m, truth.triangles))
     for name, T_world_camera in zip(names, truth.T_world_camera, strict=True):
         write_pose(directory / name / POSE_NAME, T_world_camera)

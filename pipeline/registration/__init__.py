@@ -1,7 +1,7 @@
 """Registration of two clouds as a sequence of steps, and their fusion (SPEC 4)."""
 
 from pipeline.registration.fusion import fuse
-from pipeline.registration.loop import iterate, register, register_timed
+from pipeline.registration.loop import iterate_registration, register, register_timed
 from pipeline.registration.metrics import average_hausdorff_m, point_error_m, rotation_error_rad
 from pipeline.registration.visibility import hidden_from
 
@@ -9,7 +9,7 @@ __all__ = [
     "average_hausdorff_m",
     "fuse",
     "hidden_from",
-    "iterate",
+    "iterate_registration",
     "point_error_m",
     "register",
     "register_timed",

@@ -1,15 +1,13 @@
-"""A start pose from nothing: local features matched across the clouds, and the motion most of them share."""
+"""A start pose without a first guess: the motion that most matched local features share."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.registration.loop import register
 from pipeline.types import FloatArray, PointCloud, RegistrationResult
 
 VOXELS_ACROSS = 50
@@ -20,21 +18,16 @@ EDGE_RATIO = 0.9
 """Least ratio of the lengths between matched points that a guess of RANSAC survives with."""
 RANSAC_ITERATIONS, RANSAC_CONFIDENCE = 100_000, 0.999
 SMALLEST_SHARE = 0.15
-"""Share of the source points that must find a partner, lest the pose be called a guess."""
+"""Least share of the source points that must find a partner."""
 
 
 def register_from_anywhere(
     source: PointCloud, target: PointCloud, config: RegistrationConfig, T_init: FloatArray | None = None
 ) -> RegistrationResult:
-    """``register`` from the pose that ``config.start`` names: ``T_init``, or one found by ``global_start``.
+    """``register``, until its callers call that."""
+    from pipeline.registration.loop import register
 
-    Raises:
-        InputError: clouds that cannot be registered.
-        ReconstructionError: no start pose was found.
-    """
-    if config.start == "global":
-        T_init = global_start(source, target, default_voxel_m(target), config.seed)
-    return register(source, target, replace(config, start="given"), T_init)
+    return register(source, target, config, T_init)
 
 
 def default_voxel_m(target: PointCloud) -> float:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator
+from dataclasses import replace
 
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.progress import drain
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import apply, rotation_angle_rad
 from pipeline.registration.acceleration import Acceleration
 from pipeline.registration.degenerate import DegenerateError
+from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.registration.matching import Matcher, Matching
 from pipeline.registration.methods import METHODS, MethodStart
 from pipeline.registration.residual import residual_for
@@ -24,7 +27,7 @@ MIN_PAIRS = 6
 MIN_EFFECTIVE_PAIRS = 10.0
 
 
-def iterate(
+def iterate_registration(
     source: PointCloud,
     target: PointCloud,
     config: RegistrationConfig,
@@ -34,19 +37,25 @@ def iterate(
     """Register ``source`` to ``target`` one iteration at a time; the generator returns the stop reason.
 
     Args:
-        source: the cloud that moves, in its own frame.
-        target: the cloud that stays; its ``normals`` are used by the plane metric when it has them.
+        source: the cloud that moves, (N, 3) points in its own frame, metres.
+        target: the cloud that stays, (M, 3); the plane metric uses its ``normals`` when it has them.
         config: method, metric, direction and their parameters.
-        T_init: (4, 4) start pose T_target_source; None is the identity.
-        method: takes the place of the method that the config names, for experiments.
+        T_init: (4, 4) start pose T_target_source; None is the identity. With ``config.start="global"``
+            matched features give the start pose instead.
+        method: replaces the method that the config names, for experiments.
 
     Raises:
         InputError: fewer than three points, points that are not finite, a start pose that is none.
-        ReconstructionError: not one pair lies within the gate at the start pose.
+        ReconstructionError: not one pair lies within the gate at the start pose, or no start pose was found.
+
+    >>> import numpy as np, packetmesh as pm
+    >>> source = pm.PointCloud(np.random.default_rng(0).uniform(0.0, 1.0, (500, 3)))
+    >>> target = pm.PointCloud(source.points_m + [0.02, 0.0, 0.0])
+    >>> steps = list(pm.iterate_registration(source, target, pm.RegistrationConfig("icp", "point")))
+    >>> steps[-1].rmse_m < 1e-6 < steps[0].rmse_m
+    True
     """
-    T = np.eye(4) if T_init is None else np.array(T_init, dtype=np.float64)
-    if T.shape != (4, 4) or not np.isfinite(T).all():
-        raise InputError("The start pose must be a 4 x 4 matrix of finite numbers.")
+    T = _start_pose(source, target, config, T_init)
     return _iterations(
         draw(source, config.max_points, config.seed, "source"),
         draw(target, config.max_points, config.seed, "target"),
@@ -63,9 +72,24 @@ def register(
     T_init: FloatArray | None = None,
     method: MethodStart | None = None,
 ) -> RegistrationResult:
-    """All steps of ``iterate`` and their outcome; ``converged`` also holds for ``stalled``.
+    """The fold of ``iterate_registration``: all its steps and the pose that they reach.
 
-    A degenerate end keeps the last good pose.
+    Args:
+        source, target, config, T_init, method: as for ``iterate_registration``.
+
+    Returns:
+        The (4, 4) T_target_source in metres, with its steps; ``converged`` also holds for ``stalled``. A
+        degenerate end keeps the last good pose.
+
+    Raises:
+        InputError, ReconstructionError: as for ``iterate_registration``.
+
+    >>> import numpy as np, packetmesh as pm
+    >>> source = pm.PointCloud(np.random.default_rng(0).uniform(0.0, 1.0, (500, 3)))
+    >>> target = pm.PointCloud(source.points_m + [0.02, 0.0, 0.0])
+    >>> result = pm.register(source, target, pm.RegistrationConfig("ceicp-a", "point"))
+    >>> result.converged, bool(np.allclose(result.T_target_source[:3, 3], [0.02, 0.0, 0.0], atol=1e-3))
+    (True, True)
     """
     return register_timed(source, target, config, T_init, method)[0]
 
@@ -77,7 +101,7 @@ def register_timed(
     T_init: FloatArray | None = None,
     method: MethodStart | None = None,
 ) -> tuple[RegistrationResult, FloatArray]:
-    """``register``, and apart from its deterministic result the time.
+    """``register``, with the time apart from its deterministic result.
 
     Returns:
         The result, and (K,) seconds from the call until each of its steps was done.
@@ -85,18 +109,29 @@ def register_timed(
     started = time.perf_counter()
     steps: list[RegistrationStep] = []
     elapsed_s: list[float] = []
-    remaining = iterate(source, target, config, T_init, method)
-    while True:
-        try:
-            steps.append(next(remaining))
-            elapsed_s.append(time.perf_counter() - started)
-        except StopIteration as end:
-            reason: str = end.value
-            break
-    start = np.eye(4) if T_init is None else np.asarray(T_init, dtype=np.float64)
-    T = steps[-1].T_target_source if steps else start
+
+    def keep(step: RegistrationStep) -> None:
+        steps.append(step)
+        elapsed_s.append(time.perf_counter() - started)
+
+    T = _start_pose(source, target, config, T_init)
+    reason = drain(iterate_registration(source, target, replace(config, start="given"), T, method), keep)
+    if steps:
+        T = steps[-1].T_target_source
     result = RegistrationResult(T, tuple(steps), reason in ("converged", "stalled"), reason)
     return result, np.array(elapsed_s)
+
+
+def _start_pose(
+    source: PointCloud, target: PointCloud, config: RegistrationConfig, T_init: FloatArray | None
+) -> FloatArray:
+    """(4, 4) T_target_source of the first matching."""
+    if config.start == "global":
+        return global_start(source, target, default_voxel_m(target), config.seed)
+    T = np.eye(4) if T_init is None else np.array(T_init, dtype=np.float64)
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        raise InputError("The start pose must be a 4 x 4 matrix of finite numbers.")
+    return T
 
 
 def _iterations(
@@ -150,7 +185,7 @@ def _iterations(
 def _weigh(
     method: PairWeighting, matcher: Matcher, T: FloatArray, first: bool = False
 ) -> tuple[PairWeighting, Matching, PairWeights]:
-    """The pairs that count, after widening the method if it keeps too few; it comes back as it ended."""
+    """The method, widened if it keeps too few pairs; the pairs that it matches; those that it weighs."""
 
     def match(state: PairWeighting) -> Matching:
         return matcher.match(T, state.neighbours, state.source_share, state.target_share, state.gate_m)

@@ -1,7 +1,7 @@
 """From an oriented cloud to a triangle mesh and its measures (SPEC 5)."""
 
 from pipeline.rays import Camera, hit_depth
-from pipeline.surface.ball_pivoting import reconstruct_surface, roll_or_nothing, roll_over
+from pipeline.surface.ball_pivoting import reconstruct_surface, roll_ball, roll_or_nothing
 from pipeline.surface.boundary import boundary_loops
 from pipeline.surface.normals import estimate_normals
 from pipeline.surface.quality import measure_quality, measured
@@ -22,8 +22,8 @@ __all__ = [
     "nearest_distances_m",
     "radii",
     "reconstruct_surface",
+    "roll_ball",
     "roll_or_nothing",
-    "roll_over",
     "smooth",
     "spacing",
     "voxel_average",

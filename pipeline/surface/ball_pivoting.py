@@ -2,44 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.progress import drain
 from pipeline.rays import Camera
-from pipeline.surface.pivoting import roll
+from pipeline.surface.pivoting import ALL_AT_ONCE, BallPivotStep, iterate_roll
 from pipeline.surface.quality import measured
 from pipeline.surface.radii import spacing
 from pipeline.types import PointCloud, Surface, SurfaceResult
 
 
-def reconstruct_surface(
-    cloud: PointCloud, radii_m: Sequence[float], cameras: Sequence[Camera] = ()
-) -> SurfaceResult:
-    """``roll_over`` and measure what came out.
+def iterate_ball(
+    cloud: PointCloud, radii_m: Sequence[float], batch: int = 2000
+) -> Generator[BallPivotStep, None, Surface]:
+    """Roll balls over an oriented cloud, the smallest first, in steps of ``batch`` triangles.
 
     Args:
-        cloud: points with normals towards the outside.
+        cloud: (N, 3) points with unit normals towards the outside, metres.
         radii_m: ball radii.
-        cameras: whose rays measure the share without a surface; NaN without any.
+        batch: new triangles in a step at most.
 
-    Raises:
-        InputError, ReconstructionError: see ``roll_over``.
-    """
-    return measured(roll_over(cloud, radii_m), cameras, len(cloud))
+    Yields:
+        The new triangles as rows of ``cloud``, where the ball lay, and the front.
 
-
-def roll_over(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
-    """Roll balls over an oriented cloud, the smallest first; its points become the vertices.
-
-    Args:
-        cloud: points with normals towards the outside.
-        radii_m: ball radii.
+    Returns:
+        The surface, its vertices those points of the cloud that a triangle uses; closing the generator
+        earlier cancels.
 
     Raises:
         InputError: fewer than three points, no normals, or a radius that is not positive.
         ReconstructionError: the balls fall through everywhere.
+
+    >>> import numpy as np, packetmesh as pm
+    >>> xyz_m = np.stack(np.meshgrid(np.arange(5.0), np.arange(5.0), [0.0]), axis=-1).reshape(-1, 3)
+    >>> cloud = pm.PointCloud(xyz_m, normals=np.tile([0.0, 0.0, 1.0], (25, 1)))
+    >>> [len(step.triangles) for step in pm.iterate_ball(cloud, [1.0], batch=12)]
+    [12, 12, 8]
     """
     if len(cloud) < 3:
         raise InputError(f"A surface needs at least 3 points, not {len(cloud)}; check the depth image")
@@ -50,11 +51,11 @@ def roll_over(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
             f"The ball radii are {list(radii_m)} m; try about one to four times the point spacing"
         )
     radii_m = tuple(sorted({float(radius_m) for radius_m in radii_m}))
-    triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
-    if not len(triangles):
+    rolled = yield from iterate_roll(cloud.points_m, cloud.normals, radii_m, batch)
+    if not len(rolled.triangles):
         raise ReconstructionError(_why_nothing(cloud, radii_m[-1]))
-    used = np.bincount(triangles.reshape(-1), minlength=len(cloud)) > 0
-    kept, triangles = cloud.select(used), (np.cumsum(used, dtype=np.int32) - 1)[triangles]
+    used = np.bincount(rolled.triangles.reshape(-1), minlength=len(cloud)) > 0
+    kept, triangles = cloud.select(used), (np.cumsum(used, dtype=np.int32) - 1)[rolled.triangles]
     return Surface(
         vertices_m=kept.points_m,
         triangles=triangles,
@@ -65,14 +66,49 @@ def roll_over(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
     )
 
 
-def roll_or_nothing(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
-    """``roll_over``, with a surface of no triangle where the balls fall through everywhere.
+def roll_ball(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
+    """The fold of ``iterate_ball``: roll balls over an oriented cloud, the smallest first.
+
+    Args:
+        cloud: (N, 3) points with unit normals towards the outside, metres.
+        radii_m: ball radii.
 
     Raises:
-        InputError: as ``roll_over``.
+        InputError, ReconstructionError: as for ``iterate_ball``.
+
+    >>> import numpy as np, packetmesh as pm
+    >>> xyz_m = np.stack(np.meshgrid(np.arange(5.0), np.arange(5.0), [0.0]), axis=-1).reshape(-1, 3)
+    >>> cloud = pm.PointCloud(xyz_m, normals=np.tile([0.0, 0.0, 1.0], (25, 1)))
+    >>> pm.roll_ball(cloud, [1.0]).triangles.shape
+    (32, 3)
+    """
+    return drain(iterate_ball(cloud, radii_m, batch=ALL_AT_ONCE))
+
+
+def reconstruct_surface(
+    cloud: PointCloud, radii_m: Sequence[float], cameras: Sequence[Camera] = ()
+) -> SurfaceResult:
+    """``roll_ball``, and the measures of its surface.
+
+    Args:
+        cloud: points with normals towards the outside.
+        radii_m: ball radii.
+        cameras: whose rays measure the share without a surface; NaN without any.
+
+    Raises:
+        InputError, ReconstructionError: as for ``iterate_ball``.
+    """
+    return measured(roll_ball(cloud, radii_m), cameras, len(cloud))
+
+
+def roll_or_nothing(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
+    """``roll_ball``, with a surface of no triangle where the balls fall through everywhere.
+
+    Raises:
+        InputError: as ``roll_ball``.
     """
     try:
-        return roll_over(cloud, radii_m)
+        return roll_ball(cloud, radii_m)
     except ReconstructionError:
         return Surface(np.empty((0, 3)), np.empty((0, 3), np.int32), None, tuple(radii_m))
 

@@ -31,6 +31,12 @@ def estimate_normals(cloud: PointCloud, viewpoint_m: FloatArray, neighbours: int
 
     Raises:
         InputError: fewer than three points or neighbours.
+
+    >>> import numpy as np, packetmesh as pm
+    >>> floor = pm.PointCloud(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
+    >>> upwards = pm.estimate_normals(floor, viewpoint_m=np.array([0.0, 0.0, 2.0]), neighbours=3)
+    >>> bool(np.allclose(upwards.normals, [0.0, 0.0, 1.0]))
+    True
     """
     return turned_to_viewpoint(_with_normals(cloud, neighbours), viewpoint_m)
 

@@ -27,10 +27,14 @@ def nearest_distances_m(points_m: FloatArray) -> FloatArray:
 
 
 def spacing(points_m: FloatArray) -> tuple[float, float]:
-    """r_F and sigma_D, metres: mean and standard deviation of the nearest-neighbour distance.
+    """r_F and sigma_D of (N, 3) points, metres: mean and deviation of the nearest-neighbour distance.
 
     Raises:
         InputError: fewer than two points.
+
+    >>> import numpy as np, packetmesh as pm
+    >>> pm.spacing(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]))
+    (1.0, 0.0)
     """
     distances_m = nearest_distances_m(points_m)
     return float(distances_m.mean()), float(distances_m.std())

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import Progress
 from pipeline.surface.holes import find_holes
-from pipeline.surface.pivoting import BallPivotBatch, iterate_roll
+from pipeline.surface.pivoting import BallPivotStep, iterate_roll
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 _NO_TURN_RAD = 1e-3
@@ -80,7 +80,7 @@ def iterate_walk(
         ReconstructionError: no ball finds three points to rest on.
     """
     radii_m = tuple(radii_m)
-    steps: list[BallPivotBatch] = []
+    steps: list[BallPivotStep] = []
     balls: list[int] = []
     reported = 0.0
     for step in iterate_roll(points_m, normals, radii_m, batch):
@@ -150,7 +150,7 @@ def hole_on_flat_ground(
 
 
 def _walk_of(
-    vertices_m: FloatArray, radii_m: tuple[float, ...], steps: Sequence[BallPivotBatch], balls: ByteArray
+    vertices_m: FloatArray, radii_m: tuple[float, ...], steps: Sequence[BallPivotStep], balls: ByteArray
 ) -> Walk:
     triangles = np.concatenate([step.triangles for step in steps])
     centers_m = np.concatenate([step.ball_centers_m for step in steps])
@@ -206,7 +206,7 @@ def _glued_by(twins: IntArray) -> IntArray:
 
 
 def _left_front(
-    triangles: IntArray, steps: Sequence[BallPivotBatch], balls: ByteArray, radii: int
+    triangles: IntArray, steps: Sequence[BallPivotStep], balls: ByteArray, radii: int
 ) -> IntArray:
     """A half-edge is on one ball's front without a break, so the last step in which it is there tells all."""
     left = np.zeros((radii, 3 * len(triangles)), np.int32)

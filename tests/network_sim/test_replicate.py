@@ -17,20 +17,16 @@ from network_sim.replicate import (
     t_interval,
 )
 from packetmesh.errors import InputError
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, drain
 from packetmesh.settings import with_settings
 
 TINY = with_settings(PRESETS["thesis-link"], ["nodes.image_bytes=2000", "run.horizon_s=10"])
 
 
 def answer(steps):
-    """What a generator returns, and what it said."""
-    said = []
-    while True:
-        try:
-            said.append(next(steps))
-        except StopIteration as stop:
-            return stop.value, said
+    """What a generator returns, and its reports."""
+    reports = []
+    return drain(steps, reports.append), reports
 
 
 def test_the_interval_of_five_values_is_the_one_of_the_tables():

@@ -9,7 +9,7 @@ from pipeline.io.clouds import write_cloud
 from pipeline.io.images import write_color, write_depth_mm
 from pipeline.io.intrinsics import write_intrinsics
 from pipeline.io.meshes import write_mesh
-from pipeline.types import CameraIntrinsics, DepthMap, PointCloud
+from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, Surface
 
 
 def test_a_written_file_is_there_and_alone(tmp_path):
@@ -54,7 +54,7 @@ WRITERS = {
     "depth.png": lambda path: write_depth_mm(path, DepthMap(np.ones((4, 4), np.float32))),
     "camera.json": lambda path: write_intrinsics(path, CameraIntrinsics.pinhole(1.0, 1.0, 1.0, 1.0, 4, 4)),
     "cloud.ply": lambda path: write_cloud(path, PointCloud(np.zeros((4, 3)))),
-    "mesh.glb": lambda path: write_mesh(path, np.eye(3), np.array([[0, 1, 2]])),
+    "mesh.glb": lambda path: write_mesh(path, Surface(np.eye(3), np.array([[0, 1, 2]]))),
     "folder": writable_folder,
 }
 

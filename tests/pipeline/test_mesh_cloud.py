@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, drain
 from pipeline.mesh_cloud import (
     ESTIMATED_OUTWARDS,
     ESTIMATED_VIEWPOINT,
@@ -25,16 +25,12 @@ from tests.pipeline.surface.shapes import perforated_plane, sphere
 
 
 def meshed(cloud, **options):
-    steps = iterate_mesh_cloud(cloud, MeshOptions(**options))
-    fractions = []
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as stop:
-            assert fractions == sorted(fractions)
-            return stop.value
-        assert isinstance(progress, Progress)
-        fractions.append(progress.fraction)
+    reports = []
+    answer = drain(iterate_mesh_cloud(cloud, MeshOptions(**options)), reports.append)
+    assert all(isinstance(report, Progress) for report in reports)
+    fractions = [report.fraction for report in reports]
+    assert fractions == sorted(fractions)
+    return answer
 
 
 def test_points_alone_become_a_closed_surface_seen_from_outside():

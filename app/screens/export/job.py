@@ -53,7 +53,7 @@ def export_job(store: Store, spec: Spec, name: str, shown: Shown = "after") -> G
             write_cloud(path, clouds_of(clouds)[name])
         elif name.startswith("surface."):
             surface = yield from store.stage(spec, shown)
-            write_mesh(path, surface.vertices_m, surface.triangles, surface.colors)
+            write_mesh(path, surface)
         elif name == "scene.html":
             surface = yield from store.stage(spec, shown)
             yield Progress("writing the page", 0.8)

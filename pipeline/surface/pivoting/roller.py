@@ -8,12 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from packetmesh.errors import InputError
+from packetmesh.progress import drain
 from pipeline.surface.pivoting.front import FACES, HEAD, SETTLED, TAIL, grown, new_front
 from pipeline.surface.pivoting.grid import build_grid
 from pipeline.surface.pivoting.roll import advance, restart
 from pipeline.surface.pivoting.seed import new_scratch
 from pipeline.types import ByteArray, FloatArray, IntArray
 
+ALL_AT_ONCE = 1 << 30
+"""A batch that no ball's triangles fill."""
 _JITTER = 1e-10
 """Points move by up to this share of the first radius, so that no four lie on one ball exactly."""
 _CELL = 2.0
@@ -34,7 +37,7 @@ class Rolled:
 
 
 @dataclass(frozen=True, slots=True)
-class BallPivotBatch:
+class BallPivotStep:
     """What some pivots added, and where the front is now."""
 
     triangles: IntArray
@@ -104,11 +107,11 @@ class Roller:
         Raises:
             InputError: the radius is not positive, or not larger.
         """
-        for _ in self.iterate(radius_m, batch=1 << 30):
+        for _ in self.iterate(radius_m, ALL_AT_ONCE):
             pass
         return self.rolled
 
-    def iterate(self, radius_m: float, batch: int = 2000) -> Generator[BallPivotBatch]:
+    def iterate(self, radius_m: float, batch: int = 2000) -> Generator[BallPivotStep]:
         """The same in steps of ``batch`` triangles; progress is that of this radius.
 
         A generator closed early leaves its triangles; a larger ball can go on from there.
@@ -141,9 +144,9 @@ class Roller:
                 )
             yield self._batch(first, done)
 
-    def _batch(self, first: int, done: bool) -> BallPivotBatch:
+    def _batch(self, first: int, done: bool) -> BallPivotStep:
         counts = self._front.counts
-        return BallPivotBatch(
+        return BallPivotStep(
             self._front.triangles[first : counts[FACES]].copy(),
             self._front.centers_m[first : counts[FACES]] + self._middle_m,
             self._radii_m[-1],
@@ -166,7 +169,7 @@ class Roller:
 
 def iterate_roll(
     points_m: FloatArray, normals: FloatArray | None, radii_m: Sequence[float], batch: int = 2000
-) -> Generator[BallPivotBatch, None, Rolled]:
+) -> Generator[BallPivotStep, None, Rolled]:
     """Roll balls over an oriented cloud, the smallest first, in steps of ``batch`` triangles.
 
     Args:
@@ -190,24 +193,19 @@ def iterate_roll(
     for index, radius_m in enumerate(radii_m):
         for step in roller.iterate(radius_m, batch):
             progress = (index + step.progress) / len(radii_m)
-            yield BallPivotBatch(
+            yield BallPivotStep(
                 step.triangles, step.ball_centers_m, step.radius_m, step.front_edges, progress
             )
     return roller.rolled
 
 
 def roll(points_m: FloatArray, normals: FloatArray | None, radii_m: Sequence[float]) -> Rolled:
-    """``iterate_roll`` to its end."""
-    steps = iterate_roll(points_m, normals, radii_m, batch=1 << 30)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
+    """The fold of ``iterate_roll``."""
+    return drain(iterate_roll(points_m, normals, radii_m, ALL_AT_ONCE))
 
 
 def compile_all() -> None:
-    """Have the ball compiled, which takes ten seconds once and then stays on the disk."""
+    """Compile the ball, which takes ten seconds once; the result is kept on the disk."""
     corner_m = np.eye(3)
     roll(corner_m, np.full((3, 3), 0.6), [1.0, 2.0])
 

@@ -14,7 +14,7 @@ from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.io.poses import read_pose
 from pipeline.io.rigs import load_rig, save_rig
-from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RgbdFrame, Rig
+from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RgbdFrame, Rig, Surface
 
 CAMERA = {"width": 16, "height": 12, "fx": 14.0, "fy": 14.0, "cx": 7.5, "cy": 5.5}
 
@@ -40,6 +40,7 @@ JPEG = cv2.imencode(".jpg", np.zeros((40, 40, 3), np.uint8))[1].tobytes()
 XYZ = "property float x\nproperty float y\nproperty float z\n"
 K9 = [14, 0, 7.5, 0, 14, 5.5, 0, 0, 1]
 EYE = np.eye(4)
+TRIANGLE = Surface(np.eye(3), np.array([[0, 1, 2]]))
 
 
 def camera_json(**changes) -> bytes:
@@ -164,9 +165,9 @@ BAD_FILES = {
         b"x",
         "ends in .ply",
     ),
-    "mesh to .off": (lambda path: write_mesh(f"{path}.off", EYE[:3, :3], [[0, 1, 2]]), b"x", "ends in"),
+    "mesh to .off": (lambda path: write_mesh(f"{path}.off", TRIANGLE), b"x", "ends in"),
     "mesh of nothing": (
-        lambda path: write_mesh(f"{path}.ply", EYE[:3, :3], np.empty((0, 3), int)),
+        lambda path: write_mesh(f"{path}.ply", Surface(EYE[:3, :3], np.empty((0, 3), int))),
         b"x",
         "no triangle",
     ),
@@ -208,7 +209,7 @@ def test_a_bad_file_gets_its_sentence(tmp_path, case):
 @pytest.mark.parametrize("damage", ["truncated", "text", "noise"])
 def test_a_damaged_mesh_gets_its_sentence(tmp_path, suffix, damage):
     path = tmp_path / f"mesh{suffix}"
-    write_mesh(path, np.random.default_rng(0).normal(size=(99, 3)), np.arange(99).reshape(-1, 3))
+    write_mesh(path, Surface(np.random.default_rng(0).normal(size=(99, 3)), np.arange(99).reshape(-1, 3)))
     data = path.read_bytes()
     noise = np.random.default_rng(0).bytes(500)
     path.write_bytes({"truncated": data[: len(data) // 3], "text": b"hello\n", "noise": noise}[damage])

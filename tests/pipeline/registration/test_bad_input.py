@@ -6,7 +6,7 @@ import pytest
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import rigid
-from pipeline.registration import iterate, register
+from pipeline.registration import iterate_registration, register
 from pipeline.types import PointCloud
 
 CONFIG = RegistrationConfig()
@@ -15,22 +15,22 @@ FAR = rigid(np.eye(3), [0.0, 0.0, 50.0])
 
 def test_fewer_than_three_points(corner):
     with pytest.raises(InputError, match="source cloud has 2 points"):
-        iterate(corner.select(np.arange(2)), corner, CONFIG)
+        iterate_registration(corner.select(np.arange(2)), corner, CONFIG)
     with pytest.raises(InputError, match="target cloud has 0 points"):
-        iterate(corner, PointCloud(np.empty((0, 3))), CONFIG)
+        iterate_registration(corner, PointCloud(np.empty((0, 3))), CONFIG)
 
 
 def test_points_that_are_not_finite(corner):
     points_m = corner.points_m.copy()
     points_m[[3, 8], 1] = np.nan, np.inf
     with pytest.raises(InputError, match="target cloud has 2 points with NaN"):
-        iterate(corner, PointCloud(points_m), CONFIG)
+        iterate_registration(corner, PointCloud(points_m), CONFIG)
 
 
 @pytest.mark.parametrize("T", [np.eye(3), np.full((4, 4), np.nan)])
 def test_a_start_pose_that_is_none(corner, T):
     with pytest.raises(InputError, match="start pose"):
-        iterate(corner, corner, CONFIG, T)
+        iterate_registration(corner, corner, CONFIG, T)
 
 
 @pytest.mark.parametrize(("method", "reach"), [("ceicp-n", "0.30"), ("ceicp-a", "0.60")])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import inverse, rigid, rotation_exp
-from pipeline.registration import iterate, point_error_m, register
+from pipeline.registration import iterate_registration, point_error_m, register
 from pipeline.registration.ceicp import CeicpA, entropy_weights
 from pipeline.registration.ceicp_ml import CeicpMl, box_volume_m3, responsibilities
 from pipeline.registration.ceicp_r import CeicpR
@@ -91,7 +91,7 @@ def test_em_lowers_the_cross_entropy(corner):
     config = RegistrationConfig("ceicp-ml", "point")
     outlier_density = CeicpMl.starting(config, source, target).outlier_density
     T_before, entropies, sigma_m = np.eye(4), [], None
-    for step in iterate(source, target, config):
+    for step in iterate_registration(source, target, config):
         if sigma_m is not None:
             entropies.append(_cross_entropy(source, target, T_before, sigma_m, outlier_density))
         T_before, sigma_m = step.T_target_source, step.sigma_m
@@ -142,5 +142,7 @@ def test_kernel_correlation_is_a_gaussian_on_the_schedule_of_a(corner):
 
 def test_kernel_correlation_finds_ten_partners_each(corner):
     cloud = corner.select(np.arange(0, 1500, 5))
-    step = next(iterate(cloud, cloud, RegistrationConfig("kernel-correlation", "point", gate_m=3.0)))
+    step = next(
+        iterate_registration(cloud, cloud, RegistrationConfig("kernel-correlation", "point", gate_m=3.0))
+    )
     assert (np.bincount(step.pairs[:, 0]) == 10).all()

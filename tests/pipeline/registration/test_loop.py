@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import apply, inverse, rigid, rotation_exp
-from pipeline.registration import iterate, point_error_m, register
+from pipeline.registration import iterate_registration, point_error_m, register
 from pipeline.types import PointCloud
 
 METHODS = ("icp", "ceicp-n", "ceicp-a")
@@ -163,7 +163,7 @@ def test_same_seed_same_bits(overlapping):
 def test_stepping_and_folding_agree(overlapping):
     source, target, _ = overlapping
     result = register(source, target, RegistrationConfig())
-    steps = list(iterate(source, target, RegistrationConfig()))
+    steps = list(iterate_registration(source, target, RegistrationConfig()))
     assert [step.index for step in steps] == list(range(len(steps)))
     assert steps[-1].T_target_source.tobytes() == result.T_target_source.tobytes()
     assert result.stop_reason == "converged"
@@ -176,12 +176,12 @@ def test_it_stops_after_max_iterations(overlapping):
 
 
 def _first_pairs(source, target, direction):
-    step = next(iterate(source, target, RegistrationConfig("icp", "point", direction)))
+    step = next(iterate_registration(source, target, RegistrationConfig("icp", "point", direction)))
     return [tuple(pair) for pair in step.pairs]
 
 
 def _with_pose_before(source, target, config, T):
     """Every step with the pose it started from."""
-    for step in iterate(source, target, config, T):
+    for step in iterate_registration(source, target, config, T):
         yield step, T
         T = step.T_target_source

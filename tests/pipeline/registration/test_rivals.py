@@ -9,7 +9,7 @@ import pytest
 from packetmesh.errors import InputError
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import inverse, rigid, rotation_exp
-from pipeline.registration import iterate, point_error_m, register
+from pipeline.registration import iterate_registration, point_error_m, register
 from pipeline.registration.fast_robust import FastRobustIcp, neighbourhood_m
 from pipeline.registration.ficp import Ficp, inlier_fraction
 from pipeline.registration.hicp import Hicp, hue_coordinates
@@ -103,7 +103,7 @@ def test_moving_both_clouds_moves_the_answer(halves, config):
 
 @pytest.mark.parametrize("config", EVERY)
 def test_every_step_keeps_pairs_with_weights_that_sum_to_one(halves, config):
-    for step in iterate(*halves, config):
+    for step in iterate_registration(*halves, config):
         assert (step.weights >= 0.0).all()
         assert step.weights.sum() == pytest.approx(1.0, abs=1e-9)
         assert len(step.pairs) == len(step.weights) == len(step.distances_m)
@@ -149,7 +149,7 @@ def test_picp_rejects_before_it_pairs():
 
 
 def test_picp_keeps_every_point_once_in_both_directions(halves):
-    for step in iterate(*halves, RegistrationConfig("picp", direction="both")):
+    for step in iterate_registration(*halves, RegistrationConfig("picp", direction="both")):
         assert len(np.unique(step.pairs[:, 0])) == len(step.pairs) == len(np.unique(step.pairs[:, 1]))
 
 
@@ -182,7 +182,7 @@ def test_a_restless_level_gives_way_after_its_share():
 
 def test_levels_of_mricp_take_a_quarter_of_the_points_each(coloured, displacement):
     source = coloured.transformed(inverse(displacement))
-    counts = [len(step.pairs) for step in iterate(source, coloured, RegistrationConfig("mricp"))]
+    counts = [len(step.pairs) for step in iterate_registration(source, coloured, RegistrationConfig("mricp"))]
     assert sorted(set(counts)) == [94, 375, 1500]
     assert counts == sorted(counts)
 
@@ -271,9 +271,9 @@ def test_hicp_matches_like_with_like():
     colors = np.where(np.arange(300)[:, None] % 2, np.uint8([255, 0, 0]), np.uint8([0, 255, 0]))
     target = PointCloud(place_m, colors=colors)
     source = PointCloud(place_m + np.array([0.06, 0.0, 0.0]), colors=colors)
-    step = next(iterate(source, target, RegistrationConfig("hicp", "point", trim=1.0)))
+    step = next(iterate_registration(source, target, RegistrationConfig("hicp", "point", trim=1.0)))
     assert (step.pairs[:, 0] % 2 == step.pairs[:, 1] % 2).all()
-    blind = next(iterate(source, target, RegistrationConfig("trimmed-icp", "point", trim=1.0)))
+    blind = next(iterate_registration(source, target, RegistrationConfig("trimmed-icp", "point", trim=1.0)))
     assert (blind.pairs[:, 0] % 2 != blind.pairs[:, 1] % 2).sum() > 10
 
 
