@@ -109,7 +109,7 @@ class DepthNode:
 
     name: str
     pictures: dict[str, Picture]
-    """By the names of ``app.screens.depth.labels.PICTURES``, all of one size."""
+    """By ``app.screens.depth.view.PictureName``, all of one size."""
     sensor: Sample
     inferred: Sample
     outliers: Sample

@@ -35,6 +35,11 @@ class RaceClock:
         return RaceClock(xs, unit, True)
 
     @property
+    def label(self) -> str:
+        """Of an axis."""
+        return "time, ms" if self.in_ms else "iteration"
+
+    @property
     def length(self) -> int:
         """Places, so that at the last one every lane is at its end."""
         return int(np.ceil(max(x[-1] for x in self.xs) / self.unit)) + 1

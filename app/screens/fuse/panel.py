@@ -233,7 +233,7 @@ class FusePanel(Panel):
             return
         with self.ui.atomic():
             self._drawing.show(clock.rows(at))
-            self._charts.mark(at, clock.rows(at))
+            self._charts.mark(float(at * clock.unit), clock.rows(at))
 
     # The gizmo.
 

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from app.screens.network.view import NetworkView, Pieces, Series, What
+from app.screens.network.view import Curve, NetworkView, Pieces, Series, What
 from app.state import Spec
 from app.store import Store
 from network_sim.config import NetworkConfig
@@ -173,8 +173,8 @@ def _downtimes(events: Events, horizon_ns: int) -> Pieces:
 # The curves.
 
 
-def series_of(trace: NetworkTrace, start_ns: int) -> dict[str, Series]:
-    """The curves of ``app.screens.network.labels.CURVES``, over the time after the warm-up."""
+def series_of(trace: NetworkTrace, start_ns: int) -> dict[Curve, Series]:
+    """Every curve over the time after the warm-up."""
     edges_s = np.linspace(start_ns, trace.horizon_ns, INTERVALS + 1) / NS_PER_S
     middles_s = (edges_s[:-1] + edges_s[1:]) / 2.0
     images = trace.events.where(trace.events.packet_kind == PacketKind.IMAGE)
@@ -183,10 +183,10 @@ def series_of(trace: NetworkTrace, start_ns: int) -> dict[str, Series]:
     bits = _binned(received, edges_s, 8.0 * received.size_bytes)
     with np.errstate(invalid="ignore", divide="ignore"):
         return {
-            "Delivery": Series(middles_s, 100.0 * got / (got + lost)),
-            "Delay": Series(middles_s, _delays_s(trace.events, edges_s)),
-            "Throughput": Series(middles_s, bits / np.diff(edges_s) / 1000.0),
-            "Energy": _radio_j(trace),
+            "delivery": Series(middles_s, 100.0 * got / (got + lost)),
+            "delay": Series(middles_s, _delays_s(trace.events, edges_s)),
+            "throughput": Series(middles_s, bits / np.diff(edges_s) / 1000.0),
+            "energy": _radio_j(trace),
         }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from enum import IntEnum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,9 @@ class Pieces:
         return Pieces(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
+Curve = Literal["delivery", "delay", "throughput", "energy"]
+
+
 @dataclass(frozen=True, slots=True)
 class Series:
     """One quantity over the simulated time."""
@@ -96,8 +100,7 @@ class NetworkView:
     pieces: Pieces
     kept_until_ns: int
     """The pieces end here if the run had more of them than are kept; otherwise ``end_ns``."""
-    series: dict[str, Series]
-    """By ``app.screens.network.labels.CURVES``."""
+    series: dict[Curve, Series]
     metrics: dict[str, Metric]
     """Numbers of the whole run by name."""
     elapsed_s: float
