@@ -14,16 +14,7 @@ from app.drawing.pictures import (
     depth_range_m,
     difference_picture,
 )
-from app.records import (
-    SCREEN_POINTS,
-    DepthNode,
-    DepthView,
-    JudgedView,
-    Picture,
-    ResidualView,
-    Sample,
-    sample,
-)
+from app.records import SCREEN_POINTS, DepthNode, DepthView, JudgedView, Picture, ResidualView, Sample, sample
 from app.screens.depth.view import SeenSample
 from app.state import Spec
 from app.store import Store

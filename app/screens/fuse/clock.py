@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.records import RaceLane
+from app.screens.fuse.view import RaceLane
 from pipeline.types import FloatArray
 
 TICKS_MS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)

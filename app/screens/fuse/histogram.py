@@ -8,7 +8,7 @@ from viser import uplot
 
 from app.drawing.colors import DELIVERED, INFERRED, NEUTRAL, css
 from app.drawing.curves import add_chart, scales
-from app.records import PairHistogram, RaceLane
+from app.screens.fuse.view import PairHistogram, RaceLane
 from pipeline.types import FloatArray
 
 BARS, KERNEL, WEIGHT = css(NEUTRAL), css(DELIVERED), css(INFERRED)
