@@ -87,6 +87,11 @@ class Gui:
         assert len(found) == 1, f"{len(found)} controls are called {label!r}"
         return found[0]
 
+    def find_starting(self, label):
+        """The one control whose label begins so."""
+        (found,) = (one for one in self.handles if str(getattr(one, "label", "")).startswith(label))
+        return found
+
     def set(self, label, value, folder=None):
         """Change an input as a person does."""
         handle = self.find(label, folder)
@@ -157,16 +162,23 @@ def at_once(function, *arguments):
     function(*arguments)
 
 
-def ui_of(scene=None, post=at_once):
+def ui_of(scene=None, post=at_once, kind=Ui):
     """A bundle with a new control panel; the scene is a server's."""
-    return Ui(Gui(), Scene(scene), post, contextlib.nullcontext, lambda: None)
+    return kind(Gui(), Scene(scene), post, contextlib.nullcontext, lambda: None)
+
+
+class Impatient(Ui):
+    """Does at once what otherwise waits until a hand rests."""
+
+    def debounce(self, wait_s, action):
+        return SimpleNamespace(restart=action, cancel=lambda: None, pending=False)
 
 
 class Bench:
     """Stands for a session with one panel: computes at once and in this process what the panel asks for."""
 
-    def __init__(self, panel, scene, store, folder=None, steps=CHAIN):
-        self.ui = ui_of(scene)
+    def __init__(self, panel, ui, store, folder=None, steps=CHAIN):
+        self.ui = ui
         self.store, self.folder, self.steps = store, folder, steps
         self.spec = Spec(Source(scene="box-on-table"))
         self.results, self.notices, self.refuse = Results(), [], False

@@ -16,7 +16,7 @@ from app.screens.depth.panel import DepthPanel
 from app.screens.depth.view import Disc
 from app.state import Source
 from pipeline.depth.inference import SHIPPED_MODEL
-from tests.app.fakes import Bench
+from tests.app.fakes import Bench, ui_of
 
 pytestmark = pytest.mark.xdist_group("depth panel")
 HIDE, MODEL = "Hide a region and see it filled", "Neural network"
@@ -26,7 +26,7 @@ HIDE, MODEL = "Hide a region and see it filled", "Neural network"
 def session(store, tmp_path_factory):
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     session = Bench(
-        DepthPanel, server.scene, store, tmp_path_factory.mktemp("uploads"), steps=("scene", "depth")
+        DepthPanel, ui_of(server.scene), store, tmp_path_factory.mktemp("uploads"), steps=("scene", "depth")
     )
     session.advance()
     yield session
