@@ -5,7 +5,6 @@ import sys
 
 import numpy as np
 import pytest
-import viser
 
 from app.drawing.colors import CONFIDENCE_STOPS, HOLE
 from app.drawing.pictures import (
@@ -21,10 +20,10 @@ from app.drawing.pictures import (
 from app.records import ColorBar, Picture, ResidualView
 from app.screens.depth.colorbar import captions_html
 from app.screens.depth.compare import CompareArea
-from app.screens.depth.labels import PICTURES
 from app.screens.depth.residuals import residual_figure
 from app.screens.depth.split import split
 from pipeline.types import DepthMap
+from tests.app.fakes import ui_of
 
 RED, BLUE = (200, 10, 20), (5, 60, 190)
 
@@ -108,35 +107,20 @@ def test_residuals_have_their_median_and_rms_marked_in_centimetres():
     assert not residual_figure(None).data
 
 
-@pytest.fixture(scope="module")
-def server():
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    yield server
-    server.stop()
+NAMES = {"one": "the first", "two": "the second", "three": "the third"}
 
 
 class Screen:
-    """The area and what a person can do to it."""
+    """The area, and what a person does with it and sees of it."""
 
-    def __init__(self, server, **keywords):
-        self.actions = {}
-        self.area = CompareArea(
-            server.gui,
-            lambda handle, action: self.actions.__setitem__(handle.label, (handle, action)),
-            ("one", "two", "three"),
-            "one",
-            "two",
-            **keywords,
-        )
-
-    def change(self, label, value):
-        handle, action = self.actions[label]
-        handle.value = value
-        action()
+    def __init__(self, **keywords):
+        ui = ui_of()
+        self.area, self.gui = CompareArea(ui, NAMES, "one", "two", **keywords), ui.gui
 
     @property
     def shown(self):
-        return self.area._image.image
+        (image,) = self.gui.all("image")
+        return image.image
 
 
 PICTURES_OF = {
@@ -146,56 +130,51 @@ PICTURES_OF = {
 }
 
 
-def test_the_area_shows_what_is_chosen_and_moves_the_line(server):
-    screen = Screen(server)
+def test_the_area_shows_what_is_chosen_and_moves_the_line():
+    screen = Screen()
     screen.area.load(PICTURES_OF)
     np.testing.assert_array_equal(screen.shown, split(plain(RED), plain(BLUE), 0.5))
-    screen.change("Split (%)", 20.0)
+    screen.gui.set("Split (%)", 20.0)
     np.testing.assert_array_equal(screen.shown, split(plain(RED), plain(BLUE), 0.2))
-    screen.change("Right", "three")
+    screen.gui.set("Right", "the third")
     np.testing.assert_array_equal(screen.shown, split(plain(RED), plain((9, 9, 9)), 0.2))
-    assert "Third" in screen.area._captions.content
-    assert "Second" not in screen.area._captions.content
+    assert "Third" in screen.gui.text()
+    assert "Second" not in screen.gui.text()
     screen.area.set("two", "one", 1.0)
     np.testing.assert_array_equal(screen.shown, plain(BLUE))
 
 
-def test_pictures_of_the_same_names_replace_those_before(server):
-    screen = Screen(server)
+def test_pictures_of_the_same_names_replace_those_before():
+    screen = Screen()
     screen.area.load(PICTURES_OF)
     screen.area.load({**PICTURES_OF, "one": Picture(plain((1, 2, 3)), "New")})
     assert np.all(screen.shown[:, 0] == (1, 2, 3))
-    assert "New" in screen.area._captions.content
+    assert "New" in screen.gui.text()
 
 
-def test_a_burst_of_the_same_change_is_drawn_once(server, monkeypatch):
+def test_a_burst_of_the_same_change_is_drawn_once(monkeypatch):
     drawn = []
     monkeypatch.setattr("app.screens.depth.compare.split", lambda *a: drawn.append(a) or split(*a))
-    screen = Screen(server)
+    screen = Screen()
     screen.area.load(PICTURES_OF)
     for _ in range(9):
-        screen.change("Split (%)", 33.0)
+        screen.gui.set("Split (%)", 33.0)
     assert len(drawn) == 2
 
 
-def test_the_area_is_hidden_until_there_is_something(server):
-    screen = Screen(server, visible=False)
-    parts = (screen.area._left, screen.area._image, screen.area._captions)
-    assert not any(part.visible for part in parts)
+def test_the_area_is_hidden_until_there_is_something():
+    screen = Screen(visible=False)
+    assert not any(handle.seen for handle in screen.gui.handles)
     screen.area.load({"two": PICTURES_OF["two"], "three": PICTURES_OF["three"]})
-    assert all(part.visible for part in parts)
-    assert screen.area._left.options == ("two", "three")
+    assert all(handle.seen for handle in screen.gui.handles)
+    assert screen.gui.find("Left").options == ("the second", "the third")
     np.testing.assert_array_equal(screen.shown, split(plain(BLUE), plain(BLUE), 0.5))
     screen.area.load(None)
-    assert not any(part.visible for part in parts)
-
-
-def test_all_five_pictures_have_names():
-    assert len(set(PICTURES)) == 5
+    assert not any(handle.seen for handle in screen.gui.handles)
 
 
 def test_the_screen_needs_nothing_heavy():
     heavy = "{'onnxruntime', 'open3d', 'numba', 'pipeline.surface', 'pipeline.depth'}"
-    script = f"import sys, app.screens.depth; print({heavy} & set(sys.modules))"
+    script = f"import sys, app.screens.depth.panel; print({heavy} & set(sys.modules))"
     text = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert text.stdout.strip() == "set()"

@@ -11,19 +11,7 @@ from app.drawing.pictures import UNKNOWN, confidence_colors
 from app.screens.depth.discs import window_around
 from app.screens.depth.hide_job import LEAST_HIDDEN_PX, believed, fill_row, hidden_pixels, hide_job
 from app.screens.depth.job import depth_job, judged_view, residual_view
-from app.screens.depth.labels import (
-    BLANK,
-    CONFIDENCE,
-    DIFFERENCE,
-    INFERRED,
-    MEASURED,
-    NETWORK_PRESETS,
-    OURS,
-    PEER_NAMES,
-    PHOTO,
-    PICTURES,
-    SENSOR,
-)
+from app.screens.depth.labels import FILLS, NETWORK_PRESETS, PICTURES
 from app.screens.depth.model_job import model_job
 from app.screens.depth.view import Disc, HideRequest, ModelChoice, SeenSample
 from app.state import Spec
@@ -65,26 +53,26 @@ def colored(picture, color):
 def test_every_node_has_all_five_pictures_of_one_size(rig, view):
     assert [node.name for node in view.nodes] == [frame.name for frame in rig.frames]
     for frame, node in zip(rig.frames, view.nodes, strict=True):
-        assert tuple(node.pictures) == PICTURES
+        assert tuple(node.pictures) == tuple(PICTURES)
         assert {picture.rgb.shape for picture in node.pictures.values()} == {frame.rgb.shape}
-        np.testing.assert_array_equal(node.pictures[PHOTO].rgb, frame.rgb)
-        assert [name for name, picture in node.pictures.items() if picture.bar is None] == [PHOTO]
+        np.testing.assert_array_equal(node.pictures["photo"].rgb, frame.rgb)
+        assert [name for name, picture in node.pictures.items() if picture.bar is None] == ["photo"]
 
 
 def test_what_is_unknown_is_marked_in_each_picture(store, rig, view):
     for frame, clouds, node in zip(rig.frames, end(store.stage(SPEC, "nodes")), view.nodes, strict=True):
         measured, inferred = frame.depth.valid, clouds.alignment.depth.valid
-        np.testing.assert_array_equal(colored(node.pictures[SENSOR], HOLE), ~measured)
-        np.testing.assert_array_equal(colored(node.pictures[INFERRED], HOLE), ~inferred)
-        np.testing.assert_array_equal(colored(node.pictures[DIFFERENCE], UNKNOWN), ~(measured & inferred))
-        assert not np.any(colored(node.pictures[CONFIDENCE], UNKNOWN) & measured & inferred)
+        np.testing.assert_array_equal(colored(node.pictures["sensor"], HOLE), ~measured)
+        np.testing.assert_array_equal(colored(node.pictures["inferred"], HOLE), ~inferred)
+        np.testing.assert_array_equal(colored(node.pictures["difference"], UNKNOWN), ~(measured & inferred))
+        assert not np.any(colored(node.pictures["confidence"], UNKNOWN) & measured & inferred)
 
 
 def test_wide_images_are_thinned_alike(store, rig, monkeypatch):
     monkeypatch.setattr("app.screens.depth.job.PICTURE_WIDTH_PX", rig.frames[0].rgb.shape[1] // 2)
     node = end(depth_job(store, SPEC)).nodes[0]
     assert {picture.rgb.shape for picture in node.pictures.values()} == {rig.frames[0].rgb[::2, ::2].shape}
-    np.testing.assert_array_equal(node.pictures[PHOTO].rgb, rig.frames[0].rgb[::2, ::2])
+    np.testing.assert_array_equal(node.pictures["photo"].rgb, rig.frames[0].rgb[::2, ::2])
 
 
 def test_the_confidence_of_every_drawn_point_is_that_of_its_pixel(store, rig, view):
@@ -191,10 +179,10 @@ def test_the_hidden_disc_is_blank_then_filled_and_nothing_else_changes(rig, hidd
     disc = hidden_pixels(rig.frames[0].depth, FLAT.discs)
     assert hidden.hidden_px == disc.sum() > 1000
     assert hidden.node == rig.frames[0].name
-    names = [OURS, *(PEER_NAMES[name] for name in PEERS)]
+    names = ["ours", *PEERS]
     assert [row.name for row in hidden.rows] == names
-    assert list(hidden.pictures) == [MEASURED, BLANK, *names]
-    before, blank = hidden.pictures[MEASURED], hidden.pictures[BLANK]
+    assert list(hidden.pictures) == ["measured", "hidden", *names]
+    before, blank = hidden.pictures["measured"], hidden.pictures["hidden"]
     changed = np.any(before.rgb != blank.rgb, axis=-1)
     times = round(np.sqrt(changed.sum() / disc.sum()))
     assert changed.sum() == times**2 * disc.sum()
@@ -210,11 +198,11 @@ def test_the_pictures_show_the_region_around_all_discs(store, rig):
     both = end(hide_job(store, SPEC, HideRequest(0, discs)))
     assert both.hidden_px == hidden_pixels(rig.frames[0].depth, discs).sum()
     rows, columns = window_around(discs, *rig.frames[0].rgb.shape[1::-1])
-    shown = both.pictures[BLANK].rgb
+    shown = both.pictures["hidden"].rgb
     assert shown.shape[1] / shown.shape[0] == pytest.approx(
         (columns.stop - columns.start) / (rows.stop - rows.start)
     )
-    hidden = colored(both.pictures[BLANK], HOLE) & ~colored(both.pictures[MEASURED], HOLE)
+    hidden = colored(both.pictures["hidden"], HOLE) & ~colored(both.pictures["measured"], HOLE)
     middle = shown.shape[1] // 2
     assert hidden[:, :middle].any()
     assert hidden[:, middle:].any()
@@ -222,11 +210,11 @@ def test_the_pictures_show_the_region_around_all_discs(store, rig):
 
 def test_a_flat_wall_comes_back(hidden):
     errors = {row.name: row for row in hidden.rows}
-    for name in (PEER_NAMES["nearest"], PEER_NAMES["inpaint-telea"]):
+    for name in ("nearest", "inpaint-telea"):
         assert errors[name].filled_share == 1.0
         assert errors[name].abs_rel < 0.1
-    assert errors[OURS].filled_share > 0.8
-    assert errors[OURS].abs_rel < 0.15
+    assert errors["ours"].filled_share > 0.8
+    assert errors["ours"].abs_rel < 0.15
 
 
 def test_a_network_that_knows_the_truth_gives_back_what_was_hidden(rig):
@@ -247,7 +235,7 @@ def test_a_node_that_is_not_there_is_one_sentence(store):
 
 def test_the_words_of_the_screen_are_those_of_the_pipeline():
     assert set(NETWORK_PRESETS) == set(PRESETS)
-    assert set(PEER_NAMES) == set(PEERS)
+    assert set(FILLS) == {"measured", "hidden", "ours", *PEERS}
 
 
 def test_the_network_that_ships_says_what_it_is():

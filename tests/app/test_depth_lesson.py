@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from app.lesson import read_lesson
 from app.screens.depth.hide_job import hidden_pixels
-from app.screens.depth.labels import CONFIDENCE, DIFFERENCE, EVERYWHERE, INFERRED, PHOTO, SENSOR
-from app.screens.depth.lesson import DepthLook, depth_lesson
+from app.screens.depth.labels import EVERYWHERE
+from app.screens.depth.lesson import SETTINGS, SHIPPED, DepthLook
 from app.screens.depth.view import Disc, HideRequest
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig
@@ -17,14 +18,13 @@ from pipeline.io.demos import load_demo
 def lesson(tmp_path, text):
     path = tmp_path / "lesson.md"
     path.write_text(text)
-    return depth_lesson(path)
+    return read_lesson(path, SETTINGS, DepthLook())
 
 
-def test_the_lesson_that_ships_has_seven_stops_that_ask_and_answer():
-    shipped = depth_lesson()
-    assert shipped.title == "Can a picture measure?"
-    assert len(shipped.stops) == len({stop.title for stop in shipped.stops}) == 7
-    assert len({stop.look for stop in shipped.stops}) == 7
+def test_the_stops_of_the_lesson_that_ships_differ_ask_and_answer():
+    shipped = read_lesson(SHIPPED, SETTINGS, DepthLook())
+    assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) > 1
+    assert len({stop.look for stop in shipped.stops}) == len(shipped.stops)
     for stop in shipped.stops:
         assert stop.text.count("*Question:*") == stop.text.count("*Answer:*") == 1
         assert "set:" not in stop.text
@@ -43,7 +43,7 @@ def test_a_stop_sets_what_it_names_and_leaves_the_rest_as_the_screen_begins(tmp_
     assert bare.look == DepthLook()
     hide = HideRequest(0, (Disc(0.3, 0.625, 0.2),))
     assert full.look == DepthLook(
-        DIFFERENCE, CONFIDENCE, 0.3, "median", "confidence", EVERYWHERE, 0.07, 0.4, hide
+        "difference", "confidence", 0.3, "median", "confidence", EVERYWHERE, 0.07, 0.4, hide
     )
 
 
@@ -59,14 +59,14 @@ def test_to_hide_nothing_takes_back_what_was_to_be_hidden(tmp_path):
     [
         ("picture = photo", "cannot set picture = photo: try one of left, right, split"),
         ("left = rgb", "try one of photo, sensor depth, inferred depth, difference, confidence"),
-        ("split = half", "try a share from 0 % to 100 %"),
-        ("split = 101 %", "try a share from 0 % to 100 %"),
+        ("split = half", "try 0 to 100 %"),
+        ("split = 101 %", "try 0 to 100 %"),
         ("alignment = best", "try one of none, median, affine_depth, affine_inverse, local"),
         ("colours = red", "try one of source, photo, confidence of inferred points"),
         ("inferred points = all", "try one of only in the holes, everywhere, hidden"),
-        ("reach = 0.1", "try a share from 0 % to 100 %"),
-        ("reach = 0 %", "try a share above 0 % and up to 100 %"),
-        ("least confidence = high", "try a share from 0 % to 100 %"),
+        ("reach = 0.1", "try more than 0 to 100 %"),
+        ("reach = 0 %", "try more than 0 to 100 %"),
+        ("least confidence = high", "try 0 to 100 %"),
         ("hide = table", "try 'nothing' or such as '20 % wide at 50 % 40 %'"),
         ("hide = 20 % wide at 50 % 140 %", "try 'nothing' or such as '20 % wide at 50 % 40 %'"),
     ],
@@ -80,15 +80,15 @@ def test_a_bad_setting_is_one_sentence(tmp_path, setting, sentence):
 
 
 def look_at(title):
-    (stop,) = (stop for stop in depth_lesson().stops if stop.title == title)
+    (stop,) = (stop for stop in read_lesson(SHIPPED, SETTINGS, DepthLook()).stops if stop.title == title)
     return stop.look
 
 
 def test_the_stops_show_what_their_text_speaks_of():
-    assert (look_at("What the sensor saw").left, look_at("What the sensor saw").right) == (PHOTO, SENSOR)
-    assert look_at("What the network says").right == INFERRED
+    assert (look_at("What the sensor saw").left, look_at("What the sensor saw").right) == ("photo", "sensor")
+    assert look_at("What the network says").right == "inferred"
     assert look_at("What the network says").alignment == "none"
-    assert look_at("A line and a correction").right == DIFFERENCE
+    assert look_at("A line and a correction").right == "difference"
     assert look_at("How far to believe it").coloring == "confidence"
     assert look_at("Points that fly").reach < DepthConfig().reach
     assert look_at("Hide what you know").hide is not None

@@ -5,11 +5,19 @@ import re
 import numpy as np
 import pytest
 
-from app.screens.fuse.capture_plot import CELLS, capture_html, capture_sentence
+from app.screens.fuse.capture_plot import capture_html, capture_sentence, cell_name
 from app.screens.fuse.draw import gizmo_pose, start_of
 from app.screens.fuse.histogram import kernel, weights
 from app.screens.fuse.numbers import race_table, verdict
-from app.screens.fuse.view import CaptureView, PairHistogram, RaceLane, RaceStep, Start
+from app.screens.fuse.view import (
+    CAPTURE_SHIFTS_M,
+    CAPTURE_TURNS_DEG,
+    CaptureView,
+    PairHistogram,
+    RaceLane,
+    RaceStep,
+    Start,
+)
 
 NOTHING = np.empty((0, 3), np.float32)
 EDGES_M = np.linspace(0.0, 0.3, 31)
@@ -84,7 +92,9 @@ def test_the_map_names_every_cell_and_marks_what_arrives():
     errors_m[1, :2] = 0.001
     view = CaptureView(("ICP point", "CEICP-A plane"), errors_m)
     html = capture_html(view, 1)
-    assert re.findall('data-cell="([^"]+)"', html) == list(CELLS)
+    assert re.findall('data-cell="([^"]+)"', html) == [
+        cell_name(turn_deg, shift_m) for turn_deg in CAPTURE_TURNS_DEG for shift_m in CAPTURE_SHIFTS_M
+    ]
     assert html.count("✓ 0.1") == 10
     assert html.count("✗ 30") == 15
     assert "ICP point 0, CEICP-A plane 10" in capture_sentence(view)

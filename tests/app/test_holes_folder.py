@@ -10,11 +10,12 @@ import viser
 
 from app.records import MeshView
 from app.screens.surface.draw_holes import picked_hole, tape
-from app.screens.surface.holes import NONE, HolesFolder, filled_sentence, hole_name, parts_sentence
+from app.screens.surface.holes import FILL_OFF, NONE, HolesFolder, filled_sentence, hole_name, parts_sentence
 from app.screens.surface.view import ExplainView, FilledView, HoleView, PartsView
 from pipeline.geometry import rotation_exp
 from pipeline.surface import boundary_loops
 from pipeline.types import SurfaceQuality
+from tests.app.fakes import ui_of
 
 EYE = np.zeros(3)
 AHEAD = np.array([0.0, 0.0, 1.0])
@@ -144,29 +145,24 @@ def server():
     server.stop()
 
 
+FILL = "Fill small holes up to (cm)"
+
+
 class Screen:
-    """The folder with what it asked for and what a person can do to it."""
+    """The folder with what it asked for."""
 
     def __init__(self, server):
-        self.asked, self.requested, self.actions = [], [], {}
+        self.asked, self.requested = [], []
+        ui = ui_of(server.scene)
+        self.gui = ui.gui
         self.folder = HolesFolder(
-            server.gui,
-            server.scene,
-            lambda function, *arguments: function(*arguments),
-            lambda handle, action: self.actions.__setitem__(handle.label, (handle, action)),
-            lambda which, index: self.asked.append((which, index)),
-            self.requested.append,
+            ui, lambda which, index: self.asked.append((which, index)), self.requested.append
         )
-        self.list = self.actions["Hole"][0]
-
-    def change(self, label, value):
-        handle, action = self.actions[label]
-        handle.value = value
-        action()
+        self.list = self.gui.find("Hole")
 
     @property
     def why(self):
-        return self.folder._why.content
+        return self.gui.text()
 
 
 @pytest.fixture
@@ -181,18 +177,18 @@ def test_the_list_names_holes_then_rims_and_choosing_asks(screen):
     assert screen.list.options[1] == "1: 120 cm around, 900.0 cm²"
     assert screen.list.options[3] == "3: rim, 1,200 cm long"
     assert screen.asked == []
-    screen.change("Hole", screen.list.options[2])
+    screen.gui.set("Hole", screen.list.options[2])
     assert screen.asked == [("after", 1)]
     screen.folder.tell(ANSWER)
-    assert screen.why == "**Gap.** The ball fell.\n\n**What to try:** Take a larger one."
-    assert all(share in screen.folder._shares.content for share in ("75 %", "15 %", "10 %"))
-    screen.change("Hole", NONE)
+    assert all(part in screen.why for part in ("Gap", ANSWER.sentence, ANSWER.remedy))
+    assert all(share in screen.why for share in ("75 %", "15 %", "10 %"))
+    screen.gui.set("Hole", NONE)
     assert "2 holes and 1 rim after fusion" in screen.why
-    assert screen.folder._shares.content == ""
+    assert "share of pixels" not in screen.why
 
 
 def test_an_answer_about_another_hole_is_not_shown(screen):
-    screen.change("Hole", screen.list.options[1])
+    screen.gui.set("Hole", screen.list.options[1])
     asking = screen.why
     screen.folder.tell(ANSWER)
     assert screen.why == asking
@@ -201,20 +197,20 @@ def test_an_answer_about_another_hole_is_not_shown(screen):
 
 
 def test_without_cameras_that_look_there_is_no_table(screen):
-    screen.change("Hole", screen.list.options[2])
+    screen.gui.set("Hole", screen.list.options[2])
     unseen = float("nan")
     screen.folder.tell(replace(ANSWER, sensor_share=unseen, inferred_share=unseen, unknown_share=unseen))
-    assert screen.folder._shares.content == ""
+    assert "share of pixels" not in screen.why
 
 
 def test_previous_and_next_go_round(screen):
-    for by in (1, 1, 1, 1, -1, -1):
-        screen.folder._step(by)
+    for button in ("Next", "Next", "Next", "Next", "Previous", "Previous"):
+        screen.gui.press("Go to", button)
     assert [index for _, index in screen.asked] == [0, 1, 2, 0, 2, 1]
 
 
 def test_previous_without_a_choice_is_the_last(screen):
-    screen.folder._step(-1)
+    screen.gui.press("Go to", "Previous")
     assert screen.asked == [("after", 2)]
 
 
@@ -239,15 +235,15 @@ def test_a_small_hole_that_is_not_listed_can_be_clicked(screen):
 
 
 def test_the_same_surface_keeps_its_hole_and_its_filling_and_another_does_not(screen, server):
-    screen.change("Hole", screen.list.options[2])
-    screen.change("Fill small holes up to (cm)", 40.0)
+    screen.gui.set("Hole", screen.list.options[2])
+    screen.gui.set(FILL, 40.0)
     again = tuple(replace(hole) for hole in HOLES)
     screen.folder.load({"after": again, "before": HOLES}, "after")
     assert screen.list.value.startswith("2: ")
-    assert screen.actions["Fill small holes up to (cm)"][0].value == 40.0
+    assert screen.gui.find(FILL).value == 40.0
     screen.folder.load({"after": HOLES[1:]}, "after")
     assert screen.list.value == NONE
-    assert screen.actions["Fill small holes up to (cm)"][0].value == 0.0
+    assert screen.gui.find(FILL).value == 0.0
     assert server.scene.get_handle_by_name("/surface/hole/loop") is None
     assert screen.asked == [("after", 1)]
 
@@ -262,26 +258,25 @@ def test_side_by_side_invites_a_click_and_forgetting_empties(screen):
     screen.folder.load({"after": HOLES, "before": HOLES[1:]}, "after")
     assert screen.list.value == NONE
     screen.folder.forget()
-    assert screen.why == ""
+    assert "after fusion" not in screen.why
     assert not screen.folder.picked(EYE, AHEAD, "after", EYE)
 
 
 def test_the_slider_asks_for_metres_and_nothing_at_zero(screen):
-    screen.change("Fill small holes up to (cm)", 25.0)
-    screen.change("Fill small holes up to (cm)", 0.0)
+    screen.gui.set(FILL, 25.0)
+    screen.gui.set(FILL, 0.0)
     assert screen.requested == [0.25, None]
 
 
 def test_an_answer_that_comes_after_filling_was_turned_off_is_not_told(screen):
-    line = screen.folder._filled
-    screen.change("Fill small holes up to (cm)", 25.0)
+    screen.gui.set(FILL, 25.0)
     screen.folder.filled(FILLED)
-    assert line.content == filled_sentence(FILLED)
+    assert filled_sentence(FILLED) in screen.why
     screen.folder.filled(None)
-    assert "Drag the slider again" in line.content
-    screen.change("Fill small holes up to (cm)", 0.0)
+    assert "Drag the slider again" in screen.why
+    screen.gui.set(FILL, 0.0)
     screen.folder.filled(FILLED)
-    assert line.content.startswith("Filling is off.")
+    assert FILL_OFF in screen.why
 
 
 def test_sentences_carry_the_numbers(screen):
@@ -297,6 +292,6 @@ def test_sentences_carry_the_numbers(screen):
 
 def test_the_folder_needs_nothing_heavy():
     heavy = "{'trimesh', 'open3d', 'numba', 'pipeline.surface'}"
-    script = f"import sys, app.screens.surface.holes; print({heavy} & set(sys.modules))"
+    script = f"import sys, app.screens.surface.panel; print({heavy} & set(sys.modules))"
     text = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert text.stdout.strip() == "set()"

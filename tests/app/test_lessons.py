@@ -1,25 +1,24 @@
 """Lesson files, the one about the race that ships and bad ones, and the folder that shows them."""
 
 import pytest
-import viser
-from app.lesson_folder import BEGIN, LessonFolder
 
+from app.lesson import BEGIN, OFF, LessonFolder, read_lesson
 from app.screens.fuse.labels import STARTS
-from app.screens.fuse.lesson import race_lesson
+from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.view import Race, Start
 from packetmesh.errors import InputError
+from tests.app.fakes import ui_of
 
 
 def lesson(tmp_path, text):
     path = tmp_path / "lesson.md"
     path.write_text(text)
-    return race_lesson(path)
+    return read_lesson(path, SETTINGS, RaceLook())
 
 
-def test_the_lesson_that_ships_has_ten_stops_with_different_titles_and_text():
-    shipped = race_lesson()
-    assert shipped.title == "ICP against CEICP"
-    assert len(shipped.stops) == len({stop.title for stop in shipped.stops}) == 10
+def test_the_stops_of_the_lesson_that_ships_have_different_titles_and_text():
+    shipped = read_lesson(SHIPPED, SETTINGS, RaceLook())
+    assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) > 1
     assert all("set:" not in stop.text and len(stop.text) > 100 for stop in shipped.stops)
     assert {stop.look.race.mode for stop in shipped.stops} == {"nodes", "inferred"}
     assert any(stop.look.in_ms for stop in shipped.stops)
@@ -75,35 +74,24 @@ def test_a_missing_or_binary_lesson_is_one_sentence(tmp_path):
     (tmp_path / "binary.md").write_bytes(b"\xff\xfe\x00")
     for name in ("none.md", "binary.md"):
         with pytest.raises(InputError, match=f"{name} cannot be read"):
-            race_lesson(tmp_path / name)
+            read_lesson(tmp_path / name, SETTINGS, RaceLook())
 
 
 def test_the_folder_begins_with_how_to_begin_and_goes_from_stop_to_stop():
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    shown = []
-    by_hand = []
-    folder = LessonFolder(
-        server.gui,
-        race_lesson(),
-        lambda function, *arguments: function(*arguments),
-        lambda _, action: by_hand.append(action),
-        shown.append,
-    )
-    stops = race_lesson().stops
-    assert folder._text.content == BEGIN
-    folder._go(-1)
+    ui, shown, shipped = ui_of(), [], read_lesson(SHIPPED, SETTINGS, RaceLook())
+    LessonFolder(ui, shipped, shown.append)
+    stops, gui = shipped.stops, ui.gui
+    assert gui.text() == BEGIN
+    gui.press("Go", "Back")
     assert shown == []
     for _ in range(len(stops) + 2):
-        folder._go(1)
+        gui.press("Go", "Next")
     assert shown == [stop.look for stop in stops]
-    folder._go(-1)
+    gui.press("Go", "Back")
     assert shown[-1] == stops[-2].look
-    assert folder._text.content == f"**{stops[-2].title}** (9 of 10)\n\n{stops[-2].text}"
-    (picked,) = by_hand
-    folder._stop.value = folder._stop.options[1]
-    picked()
+    assert stops[-2].title in gui.text()
+    assert stops[-2].text in gui.text()
+    gui.set("Stop", gui.find("Stop").options[1])
     assert shown[-1] == stops[0].look
-    folder._stop.value = folder._stop.options[0]
-    picked()
-    assert folder._text.content == BEGIN
-    server.stop()
+    gui.set("Stop", OFF)
+    assert gui.text() == BEGIN

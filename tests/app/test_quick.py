@@ -1,5 +1,6 @@
 """Quick looks: one at a time, always the newest, none faster than the browser answers."""
 
+import html
 import time
 from types import SimpleNamespace
 
@@ -10,30 +11,27 @@ from app.screens.surface import quick
 from app.screens.surface.detail import FEWEST_POINTS, LOOKS, SLOW_S, Detail
 from app.screens.surface.quick import QuickLook
 from app.screens.surface.view import QUICK_POINTS, PaintedView, PaintRequest
+from tests.app.fakes import ui_of
 
 
 class Browser:
     """Stands for session and browser: keeps what is asked of both, and answers when asked to."""
 
     def __init__(self):
-        self.jobs, self.presses, self.questions = [], [], SimpleNamespace(content="")
+        self.ui, self.jobs = ui_of(), []
         self.store = self.spec = None
         self.results = SimpleNamespace(fresh=lambda step, spec: True)
-
-    def post(self, function, *arguments):
-        function(*arguments)
 
     def quick_job(self, job, store, spec, request, on_end):
         self.jobs.append((request, on_end))
 
-    def add_html(self, _):
-        return self.questions
-
-    def add_command(self, _, hotkey, modifier):
-        return SimpleNamespace(on_trigger=self.presses.append)
+    @property
+    def script(self):
+        """What the browser was asked to run last."""
+        return html.unescape(self.ui.gui.handles[0].content)
 
     def answer(self):
-        self.presses[0](None)
+        self.ui.gui.press("Say that all is drawn")
 
     def finish(self):
         request, on_end = self.jobs[-1]
@@ -53,9 +51,9 @@ def scene(monkeypatch):
         seen.append(view.request.radius_m)
         look.sent()
 
-    look = QuickLook(browser, browser, draw, lambda: seen.append("drawn"), lambda: seen.append("rest"))
+    look = QuickLook(browser, draw, lambda: seen.append("drawn"), lambda: seen.append("rest"))
     yield browser, look, seen
-    look.close()
+    browser.ui.close()
 
 
 def test_while_one_rolls_the_newest_of_many_waits(scene):
@@ -112,7 +110,7 @@ def test_before_the_nodes_are_placed_nothing_is_rolled(scene):
     assert look.moving
 
 
-def test_a_delay_comes_once_after_the_last_restart_and_not_when_cancelled():
+def test_a_debounced_action_comes_once_after_the_last_restart_and_not_when_cancelled():
     came = []
     debounce = Debounce(0.15, lambda: came.append(time.monotonic()))
     for _ in range(3):
@@ -153,11 +151,13 @@ def test_the_detail_settles_whatever_the_speed(seconds_per_point):
     assert seen[-1] * seconds_per_point <= SLOW_S
 
 
-def test_what_is_asked_for_follows_the_browsers_answers(scene):
+def test_what_is_asked_for_follows_the_browsers_answers(scene, monkeypatch):
     browser, look, _ = scene
+    now_s = 0.0
+    monkeypatch.setattr(quick, "time", SimpleNamespace(monotonic=lambda: now_s))
     for _ in range(2 * LOOKS):
         look.want(request(0.01))
-        look._asked_s -= 0.5
+        now_s += 0.5
         browser.finish()
         browser.answer()
     for _ in range(LOOKS):
@@ -171,11 +171,11 @@ def test_what_is_asked_for_follows_the_browsers_answers(scene):
 def test_the_view_is_held_from_the_first_move_until_the_radius_rests(scene):
     browser, look, _ = scene
     look.want(request(0.01))
-    assert "packetmesh.hold()" in browser.questions.content
+    assert "packetmesh.hold()" in browser.script
     look.sent([4, 5])
-    assert "packetmesh.ask([4, 5], true)" in browser.questions.content
+    assert "packetmesh.ask([4, 5], true)" in browser.script
     look.want(request(0.02))
-    assert "packetmesh.ask([4, 5], true)" in browser.questions.content
-    look.close()
+    assert "packetmesh.ask([4, 5], true)" in browser.script
+    browser.ui.close()
     look.sent()
-    assert "packetmesh.ask([], false)" in browser.questions.content
+    assert "packetmesh.ask([], false)" in browser.script

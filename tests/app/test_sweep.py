@@ -2,20 +2,21 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
-import viser
 
-from app.screens.surface.advice import STOP, STOPPED, SWEEP, WAITING, AdviceFolder, suggestions_html
+from app.screens.surface.advice import NO_ADVICE, STOPPED, WAITING, AdviceFolder
 from app.screens.surface.spacing_plot import ADVISED, OF_THESIS, USED, spacing_figure
 from app.screens.surface.sweep_job import suggestions_of, sweep_job
 from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
 from app.screens.surface.view import SpacingView, SuggestionRow, SweepRow, SweepView
 from app.state import Spec
-from packetmesh.progress import Progress, drain
+from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig, SurfaceConfig
 from pipeline.sources import Demo
+from tests.app.fakes import ui_of
 
 SPEC = Spec(Demo("box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))
 NAN = float("nan")
@@ -28,8 +29,11 @@ ROWS = (
 def run(job):
     """All that a job says, and what it answers."""
     steps = []
-    view = drain(job, steps.append)
-    return steps, view
+    while True:
+        try:
+            steps.append(next(job))
+        except StopIteration as stop:
+            return steps, stop.value
 
 
 def row(radius_mm, no_hit, accuracy=NAN, triangles=100):
@@ -171,87 +175,77 @@ def test_the_histogram_tells_the_radii_of_the_thesis_the_advice_and_those_in_use
     assert len(spacing_figure(None).data) == 0
 
 
-@pytest.fixture(scope="module")
-def server():
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    yield server
-    server.stop()
+class Advice:
+    """The folder, and what it called."""
+
+    def __init__(self):
+        ui, self.calls = ui_of(), []
+        sweep, stop = (partial(self.calls.append, word) for word in ("sweep", "stop"))
+        self.gui, self.folder = ui.gui, AdviceFolder(ui, sweep, stop, self.calls.append)
+
+    @property
+    def curves(self):
+        """What is drawn of the sweep; None while nothing is."""
+        plots = self.gui.all("plotly")
+        return plots[0].figure.data if plots else None
 
 
 @pytest.fixture
-def folder(server):
-    """The folder, and what it called."""
-    calls = []
-    folder = AdviceFolder(
-        server.gui,
-        lambda function, *arguments: function(*arguments),
-        lambda handle, action: handle.on_update(lambda _: action()),
-        lambda key: calls.append(key),
-        lambda radius_m: calls.append(radius_m),
-    )
-    yield folder, calls
-    server.gui.reset()
+def advice():
+    return Advice()
 
 
-def press(handle, value):
-    """As a person does it; viser calls the handle's actions."""
-    handle.value = value
-
-
-def test_a_suggestion_is_taken_with_its_button(folder):
-    folder, calls = folder
-    assert not folder._take.visible
-    folder.suggest(ROWS)
-    assert folder._take.visible
-    assert tuple(folder._take.options) == ("finest", "even")
+def test_a_suggestion_is_taken_with_its_button(advice):
+    take = advice.gui.find("Take")
+    assert not take.seen
+    advice.folder.suggest(ROWS)
+    assert take.seen
+    assert take.options == ("finest", "even")
     for one in (ROWS[1], ROWS[0], ROWS[0]):
-        press(folder._take, one.name)
-    assert calls == [0.0312, 0.0246, 0.0246]
+        advice.gui.press("Take", one.name)
+    assert advice.calls == [0.0312, 0.0246, 0.0246]
     for part in ("finest", "24.6 mm", "49 %", "even", "31.2 mm", "88 %", ROWS[0].sentence):
-        assert part in folder._table.content
-    folder.forget()
-    press(folder._take, "even")
-    assert len(calls) == 3
-    assert not folder._take.visible
+        assert part in advice.gui.text()
+    advice.folder.forget()
+    advice.gui.press("Take", "even")
+    assert len(advice.calls) == 3
+    assert not take.seen
 
 
-def test_without_a_suggestion_the_folder_says_why(folder):
-    folder, _ = folder
-    folder.suggest(())
-    assert not folder._take.visible
-    assert "No point has neighbours on all sides" in folder._table.content
-    assert suggestions_html(()) == folder._table.content
+def test_without_a_suggestion_the_folder_says_why(advice):
+    advice.folder.suggest(())
+    assert not advice.gui.find("Take").seen
+    assert NO_ADVICE in advice.gui.text()
 
 
-def test_the_sweep_is_asked_for_followed_and_stopped(folder):
-    folder, calls = folder
-    view = swept(row(10, 0.6), row(28, 0.2, 0.93), row(60, 0.2, 0.88))
-    press(folder._keys, SWEEP)
-    assert folder._status.content == WAITING
-    folder.load(replace(view, points=view.points[:2]))
-    assert folder._status.content == "2 of 3 balls have rolled."
-    assert len(folder._plot.figure.data[0].x) == 2
-    folder.load(view)
-    assert folder._status.content == sweep_sentence(view)
-    assert len(folder._plot.figure.data[0].x) == 3
-    press(folder._keys, SWEEP)
-    assert not folder._plot.visible
-    folder.load(replace(view, points=view.points[:1]))
-    press(folder._keys, STOP)
-    folder.load(None)
-    assert folder._status.content == STOPPED
-    assert folder._plot.visible
-    assert calls == [SWEEP, SWEEP, STOP]
+def test_the_sweep_is_asked_for_followed_and_stopped(advice):
+    view, gui = swept(row(10, 0.6), row(28, 0.2, 0.93), row(60, 0.2, 0.88)), advice.gui
+    gui.press("All radii", "Sweep the radius")
+    assert WAITING in gui.text()
+    advice.folder.load(replace(view, points=view.points[:2]))
+    assert "2 of 3 balls have rolled." in gui.text()
+    assert len(advice.curves[0].x) == 2
+    advice.folder.load(view)
+    assert sweep_sentence(view) in gui.text()
+    assert len(advice.curves[0].x) == 3
+    gui.press("All radii", "Sweep the radius")
+    assert advice.curves is None
+    advice.folder.load(replace(view, points=view.points[:1]))
+    gui.press("All radii", "Stop the sweep")
+    advice.folder.load(None)
+    assert STOPPED in gui.text()
+    assert advice.curves is not None
+    assert advice.calls == ["sweep", "sweep", "stop"]
 
 
-def test_the_lower_plot_can_be_chosen(folder):
-    folder, _ = folder
-    folder.load(swept(row(10, 0.6), row(28, 0.2)))
-    np.testing.assert_allclose(folder._plot.figure.data[1].y, [100, 100])
-    folder._below.value = POINTS
-    np.testing.assert_allclose(folder._plot.figure.data[1].y, [10, 10])
-    np.testing.assert_allclose(folder._plot.figure.data[2].y, [0.2, 0.2])
-    folder.forget()
-    assert not folder._below.visible
-    folder.load(None)
-    assert folder._status.content == "Stopped."
+def test_the_lower_plot_can_be_chosen(advice):
+    advice.folder.load(swept(row(10, 0.6), row(28, 0.2)))
+    np.testing.assert_allclose(advice.curves[1].y, [100, 100])
+    advice.gui.set("Lower plot", POINTS)
+    np.testing.assert_allclose(advice.curves[1].y, [10, 10])
+    np.testing.assert_allclose(advice.curves[2].y, [0.2, 0.2])
+    advice.folder.forget()
+    assert advice.curves is None
+    assert not advice.gui.find("Lower plot").seen
+    advice.folder.load(None)
+    assert "Stopped." in advice.gui.text()

@@ -1,17 +1,15 @@
 """The walk of the ball on the Surface screen: the record, what is drawn of it, and its player."""
 
-import contextlib
 import pickle
 import threading
 import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import viser
 
 from app.screens.surface.draw_rolling import RollingDrawing, pieces
-from app.screens.surface.labels import BEFORE
+from app.screens.surface.labels import AFTER, BEFORE
 from app.screens.surface.rolling import CLOSE_UP, WHOLE, RollingFolder, status_line
 from app.screens.surface.walk_job import PATCH_POINTS, PLACES, walk_job, walk_over
 from app.screens.surface.walk_view import WalkRequest
@@ -22,6 +20,7 @@ from packetmesh.progress import drain as end
 from pipeline.sources import Demo
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import roll
+from tests.app.fakes import ui_of
 from tests.pipeline.surface.shapes import perforated_plane
 
 RADII_M = (0.016, 0.03)
@@ -95,7 +94,7 @@ def test_front_and_dead_edges_are_together_the_rims_of_the_mesh(name, request):
     assert max(fronts) > 10
 
 
-def test_the_job_remembers_its_walk_and_looks_where_it_is_told(tmp_path):
+def test_the_job_remembers_its_walk_and_looks_where_it_should(tmp_path):
     store = Store(str(tmp_path))
     view = end(walk_job(store, SPEC, WalkRequest("after", True, None)))
     assert view is end(walk_job(store, SPEC, WalkRequest("after", True, None)))
@@ -108,7 +107,7 @@ def test_the_job_remembers_its_walk_and_looks_where_it_is_told(tmp_path):
     assert len(pickle.dumps(sensor)) < 5_000_000
 
 
-def test_a_ball_that_falls_through_is_told(cloud):
+def test_a_ball_that_falls_through_is_one_sentence(cloud):
     with pytest.raises(ReconstructionError, match="try a larger radius"):
         end(walk_over(cloud, (0.001,), WalkRequest("after", False, None)))
 
@@ -118,11 +117,11 @@ def test_a_ball_that_falls_through_is_told(cloud):
 
 def drawn_triangles(server, below, view):
     """(F, 3, 3) corners of all triangles that are visible, in order."""
-    handles = server.scene._handle_from_node_name
+    node = server.scene.get_handle_by_name
     shown = [
         handle.vertices[handle.faces]
         for name in (*(f"piece{index}" for index in range(len(pieces(view)[0]))), "newest")
-        if (handle := handles[f"{below}/{name}"]).visible
+        if (handle := node(f"{below}/{name}")).visible
     ]
     return np.concatenate([np.empty((0, 3, 3)), *shown])
 
@@ -131,17 +130,17 @@ def drawn_triangles(server, below, view):
 def test_any_step_can_be_shown_after_any_other(server, name, request):
     view, below = request.getfixturevalue(name), f"/{name}"
     drawing = RollingDrawing(server.scene, below, view)
-    handles = server.scene._handle_from_node_name
+    node = server.scene.get_handle_by_name
     for done in [0, view.steps, 1, *np.random.default_rng(0).integers(0, view.steps + 1, 25).tolist(), 0]:
         drawing.show(done, 0)
         expected_m = view.points_m[view.triangles[: view.count(done)]]
         np.testing.assert_array_equal(drawn_triangles(server, below, view), expected_m)
         for lines, ends in zip(("front", "dead"), view.open_edges(done), strict=True):
-            handle = handles[f"{below}/{lines}"]
+            handle = node(f"{below}/{lines}")
             assert handle.visible == bool(len(ends))
             if len(ends):
                 np.testing.assert_array_equal(handle.points, view.points_m[ends])
-        ball = handles[f"{below}/ball"]
+        ball = node(f"{below}/ball")
         np.testing.assert_allclose(ball.position, view.places_m[max(done - 1, 0), -1])
         assert ball.radius == view.radii_m[view.step_radius[max(done - 1, 0)]]
 
@@ -150,11 +149,11 @@ def test_on_its_way_the_ball_shows_the_edge_it_turns_about(server, close_up):
     drawing = RollingDrawing(server.scene, "/way", close_up)
     step = close_up.happenings.index("join")
     drawing.show(step, 4)
-    handles = server.scene._handle_from_node_name
-    np.testing.assert_allclose(handles["/way/ball"].position, close_up.places_m[step, 3])
-    np.testing.assert_array_equal(handles["/way/pivot"].points[0], close_up.points_m[close_up.pivot(step)])
+    node = server.scene.get_handle_by_name
+    np.testing.assert_allclose(node("/way/ball").position, close_up.places_m[step, 3])
+    np.testing.assert_array_equal(node("/way/pivot").points[0], close_up.points_m[close_up.pivot(step)])
     drawing.show(step, 0)
-    assert not handles["/way/pivot"].visible
+    assert not node("/way/pivot").visible
 
 
 def test_pieces_are_about_a_hundred_and_of_one_ball_each(close_up, whole):
@@ -171,43 +170,21 @@ def test_pieces_are_about_a_hundred_and_of_one_ball_each(close_up, whole):
 
 
 class Room:
-    """A folder in a control panel nobody sees, with what happened to it."""
+    """A folder in a control panel nobody sees, with what it asked for and what is drawn of it."""
 
     def __init__(self, server):
-        self.requests = []
-        self.actions = {}
-        self.lock = threading.RLock()
-        self.scene = server.scene
-        before = set(server.gui._gui_input_handle_from_uuid)
-        self.folder = RollingFolder(
-            server.gui,
-            server.scene,
-            self.post,
-            lambda handle, action: self.actions.update({handle.label: action}),
-            contextlib.nullcontext,
-            self.requests.append,
-        )
-        inputs = server.gui._gui_input_handle_from_uuid
-        self.inputs = {handle.label: handle for key, handle in inputs.items() if key not in before}
+        self.requests, self.lock = [], threading.RLock()
+        self.ui = ui_of(server.scene, self.post)
+        self.gui, self.folder = self.ui.gui, RollingFolder(self.ui, self.requests.append)
 
     def post(self, function, *arguments):
         """One thing after the other, as on a session's thread."""
         with self.lock:
             function(*arguments)
 
-    def press(self, label, value):
-        """As a click on a button of a group."""
-        for callback in self.inputs[label]._impl.update_cb:
-            callback(SimpleNamespace(target=SimpleNamespace(value=value)))
-
-    def set(self, label, value):
-        """As a change by a person."""
-        self.inputs[label].value = value
-        self.post(self.actions[label])
-
     @property
     def drawn(self):
-        return [name for name in self.scene._handle_from_node_name if name.startswith("/surface/rolling/")]
+        return self.ui.scene.names("/surface/rolling")
 
 
 @pytest.fixture
@@ -215,48 +192,52 @@ def room(server):
     room = Room(server)
     yield room
     room.folder.forget()
-    room.folder.close()
+    room.ui.close()
 
 
 def test_requests_are_what_is_chosen_and_change_while_somebody_watches(room, close_up):
-    room.set("Cloud", BEFORE)
+    gui = room.gui
+    gui.set("Cloud", BEFORE)
     assert room.requests == []
-    room.press("Ball", "Roll")
-    room.set("Watch", WHOLE)
+    gui.press("Ball", "Roll")
+    gui.set("Watch", WHOLE)
     assert room.requests == [WalkRequest("before", True, None), WalkRequest("before", False, None)]
     room.folder.load(close_up)
     assert room.folder.showing
-    assert (room.inputs["Watch"].value, room.inputs["Cloud"].value) == (CLOSE_UP, "after fusion")
-    room.set("Cloud", BEFORE)
+    assert [gui.find(label).value for label in ("Watch", "Cloud")] == [CLOSE_UP, AFTER]
+    gui.set("Cloud", BEFORE)
     assert room.requests[-1] == WalkRequest("before", True, None)
-    room.press("Ball", "Close")
+    gui.press("Ball", "Close")
     assert room.requests[-1] is None
     assert not room.folder.showing
     assert room.drawn == []
-    room.set("Watch", WHOLE)
+    gui.set("Watch", WHOLE)
     assert room.requests[-1] is None
 
 
 def test_the_player_steps_scrubs_and_plays(room, close_up):
-    assert not room.inputs["Player"].visible
+    gui = room.gui
+    assert not gui.find("Player").seen
     room.folder.load(close_up)
-    assert room.inputs["Player"].visible
-    assert room.inputs["Step"].max == close_up.steps
-    room.press("Player", "Step")
-    room.press("Player", "Step")
-    assert room.inputs["Step"].value == 2
-    room.press("Player", "Step back")
-    assert room.inputs["Step"].value == 1
-    room.set("Step", 200)
-    assert room.folder._status.content == status_line(close_up, 200)
-    room.set("Speed (1/s)", 60.0)
-    room.press("Player", "Play")
+    gui.press("Player", "Pause")
+    gui.set("Step", 0)
+    assert gui.find("Player").seen
+    assert gui.find("Step").max == close_up.steps
+    gui.press("Player", "Step")
+    gui.press("Player", "Step")
+    assert gui.find("Step").value == 2
+    gui.press("Player", "Step back")
+    assert gui.find("Step").value == 1
+    gui.set("Step", 200)
+    assert status_line(close_up, 200) in gui.text()
+    gui.set("Speed (1/s)", 60.0)
+    gui.press("Player", "Play")
     time.sleep(0.5)
-    room.press("Player", "Pause")
-    played = room.inputs["Step"].value
+    gui.press("Player", "Pause")
+    played = gui.find("Step").value
     assert played > 205
     time.sleep(0.2)
-    assert room.inputs["Step"].value == played
+    assert gui.find("Step").value == played
 
 
 def test_a_close_up_has_a_focus_and_the_whole_has_none(room, close_up, whole):
@@ -267,9 +248,11 @@ def test_a_close_up_has_a_focus_and_the_whole_has_none(room, close_up, whole):
     away_m = stand_m - center_m
     assert np.linalg.norm(away_m) > close_up.reach_m
     assert away_m @ close_up.outward == pytest.approx(np.linalg.norm(away_m))
+    before = set(room.drawn)
     room.folder.load(whole)
     assert room.folder.focus is None
-    assert all("/walk2" in name for name in room.drawn)
+    assert room.drawn
+    assert not before & set(room.drawn)  # the browser remembers how a node of the same name was
     room.folder.load(None)
     assert not room.folder.showing
 

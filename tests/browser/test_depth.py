@@ -7,7 +7,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from app.screens.depth.labels import COLORINGS, CONFIDENCE, DIFFERENCE, EVERYWHERE, OURS, PEER_NAMES
+from app.screens.depth.labels import COLORINGS, EVERYWHERE, FILLS, PICTURES
 from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, press, slider, unfold
 
 BY_CONFIDENCE = next(name for name, coloring in COLORINGS.items() if coloring == "confidence")
@@ -55,10 +55,10 @@ def test_the_split_slider_and_the_lists_change_the_picture_and_its_captions(dept
     assert becomes_another(depth, begin)
     assert differing(canvas(depth), view) < ALIKE  # the arrows moved the slider, not the view
     whole = picture(depth)
-    pick(depth, "Left", DIFFERENCE)
+    pick(depth, "Left", PICTURES["difference"])
     depth.get_by_text("+30 cm").wait_for()
     assert becomes_another(depth, whole)
-    pick(depth, "Right", CONFIDENCE)
+    pick(depth, "Right", PICTURES["confidence"])
     depth.get_by_text("100 %", exact=True).first.wait_for()
 
 
@@ -93,7 +93,7 @@ def test_a_hidden_disc_is_filled_in_every_way(depth):
     unfold(depth, "Hide a region and see it filled")
     press(depth, "Hide and fill")
     depth.get_by_text(re.compile(r"[\d,]+ measured pixels of node_00 hidden")).wait_for()
-    for name in (OURS, *PEER_NAMES.values()):
+    for name in list(FILLS.values())[2:]:
         depth.get_by_role("row", name=name).wait_for()
 
 
@@ -137,7 +137,7 @@ def test_the_lesson_sets_the_controls(depth):
         if stop == 3:
             expect(visible(depth, "Alignment")).to_have_value("one scale")
         if stop == 5:
-            expect(visible(depth, "Right")).to_have_value(CONFIDENCE)
+            expect(visible(depth, "Right")).to_have_value(PICTURES["confidence"])
     unfold(depth, "Hide a region and see it filled")
     depth.get_by_text(re.compile(r"[\d,]+ measured pixels of node_00 hidden")).wait_for()
     depth.get_by_text("Up to date").wait_for()
