@@ -8,12 +8,13 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import viser
-from tests.app.answers import end
 
 from app import jobs
-from app.state import CHAIN, Results, Source, Spec
+from app.state import CHAIN, Results, Spec
 from app.ui import Ui
 from packetmesh.errors import PacketMeshError
+from packetmesh.progress import drain as end
+from pipeline.sources import Demo
 
 
 class Handle:
@@ -180,8 +181,10 @@ class Bench:
     def __init__(self, panel, ui, store, folder=None, steps=CHAIN):
         self.ui = ui
         self.store, self.folder, self.steps = store, folder, steps
-        self.spec = Spec(Source(scene="box-on-table"))
-        self.results, self.notices, self.refuse = Results(), [], False
+        self.spec = Spec(Demo("box-on-table"))
+        self.results, self.notices = Results(), []
+        self.refuse = ""
+        """Why nothing can be computed now."""
         camera = SimpleNamespace(aspect=1.5, fov=0.9, position=None, look_at=None)
         self.client = SimpleNamespace(camera=camera, atomic=contextlib.nullcontext)
         self.panel = panel(self)
@@ -214,10 +217,14 @@ class Bench:
         self.advance()
 
     def advance(self):
-        for step in self.steps:
-            if not self.results.fresh(step, self.spec):
+        while (step := self.results.first_stale(self.spec, self.steps)) is not None:
+            key = self.spec.key(step)
+            if self.refuse:
+                self.results.fail(step, key, self.refuse)
+                self.panel.on_failure(step, self.refuse)
+            else:
                 view = end(jobs.run(step, self.store, self.spec))
-                self.results.put(step, self.spec.key(step), view)
+                self.results.put(step, key, view)
                 self.panel.on_view(step, view)
 
     def side_job(self, job, *arguments, on_end, on_partial=None):
@@ -229,7 +236,7 @@ class Bench:
             self.notices.append(str(error))
         on_end(view)
 
-    quick_job = apart_job = side_job
+    quick_job = side_job
 
     def cancel_side_job(self):
         """Nothing runs beside the test."""

@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import viser
 
 from app.screens.network.draw import ground_of
 from app.screens.network.labels import NETWORKS
-from app.screens.network.panel import CANCELLED, FAILED, ORIGIN, NetworkPanel
+from app.screens.network.panel import ORIGIN, NetworkPanel
 from app.screens.network.view import What
 from network_sim.config import PRESETS
 from packetmesh.errors import InputError
@@ -23,19 +24,20 @@ class Screen(Bench):
     """The screen; keeps the runs that it was answered, and does not wait for a hand to rest."""
 
     def __init__(self, scene, store):
-        self.views, self.cancel = (), False
-        super().__init__(NetworkPanel, ui_of(scene, kind=Impatient), store, steps=())
+        super().__init__(NetworkPanel, ui_of(scene, kind=Impatient), store, steps=("network",))
         self.use("nodes.image_bytes=3000")
         self.panel.on_show()
 
-    def apart_job(self, job, *arguments, on_end):
-        def keep(views):
-            self.views = views or ()
-            if self.cancel:
-                self.panel.on_action("Cancel")
-            on_end(views)
+    @property
+    def views(self):
+        """The runs that are there, if they are those that are asked for."""
+        there = self.results.fresh("network", self.spec)
+        return self.results.view("network") if there else ()
 
-        super().apart_job(job, *arguments, on_end=keep)
+    def retry(self):
+        """Press *Retry*."""
+        self.results.retry_failed()
+        self.advance()
 
     def use(self, text):
         """Write free settings and have them simulated."""
@@ -151,7 +153,7 @@ def test_a_second_run_gets_a_column_rows_and_a_place_beside(screen):
     gui.set("Beside", "a link of its own for each")
     one, two = screen.views
     assert (one.config.mac.kind, two.config.mac.kind) == ("ieee802154", "ideal")
-    assert f">{two.label}</th>" in gui.text()
+    assert ">a link of its own for each</th>" in gui.text()
     assert len(screen.pages) == 2
     west, east = (screen.handle(f"{index}/sink").points[0][0] for index in (0, 1))
     assert east - west > ground_of(screen.views).width
@@ -175,30 +177,25 @@ def test_a_wrong_key_names_the_nearest_and_keeps_what_was(screen):
     assert screen.panel.command == before
 
 
-def test_failed_runs_are_sentences_and_retry_runs_again(screen):
-    screen.refuse = True
-    screen.gui.set("Seed", 7)
-    assert FAILED in screen.gui.text()
+@pytest.mark.parametrize("seed", [7, 8])
+@pytest.mark.parametrize("sentence", ["There is no memory left.", "Cancelled."])
+def test_a_failed_or_cancelled_run_says_why_and_retry_runs_it(screen, seed, sentence):
+    screen.refuse = sentence
+    screen.gui.set("Seed", seed)
+    assert sentence in screen.gui.text()
     assert screen.ui.scene.names("/network/runs") == []
-    screen.refuse = False
-    screen.panel.on_action("Retry")
-    assert screen.views[0].config.run.seed == 7
-
-
-def test_a_cancelled_run_says_so(screen):
-    screen.refuse = screen.cancel = True
-    screen.gui.set("Seed", 8)
-    assert CANCELLED in screen.gui.text()
-    screen.refuse = screen.cancel = False
-    screen.panel.on_action("Retry")
-    assert screen.views[0].config.run.seed == 8
+    screen.refuse = ""
+    screen.retry()
+    assert screen.views[0].config.run.seed == seed
+    assert "simulated in" in screen.gui.text()
+    screen.gui.set("Seed", 0)
 
 
 def test_vehicles_move_and_the_origin_of_the_schemes_is_named(screen):
-    gui, screen.refuse = screen.gui, True
+    gui, screen.refuse = screen.gui, "not yet"
     gui.set("Preset", NETWORKS["street-grid"].title)
     gui.set("Vehicles", 5)
-    screen.refuse = False
+    screen.refuse = ""
     screen.use("run.horizon_s=660")
     assert ORIGIN in gui.text()
     assert gui.find("Scheme").seen
@@ -209,5 +206,5 @@ def test_vehicles_move_and_the_origin_of_the_schemes_is_named(screen):
     moved = np.linalg.norm(screen.handle("0/vehicle").points - start, axis=1)
     assert moved.max() <= 1.001 * 100.0 * ground_of(screen.views).scale
     assert moved.min() > 0.0
-    screen.panel.on_action("Reset")
+    screen.want(replace(screen.spec, networks=()))  # as *Reset* does
     assert gui.find("Preset").value == NETWORKS["thesis-link"].title

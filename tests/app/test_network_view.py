@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from app.screens.network.curves import polyline
+from app.drawing.curves import polyline
 
 from app.screens.network.draw import Flights, ground_of
 from app.screens.network.gantt import WIDTH_PX, Window, areas, cursor_html, gantt_html, paint, row_px, visible

@@ -109,9 +109,12 @@ class NetworkPanel(Panel):
         runs = self._setup.runs()
         self._labels, session = tuple(runs), self.session
         asked = replace(session.spec, networks=tuple(runs.values()))
-        if not session.results.fresh("network", asked):
+        there = session.results.fresh("network", asked)
+        if not there:
             self._status.content = RUNNING
         session.want(asked)
+        if there:
+            self.on_view("network", session.results.view("network"))
 
     def _take(self, views: tuple[NetworkView, ...]) -> None:
         self._views = views
