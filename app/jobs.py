@@ -20,7 +20,7 @@ JOBS = {
     "baseline": "app.screens.surface.baselines_job:baseline_job",
     "race": "app.screens.fuse.race_job:race_job",
     "capture": "app.screens.fuse.capture_job:capture_job",
-    "simulate": "app.screens.network.job:simulate_job",
+    "network": "app.screens.network.job:network_job",
     "export": "app.screens.export.job:export_job",
 }
 

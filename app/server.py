@@ -20,6 +20,7 @@ import viser
 
 from app.drawing.colors import BRAND
 from app.jobs import warm_up
+from app.origin import only_own_page
 from app.pool import ComputePool
 from app.screens.depth.panel import DepthPanel
 from app.screens.export.panel import ExportPanel
@@ -90,7 +91,7 @@ def build_server(
     spec = start_spec(scene, config or PipelineConfig())
     folder = Path(tempfile.mkdtemp(prefix="packetmesh-"))
     pool = ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
-    with contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.redirect_stdout(io.StringIO()), only_own_page():
         server = viser.ViserServer(host=host, port=port, label="PacketMesh", verbose=False)
     app = AppServer(server, pool, folder)
     if port and server.get_port() != port:

@@ -8,7 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -19,7 +19,7 @@ from app.drawing.cameras import look, stage_of
 from app.drawing.colors import BRAND, DELIVERED
 from app.page import add_script
 from app.pool import ComputePool, LatestWins, Outcome
-from app.state import CHAIN, Results, SharedViews, Spec, Step
+from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
 from app.stepper import Stepper
 from app.store import Store
 from app.tables import command_html
@@ -32,6 +32,19 @@ logger = logging.getLogger(__name__)
 
 Target: TypeAlias = viser.ClientHandle | viser.ViserServer
 """Where a session lives: one browser, or the server for a session that all browsers share."""
+
+CANCELLED = "Cancelled."
+
+
+@dataclass(slots=True, eq=False)
+class _Track:
+    """Steps that are computed one after the other, beside those of other tracks."""
+
+    lane: LatestWins
+    steps: tuple[Step, ...]
+    running: Step | None = None
+    submitted: tuple[Any, ...] | None = None
+    """The key of what is running."""
 
 
 class Session:
@@ -59,12 +72,12 @@ class Session:
         self._start = spec
         self.results = Results()
         self.folder = Path(tempfile.mkdtemp(prefix="upload-", dir=store.folder))
-        self._chain = LatestWins(pool, self)
+        self._tracks = (
+            _Track(LatestWins(pool, self), CHAIN),
+            _Track(LatestWins(pool, object()), ("network",)),
+        )
         self._side = LatestWins(pool, self)
         self._quick = LatestWins(pool, object())
-        self._apart = LatestWins(pool, object())
-        self._running: Step | None = None
-        self._submitted: tuple[Any, ...] | None = None
         self._wide = False
         self._shape = 0.0
         self._closed = False
@@ -82,11 +95,16 @@ class Session:
                 self._thread.submit(self._guarded, function, *arguments)
 
     def close(self) -> None:
-        """Stop computing and forget everything; the browser is gone."""
+        """Have the session end on its own thread, whoever calls; what was posted to it before is dropped."""
         self._closed = True
+        with contextlib.suppress(RuntimeError):
+            self._thread.submit(self._end)
+        self._thread.shutdown(wait=False)
+
+    def _end(self) -> None:
+        """Stop computing and delete what was uploaded; the browser is gone."""
         self._cancel()
         self.ui.close()
-        self._thread.shutdown(wait=False, cancel_futures=True)
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def clients(self) -> Iterable[viser.ClientHandle]:
@@ -131,10 +149,6 @@ class Session:
         """Run a job of a fraction of a second, even beside one of the chain; of many, the latest."""
         self._run_beside(self._quick, job, arguments, on_end, lambda _: None)
 
-    def apart_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
-        """Run a job that needs nothing of the chain, and so beside it, in place of the one before."""
-        self._run_beside(self._apart, job, arguments, on_end, lambda _: None)
-
     def _run_beside(
         self,
         lane: LatestWins,
@@ -168,48 +182,56 @@ class Session:
         self._side.cancel()
 
     def _cancel(self) -> None:
-        for lane in (self._chain, self._side, self._apart):
+        for lane in (self._side, *(track.lane for track in self._tracks)):
             lane.cancel()
 
     def advance(self) -> None:
-        """Compute the first step that is out of date."""
-        while (step := self.results.first_stale(self.spec)) is not None:
+        """Compute the first step of each track that is out of date."""
+        for track in self._tracks:
+            self._advance(track)
+        self._show_status()
+
+    def _advance(self, track: _Track) -> None:
+        while (step := self.results.first_stale(self.spec, track.steps)) is not None:
             view = self._shared.get(self.spec.key(step))
             if view is None:
                 break
             self._take(step, self.spec.key(step), view)
         if step is None:
-            self._running = self._submitted = None
-            self._show_status()
+            track.running = track.submitted = None
             return
         key = self.spec.key(step)
-        if key == self._submitted:
+        if key == track.submitted:
             return
-        self._running, self._submitted = step, key
-        self._show_status()
-        self._chain.submit(
+        track.running, track.submitted = step, key
+        track.lane.submit(
             jobs.run,
             step,
             self.store,
             self.spec,
             on_progress=lambda value: self.post(self._progressed, step, value),
-            on_end=lambda outcome: self.post(self._ended, step, key, outcome),
+            on_end=lambda outcome: self.post(self._ended, track, step, key, outcome),
         )
 
-    def _ended(self, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
-        latest = key == self._submitted
+    def _ended(self, track: _Track, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
+        latest = key == track.submitted
         if latest:
-            self._running = self._submitted = None
+            track.running = track.submitted = None
         if outcome.kind == "result":
             self._shared.put(key, outcome.value)
             self._take(step, key, outcome.value)
-        elif outcome.kind == "error":
-            self.results.fail(step, key, outcome.value)
+        elif outcome.kind == "error" or latest:
+            sentence = CANCELLED if outcome.kind == "stopped" else outcome.value
+            self.results.fail(step, key, sentence)
             if latest:
-                self.notify(f"{step.capitalize()} failed", outcome.value)
-        elif latest:
-            self.results.fail(step, key, "Cancelled.")
+                self._fail(step, sentence)
         self.advance()
+
+    def _fail(self, step: Step, sentence: str) -> None:
+        if sentence != CANCELLED:
+            self.notify(f"{step.capitalize()} failed", sentence)
+        for panel in self._panels:
+            panel.on_failure(step, sentence)
 
     def _take(self, step: Step, key: tuple[Any, ...], view: Any) -> None:
         self.results.put(step, key, view)
@@ -303,23 +325,24 @@ class Session:
 
     def _show_status(self) -> None:
         """Bring the stepper and the status line up to date."""
+        running = [track.running for track in self._tracks if track.running is not None]
         statuses = {
-            panel.title: self.results.status(panel.step, self.spec, self._running)
+            panel.title: self.results.status(panel.step, self.spec, running)
             for panel in self._panels
             if panel.step is not None
         }
         self._stepper.show(self._current.title, statuses)
-        failures = [self.results.failure(step, self.spec) for step in CHAIN]
+        failures = [self.results.failure(step, self.spec) for step in STEPS]
         failure = next((sentence for sentence in failures if sentence), None)
-        if self._running is not None:
-            self._status.content = f"**Computing** · {self._running}"
+        if running:
+            self._status.content = f"**Computing** · {running[0]}"
         elif failure is not None:
             self._status.content = f"**Stopped** · {failure} Change a setting or press Retry."
             self._bar.value = 0.0
-        elif not self._side.busy and not self._apart.busy:
+        elif not self._side.busy:
             self._status.content = "**Up to date**"
             self._bar.value = 100.0
-        working = self._running is not None or self._side.busy or self._apart.busy
+        working = bool(running) or self._side.busy
         self._bar.color = BRAND if working else DELIVERED
 
     def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:

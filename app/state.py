@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from network_sim.config import NetworkConfig
 from pipeline import spec
 from pipeline.spec import StageName
 
-Step = Literal["scene", "depth", "fuse", "surface"]
+Step = Literal["scene", "depth", "fuse", "surface", "network"]
 CHAIN: tuple[Step, ...] = ("scene", "depth", "fuse", "surface")
-"""The steps that compute, each from the one before it."""
+"""The steps of the chain, each computed from the one before it."""
+STEPS: tuple[Step, ...] = (*CHAIN, "network")
+"""All steps that compute; the network needs nothing of the chain."""
 StepStatus = Literal["fresh", "stale", "running", "failed", "missing"]
 
 
-STAGE_OF: dict[Step, StageName] = {"scene": "rig", "depth": "nodes", "fuse": "placement", "surface": "after"}
+STAGE_OF: Mapping[Step, StageName] = {
+    "scene": "rig",
+    "depth": "nodes",
+    "fuse": "placement",
+    "surface": "after",
+}
 """The stage of the chain whose result each step shows."""
 
 
@@ -25,8 +33,13 @@ STAGE_OF: dict[Step, StageName] = {"scene": "rig", "depth": "nodes", "fuse": "pl
 class Spec(spec.Spec):
     """Everything that a session asks for."""
 
+    networks: tuple[NetworkConfig, ...] = ()
+    """Runs of the camera network, beside each other; none until somebody looks."""
+
     def key(self, step: Step) -> tuple[Hashable, ...]:
         """What a step's result depends on; equal keys mean equal results."""
+        if step == "network":
+            return (step, self.networks)
         return spec.key(self, STAGE_OF[step])
 
 
@@ -87,16 +100,18 @@ class Results:
         """Whether a step's result is what ``spec`` asks for."""
         return step in self._views and self._views[step][0] == spec.key(step)
 
-    def first_stale(self, spec: Spec) -> Step | None:
-        """The next step to compute; None if all is fresh or a step before it failed."""
-        for step in CHAIN:
+    def first_stale(self, spec: Spec, steps: Sequence[Step] = CHAIN) -> Step | None:
+        """The next of ``steps`` to compute; None if all are fresh, one failed, or nobody asks for it."""
+        for step in steps:
+            if step == "network" and not spec.networks:
+                return None
             if not self.fresh(step, spec):
                 return None if self.failure(step, spec) else step
         return None
 
-    def status(self, step: Step, spec: Spec, running: Step | None) -> StepStatus:
+    def status(self, step: Step, spec: Spec, running: Collection[Step] = ()) -> StepStatus:
         """What to mark a step with."""
-        if step == running:
+        if step in running:
             return "running"
         if self.fresh(step, spec):
             return "fresh"

@@ -121,9 +121,6 @@ class Workbench(Protocol):
     def quick_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
         """Run a job of a fraction of a second, even beside one of the chain; of many, the latest."""
 
-    def apart_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
-        """Run a job that needs nothing of the chain beside it, in place of the one before."""
-
     def cancel_side_job(self) -> None:
         """End the side job now."""
 
@@ -165,6 +162,9 @@ class Panel(ABC):
 
     def on_partial(self, view: Any) -> None:
         """This panel's step shows what it has so far."""
+
+    def on_failure(self, step: Step, sentence: str) -> None:
+        """A step, this or another, could not be computed, or was cancelled."""
 
     def on_show(self) -> None:
         """This became the current step."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 Step = TypeVar("Step")
@@ -49,3 +49,15 @@ def drain(
         except StopIteration as stop:
             return stop.value
         on_step(step)
+
+
+def part(
+    steps: Generator[Progress, None, Result], begin: float, end: float
+) -> Generator[Progress, None, Result]:
+    """The same computation as the part of a longer one that goes from ``begin`` to ``end`` of it."""
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        yield replace(step, fraction=begin + step.fraction * (end - begin))

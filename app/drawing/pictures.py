@@ -25,17 +25,18 @@ def depth_range_m(depth: DepthMap) -> tuple[float, float]:
     return float(nearest_m), float(max(farthest_m, nearest_m + 1e-3))
 
 
-def depth_picture(depth: DepthMap, range_m: tuple[float, float], what: str) -> Picture:
-    """Near is dark, far is bright, unknown is magenta."""
+def depth_picture(depth: DepthMap, range_m: tuple[float, float], what: str = "") -> Picture:
+    """Near is dark, far is bright, unknown is magenta; the caption begins with ``what``."""
     nearest_m, farthest_m = range_m
     level = np.clip((depth.z_m - nearest_m) / (farthest_m - nearest_m), 0.0, 1.0)
     rgb = _cividis((np.nan_to_num(level) * 255).astype(np.uint8))
     rgb[~depth.valid] = HOLE
     stops = _cividis(np.linspace(0, 255, BAR_STOPS).astype(np.uint8)[None])[0]
     labels = tuple(f"{value_m:.2f} m" for value_m in np.linspace(nearest_m, farthest_m, 3))
+    meaning = f"dark {nearest_m:.1f} m to bright {farthest_m:.1f} m, magenta where there is none"
     return Picture(
         rgb,
-        f"{what}: dark {nearest_m:.1f} m to bright {farthest_m:.1f} m, magenta where there is none",
+        f"{what}: {meaning}" if what else meaning,
         ColorBar(tuple((int(r), int(g), int(b)) for r, g, b in stops), labels),
     )
 

@@ -5,11 +5,11 @@ import re
 import numpy as np
 import pytest
 
-from app.records import CaptureView, PairHistogram, RaceLane, RaceStep, Start
 from app.screens.fuse.capture_plot import CELLS, capture_html, capture_sentence
 from app.screens.fuse.draw import gizmo_pose, start_of
 from app.screens.fuse.histogram import kernel, weights
 from app.screens.fuse.numbers import race_table, verdict
+from app.screens.fuse.view import CaptureView, PairHistogram, RaceLane, RaceStep, Start
 
 NOTHING = np.empty((0, 3), np.float32)
 EDGES_M = np.linspace(0.0, 0.3, 31)

@@ -11,7 +11,7 @@ import viser
 from app.records import MeshView
 from app.screens.surface.draw_holes import picked_hole, tape
 from app.screens.surface.holes import NONE, HolesFolder, filled_sentence, hole_name, parts_sentence
-from app.screens.surface.holes_view import ExplainView, FilledView, HoleView, PartsView
+from app.screens.surface.view import ExplainView, FilledView, HoleView, PartsView
 from pipeline.geometry import rotation_exp
 from pipeline.surface import boundary_loops
 from pipeline.types import SurfaceQuality

@@ -4,9 +4,9 @@ import pytest
 import viser
 from app.lesson_folder import BEGIN, LessonFolder
 
-from app.records import Race, Start
 from app.screens.fuse.labels import STARTS
 from app.screens.fuse.lesson import race_lesson
+from app.screens.fuse.view import Race, Start
 from packetmesh.errors import InputError
 
 

@@ -2,23 +2,27 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from app.screens.network.curves import polyline
+
 from app.screens.network.draw import Flights, ground_of
 from app.screens.network.gantt import WIDTH_PX, Window, areas, cursor_html, gantt_html, paint, row_px, visible
-from app.screens.network.job import simulate_job, view_of
+from app.screens.network.job import network_job, view_of
 from app.screens.network.labels import ACCESS, NETWORKS, SCHEMES, ways
 from app.screens.network.numbers import metric_tables, runs_summary, value_text
-from app.screens.network.view import MetricRow, NetworkRun, Series, What
+from app.screens.network.view import Series, What
+from app.state import Spec
 from network_sim.config import PRESETS, NetworkConfig, RunConfig
+from network_sim.metrics import Metric
 from network_sim.trace import Recorder
 from network_sim.types import Cause, EventKind, PacketKind
 from packetmesh.progress import Progress
 from packetmesh.progress import drain as end
 from packetmesh.settings import with_settings
+from pipeline.sources import Demo
 
 MS = 1_000_000
 NAMES, ROLES = ("node 1", "node 2", "sink"), ("node", "node", "sink")
@@ -45,7 +49,7 @@ def view():
     add(18 * MS, EventKind.DROP, 1, 2, packet=1, image=1, size_bytes=50, cause=Cause.CHANNEL)
     add(19 * MS, EventKind.DOWN, 1, cause=Cause.NODE_DOWN)
     config = NetworkConfig(run=RunConfig(horizon_s=0.02))
-    return view_of(recorder.trace(config, NAMES, PLACES_M, 20 * MS, ROLES), "by hand", 0.1)
+    return replace(view_of(recorder.trace(config, NAMES, PLACES_M, 20 * MS, ROLES), 0.1), label="by hand")
 
 
 def rows(view, what):
@@ -163,10 +167,10 @@ def test_numbers_have_units_and_definitions(view):
     assert "Packet delivery ratio" in first
     assert 'title="' in first
     assert "Attempts lost channel" in others
-    assert value_text(None) == "–"
-    assert value_text(MetricRow("packet_delay_mean", 0.00137, "s", "")) == "1.37 ms"
+    assert value_text("packet_delay_mean", None) == "–"
+    assert value_text("packet_delay_mean", Metric(0.00137, "s", "")) == "1.37 ms"
     assert "0.0 s of the network's time" in runs_summary([view])
-    assert all(metric.unit and metric.definition for metric in view.metrics)
+    assert all(metric.unit and metric.definition for metric in view.metrics.values())
 
 
 @pytest.mark.parametrize("preset", NETWORKS)
@@ -182,22 +186,21 @@ def test_every_preset_can_be_run_in_every_way_that_is_offered(preset):
 
 def test_two_runs_are_simulated_with_progress_and_remembered(store):
     config = with_settings(NetworkConfig(), ("nodes.image_bytes=2000", "run.horizon_s=60"))
-    runs = (NetworkRun("one", config), NetworkRun("other", with_settings(config, ("run.seed=1",))))
-    steps = list(simulate_job(store, runs))
+    spec = Spec(Demo("office"), networks=(config, with_settings(config, ("run.seed=1",))))
+    steps = list(network_job(store, spec))
     assert all(isinstance(progress, Progress) for progress in steps)
-    assert {progress.stage for progress in steps} == {"simulating one", "simulating other"}
     fractions = [progress.fraction for progress in steps]
     assert fractions == sorted(fractions)
-    one, other = end(simulate_job(store, runs))
-    assert (one.label, other.label) == ("one", "other")
+    assert fractions[-1] <= 1.0
+    one, other = end(network_job(store, spec))
     assert (one.config.run.seed, other.config.run.seed) == (0, 1)
-    assert list(simulate_job(store, runs[1:])) == []
+    assert list(network_job(store, replace(spec, networks=spec.networks[1:]))) == []
     assert {PacketKind(int(kind)) for kind in one.pieces.carries} == {PacketKind.IMAGE}
 
 
 def test_a_run_without_a_log_has_numbers_and_says_that_nothing_is_drawn(store):
     config = with_settings(NetworkConfig(), ("nodes.image_bytes=2000", "run.keep=counters"))
-    (view,) = end(simulate_job(store, (NetworkRun("counted", config),)))
+    (view,) = end(network_job(store, Spec(Demo("office"), networks=(config,))))
     assert len(view.pieces) == 0
     assert "no event was kept" in runs_summary([view])
     assert "Image delivery ratio" in metric_tables([view])[0]

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import pytest
 
 from app.debounce import Debounce
-from app.records import QUICK_POINTS, PaintedView, PaintRequest
 from app.screens.surface import quick
 from app.screens.surface.detail import FEWEST_POINTS, LOOKS, SLOW_S, Detail
 from app.screens.surface.quick import QuickLook
+from app.screens.surface.view import QUICK_POINTS, PaintedView, PaintRequest
 
 
 class Browser:

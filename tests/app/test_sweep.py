@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 import viser
 
-from app.records import SpacingView
 from app.screens.surface.advice import STOP, STOPPED, SWEEP, WAITING, AdviceFolder, suggestions_html
 from app.screens.surface.spacing_plot import ADVISED, OF_THESIS, USED, spacing_figure
 from app.screens.surface.sweep_job import suggestions_of, sweep_job
 from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
-from app.screens.surface.sweep_view import SuggestionRow, SweepRow, SweepView
+from app.screens.surface.view import SpacingView, SuggestionRow, SweepRow, SweepView
 from app.state import Spec
 from packetmesh.progress import Progress, drain
 from pipeline.config import PipelineConfig, SurfaceConfig

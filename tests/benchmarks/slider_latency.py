@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import sync_playwright
 
-from app.records import PaintedView
 from app.screens.surface.panel import SurfacePanel
+from app.screens.surface.view import PaintedView
 from app.server import build_server
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "browser"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,32 +21,32 @@ class CompareArea:
     """Two drop-downs, a split slider, the picture, and what its colours mean."""
 
     def __init__(
-        self,
-        ui: Ui,
-        names: Sequence[str],
-        left: str,
-        right: str,
-        visible: bool = True,
+        self, ui: Ui, labels: Mapping[Any, str], left: str, right: str, visible: bool = True
     ) -> None:
         """Add the area to the current container.
 
         Args:
             ui: where to add it.
-            names: of the pictures that can be chosen.
-            left: the name shown left of the line at first.
-            right: the name shown right of it.
+            labels: of the pictures that can be chosen, by their names.
+            left: name of the picture left of the line at first.
+            right: name of the one right of it.
             visible: whether it is there before the first pictures are.
         """
-        self._pictures: Mapping[str, Picture] = {}
+        self._labels = labels
+        self._names = {label: name for name, label in labels.items()}
+        self._pictures: Mapping[Any, Picture] = {}
         self._drawn: tuple[Any, ...] = ()
-        gui = ui.gui
-        self._left = gui.add_dropdown(
-            "Left", list(names), initial_value=left, hint="What is shown left of the line.", visible=visible
+        self._left, self._right = (
+            ui.gui.add_dropdown(
+                side,
+                list(self._names),
+                initial_value=labels[name],
+                hint=f"What is shown {side.lower()} of the line.",
+                visible=visible,
+            )
+            for side, name in (("Left", left), ("Right", right))
         )
-        self._right = gui.add_dropdown(
-            "Right", list(names), initial_value=right, hint="What is shown right of it.", visible=visible
-        )
-        self._split = gui.add_slider(
+        self._split = ui.gui.add_slider(
             "Split (%)",
             0.0,
             100.0,
@@ -55,27 +55,28 @@ class CompareArea:
             hint="Where the line is, in % of the picture's width; 0 shows only the right picture.",
             visible=visible,
         )
-        self._image = gui.add_image(EMPTY, format="jpeg", jpeg_quality=QUALITY, visible=visible)
-        self._captions = gui.add_html("", visible=visible)
+        self._image = ui.gui.add_image(EMPTY, format="jpeg", jpeg_quality=QUALITY, visible=visible)
+        self._captions = ui.gui.add_html("", visible=visible)
         for handle in (self._left, self._right, self._split):
             ui.when_changed(handle, self._draw)
 
-    def load(self, pictures: Mapping[str, Picture] | None) -> None:
-        """Show others, of one size and by the names that were promised; None shows nothing."""
+    def load(self, pictures: Mapping[Any, Picture] | None) -> None:
+        """Show others of one size, by their names; None shows nothing."""
         self._pictures, self._drawn = pictures or {}, ()
         for handle in (self._left, self._right, self._split, self._image, self._captions):
             handle.visible = pictures is not None
         if pictures is not None:
+            labels = tuple(self._labels[name] for name in pictures)
             for handle in (self._left, self._right):
-                if handle.options != tuple(pictures):
+                if handle.options != labels:
                     chosen = handle.value
-                    handle.options = tuple(pictures)
-                    handle.value = chosen if chosen in pictures else next(iter(pictures))
+                    handle.options = labels
+                    handle.value = chosen if chosen in labels else labels[0]
         self._draw()
 
     def set(self, left: str, right: str, split_share: float) -> None:
-        """Choose for the person."""
-        self._left.value, self._right.value = left, right
+        """Choose for the person, by name."""
+        self._left.value, self._right.value = self._labels[left], self._labels[right]
         self._split.value = round(100.0 * split_share)
         self._draw()
 
@@ -83,7 +84,7 @@ class CompareArea:
         """Only what has changed: a dragged slider asks more often than it moves."""
         if not self._pictures:
             return
-        left, right = self._pictures[self._left.value], self._pictures[self._right.value]
+        left, right = (self._pictures[self._names[handle.value]] for handle in (self._left, self._right))
         wanted = (id(left), id(right), float(self._split.value))
         if wanted == self._drawn:
             return

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import viser
 
 from app.screens.depth.brush import BrushDrawing, clicked_disc
 from app.screens.depth.compare import CompareArea
-from app.screens.depth.labels import BLANK, MEASURED, OURS, PEER_NAMES
+from app.screens.depth.labels import FILLS
 from app.screens.depth.view import Disc, HiddenView, HideRequest, SeenSample
 from app.tables import Row, number, table
 from app.ui import Ui
@@ -22,7 +23,6 @@ BUTTON = "Hide and fill"
 WAITING = "Filling …"
 SILENT = "No answer came. Press the button again."
 BESIDE = "No measured point there. Click a point of the node that is chosen above."
-NAMES = (MEASURED, BLANK, OURS, *PEER_NAMES.values())
 
 
 class HideFolder:
@@ -52,7 +52,7 @@ class HideFolder:
                 lambda _: ui.post(self._ask)
             )
             self._status = gui.add_markdown("")
-            self._area = CompareArea(ui, NAMES, BLANK, OURS, visible=False)
+            self._area = CompareArea(ui, FILLS, "hidden", "ours", visible=False)
             self._table = gui.add_html("")
 
     def _add_brush(self, ui: Ui) -> None:
@@ -116,7 +116,12 @@ class HideFolder:
             self._status.content = SILENT
             return
         self._status.content = f"**{view.hidden_px:,} measured pixels of {view.node} hidden.**"
-        self._area.load(view.pictures)
+        self._area.load(
+            {
+                name: replace(picture, caption=f"{FILLS[name].capitalize()}: {picture.caption}")
+                for name, picture in view.pictures.items()
+            }
+        )
         self._table.content = fills_table(view)
 
     def _add(self) -> None:
@@ -157,7 +162,7 @@ def fills_table(view: HiddenView) -> str:
     )
     rows = [
         Row(
-            row.name,
+            FILLS[row.name],
             hint,
             (
                 number(row.abs_rel, 3),

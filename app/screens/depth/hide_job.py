@@ -11,7 +11,6 @@ import numpy as np
 from app.drawing.pictures import depth_picture, depth_range_m
 from app.records import Picture
 from app.screens.depth.discs import covered, window_around
-from app.screens.depth.labels import BLANK, MEASURED, OURS, PEER_NAMES
 from app.screens.depth.view import Disc, FillRow, HiddenView, HideRequest
 from app.state import Spec
 from app.store import Store
@@ -43,12 +42,12 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
     hidden = hidden_pixels(frame.depth, request.discs)
     rest = DepthMap(np.where(hidden, np.float32(np.nan), frame.depth.z_m))
     ways: dict[str, Callable[[], DepthMap]] = {
-        OURS: partial(
+        "ours": partial(
             believed, node.network.depth, rest, frame.rgb, spec.config.depth, node.alignment.disparity
         ),
-        **{PEER_NAMES.get(name, name): partial(peer, rest, frame.rgb) for name, peer in PEERS.items()},
+        **{name: partial(peer, rest, frame.rgb) for name, peer in PEERS.items()},
     }
-    rows, maps = [], {MEASURED: frame.depth, BLANK: rest}
+    rows, maps = [], {"measured": frame.depth, "hidden": rest}
     for index, (name, fill) in enumerate(ways.items()):
         yield Progress(f"filling what is hidden: {name}", (index + 1) / (len(ways) + 1))
         started = time.perf_counter()
@@ -105,8 +104,7 @@ def _pictures(maps: dict[str, DepthMap], sensor: DepthMap, discs: Sequence[Disc]
     window = window_around(discs, columns, rows)
     range_m = depth_range_m(DepthMap(sensor.z_m[window]))
     return {
-        name: _enlarged(depth_picture(DepthMap(depth.z_m[window]), range_m, name.capitalize()))
-        for name, depth in maps.items()
+        name: _enlarged(depth_picture(DepthMap(depth.z_m[window]), range_m)) for name, depth in maps.items()
     }
 
 

@@ -14,17 +14,7 @@ from app.drawing.pictures import (
     depth_range_m,
     difference_picture,
 )
-from app.records import (
-    SCREEN_POINTS,
-    DepthNode,
-    DepthView,
-    JudgedView,
-    Picture,
-    ResidualView,
-    Sample,
-    sample,
-)
-from app.screens.depth.labels import CONFIDENCE, DIFFERENCE, INFERRED, PHOTO, SENSOR
+from app.records import SCREEN_POINTS, DepthNode, DepthView, JudgedView, Picture, ResidualView, Sample, sample
 from app.screens.depth.view import SeenSample
 from app.state import Spec
 from app.store import Store
@@ -79,11 +69,11 @@ def _depth_node(rig: Rig, index: int, clouds: NodeClouds) -> DepthNode:
 def _pictures(frame: RgbdFrame, clouds: NodeClouds, judged: JudgedDepth) -> dict[str, Picture]:
     range_m, aligned = depth_range_m(frame.depth), clouds.alignment.depth
     pictures = {
-        PHOTO: Picture(frame.rgb, f"Colour image of {frame.name}"),
-        SENSOR: depth_picture(frame.depth, range_m, "Sensor depth"),
-        INFERRED: depth_picture(aligned, range_m, "Inferred depth, made metric"),
-        DIFFERENCE: difference_picture(aligned, frame.depth),
-        CONFIDENCE: confidence_picture(judged.confidence, judged.flying, judged.out_of_reach),
+        "photo": Picture(frame.rgb, f"Colour image of {frame.name}"),
+        "sensor": depth_picture(frame.depth, range_m, "Sensor depth"),
+        "inferred": depth_picture(aligned, range_m, "Inferred depth, made metric"),
+        "difference": difference_picture(aligned, frame.depth),
+        "confidence": confidence_picture(judged.confidence, judged.flying, judged.out_of_reach),
     }
     every = -(-frame.rgb.shape[1] // PICTURE_WIDTH_PX)
     return {

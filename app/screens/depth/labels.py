@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
+from app.screens.depth.view import PictureName
 from pipeline.config import ModelKind, NetworkPreset, Normalisation
 
-PHOTO, SENSOR, INFERRED = "photo", "sensor depth", "inferred depth"
-DIFFERENCE, CONFIDENCE = "difference", "confidence"
-PICTURES = (PHOTO, SENSOR, INFERRED, DIFFERENCE, CONFIDENCE)
+PICTURES: dict[PictureName, str] = {
+    "photo": "photo",
+    "sensor": "sensor depth",
+    "inferred": "inferred depth",
+    "difference": "difference",
+    "confidence": "confidence",
+}
 """What stands left and right of the split."""
 PointColoring = Literal["source", "photo", "confidence"]
 COLORINGS: dict[str, PointColoring] = {
@@ -20,14 +25,16 @@ COLORINGS: dict[str, PointColoring] = {
 HOLES, EVERYWHERE, UNSEEN = "only in the holes", "everywhere", "hidden"
 DRAWN = (HOLES, EVERYWHERE, UNSEEN)
 """Which of the inferred points are drawn."""
-MEASURED, BLANK, OURS = "as measured", "hidden", "inferred and aligned"
-PEER_NAMES = {
+FILLS = {
+    "measured": "as measured",
+    "hidden": "hidden",
+    "ours": "inferred and aligned",
     "nearest": "nearest fill",
     "inpaint-telea": "OpenCV inpainting, Telea",
     "inpaint-ns": "OpenCV inpainting, Navier-Stokes",
     "joint-bilateral": "joint bilateral fill",
 }
-"""What the ways to fill without a network are called."""
+"""What was hidden, before, while and after it was filled in each way."""
 NETWORK_PRESETS: tuple[NetworkPreset, ...] = get_args(NetworkPreset)
 NETWORK_KINDS: tuple[ModelKind, ...] = get_args(ModelKind)
 NORMALISATIONS: tuple[Normalisation, ...] = get_args(Normalisation)

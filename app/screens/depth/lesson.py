@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 from app.lesson import LESSONS, NUMBER, Setting, choice, quantity, sets, short
-from app.screens.depth.labels import COLORINGS, DRAWN, HOLES, PHOTO, PICTURES, SENSOR, PointColoring
-from app.screens.depth.view import Disc, HideRequest
+from app.screens.depth.labels import COLORINGS, DRAWN, HOLES, PICTURES, PointColoring
+from app.screens.depth.view import Disc, HideRequest, PictureName
 from pipeline.config import AlignmentMode, DepthConfig
 
 SHIPPED = LESSONS / "can-a-picture-measure.md"
@@ -20,9 +20,8 @@ _MODES: dict[str, AlignmentMode] = {mode: mode for mode in get_args(AlignmentMod
 class DepthLook:
     """What a stop shows; by default what the screen shows at first."""
 
-    left: str = PHOTO
-    """This and ``right``: one of ``app.screens.depth.labels.PICTURES``."""
-    right: str = SENSOR
+    left: PictureName = "photo"
+    right: PictureName = "sensor"
     split_share: float = 0.5
     alignment: AlignmentMode = _DEFAULT.alignment
     coloring: PointColoring = "source"
@@ -45,8 +44,8 @@ def _hide(look: DepthLook, text: str) -> DepthLook:
 
 
 SETTINGS: dict[str, Setting[DepthLook]] = {
-    "left": sets("left", choice({name: name for name in PICTURES})),
-    "right": sets("right", choice({name: name for name in PICTURES})),
+    "left": sets("left", choice({label: name for name, label in PICTURES.items()})),
+    "right": sets("right", choice({label: name for name, label in PICTURES.items()})),
     "split": sets("split_share", quantity("%", 100.0, 100.0)),
     "alignment": sets("alignment", choice(_MODES)),
     "colours": sets("coloring", choice({short(name): coloring for name, coloring in COLORINGS.items()})),

@@ -12,7 +12,7 @@ from app.lesson import LessonFolder, read_lesson
 from app.records import DepthNode, DepthView, Sample, SceneView
 from app.screens.depth.compare import CompareArea
 from app.screens.depth.hide import HideFolder
-from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PHOTO, PICTURES, SENSOR
+from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PICTURES
 from app.screens.depth.lesson import SETTINGS, SHIPPED, DepthLook
 from app.screens.depth.model import ModelFolder
 from app.screens.depth.numbers import confidence_table, depth_table, residual_table
@@ -47,7 +47,7 @@ class DepthPanel(Panel):
         self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, DepthLook()), self._take_look)
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images and numbers are shown below.")
         self.ui.when_changed(self._node, self._picked_node)
-        self._area = CompareArea(self.ui, PICTURES, PHOTO, SENSOR)
+        self._area = CompareArea(self.ui, PICTURES, "photo", "sensor")
         self._controls = [self._fields(FIRST)]
         self._coloring = gui.add_dropdown(
             "Colours", list(COLORINGS), hint="What the colours of the points in the 3-D scene mean."

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from typing import Literal
 
 from app.records import Picture, Sample
 from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
 from pipeline.types import IntArray
+
+PictureName = Literal["photo", "sensor", "inferred", "difference", "confidence"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,7 @@ class FillRow:
     """How well one way filled what was hidden."""
 
     name: str
-    """One of ``app.screens.depth.labels.OURS`` and the names of the peers."""
+    """"ours" or one of ``pipeline.depth.fillers.PEERS``."""
     abs_rel: float
     """Mean of |filled - measured| / measured over the hidden pixels it filled; NaN if it filled none."""
     within_share: float
@@ -67,7 +70,7 @@ class HiddenView:
     """Measured pixels that were hidden."""
     rows: tuple[FillRow, ...]
     pictures: dict[str, Picture]
-    """``MEASURED``, ``BLANK`` and one by every row's name: the discs and what is around them."""
+    """By "measured", "hidden" and every row's name: the discs and what is around them."""
 
 
 @dataclass(frozen=True, slots=True)

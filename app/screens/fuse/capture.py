@@ -5,9 +5,9 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 
-from app.records import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, CaptureView
 from app.screens.fuse.capture_plot import capture_html, cell_name
 from app.screens.fuse.draw import MARKS
+from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, CaptureView
 from app.ui import Ui
 
 COMPUTE, STOP = "Compute the map", "Stop the map"

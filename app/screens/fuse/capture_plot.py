@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.records import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, SUCCESS_M, CaptureView
+from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, SUCCESS_M, CaptureView
 from app.tables import number
 
 REACHED, MISSED = "#bfe6d6", "#f3cdc8"

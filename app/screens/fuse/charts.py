@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.records import RaceView
+from app.drawing.curves import Curves
 from app.screens.fuse.clock import RaceClock
-from app.screens.fuse.curves import LANE_COLORS, Curves
 from app.screens.fuse.draw import MARKS
 from app.screens.fuse.histogram import HistogramChart
+from app.screens.fuse.view import RaceView
 from app.ui import Ui
 
 FIRST = f"{MARKS[0]} first"
+LANES = (("#5b6570", ()), ("#009e73", ()), ("#cc6699", (7, 3)), ("#7a4a00", (2, 3)))
+"""Colour and dashes of the first to the fourth method: grey, green, pink and brown."""
 
 
 class RaceCharts:
@@ -23,12 +25,12 @@ class RaceCharts:
         self._rows: tuple[int, ...] = ()
         tabs = gui.add_tab_group()
         with tabs.add_tab("Error"):
-            self._error = Curves(gui, "error, cm", 0.1)
+            self._error = Curves(gui, "error, cm", LANES, 0.1)
             self._unknown = gui.add_markdown("The truth of this scene is not known.", visible=False)
         with tabs.add_tab("RMSE"):
-            self._rmse = Curves(gui, "RMSE, cm", 0.1)
+            self._rmse = Curves(gui, "RMSE, cm", LANES, 0.1)
         with tabs.add_tab("Entropy"):
-            self._entropy = Curves(gui, "entropy, nat", 1.0)
+            self._entropy = Curves(gui, "entropy, nat", LANES, 1.0)
             self._without = gui.add_markdown("None of these methods has an entropy.", visible=False)
         with tabs.add_tab("Pairs"):
             self._lane = gui.add_dropdown("Lane", [FIRST], hint="Method whose pairs are counted.")
@@ -40,10 +42,12 @@ class RaceCharts:
         """Show another race, or the same by another clock."""
         self._view = view
         lanes = view.lanes
-        self._error.load(clock, [[_cm(step.point_error_m) for step in lane.steps] for lane in lanes])
-        self._rmse.load(clock, [[_cm(step.rmse_m) for step in lane.steps] for lane in lanes])
-        entropies = [[step.entropy_nat for step in lane.steps] for lane in lanes]
-        self._entropy.load(clock, entropies)
+        entropies = [np.array([step.entropy_nat for step in lane.steps]) for lane in lanes]
+        errors = [np.array([_cm(step.point_error_m) for step in lane.steps]) for lane in lanes]
+        rmses = [np.array([_cm(step.rmse_m) for step in lane.steps]) for lane in lanes]
+        ends, label = (0.0, float((clock.length - 1) * clock.unit or 1)), clock.label
+        for chart, values in ((self._error, errors), (self._rmse, rmses), (self._entropy, entropies)):
+            chart.load(list(zip(clock.xs, values, strict=True)), ends, label)
         self._unknown.visible = not view.has_truth
         self._without.visible = not np.isfinite(np.concatenate(entropies)).any()
         names = tuple(f"{MARKS[index]} {lane.label}" for index, lane in enumerate(lanes))
@@ -58,11 +62,11 @@ class RaceCharts:
         self._lane.value = self._lane.options[min(index, len(self._lane.options) - 1)]
         self._show_pairs()
 
-    def mark(self, place: int, rows: tuple[int, ...]) -> None:
-        """Follow the player."""
+    def mark(self, now: float, rows: tuple[int, ...]) -> None:
+        """Follow the player: the place on the axis, and the step of each lane."""
         self._rows = rows
         for curves in (self._error, self._rmse, self._entropy):
-            curves.mark(place)
+            curves.mark(now, rows)
         self._show_pairs()
 
     def _index(self) -> int:
@@ -82,6 +86,6 @@ def legend(view: RaceView) -> str:
     """The lanes with the colours of their curves."""
     names = " &emsp; ".join(
         f"<b style='color:{color}; white-space: nowrap'>{mark} {lane.label}</b>"
-        for mark, color, lane in zip(MARKS, LANE_COLORS, view.lanes, strict=False)
+        for mark, (color, _), lane in zip(MARKS, LANES, view.lanes, strict=False)
     )
     return f"<div style='padding: 0 0.8em 0.5em; font-size: 13px'>{names}</div>"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.records import RaceLane
+from app.screens.fuse.view import RaceLane
 from pipeline.types import FloatArray
 
 TICKS_MS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
@@ -33,6 +33,11 @@ class RaceClock:
         longest_ms = max(x[-1] for x in xs)
         unit = next((tick for tick in TICKS_MS if longest_ms <= tick * MOST_TICKS), TICKS_MS[-1])
         return RaceClock(xs, unit, True)
+
+    @property
+    def label(self) -> str:
+        """Of an axis."""
+        return "time, ms" if self.in_ms else "iteration"
 
     @property
     def length(self) -> int:

@@ -13,7 +13,7 @@ from app.drawing.cameras import Stage
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import SOURCE, TARGET
 from app.drawing.poses import move, place
-from app.records import RaceStep, RaceView, Start
+from app.screens.fuse.view import RaceStep, RaceView, Start
 from pipeline.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.types import ByteArray, FloatArray
 

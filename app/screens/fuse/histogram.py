@@ -7,7 +7,8 @@ import viser
 from viser import uplot
 
 from app.drawing.colors import DELIVERED, INFERRED, NEUTRAL, css
-from app.records import PairHistogram, RaceLane
+from app.drawing.curves import add_chart, scales
+from app.screens.fuse.view import PairHistogram, RaceLane
 from pipeline.types import FloatArray
 
 BARS, KERNEL, WEIGHT = css(NEUTRAL), css(DELIVERED), css(INFERRED)
@@ -17,24 +18,12 @@ class HistogramChart:
     """Grey bars of counts, the kernel f in green and the weight w in violet, all over their own peaks."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        self._plot = gui.add_uplot(
-            data=(np.array([0.0, 1.0]), *[np.full(2, np.nan)] * 3),
-            series=(
-                uplot.Series(label="x"),
-                uplot.Series(label="pairs", stroke=BARS, fill=f"{BARS}66", width=1),
-                uplot.Series(label="f", stroke=KERNEL, width=2, dash=(7, 3)),
-                uplot.Series(label="w", stroke=WEIGHT, width=2),
-            ),
-            scales={"x": uplot.Scale(time=False), "y": uplot.Scale(range=(0.0, 1.08))},
-            axes=(
-                uplot.Axis(label="pair distance, cm", labelSize=20, size=34),
-                uplot.Axis(label="over its peak", labelSize=18, size=46),
-            ),
-            legend=uplot.Legend(show=False),
-            cursor=uplot.Cursor(show=False),
-            padding=(12, 16, 0, 0),
-            height=190,
+        series = (
+            uplot.Series(label="pairs", stroke=BARS, fill=f"{BARS}66", width=1),
+            uplot.Series(label="f", stroke=KERNEL, width=2, dash=(7, 3)),
+            uplot.Series(label="w", stroke=WEIGHT, width=2),
         )
+        self._plot = add_chart(gui, series, ("pair distance, cm", "over its peak"), 190)
         self._caption = gui.add_html("")
 
     def show(self, lane: RaceLane, row: int, edges_m: FloatArray) -> None:
@@ -42,6 +31,7 @@ class HistogramChart:
         shown = lane.steps[row].histogram
         most = max(1, *(int(step.histogram.counts.max()) for step in lane.steps))
         edges_cm = 100.0 * edges_m
+        self._plot.scales = scales((float(edges_cm[0]), float(edges_cm[-1])), 1.0)
         self._plot.data = (
             np.repeat(edges_cm, 2)[1:-1],
             np.repeat(shown.counts / most, 2),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 
-from app.records import FuseView, RegistrationRow
+from app.screens.fuse.view import FuseView, RegistrationRow
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
-from app.records import RaceMode, Rival
+from app.screens.fuse.view import RaceMode, Rival
 from pipeline.config import Direction, Method, Metric
 
 MODES: dict[str, RaceMode] = {"node on node": "nodes", "inferred on sensor": "inferred"}

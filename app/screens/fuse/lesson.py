@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from app.lesson import LESSONS, NUMBER, Setting, choice, quantity, sets, short
-from app.records import Race, Rival, Start
 from app.screens.fuse.labels import DIRECTIONS, MODES, MOST_LANES, RIVALS, STARTS
+from app.screens.fuse.view import Race, Rival, Start
 
 SHIPPED = LESSONS / "icp-against-ceicp.md"
 START = (3.0, 6.0)

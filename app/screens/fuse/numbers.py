@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.records import SUCCESS_M, FuseView, RaceLane, RegistrationRow
 from app.screens.fuse.draw import MARKS
+from app.screens.fuse.view import SUCCESS_M, FuseView, RaceLane, RegistrationRow
 from app.tables import Row, number, table
 
 STOPS = {"max_iterations": "limit"}

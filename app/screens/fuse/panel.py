@@ -12,7 +12,7 @@ from app.drawing.cameras import Stage, stage_of
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.poses import move, place
 from app.lesson import LessonFolder, read_lesson
-from app.records import CaptureView, DepthView, FuseView, Race, RaceView, Start
+from app.records import DepthView
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
 from app.screens.fuse.draw import RaceDrawing, gizmo_pose, look_at_lanes
@@ -21,6 +21,7 @@ from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.numbers import places_table, race_table, verdict
 from app.screens.fuse.player import RacePlayer
 from app.screens.fuse.setup import RaceSetup
+from app.screens.fuse.view import CaptureView, FuseView, Race, RaceView, Start
 from app.state import Spec, Step
 from app.ui import Panel
 from pipeline.config import Method
@@ -233,7 +234,7 @@ class FusePanel(Panel):
             return
         with self.ui.atomic():
             self._drawing.show(clock.rows(at))
-            self._charts.mark(at, clock.rows(at))
+            self._charts.mark(float(at * clock.unit), clock.rows(at))
 
     # The gizmo.
 

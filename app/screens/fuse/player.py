@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from app.player import Player, Ruler
-from app.records import RaceLane
 from app.screens.fuse.clock import RaceClock
+from app.screens.fuse.view import RaceLane
 from app.ui import Ui
 
 CLOCKS = {"iterations": False, "milliseconds": True}

@@ -7,17 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.records import (
-    PairHistogram,
-    Race,
-    RaceLane,
-    RaceStep,
-    RaceView,
-    Rival,
-    Start,
-    sample,
-)
+from app.records import sample
 from app.screens.fuse.job import true_pose
+from app.screens.fuse.view import PairHistogram, Race, RaceLane, RaceStep, RaceView, Rival, Start
 from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError, ReconstructionError

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import viser
 
-from app.records import Race, RaceMode, Start
 from app.screens.fuse.labels import BY_HAND, DIRECTIONS, MOST_LANES, NOBODY, RIVAL_NAMES, RIVALS, STARTS
+from app.screens.fuse.view import Race, RaceMode, Start
 from app.ui import Ui
 
 SLIGHTLY = list(STARTS)[1]

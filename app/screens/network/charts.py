@@ -7,14 +7,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.screens.network.curves import RUN_COLORS, NetworkCurves
+from app.drawing.colors import SOURCE, TARGET, css
+from app.drawing.curves import Curves
 from app.screens.network.gantt import Window, cursor_html, gantt_html, legend_html
-from app.screens.network.labels import CURVE_HINTS, CURVES
+from app.screens.network.labels import CURVES
 from app.screens.network.player import RUN_S, NetworkPlayer, short_time
-from app.screens.network.view import NetworkView, What
+from app.screens.network.view import Curve, NetworkView, Series, What
 from app.ui import Ui
 from network_sim.types import PacketKind
 
+RUNS = ((css(TARGET), ()), (css(SOURCE), (7, 3)))
+"""Colour and dashes of the first run and of the one beside it."""
 NARROWEST = -3.0
 """Power of ten of the shortest window in seconds."""
 PAGE = 0.9
@@ -30,14 +33,12 @@ class NetworkCharts:
     def __init__(self, ui: Ui, player: NetworkPlayer) -> None:
         """Add the tabs, the rows of nodes and what moves their window, and the ``player`` with it."""
         gui = ui.gui
-        self._curves: dict[str, NetworkCurves] = {}
+        self._curves: dict[Curve, Curves] = {}
         tabs = gui.add_tab_group()
-        for name, (unit, top) in CURVES.items():
-            with tabs.add_tab(name):
-                self._curves[name] = NetworkCurves(gui, unit, top)
-                gui.add_html(
-                    f"<div style='padding: 0 0.8em 0.5em; font-size: 12px'>{CURVE_HINTS[name]}</div>"
-                )
+        for curve, (title, quantity, least, hint) in CURVES.items():
+            with tabs.add_tab(title):
+                self._curves[curve] = Curves(gui, quantity, RUNS, least, 170)
+                gui.add_html(f"<div style='padding: 0 0.8em 0.5em; font-size: 12px'>{hint}</div>")
         self._labels = gui.add_html("")
         self._player = player
         self._views: Sequence[NetworkView] = ()
@@ -74,7 +75,7 @@ class NetworkCharts:
         self._zoom.max = widest
         self._zoom.value = widest
         for name, curves in self._curves.items():
-            curves.load([view.series[name] for view in views], start_ns / 1e9, end_ns / 1e9)
+            self._load(curves, [view.series[name] for view in views], start_ns, end_ns)
         self._labels.content = _labels([view.label for view in views]) if len(views) > 1 else ""
         self._legend.content = legend_html(
             {PacketKind(int(kind)) for view in views for kind in set(view.pieces.carries.tolist())}
@@ -87,9 +88,14 @@ class NetworkCharts:
         """Show nothing."""
         self._views = ()
         for curves in self._curves.values():
-            curves.load((), 0.0, 1.0)
+            self._load(curves, (), 0, 1_000_000_000)
         for html in (*self._rows, self._legend, self._labels):
             html.content = ""
+
+    @staticmethod
+    def _load(curves: Curves, series: Sequence[Series], start_ns: int, end_ns: int) -> None:
+        ends_s = (start_ns / 1e9, end_ns / 1e9)
+        curves.load([(one.t_s, one.values) for one in series], ends_s, "simulated time, s")
 
     def mark(self, now_ns: int) -> None:
         """Follow the player; the window turns like a page when it is left."""
@@ -167,6 +173,6 @@ def _labels(labels: Sequence[str]) -> str:
     """The runs in the colours of their curves."""
     words = " &emsp; ".join(
         f"<b style='color: {color}'>{'―' if index == 0 else '- -'} {label}</b>"
-        for index, (color, label) in enumerate(zip(RUN_COLORS, labels, strict=False))
+        for index, ((color, _), label) in enumerate(zip(RUNS, labels, strict=False))
     )
     return f"<div style='padding: 0 0.8em 0.5em; font-size: 13px'>{words}</div>"

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.screens.network.view import MetricRow, NetworkRun, NetworkView, Pieces, Series, What
+from app.screens.network.view import Curve, NetworkView, Pieces, Series, What
+from app.state import Spec
 from app.store import Store
+from network_sim.config import NetworkConfig
 from network_sim.metrics import CAMERA_ROLES, metrics
 from network_sim.simulate import iterate_simulation, street_of
 from network_sim.states import State
 from network_sim.trace import Events, NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, part
 from pipeline.types import FloatArray
 
 MOST_PIECES = 500_000
@@ -36,29 +38,22 @@ NOT_HEARD = (Cause.COLLISION, Cause.NOISE, Cause.RANGE, Cause.NODE_DOWN, Cause.U
 """Causes for which a frame did not reach its receiver."""
 
 
-def simulate_job(
-    store: Store, runs: tuple[NetworkRun, ...]
-) -> Generator[Progress, None, tuple[NetworkView, ...]]:
-    """All runs, one after the other."""
-    views = []
-    for index, run in enumerate(runs):
-
-        def simulate(run: NetworkRun = run, index: int = index) -> Generator[Progress, None, NetworkView]:
-            started_s = time.perf_counter()
-            steps = iterate_simulation(run.config)
-            while True:
-                try:
-                    progress = next(steps)
-                except StopIteration as stop:
-                    return view_of(stop.value, run.label, time.perf_counter() - started_s)
-                yield Progress(f"simulating {run.label}", (index + progress.fraction) / len(runs))
-
-        view = yield from store.remember(("simulate", run.config), simulate)
-        views.append(replace(view, label=run.label))
+def network_job(store: Store, spec: Spec) -> Generator[Progress, None, tuple[NetworkView, ...]]:
+    """The views of all runs that are asked for, simulated one after the other."""
+    views, share = [], 1.0 / max(1, len(spec.networks))
+    for index, config in enumerate(spec.networks):
+        work = store.remember(("simulate", config), partial(_simulated, config))
+        views.append((yield from part(work, index * share, (index + 1) * share)))
     return tuple(views)
 
 
-def view_of(trace: NetworkTrace, label: str, elapsed_s: float) -> NetworkView:
+def _simulated(config: NetworkConfig) -> Generator[Progress, None, NetworkView]:
+    started = time.perf_counter()
+    trace = yield from iterate_simulation(config)
+    return view_of(trace, time.perf_counter() - started)
+
+
+def view_of(trace: NetworkTrace, elapsed_s: float) -> NetworkView:
     """What the screen shows of a run that took so long to simulate."""
     start_ns = min(to_ns(trace.config.run.warmup_s), trace.horizon_ns)
     pieces = pieces_of(trace, start_ns)
@@ -68,7 +63,6 @@ def view_of(trace: NetworkTrace, label: str, elapsed_s: float) -> NetworkView:
         pieces = pieces.where(np.arange(MOST_PIECES))
     track_s, tracks_m = _tracks(trace)
     return NetworkView(
-        label=label,
         config=trace.config,
         names=trace.names,
         roles=trace.roles,
@@ -79,10 +73,7 @@ def view_of(trace: NetworkTrace, label: str, elapsed_s: float) -> NetworkView:
         pieces=pieces,
         kept_until_ns=kept_until_ns,
         series=series_of(trace, start_ns),
-        metrics=tuple(
-            MetricRow(name, metric.value, metric.unit, metric.definition)
-            for name, metric in metrics(trace).items()
-        ),
+        metrics=metrics(trace),
         elapsed_s=elapsed_s,
         packets=trace.counters.created,
     )
@@ -182,8 +173,8 @@ def _downtimes(events: Events, horizon_ns: int) -> Pieces:
 # The curves.
 
 
-def series_of(trace: NetworkTrace, start_ns: int) -> dict[str, Series]:
-    """The curves of ``app.screens.network.labels.CURVES``, over the time after the warm-up."""
+def series_of(trace: NetworkTrace, start_ns: int) -> dict[Curve, Series]:
+    """Every curve over the time after the warm-up."""
     edges_s = np.linspace(start_ns, trace.horizon_ns, INTERVALS + 1) / NS_PER_S
     middles_s = (edges_s[:-1] + edges_s[1:]) / 2.0
     images = trace.events.where(trace.events.packet_kind == PacketKind.IMAGE)
@@ -192,10 +183,10 @@ def series_of(trace: NetworkTrace, start_ns: int) -> dict[str, Series]:
     bits = _binned(received, edges_s, 8.0 * received.size_bytes)
     with np.errstate(invalid="ignore", divide="ignore"):
         return {
-            "Delivery": Series(middles_s, 100.0 * got / (got + lost)),
-            "Delay": Series(middles_s, _delays_s(trace.events, edges_s)),
-            "Throughput": Series(middles_s, bits / np.diff(edges_s) / 1000.0),
-            "Energy": _radio_j(trace),
+            "delivery": Series(middles_s, 100.0 * got / (got + lost)),
+            "delay": Series(middles_s, _delays_s(trace.events, edges_s)),
+            "throughput": Series(middles_s, bits / np.diff(edges_s) / 1000.0),
+            "energy": _radio_j(trace),
         }
 
 

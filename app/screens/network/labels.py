@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from app.drawing.colors import INFERRED, NEUTRAL, SOURCE, TARGET
+from app.screens.network.view import Curve
 from network_sim.config import PRESETS, NetworkConfig
 from network_sim.types import Cause, PacketKind
 from packetmesh.errors import InputError
@@ -90,23 +91,35 @@ ACCESS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     }
 )
 
-CURVES: Mapping[str, tuple[str, float]] = MappingProxyType(
+CURVES: Mapping[Curve, tuple[str, str, float, str]] = MappingProxyType(
     {
-        "Delivery": ("delivered, %", 100.0),
-        "Delay": ("image delay, s", 0.0),
-        "Throughput": ("kbit/s", 0.0),
-        "Energy": ("radio, J", 0.0),
+        "delivery": (
+            "Delivery",
+            "delivered, %",
+            100.0,
+            "Of the image packets whose way ended in an interval, the share that had arrived.",
+        ),
+        "delay": (
+            "Delay",
+            "image delay, s",
+            0.0,
+            "Mean time from capture to completion of the images that were completed in an interval.",
+        ),
+        "throughput": (
+            "Throughput",
+            "kbit/s",
+            0.0,
+            "Bits of image packets that reached their last node in an interval, over its length.",
+        ),
+        "energy": (
+            "Energy",
+            "radio, J",
+            0.0,
+            "What the radios of all camera nodes have used since the end of the warm-up.",
+        ),
     }
 )
-"""Unit of each curve, and the top of its axis if that is fixed."""
-CURVE_HINTS: Mapping[str, str] = MappingProxyType(
-    {
-        "Delivery": "Of the image packets whose way ended in an interval, the share that had arrived.",
-        "Delay": "Mean time from capture to completion of the images that were completed in an interval.",
-        "Throughput": "Bits of image packets that reached their last node in an interval, over its length.",
-        "Energy": "What the radios of all camera nodes have used since the end of the warm-up.",
-    }
-)
+"""Title, quantity and unit, smallest height of the axis, and meaning of each curve."""
 
 PACKET_COLORS: Mapping[PacketKind, tuple[int, int, int]] = MappingProxyType(
     {

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.screens.network.view import MetricRow, NetworkView
+from app.screens.network.view import NetworkView
 from app.tables import Row, table
+from network_sim.metrics import Metric
 
 FIRST = (
     "image_delivery_ratio",
@@ -30,10 +31,10 @@ SHARES = ("ratio", "share", "coverage", "redundancy")
 
 def metric_tables(views: Sequence[NetworkView]) -> tuple[str, str]:
     """HTML of the most telling numbers, and of all others that are not zero in every run."""
-    by_name: dict[str, list[MetricRow | None]] = {}
+    by_name: dict[str, list[Metric | None]] = {}
     for index, view in enumerate(views):
-        for metric in view.metrics:
-            by_name.setdefault(metric.name, [None] * len(views))[index] = metric
+        for name, metric in view.metrics.items():
+            by_name.setdefault(name, [None] * len(views))[index] = metric
     first = [name for name in FIRST if name in by_name]
     others = [
         name
@@ -45,17 +46,19 @@ def metric_tables(views: Sequence[NetworkView]) -> tuple[str, str]:
     return one, other
 
 
-def _row(name: str, metrics: Sequence[MetricRow | None]) -> Row:
+def _row(name: str, metrics: Sequence[Metric | None]) -> Row:
     definition = next(metric.definition for metric in metrics if metric is not None)
     title = name.replace("_", " ")
-    return Row(title[0].upper() + title[1:], f"{definition}.", tuple(map(value_text, metrics)))
+    return Row(
+        title[0].upper() + title[1:], f"{definition}.", tuple(value_text(name, metric) for metric in metrics)
+    )
 
 
-def value_text(metric: MetricRow | None) -> str:
+def value_text(name: str, metric: Metric | None) -> str:
     """The value with its unit; a dash where a run has no such number."""
     if metric is None:
         return "–"
-    if metric.unit == "1" and any(word in metric.name for word in SHARES):
+    if metric.unit == "1" and any(word in name for word in SHARES):
         return f"{100.0 * metric.value:.4g} %"
     value, unit = metric.value, metric.unit
     if unit == "s" and abs(value) < 0.1:

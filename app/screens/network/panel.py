@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from dataclasses import replace
+from typing import Any, ClassVar
 
 from app.drawing.clouds import clear
 from app.screens.network.charts import NetworkCharts
@@ -11,7 +12,8 @@ from app.screens.network.labels import NETWORKS
 from app.screens.network.numbers import metric_tables, runs_summary
 from app.screens.network.player import NetworkPlayer
 from app.screens.network.setup import NetworkSetup
-from app.screens.network.view import NetworkRun, NetworkView
+from app.screens.network.view import NetworkView
+from app.state import Spec, Step
 from app.ui import Panel
 
 TEXT = """**What you see.** Camera nodes (blue) send their images by radio to a sink or to access points
@@ -25,25 +27,24 @@ REST_S = 0.6
 SHOWN_S = 0.4
 """How long a packet is seen moving at least, and a loss stays, in seconds of the person who looks."""
 RUNNING = "Simulating; the bar at the top shows how far. *Cancel* ends it."
-CANCELLED = "Cancelled. *Retry* simulates again."
-FAILED = "The simulation failed, and a notice said why. Change a setting, or press *Retry*."
 
 
 class NetworkPanel(Panel):
     """Runs of the camera network on one timeline."""
 
     title = "Network"
+    step: ClassVar[Step | None] = "network"
     drawn_below: ClassVar[str] = "/network"
 
     def build(self) -> None:
         """Settings, player, curves, timeline, numbers."""
         gui = self.gui
         self._views: tuple[NetworkView, ...] = ()
-        self._wanted: tuple[NetworkRun, ...] = ()
+        self._labels: tuple[str, ...] = ()
         self._drawing: NetworkDrawing | None = None
         self._drawn = 0
         self._framed: tuple[float, ...] = ()
-        self._cancelled = False
+        self._visited = False
         self._resting = self.ui.debounce(REST_S, self._run)
         gui.add_markdown(TEXT)
         self._setup = NetworkSetup(self.ui, self._resting.restart)
@@ -60,18 +61,31 @@ class NetworkPanel(Panel):
     def on_show(self) -> None:
         """Simulate at the first visit; turn the view to the network."""
         self._framed = ()
-        if not self._wanted:
+        if not self._visited:
+            self._visited = True
             self._run()
 
-    def on_action(self, action: str) -> None:
-        """Cancel, retry and reset also mean the simulation."""
-        if action == "Cancel":
-            self._cancelled = True
-        elif action == "Retry" and self._wanted and not self._views:
-            self._run()
-        elif action == "Reset" and self._wanted:
+    def on_spec(self, spec: Spec) -> None:
+        """Go back to the settings of the start with the rest of the session."""
+        if self._visited and not spec.networks:
             self._setup.reset()
-            self._run()
+            self.ui.post(self._run)
+
+    def on_view(self, step: Step, view: Any) -> None:
+        """Draw the runs."""
+        if step == self.step and self.session.results.fresh("network", self.session.spec):
+            with self.ui.atomic():
+                self._take(
+                    tuple(replace(one, label=label) for one, label in zip(view, self._labels, strict=True))
+                )
+            self.session.frame_view()
+
+    def on_failure(self, step: Step, sentence: str) -> None:
+        """Show that there is nothing to show, and why."""
+        if step == self.step:
+            with self.ui.atomic():
+                self._forget()
+                self._status.content = f"**Not simulated**: {sentence} Change a setting or press *Retry*."
 
     def look(self) -> bool:
         """Turn the view to the whole network, once for each shape of the window."""
@@ -89,29 +103,15 @@ class NetworkPanel(Panel):
         return self._setup.command()
 
     def _run(self) -> None:
-        """Simulate what the controls say, unless it is what is shown."""
+        """Ask for what the controls say."""
         preset = NETWORKS[self._setup.preset]
         self._about.content = preset.sentence + (f" {ORIGIN}" if preset.schemes else "")
         runs = self._setup.runs()
-        if runs == self._wanted and self._views:
-            return
-        self._wanted, self._cancelled = runs, False
-        self._status.content = RUNNING
-        self.session.apart_job(
-            "simulate", self.session.store, runs, on_end=lambda views: self._ended(runs, views)
-        )
-
-    def _ended(self, runs: tuple[NetworkRun, ...], views: tuple[NetworkView, ...] | None) -> None:
-        if runs != self._wanted:
-            return
-        with self.ui.atomic():
-            if views is None:
-                self._forget()
-                self._status.content = CANCELLED if self._cancelled else FAILED
-            else:
-                self._take(views)
-        if views is not None:
-            self.session.frame_view()
+        self._labels, session = tuple(runs), self.session
+        asked = replace(session.spec, networks=tuple(runs.values()))
+        if not session.results.fresh("network", asked):
+            self._status.content = RUNNING
+        session.want(asked)
 
     def _take(self, views: tuple[NetworkView, ...]) -> None:
         self._views = views

@@ -8,7 +8,6 @@ from collections.abc import Callable
 import viser
 
 from app.screens.network.labels import NETWORKS, ways
-from app.screens.network.view import NetworkRun
 from app.ui import Ui
 from network_sim.config import PRESETS, NetworkConfig
 from packetmesh.errors import InputError
@@ -88,27 +87,28 @@ class NetworkSetup:
         self._preset.value = NETWORKS[FIRST].title
         self._load()
 
-    def runs(self) -> tuple[NetworkRun, ...]:
-        """The runs that the controls say.
+    def runs(self) -> dict[str, NetworkConfig]:
+        """The runs that the controls ask for, each by what the screen calls it.
 
         Raises:
             InputError: settings that do not go together.
         """
         way, beside = self._way.value, self._beside.value
-        first = NetworkRun(way, self._config(way, self._extra))
-        if beside == NOTHING and not self._beside_extra:
-            return (first,)
-        second_way = way if beside == NOTHING else beside
-        label = " ".join((second_way, *self._beside_extra))
-        return first, NetworkRun(label, self._config(second_way, (*self._extra, *self._beside_extra)))
+        runs = {way: self._config(way, self._extra)}
+        if beside != NOTHING or self._beside_extra:
+            second_way = way if beside == NOTHING else beside
+            label = " ".join((second_way, *self._beside_extra))
+            label = label if label not in runs else f"{label} again"
+            runs[label] = self._config(second_way, (*self._extra, *self._beside_extra))
+        return runs
 
     def command(self) -> str:
         """The command lines that simulate the same."""
         base = PRESETS[self.preset]
         lines = []
-        for run in self.runs():
+        for config in self.runs().values():
             words = ["packetmesh", "simulate", "--preset", self.preset]
-            if changed := differences(run.config, base):
+            if changed := differences(config, base):
                 words += ["--set", *changed]
             lines.append(shlex.join(words))
         return "\n".join(lines)

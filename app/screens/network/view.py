@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from enum import IntEnum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from network_sim.config import NetworkConfig
+from network_sim.metrics import Metric
 from pipeline.types import FloatArray
 
 
@@ -36,15 +38,6 @@ class What(IntEnum):
 
 
 FAILURES = (What.LOSS, What.DROP, What.EXPIRE)
-
-
-@dataclass(frozen=True, slots=True)
-class NetworkRun:
-    """A run that is asked for."""
-
-    label: str
-    """What to call it where two are compared."""
-    config: NetworkConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +69,9 @@ class Pieces:
         return Pieces(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
+Curve = Literal["delivery", "delay", "throughput", "energy"]
+
+
 @dataclass(frozen=True, slots=True)
 class Series:
     """One quantity over the simulated time."""
@@ -87,20 +83,9 @@ class Series:
 
 
 @dataclass(frozen=True, slots=True)
-class MetricRow:
-    """A number of the whole run."""
-
-    name: str
-    value: float
-    unit: str
-    definition: str
-
-
-@dataclass(frozen=True, slots=True)
 class NetworkView:
     """One run."""
 
-    label: str
     config: NetworkConfig
     names: tuple[str, ...]
     """Of the N nodes, access points, sink and cloud."""
@@ -115,13 +100,15 @@ class NetworkView:
     pieces: Pieces
     kept_until_ns: int
     """The pieces end here if the run had more of them than are kept; otherwise ``end_ns``."""
-    series: dict[str, Series]
-    """By ``app.screens.network.labels.CURVES``."""
-    metrics: tuple[MetricRow, ...]
+    series: dict[Curve, Series]
+    metrics: dict[str, Metric]
+    """Numbers of the whole run by name."""
     elapsed_s: float
     """Time that the simulation took on this machine."""
     packets: int
     """That were created in all."""
+    label: str = ""
+    """What the screen calls it where two are compared."""
 
     def positions_m(self, t_ns: int) -> FloatArray:
         """(N, 2) where everybody is."""

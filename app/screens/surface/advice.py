@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.screens.surface.sweep_plot import BELOW, sweep_figure, sweep_sentence
-from app.screens.surface.sweep_view import SuggestionRow, SweepView
+from app.screens.surface.view import SuggestionRow, SweepView
 from app.tables import Row, number, table
 from app.ui import Ui
 

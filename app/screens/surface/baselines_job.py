@@ -6,7 +6,7 @@ from collections.abc import Generator
 from typing import get_args
 
 from app.drawing.meshes import mesh_view
-from app.screens.surface.baselines_view import BaselineName, BaselineView
+from app.screens.surface.view import BaselineName, BaselineView
 from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError

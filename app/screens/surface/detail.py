@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.records import QUICK_POINTS
+from app.screens.surface.view import QUICK_POINTS
 
 FEWEST_POINTS = QUICK_POINTS // 4
 SLOW_S, FAST_S = 0.25, 0.11

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import viser
 
-from app.records import MeshView, PaintedMesh
+from app.records import MeshView
+from app.screens.surface.view import PaintedMesh
 from pipeline.types import FloatArray
 
 

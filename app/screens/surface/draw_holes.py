@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import viser
 
-from app.screens.surface.holes_view import HoleView
+from app.screens.surface.view import HoleView
 from pipeline.types import ByteArray, FloatArray
 
 TAPE = ((255, 225, 0), (0, 0, 0))

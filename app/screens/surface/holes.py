@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from app.records import Which
 from app.screens.surface.draw_holes import HoleDrawing, picked_hole
-from app.screens.surface.holes_view import ExplainView, FilledView, HoleView, PartsView
+from app.screens.surface.view import ExplainView, FilledView, HoleView, PartsView, Which
 from app.tables import Row, number, table
 from app.ui import Ui
 from pipeline.types import FloatArray

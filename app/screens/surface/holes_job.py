@@ -9,8 +9,7 @@ import numpy as np
 
 from app.drawing.colors import HOLE, NEUTRAL
 from app.drawing.meshes import mesh_view, surface_glb
-from app.records import Which
-from app.screens.surface.holes_view import ExplainView, FilledView, HoleView, PartsView
+from app.screens.surface.view import ExplainView, FilledView, HoleView, PartsView, Which
 from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError

@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from app.drawing.meshes import mesh_view
-from app.records import SpacingView
 from app.screens.surface.holes_job import hole_views, parts_of
 from app.screens.surface.sweep_job import suggestions_of
-from app.screens.surface.view import SurfaceView
+from app.screens.surface.view import SpacingView, SurfaceView
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from app.records import Coloring
+from app.screens.surface.view import Coloring
 from pipeline.config import RadiusRule
 
 AFTER, BEFORE, BOTH = "after fusion", "before fusion (sensor only)", "side by side"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET, css
-from app.records import Coloring
+from app.screens.surface.view import Coloring
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import html
 from collections.abc import Callable, Mapping
 
-from app.records import MeshView, PaintedView
-from app.screens.surface.baselines_view import BaselineView
-from app.screens.surface.view import SurfaceView
+from app.records import MeshView
+from app.screens.surface.view import BaselineView, PaintedView, SurfaceView
 from app.tables import Row, number, table
 
 

@@ -8,11 +8,9 @@ from typing import Any, ClassVar
 from app.controls import Controls
 from app.drawing.cameras import look_closely, stage_of
 from app.lesson import LessonFolder, read_lesson
-from app.records import MeshView, PaintedView, PaintRequest, SceneView, Which
+from app.records import MeshView, SceneView
 from app.screens.surface.advice import AdviceFolder
-from app.screens.surface.baselines_view import BaselineView
 from app.screens.surface.holes import HolesFolder
-from app.screens.surface.holes_view import ExplainView, FilledView
 from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN
 from app.screens.surface.legend import legend_html
 from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook
@@ -22,7 +20,15 @@ from app.screens.surface.rolling import RollingFolder
 from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
 from app.screens.surface.spacing_plot import spacing_figure
 from app.screens.surface.stage import SurfaceStage
-from app.screens.surface.view import SurfaceView
+from app.screens.surface.view import (
+    BaselineView,
+    ExplainView,
+    FilledView,
+    PaintedView,
+    PaintRequest,
+    SurfaceView,
+    Which,
+)
 from app.screens.surface.walk_view import WalkRequest, WalkView
 from app.state import Spec, Step
 from app.ui import Panel

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from app.acknowledgement import DrawAcknowledgement
-from app.records import PaintedView, PaintRequest
 from app.screens.surface.detail import Detail
+from app.screens.surface.view import PaintedView, PaintRequest
 from app.ui import Workbench
 
 QUIET_S = 0.4

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from app.controls import Number
-from app.records import SpacingView
+from app.screens.surface.view import SpacingView
 from pipeline.config import PipelineConfig, RadiusRule
 
 ADVANCED = (

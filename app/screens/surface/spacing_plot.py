@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 
 from app.drawing.colors import BRAND, DELIVERED, INFERRED, LOSS, NEUTRAL, SOURCE, css
 from app.drawing.marks import mark
-from app.records import SpacingView
+from app.screens.surface.view import SpacingView
 
 THESIS = {"r<sub>F</sub>": 0.0, "r<sub>F</sub>+¼σ": 0.25, "r<sub>F</sub>+½σ": 0.5, "r<sub>F</sub>+σ": 1.0}
 """The thesis's four radii as multiples of sigma_D above r_F (SPEC 5)."""

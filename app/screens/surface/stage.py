@@ -6,9 +6,10 @@ import numpy as np
 import viser
 
 from app.drawing.cameras import Stage
-from app.records import MeshView, PaintedMesh, Which
+from app.records import MeshView
 from app.screens.surface.draw import SurfaceDrawing
 from app.screens.surface.labels import AFTER, BASELINES, BEFORE, BOTH
+from app.screens.surface.view import PaintedMesh, Which
 from pipeline.types import FloatArray
 
 

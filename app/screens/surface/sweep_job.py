@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import asdict
 
-from app.screens.surface.sweep_view import SuggestionRow, SweepRow, SweepView
+from app.screens.surface.view import SuggestionRow, SweepRow, SweepView
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from app.drawing.colors import DELIVERED, INFERRED, LOSS, NEUTRAL, SOURCE, TARGET, css
-from app.screens.surface.sweep_view import SweepRow, SweepView
+from app.screens.surface.view import SweepRow, SweepView
 
 NO_HIT, ACCURATE, LEFT, RIGHT = css(LOSS), css(TARGET), css(NEUTRAL), css(INFERRED)
 WORK, POINTS = "triangles and time", "unused points and hole area"

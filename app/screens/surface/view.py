@@ -1,13 +1,193 @@
-"""What the Surface screen shows of the surfaces before and after fusion."""
+"""What the Surface screen gets of surfaces, their holes, balls and baselines."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
-from app.records import MeshView, SpacingView, Which
-from app.screens.surface.holes_view import HoleView, PartsView
-from app.screens.surface.sweep_view import SuggestionRow
+from app.records import MeshView
+from pipeline.types import FloatArray, IntArray
+
+Coloring = Literal["color", "source", "distance", "normal"]
+"""What the colours of a surface mean."""
+
+
+Which = Literal["after", "before"]
+"""Fusion."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpacingView:
+    """How far apart the points are that the ball rolls over."""
+
+    r_F_m: float
+    sigma_D_m: float
+    edges_m: FloatArray
+    """(B + 1,) bins of the nearest-neighbour distance."""
+    counts: IntArray
+    """(B,)."""
+    points_before: int
+    points_after: int
+
+
+QUICK_POINTS = 20_000
+"""Of a quick look, where the browser draws fast enough."""
+
+
+@dataclass(frozen=True, slots=True)
+class PaintRequest:
+    """Surfaces to draw in certain colours; with a radius, a quick look while the ball is being chosen."""
+
+    which: tuple[Which, ...]
+    coloring: Coloring
+    radius_m: float | None = None
+    """None takes the surfaces of the settings as they are."""
+    most_points: int = QUICK_POINTS
+    """A larger cloud is thinned to about so many for a quick look."""
+
+
+@dataclass(frozen=True, slots=True)
+class PaintedMesh:
+    """One surface to draw."""
+
+    glb: bytes
+    rims_glb: bytes
+    vertices: int
+    triangles: int
+
+
+@dataclass(frozen=True, slots=True)
+class PaintedView:
+    """The answer to a ``PaintRequest``."""
+
+    request: PaintRequest
+    meshes: dict[Which, PaintedMesh]
+    points: int
+    """That the ball rolled over, of the cloud after fusion or, if that is not shown, before."""
+    all_points: int
+    """Of the whole cloud."""
+    roll_s: float
+    """The ball alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class HoleView:
+    """One loop of edges that have one triangle only."""
+
+    loop_m: FloatArray
+    """(L, 3) float32, world frame, closed without repeating the first point; a hole's loop runs clockwise
+    seen from outside."""
+    length_m: float
+    area_m2: float
+    center_m: FloatArray
+    """(3,)."""
+    rim: bool
+    """Whether the surface, or a piece that hangs on it by a point, ends there instead of having a hole."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExplainView:
+    """Why there is a hole, as ``pipeline.surface.hole_diagnosis.Explanation`` says it."""
+
+    which: Which
+    index: int
+    """In that surface's holes."""
+    reason: str
+    sentence: str
+    remedy: str
+    closing_radius_m: float | None
+    sensor_share: float
+    """This and the other two: shares of the pixels that look into the hole; NaN if none does."""
+    inferred_share: float
+    unknown_share: float
+
+
+@dataclass(frozen=True, slots=True)
+class PartsView:
+    """Where the pixel rays of all cameras end; shares with sum 1."""
+
+    on_sensor: float
+    """On surface that the sensor measured."""
+    on_inferred: float
+    """On surface that only inference made possible."""
+    missed_measured: float
+    """In no surface, though the sensor measured the pixel."""
+    missed_inferred: float
+    """In no surface; only inference has a depth for the pixel."""
+    missed_unknown: float
+    """In no surface, and nobody has a depth for the pixel."""
+
+
+@dataclass(frozen=True, slots=True)
+class FilledView:
+    """The surface after fusion with its small holes filled."""
+
+    mesh: MeshView
+    """What was invented is drawn in its own colour; the numbers are those of the filled surface."""
+    holes: int
+    """How many were filled."""
+    area_m2: float
+    """Of what was invented."""
+
+
+@dataclass(frozen=True, slots=True)
+class SuggestionRow:
+    """A ball radius with a meaning, as ``pipeline.surface.advice.Suggestion`` gives it."""
+
+    name: str
+    radius_m: float
+    share: float
+    """Share of the sampled surface points, borders left out, whose fan of triangles this ball closes."""
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class SweepRow:
+    """The surface that one ball leaves, as ``pipeline.surface.sweep.SweepPoint`` measures it."""
+
+    radius_m: float
+    triangles: int
+    unused_share: float
+    hole_area_m2: float
+    no_hit_ray_share: float
+    accuracy_1cm: float
+    """This and the next: NaN without truth or without a triangle."""
+    f_score_5cm: float
+    elapsed_s: float
+    """Of the ball alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class SweepView:
+    """The balls of a sweep; while it runs, those that have rolled."""
+
+    points: tuple[SweepRow, ...]
+    """By radius, ascending."""
+    r_F_m: float
+    sigma_D_m: float
+    planned: int
+    """How many balls there will be."""
+
+    @property
+    def done(self) -> bool:
+        """Whether all of them have rolled."""
+        return len(self.points) == self.planned
+
+
+BaselineName = Literal["poisson", "alpha"]
+
+
+@dataclass(frozen=True, slots=True)
+class BaselineView:
+    """The surface of another method over the same points, to hold the ball's against."""
+
+    name: BaselineName
+    mesh: MeshView
+    elapsed_s: float
+    """From the cloud to the surface, without the measures."""
+    note: str
+    """One sentence on the method and its parameters."""
 
 
 @dataclass(frozen=True, slots=True)

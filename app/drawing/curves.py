@@ -1,0 +1,120 @@
+"""Charts that are drawn many times a second: curves over a common axis, with the player's place marked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+from viser import uplot
+
+from app.drawing.colors import NEUTRAL, css
+from pipeline.types import FloatArray
+
+HEADROOM = 1.08
+"""Height of the axis over the highest value."""
+
+
+def add_chart(
+    gui: viser.GuiApi, series: Sequence[uplot.Series], labels: tuple[str, str], height_px: int
+) -> viser.GuiUplotHandle:
+    """An empty chart of these series; ``labels`` are those of the x and the y axis."""
+    return gui.add_uplot(
+        data=(np.array([0.0, 1.0]), *[np.full(2, np.nan)] * len(series)),
+        series=(uplot.Series(label="x"), *series),
+        scales=scales((0.0, 1.0), 1.0),
+        axes=axes(*labels),
+        legend=uplot.Legend(show=False),
+        cursor=uplot.Cursor(show=False),
+        padding=(12, 16, 0, 0),
+        height=height_px,
+    )
+
+
+def scales(ends: tuple[float, float], top: float) -> dict[str, uplot.Scale]:
+    """Fixed ranges, because uPlot finds none by itself where a curve has gaps."""
+    return {"x": uplot.Scale(time=False, range=ends), "y": uplot.Scale(range=(0.0, HEADROOM * top))}
+
+
+def axes(x: str, y: str) -> tuple[uplot.Axis, ...]:
+    """Both axes with their labels."""
+    return (uplot.Axis(label=x, labelSize=20, size=34), uplot.Axis(label=y, labelSize=18, size=50))
+
+
+class Curves:
+    """One quantity of several things that are told apart by their colours and dashes."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        quantity: str,
+        styles: Sequence[tuple[str, tuple[int, ...]]],
+        least: float = 0.0,
+        height_px: int = 180,
+    ) -> None:
+        """Add an empty chart.
+
+        Args:
+            gui: where to add it.
+            quantity: with its unit, of the vertical axis.
+            styles: colour and dashes of each curve that there can be.
+            least: the smallest height of the vertical axis.
+            height_px: of the whole.
+        """
+        self._quantity, self._least, self._most = quantity, least, len(styles)
+        lines = [uplot.Series(label="curve", stroke=color, width=2, dash=dash) for color, dash in styles]
+        dots = [
+            uplot.Series(
+                label="now", stroke=color, width=0, points=uplot.Series_Points(show=True, size=9, fill=color)
+            )
+            for color, _ in styles
+        ]
+        cursor = uplot.Series(label="cursor", stroke=css(NEUTRAL), width=1)
+        self._plot = add_chart(gui, (cursor, *lines, *dots), ("", quantity), height_px)
+        self._curves: Sequence[tuple[FloatArray, FloatArray]] = ()
+        self._top = 1.0
+
+    def load(
+        self, curves: Sequence[tuple[FloatArray, FloatArray]], ends: tuple[float, float], label: str
+    ) -> None:
+        """Show other curves.
+
+        Args:
+            curves: (K,) ascending abscissae and (K,) values of each, NaN where there is none.
+            ends: of the horizontal axis.
+            label: of the horizontal axis.
+        """
+        self._curves = curves
+        highest = max((float(np.nanmax(values, initial=0.0)) for _, values in curves), default=0.0)
+        self._top = max(highest, self._least) or 1.0
+        self._plot.scales = scales(ends, self._top)
+        self._plot.axes = axes(label, self._quantity)
+        self.mark(ends[0])
+
+    def mark(self, now: float, rows: Sequence[int] = ()) -> None:
+        """Draw the player's place as a line, and a dot on each curve at its value in ``rows``."""
+        # The line is two points above each other, so its place stands twice among the abscissae.
+        own = np.concatenate([[now], *(at for at, _ in self._curves)])
+        x = np.sort(np.append(np.unique(own), now))
+        cursor = np.full(len(x), np.nan)
+        first = int(np.searchsorted(x, now))
+        cursor[first : first + 2] = 0.0, HEADROOM * self._top
+        empty = np.full(len(x), np.nan)
+        lines = [polyline(x, at, values) for at, values in self._curves]
+        dots = [_dot(x, at[row], values[row]) for (at, values), row in zip(self._curves, rows, strict=False)]
+        padded = [[*some, *[empty] * (self._most - len(some))] for some in (lines, dots)]
+        self._plot.data = (x, cursor, *padded[0], *padded[1])
+
+
+def polyline(x: FloatArray, at: FloatArray, values: FloatArray) -> FloatArray:
+    """A curve at a chart's abscissae, straight over gaps, nothing beyond its ends."""
+    known = np.isfinite(values)
+    if not known.any():
+        return np.full(len(x), np.nan)
+    return np.interp(x, at[known], values[known], left=np.nan, right=np.nan)
+
+
+def _dot(x: FloatArray, at: float, value: float) -> FloatArray:
+    dot = np.full(len(x), np.nan)
+    dot[int(np.searchsorted(x, at))] = value
+    return dot
