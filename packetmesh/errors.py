@@ -1,8 +1,8 @@
-"""Errors a person can act on: one sentence that names the thing, its value and what to try."""
+"""Errors with a message for people: one sentence that names the thing, its value and what to try."""
 
 
 class PacketMeshError(Exception):
-    """Base of every error that is shown to people as a single sentence, never as a stack trace."""
+    """Base of the errors that the app and the command line show as their message, without a stack trace."""
 
 
 class InputError(PacketMeshError):

@@ -1,4 +1,4 @@
-"""Files: output that is whole or absent, strict JSON, and bounded reading of what strangers made."""
+"""Files: atomic output, strict JSON, and reading with a limit of size."""
 
 from __future__ import annotations
 
@@ -14,20 +14,19 @@ from typing import Any
 from packetmesh.errors import InputError
 
 MAX_TEXT_BYTES = 1_000_000
-"""Intrinsics and poses."""
+"""Largest intrinsics or pose file that is read."""
 MAX_IMAGE_BYTES = 64_000_000
 MAX_IMAGE_PIXELS = 25_000_000
 MAX_GEOMETRY_BYTES = 1_000_000_000
-"""Clouds and meshes."""
+"""Largest cloud or mesh file that is read."""
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary sibling of ``path`` to write to, renamed to ``path`` if the body succeeds.
 
-    The sibling has the same suffix, so that libraries choose the same format; the folder is made
-    when it is missing. Whatever the body raises, no partial file remains and an older ``path``
-    stays as it was.
+    The sibling has the same suffix, so that libraries choose the same format. A missing folder is made.
+    If the body raises, no partial file remains and an older ``path`` is unchanged.
 
     Raises:
         InputError: the folder or the file cannot be written.
@@ -55,7 +54,7 @@ def _remove(sibling: Path) -> None:
 
 
 def writable_folder(path: str | os.PathLike[str]) -> Path:
-    """``path`` as a folder that exists and takes files, so that a long run fails early or not at all.
+    """``path``, made if it is missing and tried with a probe file, so that a long run fails early.
 
     Raises:
         InputError: it cannot be made or written.
@@ -87,7 +86,12 @@ def finite(value: Any) -> Any:
 
 
 def read_bytes(path: str | os.PathLike[str], max_bytes: int, what: str) -> bytes:
-    """The content of the file, ``what`` naming its kind in errors (``"depth image"``).
+    """The content of a file.
+
+    Args:
+        path: the file.
+        max_bytes: largest size that is read.
+        what: kind of the file, for the error messages (``"depth image"``).
 
     Raises:
         InputError: the file is missing, unreadable, empty or larger than ``max_bytes``.
@@ -110,10 +114,10 @@ def read_bytes(path: str | os.PathLike[str], max_bytes: int, what: str) -> bytes
 
 
 def read_text(path: str | os.PathLike[str], what: str) -> str:
-    """The content of a small text file.
+    """The content of a UTF-8 text file of at most ``MAX_TEXT_BYTES``.
 
     Raises:
-        InputError: as ``read_bytes``, or it is not UTF-8 text.
+        InputError: as for ``read_bytes``, or it is not UTF-8 text.
     """
     try:
         return read_bytes(path, MAX_TEXT_BYTES, what).decode("utf-8-sig")

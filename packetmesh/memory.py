@@ -1,4 +1,4 @@
-"""How much memory a process has held."""
+"""Peak memory of this process."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import psutil
 
 
 def peak_memory_bytes() -> int:
-    """The most memory this process has held at once.
+    """Largest resident memory of this process so far.
 
-    On Linux from the kernel's own record, because there the resource usage of a new process begins with
-    the memory of the one that started it.
+    On Linux read from /proc, because there the resource usage of a process starts at its parent's.
     """
     if sys.platform == "win32":
         return int(psutil.Process().memory_info().peak_wset)

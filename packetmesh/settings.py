@@ -66,12 +66,12 @@ def with_settings(config: Config, settings: Iterable[str]) -> Config:
 
 
 def settings(config: object) -> dict[str, str]:
-    """All settings of ``config`` by dotted key, as text that ``with_settings`` reads back."""
+    """Dotted key and value of every field of ``config``, as text that ``with_settings`` parses."""
     return _as_text(config)
 
 
 def differences(config: Config, base: Config) -> list[str]:
-    """The settings, as ``key=value``, that turn ``base`` into ``config``."""
+    """The settings of ``config`` that differ from ``base``, as ``key=value``."""
     before = settings(base)
     return [f"{key}={value}" for key, value in settings(config).items() if before[key] != value]
 
@@ -92,7 +92,7 @@ def _as_text(config: Any, prefix: str = "") -> dict[str, str]:
 
 
 def _replaced(config: Any, values: dict[str, str], known: list[str], prefix: str = "") -> Any:
-    """``config`` with ``values`` by keys below ``prefix``; ``known`` are all keys of the whole config."""
+    """``config`` with ``values``, whose keys lack ``prefix``; ``known`` are all keys of the whole config."""
     hints = typing.get_type_hints(type(config))
     changes: dict[str, Any] = {}
     for key in {key.partition(".")[0] for key in values}:
@@ -109,7 +109,7 @@ def _replaced(config: Any, values: dict[str, str], known: list[str], prefix: str
 
 
 def _unknown(key: str, known: list[str]) -> InputError:
-    """What to say of a key that does not exist: the nearest ones, by their whole or their last name."""
+    """The error for an unknown key; it offers the known ones nearest to the whole key or its last part."""
     last = key.rpartition(".")[2]
     near = [name for name in known if name.rpartition(".")[2] == last]
     near += [name for name in difflib.get_close_matches(key, known, n=3) if name not in near]

@@ -1,4 +1,4 @@
-"""What the settings of a config mean, read from the docstrings under its fields."""
+"""Help for a config: the docstring and the unit of every setting."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ UNITS = {
 """Unit by the last part of a setting's name."""
 
 UNITLESS = {"nakagami_m"}
-"""Names that end like a unit and have none."""
+"""Names that end like a unit but have none."""
 
 
 class Setting(NamedTuple):
@@ -39,9 +39,9 @@ class Setting(NamedTuple):
 
     key: str
     value: str
-    """As text that ``with_settings`` reads back."""
+    """As text that ``with_settings`` parses."""
     unit: str
-    """Empty if it is a number without a unit, a choice or a name."""
+    """Empty for a choice, a name or a number without a unit."""
     doc: str
 
 
@@ -52,7 +52,7 @@ def describe(config: Any) -> list[Setting]:
 
 
 def unit_of(key: str) -> str:
-    """The unit that a setting's name ends in: ``radio.range_m`` is in metres."""
+    """The unit that a setting's name ends in: metres for ``radio.range_m``; empty without one."""
     name = key.rpartition(".")[2]
     if name in UNITLESS or "_" not in name:
         return ""

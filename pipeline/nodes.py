@@ -14,7 +14,6 @@ from pipeline.acquisition import FilterResult, back_project, filter_outliers
 from pipeline.config import AcquisitionConfig, DepthConfig, FusionMode, NodePoints, RegistrationConfig
 from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, judge
 from pipeline.registration import fuse, register
-from pipeline.registration.global_start import register_from_anywhere
 from pipeline.registration.pose_graph import graph_points, pose_edge, solve_pose_graph
 from pipeline.types import DepthMap, FloatArray, PointCloud, PointSource, RegistrationResult, RgbdFrame
 
@@ -193,7 +192,7 @@ def _register_pair(
     """One node's cloud onto another's, from the believed poses or from anywhere."""
     T_init = geometry.inverse(frames[partner].T_world_camera) @ frames[index].T_world_camera
     try:
-        return register_from_anywhere(clouds[index], clouds[partner], config, T_init)
+        return register(clouds[index], clouds[partner], config, T_init)
     except ReconstructionError as error:
         return RegistrationResult(T_init, (), False, str(error))
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
-from pipeline.config import RegistrationConfig
-from pipeline.types import FloatArray, PointCloud, RegistrationResult
+from pipeline.types import FloatArray, PointCloud
 
 VOXELS_ACROSS = 50
 """Edge of the thinning voxel as a part of the target's extent, where none is given."""
@@ -19,15 +18,6 @@ EDGE_RATIO = 0.9
 RANSAC_ITERATIONS, RANSAC_CONFIDENCE = 100_000, 0.999
 SMALLEST_SHARE = 0.15
 """Least share of the source points that must find a partner."""
-
-
-def register_from_anywhere(
-    source: PointCloud, target: PointCloud, config: RegistrationConfig, T_init: FloatArray | None = None
-) -> RegistrationResult:
-    """``register``, until its callers call that."""
-    from pipeline.registration.loop import register
-
-    return register(source, target, config, T_init)
 
 
 def default_voxel_m(target: PointCloud) -> float:

@@ -1,4 +1,4 @@
-"""Configs as text: what is written reads back, and what is wrong is said."""
+"""Configs as text: settings are parsed as they were written, and a wrong one is a clear error."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The help of a config says of every setting what it is, in which unit, and reads back."""
+"""The help of a config: every setting once, with its unit, its docstring and a value that parses."""
 
 import pytest
 

@@ -7,8 +7,8 @@ from lab.worlds import box_room
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import inverse, rigid, rotation_exp
-from pipeline.registration import point_error_m
-from pipeline.registration.global_start import default_voxel_m, global_start, register_from_anywhere
+from pipeline.registration import iterate_registration, point_error_m, register
+from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.types import PointCloud
 from tests.pipeline.registration.rooms import seen_by
 
@@ -29,14 +29,16 @@ def pair(request) -> tuple[PointCloud, PointCloud, np.ndarray]:
 def test_ceicp_a_comes_within_two_centimetres_from_a_global_start(pair):
     source, target, T_true = pair
     assert point_error_m(np.eye(4), T_true, source.points_m) > 1.0
-    result = register_from_anywhere(source, target, GLOBAL)
+    result = register(source, target, GLOBAL)
     assert result.converged
     assert point_error_m(result.T_target_source, T_true, source.points_m) < 0.02
+    first = next(iterate_registration(source, target, GLOBAL))
+    np.testing.assert_array_equal(first.T_target_source, result.steps[0].T_target_source)
 
 
 def test_a_given_start_is_left_alone(pair):
     source, target, T_true = pair
-    given = register_from_anywhere(source, target, RegistrationConfig(), T_true)
+    given = register(source, target, RegistrationConfig(), T_true)
     assert point_error_m(given.T_target_source, T_true, source.points_m) < 0.02
     assert given.steps[0].rotation_step_rad < np.radians(1.0)
 

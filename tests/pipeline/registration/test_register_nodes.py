@@ -68,7 +68,7 @@ def test_a_registration_that_went_wrong_is_left_out(six, monkeypatch):
         wrong = source is works[3].sensor and target is works[2].sensor
         return replace(result, T_target_source=damage @ result.T_target_source) if wrong else result
 
-    monkeypatch.setattr(nodes, "register_from_anywhere", misled)
+    monkeypatch.setattr(nodes, "register", misled)
     registrations, poses = placed(frames, works)
     assert [(row.source, row.target) for row in registrations if not row.used] == [("node_03", "node_02")]
     assert max(row.loop_error_m for row in registrations) > 0.1

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.progress import drain
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.surface import boundary_loops, reconstruct_surface, spacing
+from pipeline.surface.ball_pivoting import iterate_ball, roll_ball
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import perforated_plane, sphere
@@ -160,3 +162,20 @@ def test_moving_the_cloud_moves_the_surface(bumpy):
 def test_bad_input_gets_its_sentence(cloud, radii_m, says):
     with pytest.raises(InputError, match=says):
         reconstruct_surface(cloud, radii_m)
+
+
+def test_the_steps_of_the_ball_are_its_surface_cut_into_batches():
+    cloud = sphere(500)
+    whole = roll_ball(cloud, (0.3, 0.2))
+    steps = []
+    surface = drain(iterate_ball(cloud, (0.3, 0.2), batch=100), steps.append)
+    assert max(len(step.triangles) for step in steps) <= 100
+    assert [step.radius_m for step in steps] == sorted(step.radius_m for step in steps)
+    triangles = np.concatenate([step.triangles for step in steps])
+    np.testing.assert_array_equal(cloud.points_m[triangles], whole.vertices_m[whole.triangles])
+    np.testing.assert_array_equal(surface.triangles, whole.triangles)
+    np.testing.assert_array_equal(surface.vertices_m, whole.vertices_m)
+    centers_m = np.concatenate([step.ball_centers_m for step in steps])
+    radii_m = np.repeat([step.radius_m for step in steps], [len(step.triangles) for step in steps])
+    to_corners_m = np.linalg.norm(cloud.points_m[triangles] - centers_m[:, None], axis=2)
+    np.testing.assert_allclose(to_corners_m, np.tile(radii_m[:, None], 3), rtol=1e-6)

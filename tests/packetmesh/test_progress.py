@@ -1,0 +1,26 @@
+"""The fold over a generator."""
+
+import pytest
+
+from packetmesh.progress import drain
+
+
+def counting(end):
+    yield from range(end)
+    if end > 3:
+        raise ValueError("too far")
+    return end
+
+
+def test_a_drained_generator_gives_its_return_value_and_hands_every_step_on():
+    steps = []
+    assert drain(counting(3), steps.append) == 3
+    assert steps == [0, 1, 2]
+    assert drain(counting(0)) == 0
+
+
+def test_what_the_generator_raises_is_raised_after_the_steps_before_it():
+    steps = []
+    with pytest.raises(ValueError, match="too far"):
+        drain(counting(5), steps.append)
+    assert steps == [0, 1, 2, 3, 4]
