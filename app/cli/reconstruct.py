@@ -49,9 +49,12 @@ def reconstruct(
     from pipeline.reconstruct import iterate_reconstruction
     from pipeline.run_folder import metrics_of, write_run_folder
     from pipeline.spec import Spec
+    from pipeline.stages import RunCache, run
 
+    spec, cache = Spec(source, preset, config), RunCache()
+    drain(run(spec, cache, ["rig"]))  # images that cannot be used leave no folder
     writable_folder(out)
-    result = drain(iterate_reconstruction(Spec(source, preset, config)), say_progress)
+    result = drain(iterate_reconstruction(spec, cache), say_progress)
     metrics = metrics_of(result)
     write_run_folder(result, metrics, out)
     write_reconstruction_report(result, metrics, out / "report.html")
