@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal, TypeVar, overload
+from typing import Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from network_sim.config import RadioConfig
 
 FloatArray = NDArray[np.float64]
-Power = TypeVar("Power", float, FloatArray)
 Modulation = Literal["dbpsk", "dqpsk", "cck", "oqpsk"]
 """How bytes are sent: IEEE 802.11b at 1, 2 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
 
@@ -96,38 +95,6 @@ def power_law(
     break_m = max(reference_m, near.least_m)
     far_w = near.power_w(break_m) * break_m**exponent
     return PathLoss(near.near_w, 2.0, far_w, exponent, break_m, near.least_m)
-
-
-def friis_w(
-    distance_m: Power, tx_power_w: float, wavelength_m: float, gain: float = 1.0, loss: float = 1.0
-) -> Power:
-    """Power received over free space; see ``free_space``."""
-    return free_space(tx_power_w, wavelength_m, gain, loss).power_w(distance_m)
-
-
-def two_ray_w(
-    distance_m: Power,
-    tx_power_w: float,
-    wavelength_m: float,
-    height_m: float,
-    gain: float = 1.0,
-    loss: float = 1.0,
-) -> Power:
-    """Power received over flat ground; see ``ground_reflection``."""
-    return ground_reflection(tx_power_w, wavelength_m, height_m, gain, loss).power_w(distance_m)
-
-
-def log_distance_w(
-    distance_m: Power,
-    tx_power_w: float,
-    wavelength_m: float,
-    exponent: float,
-    reference_m: float,
-    gain: float = 1.0,
-    loss: float = 1.0,
-) -> Power:
-    """Power received by a power law; see ``power_law``."""
-    return power_law(tx_power_w, wavelength_m, exponent, reference_m, gain, loss).power_w(distance_m)
 
 
 def path_loss(config: RadioConfig) -> PathLoss:

@@ -19,7 +19,7 @@ from network_sim.radio import Radio
 from network_sim.street import start_street, street_places
 from network_sim.trace import NetworkTrace, Recorder
 from network_sim.types import Packet, to_ns
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, drain
 
 REPORTS = 100
 """Reports of progress in a run."""
@@ -29,13 +29,7 @@ STREET_STREAMS = 4
 
 def simulate(config: NetworkConfig) -> NetworkTrace:
     """The trace of one run; the same config gives the same trace to the byte."""
-    steps = iterate_simulation(config)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            trace: NetworkTrace = stop.value
-            return trace
+    return drain(iterate_simulation(config))
 
 
 def iterate_simulation(config: NetworkConfig) -> Generator[Progress, None, NetworkTrace]:

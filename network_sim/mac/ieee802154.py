@@ -15,7 +15,7 @@ import simpy
 
 from network_sim.config import NetworkConfig
 from network_sim.mac.random_blocks import numbers_below
-from network_sim.types import Cause, Delivery, EventKind, Packet
+from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:
     from network_sim.mac.medium import Medium
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 SYMBOL_NS = 16_000
 BYTE_NS = 2 * SYMBOL_NS
+LINK_BPS = 8 * NS_PER_S / BYTE_NS
+"""Bit rate on the air: 250 kbit/s."""
 BACKOFF_NS = 20 * SYMBOL_NS
 CCA_NS = 8 * SYMBOL_NS
 TURNAROUND_NS = 12 * SYMBOL_NS
@@ -40,8 +42,6 @@ MIN_BE = 3
 MAX_BE = 5
 MAX_CSMA_BACKOFFS = 4
 MAX_FRAME_RETRIES = 3
-
-"""Random numbers drawn at once."""
 
 
 def spacing_ns(frame_bytes: int) -> int:

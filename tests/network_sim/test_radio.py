@@ -31,15 +31,13 @@ def radio(seed: int = 0, **changes: object) -> r.Radio:
 
 
 def test_two_ray_gives_the_values_of_ns_2() -> None:
-    def power_w(distance_m: float) -> float:
-        return r.two_ray_w(distance_m, NS2_TX_W, NS2_WAVELENGTH_M, NS2_HEIGHT_M)
-
+    power_w = r.ground_reflection(NS2_TX_W, NS2_WAVELENGTH_M, NS2_HEIGHT_M).power_w
     assert r.crossover_m(NS2_HEIGHT_M, NS2_WAVELENGTH_M) == pytest.approx(86.14, rel=1e-4)
     assert power_w(100.0) == pytest.approx(1.42681e-8, rel=1e-4)
     assert power_w(250.0) == pytest.approx(3.65262e-10, rel=1e-4)
     assert power_w(550.0) == pytest.approx(1.55924e-11, rel=1e-4)
     assert power_w(220.0) == pytest.approx(6.0908e-10, rel=1e-4)
-    assert power_w(50.0) == r.friis_w(50.0, NS2_TX_W, NS2_WAVELENGTH_M)
+    assert power_w(50.0) == r.free_space(NS2_TX_W, NS2_WAVELENGTH_M).power_w(50.0)
 
 
 def test_inside_its_range_the_default_radio_is_free_space() -> None:
@@ -63,11 +61,11 @@ def test_two_ray_is_continuous_and_falls_with_the_fourth_power_beyond_the_crosso
 
 def test_log_distance_with_exponent_two_is_free_space() -> None:
     distances_m = np.geomspace(0.1, 1e4, 50)
-    free = r.friis_w(distances_m, 0.1, 0.125, 1.2, 1.1)
-    np.testing.assert_allclose(
-        r.log_distance_w(distances_m, 0.1, 0.125, 2.0, 7.0, 1.2, 1.1), free, rtol=1e-12
+    free = r.free_space(0.1, 0.125, 1.2, 1.1).power_w(distances_m)
+    square, steep = (
+        r.power_law(0.1, 0.125, exponent, 7.0, 1.2, 1.1).power_w(distances_m) for exponent in (2.0, 3.5)
     )
-    steep = r.log_distance_w(distances_m, 0.1, 0.125, 3.5, 7.0, 1.2, 1.1)
+    np.testing.assert_allclose(square, free, rtol=1e-12)
     near = distances_m <= 7.0
     np.testing.assert_allclose(steep[near], free[near], rtol=1e-12)
     np.testing.assert_allclose(steep[~near], (free * (distances_m / 7.0) ** -1.5)[~near], rtol=1e-12)
