@@ -6,7 +6,6 @@ Powers are in watts and distances in metres, inside as well as in every argument
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal, overload
@@ -17,8 +16,8 @@ from numpy.typing import NDArray
 from network_sim.config import RadioConfig
 
 FloatArray = NDArray[np.float64]
-Modulation = Literal["dbpsk", "dqpsk", "cck", "oqpsk"]
-"""How bytes are sent: IEEE 802.11b at 1, 2 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
+Modulation = Literal["cck", "oqpsk"]
+"""How bytes are sent: IEEE 802.11b at 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 _ROUNDING = 1e-9  # nodes exactly range_m apart hear each other, however their distance was computed
@@ -118,23 +117,6 @@ def ratio(decibels: float) -> float:
     return 10.0 ** (decibels / 10.0)
 
 
-def dbpsk_bit_error_rate(sinr: float) -> float:
-    """802.11b at 1 Mb/s: ``exp(-Eb/N0) / 2`` (Proakis 2001, 5.2), noise in the 22 MHz of the channel."""
-    return 0.5 * math.exp(-22.0 * sinr)
-
-
-def dqpsk_bit_error_rate(sinr: float) -> float:
-    """802.11b at 2 Mb/s: the asymptote of Proakis 2001, 5.2, that Pei and Henderson 2009 (ns-3) take.
-
-    ``(1 + sqrt 2) / sqrt(8 pi sqrt 2 x) exp(-(2 - sqrt 2) x)`` of ``x = Eb/N0``; at most 1/2.
-    """
-    x = 11.0 * sinr
-    if x <= 0.0:
-        return 0.5
-    root = math.sqrt(2.0)
-    return min(0.5, (1.0 + root) / math.sqrt(8.0 * math.pi * root * x) * math.exp(-(2.0 - root) * x))
-
-
 _CCK_STEP = 0.01
 _CCK_LARGEST = 13.0  # errors are below 1e-16 there
 
@@ -180,13 +162,6 @@ def oqpsk_bit_error_rate(sinr: float) -> float:
     IEEE 802.15.4-2006, E.4.1.8.
     """
     return min(0.5, max(0.0, sum(factor * math.exp(power * sinr) for factor, power in _OQPSK_TERMS)))
-
-
-_BIT_ERROR_RATES: dict[Modulation, Callable[[float], float]] = {
-    "dbpsk": dbpsk_bit_error_rate,
-    "dqpsk": dqpsk_bit_error_rate,
-    "oqpsk": oqpsk_bit_error_rate,
-}
 
 
 class Radio:
@@ -245,4 +220,4 @@ class Radio:
         """
         if kind == "cck":
             return -math.expm1(size_bytes * math.log1p(-cck_symbol_error_rate(sinr)))
-        return -math.expm1(8 * size_bytes * math.log1p(-_BIT_ERROR_RATES[kind](sinr)))
+        return -math.expm1(8 * size_bytes * math.log1p(-oqpsk_bit_error_rate(sinr)))

@@ -10,6 +10,7 @@ import pytest
 import simpy
 
 from network_sim.config import MacConfig, NetworkConfig, NodesConfig
+from network_sim.mac.context import MacContext
 from network_sim.mac.ieee802154 import Ieee802154
 from network_sim.mac.medium import Medium
 from network_sim.mac.saturation import saturation
@@ -17,7 +18,7 @@ from network_sim.places import FixedPlaces
 from network_sim.radio import Radio
 from network_sim.trace import Recorder
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet, PacketKind
-from tests.network_sim.dealt import Dealt
+from tests.network_sim.fixed_backoffs import FixedBackoffs
 
 US = 1000
 SLOT = 320 * US
@@ -47,9 +48,11 @@ class Scene:
         self.down: set[int] = set()
         self.received: list[tuple[int, int]] = []
         self.deliveries: list[tuple[int, Delivery]] = []
-        draws = Dealt(*slots)
+        backoffs = FixedBackoffs(*slots)
         self.mac = Ieee802154(
-            self.env, self.medium, self.config, self.recorder, draws, self._is_up, self._receive
+            MacContext(
+                self.env, self.medium, self.config, self.recorder, backoffs, self._is_up, self._receive
+            )
         )
 
     def _is_up(self, node: int) -> bool:

@@ -12,6 +12,10 @@ from scipy import stats
 
 from network_sim.config import MacConfig, NetworkConfig
 from network_sim.mac import Mac, make_mac
+from network_sim.mac.context import MacContext
+from network_sim.mac.medium import Medium
+from network_sim.places import FixedPlaces
+from network_sim.radio import Radio
 from network_sim.trace import Recorder
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet, PacketKind, to_s
 
@@ -23,17 +27,17 @@ def link(
     config = NetworkConfig(mac=MacConfig(kind=kind, link_bps=link_bps))
     recorder = Recorder("all", 2)
     received: list[tuple[int, int]] = []
-    mac = make_mac(
-        kind,
+    rng = np.random.default_rng(0)
+    context = MacContext(
         env,
-        None,
+        Medium(env, Radio(config.radio, rng), FixedPlaces(np.zeros((2, 2))), rng),
         config,
         recorder,
-        np.random.default_rng(0),
+        rng,
         lambda node: node not in down,
         lambda packet, receiver: received.append((env.now, packet.id)),
     )
-    return env, mac, received, recorder, config
+    return env, make_mac(context), received, recorder, config
 
 
 def packet_of(size_bytes: int, number: int = 0) -> Packet:
