@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from network_sim.config import NetworkConfig
 from network_sim.images import Book
 from network_sim.mac import make_mac
+from network_sim.mac.context import MacContext
 from network_sim.mac.medium import Medium
 from network_sim.nodes import Camera, Shared, Station
 from network_sim.places import FixedPlaces, laid_out
@@ -82,7 +83,7 @@ class Collection:
             self._sink.join_cloud(config.uplink, recorder, uplink_rng)
         medium = Medium(env, radio, self.places, medium_rng)
         up = self.shared.up.__getitem__
-        self.shared.mac = make_mac(config.mac.kind, env, medium, config, recorder, mac_rng, up, self._receive)
+        self.shared.mac = make_mac(MacContext(env, medium, config, recorder, mac_rng, up, self._receive))
         if config.nodes.failures_per_h:
             for camera, station in zip(self._cameras, self.stations, strict=False):
                 env.process(self._fail(camera, station))

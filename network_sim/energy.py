@@ -1,4 +1,4 @@
-"""Joules of radios and platforms, from times in states or from bits over a distance (SPEC 6.3)."""
+"""Joules of radios and platforms, from the time that each radio spends in each state (SPEC 6.3)."""
 
 from __future__ import annotations
 
@@ -6,73 +6,45 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from network_sim.config import EnergyConfig
-from packetmesh.errors import InputError
+from network_sim.counters import Counters
+from network_sim.states import State
+from network_sim.types import NS_PER_S
 
 FloatArray = NDArray[np.float64]
-
-ELECTRONICS_J_PER_BIT = 50e-9
-"""What sending or receiving a bit costs before any distance (Heinzelman et al. 2002, table I)."""
-FREE_SPACE_J_PER_BIT_M2 = 10e-12
-"""Amplifier over free space (Heinzelman et al. 2002)."""
-MULTIPATH_J_PER_BIT_M4 = 0.0013e-12
-"""Amplifier beyond the crossover distance (Heinzelman et al. 2002)."""
-CROSSOVER_M = math.sqrt(FREE_SPACE_J_PER_BIT_M2 / MULTIPATH_J_PER_BIT_M4)
-"""Where both amplifier terms are equal: 87.7 m."""
-
-
-def first_order_tx_j(bits: float, distance_m: float) -> float:
-    """Energy to send ``bits`` over a distance: ``l E_elec + l eps d^a`` with a = 2, beyond 87.7 m a = 4."""
-    if distance_m < CROSSOVER_M:
-        return bits * (ELECTRONICS_J_PER_BIT + FREE_SPACE_J_PER_BIT_M2 * distance_m**2)
-    return bits * (ELECTRONICS_J_PER_BIT + MULTIPATH_J_PER_BIT_M4 * distance_m**4)
-
-
-def first_order_rx_j(bits: float) -> float:
-    """Energy to receive ``bits``: ``l E_elec``."""
-    return bits * ELECTRONICS_J_PER_BIT
 
 
 @dataclass(frozen=True, slots=True)
 class RadioTimes:
-    """How long each node's radio was in each state; the platform sleeps with its radio."""
+    """How long each radio was in each state, arrays of one shape; the platform sleeps with its radio."""
 
     tx_s: FloatArray
-    """(N,) sending."""
+    """Sending."""
     rx_s: FloatArray
-    """(N,) receiving."""
+    """Receiving."""
     idle_s: FloatArray
-    """(N,) listening to a channel on which nothing for it was sent."""
+    """Listening to a channel on which nothing for it was sent."""
     sleep_s: FloatArray
-    """(N,) asleep or down."""
+    """Asleep or down."""
 
     @property
     def elapsed_s(self) -> FloatArray:
-        """(N,) all states together."""
+        """All states together."""
         return self.tx_s + self.rx_s + self.idle_s + self.sleep_s
 
 
-def radio_times(elapsed_s: float, tx_s: FloatArray, rx_s: FloatArray, sleep_s: FloatArray) -> RadioTimes:
-    """Times in states of nodes that listen whenever they do nothing else.
+def radio_times(states_ns: NDArray[np.int64], elapsed_s: ArrayLike) -> RadioTimes:
+    """Times of radios that listen whenever they do nothing else.
 
     Args:
-        elapsed_s: how long they were watched.
-        tx_s, rx_s, sleep_s: (N,) time sending, receiving and asleep.
-
-    Raises:
-        InputError: a negative time, or more time in states than was watched.
+        states_ns: (..., S) time in each ``State``.
+        elapsed_s: simulated time in which they were counted; broadcasts to (...).
     """
-    busy_s = tx_s + rx_s + sleep_s
-    impossible = (np.minimum(np.minimum(tx_s, rx_s), sleep_s) < 0.0) | (busy_s > elapsed_s * (1.0 + 1e-9))
-    if impossible.any():
-        node = int(np.argmax(impossible))
-        raise InputError(
-            f"Node {node} sends {tx_s[node]:g} s, receives {rx_s[node]:g} s and sleeps {sleep_s[node]:g} s "
-            f"of {elapsed_s:g} s; try times that do not overlap, none negative"
-        )
-    return RadioTimes(tx_s, rx_s, np.maximum(elapsed_s - busy_s, 0.0), sleep_s)
+    states_s = states_ns / NS_PER_S
+    tx_s, rx_s, sleep_s = (states_s[..., s] for s in (State.SENDING, State.RECEIVING, State.ASLEEP))
+    return RadioTimes(tx_s, rx_s, np.maximum(elapsed_s - (tx_s + rx_s + sleep_s), 0.0), sleep_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,26 +52,26 @@ class Energy:
     """Joules of each node by state: of its radio, and of the computer and camera that carry it."""
 
     tx_j: FloatArray
-    """(N,) radio sending."""
+    """Radio sending."""
     rx_j: FloatArray
-    """(N,) radio receiving."""
+    """Radio receiving."""
     idle_j: FloatArray
-    """(N,) radio listening."""
+    """Radio listening."""
     sleep_j: FloatArray
-    """(N,) radio asleep."""
+    """Radio asleep."""
     platform_j: FloatArray
-    """(N,) platform awake."""
+    """Platform awake."""
     platform_sleep_j: FloatArray
-    """(N,) platform asleep."""
+    """Platform asleep."""
 
     @property
     def radio_j(self) -> FloatArray:
-        """(N,) the radio in all its states."""
+        """The radio in all its states."""
         return self.tx_j + self.rx_j + self.idle_j + self.sleep_j
 
     @property
     def total_j(self) -> FloatArray:
-        """(N,) radio and platform."""
+        """Radio and platform."""
         return self.radio_j + self.platform_j + self.platform_sleep_j
 
 
@@ -113,6 +85,23 @@ def joules(times: RadioTimes, config: EnergyConfig) -> Energy:
         platform_j=(times.tx_s + times.rx_s + times.idle_s) * config.platform_w,
         platform_sleep_j=times.sleep_s * config.platform_sleep_w,
     )
+
+
+def cumulative_radio_j(counters: Counters, nodes: NDArray[np.bool_], config: EnergyConfig) -> FloatArray:
+    """Energy of the radios of the chosen nodes together, from the end of the warm-up on.
+
+    Args:
+        counters: of a run.
+        nodes: (N,) which nodes.
+        config: power of each state.
+
+    Returns:
+        (M + 1,) joules until each of ``counters.edges_ns`` from the end of the warm-up, where they are 0.
+    """
+    after = slice(counters.warmup_minutes, None)
+    elapsed_s = np.diff(counters.edges_ns[after]) / NS_PER_S
+    times = radio_times(counters.states_ns[after][:, nodes], elapsed_s[:, None])
+    return np.append(0.0, np.cumsum(joules(times, config).radio_j.sum(axis=1)))
 
 
 def lifetimes_s(times: RadioTimes, config: EnergyConfig) -> FloatArray:

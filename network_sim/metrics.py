@@ -20,9 +20,6 @@ from network_sim.trace import NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns, to_s
 from packetmesh.errors import InputError
 
-CAMERA_ROLES = ("node", "vehicle")
-"""Those with a camera and a battery; sinks, access points and the cloud have mains."""
-
 
 @dataclass(frozen=True, slots=True)
 class Metric:
@@ -85,33 +82,6 @@ def elapsed_s(trace: NetworkTrace) -> float:
     return to_s(trace.horizon_ns - to_ns(trace.config.run.warmup_s))
 
 
-def node_energy(trace: NetworkTrace) -> energy.Energy:
-    """Joules of every node by state, arrays (N,)."""
-    return energy.joules(_times(trace), trace.config.energy)
-
-
-def node_lifetimes_s(trace: NetworkTrace) -> NDArray[np.float64]:
-    """(N,) how long each battery lasts; infinite without one and for what has mains."""
-    lifetimes_s = energy.lifetimes_s(_times(trace), trace.config.energy)
-    return np.where(_cameras(trace), lifetimes_s, np.inf)
-
-
-def node_queues(trace: NetworkTrace) -> NDArray[np.float64]:
-    """(N,) packets in each node's buffer, averaged over time; needs the whole log.
-
-    Raises:
-        ValueError: the log was not kept.
-    """
-    if trace.config.run.keep != "all":
-        raise ValueError("Only a complete log says whose packets waited")
-    events = trace.events.of(EventKind.ENQUEUE, EventKind.DELIVER, EventKind.DROP)
-    sign = np.where(events.kind == EventKind.ENQUEUE, 1, -1)
-    start_ns = to_ns(trace.config.run.warmup_s)
-    left_s = (trace.horizon_ns - np.maximum(events.t_ns, start_ns)) / NS_PER_S
-    sums = np.bincount(events.node, sign * left_s, minlength=len(trace.names))
-    return sums / elapsed_s(trace)
-
-
 def _outcomes(trace: NetworkTrace) -> Rows:
     """Delivery and delay of images and of their packets."""
     for noun, outcomes, began in (
@@ -165,7 +135,7 @@ def _losses(trace: NetworkTrace) -> Rows:
 
 
 def _airtime(trace: NetworkTrace) -> Rows:
-    sending_s = _states_s(trace)[:, State.SENDING]
+    sending_s = _states_ns(trace)[:, State.SENDING] / NS_PER_S
     share = "acknowledgements included, over time; far nodes that send at once can make it exceed 1"
     yield "airtime_share", sending_s.sum() / elapsed_s(trace), "1", f"Time on the air of all frames, {share}"
     yield "frames", _count(trace, EventKind.AIR), "1", "Frames sent, retries included, replies not"
@@ -185,9 +155,11 @@ def _queue(trace: NetworkTrace) -> Rows:
 
 
 def _energy(trace: NetworkTrace) -> Rows:
-    spent, cameras = node_energy(trace), _cameras(trace)
+    cameras = camera_nodes(trace)
     if not cameras.any():
         return
+    times = energy.radio_times(_states_ns(trace)[cameras], elapsed_s(trace))
+    spent = energy.joules(times, trace.config.energy)
     for name, joules, what in (
         ("radio_sending", spent.tx_j, "radios that send"),
         ("radio_receiving", spent.rx_j, "radios that receive what is addressed to them"),
@@ -198,12 +170,12 @@ def _energy(trace: NetworkTrace) -> Rows:
         ("platform_sleeping", spent.platform_sleep_j, "computers and cameras that sleep or have failed"),
         ("total", spent.total_j, "radios, computers and cameras"),
     ):
-        yield f"energy_{name}", joules[cameras].sum(), "J", f"Energy of {what}, all camera nodes together"
-    total_j = spent.total_j[cameras]
+        yield f"energy_{name}", joules.sum(), "J", f"Energy of {what}, all camera nodes together"
+    total_j = spent.total_j
     yield "energy_per_node", total_j.mean(), "J", "Energy of a camera node, their mean"
     if arrived := _count(trace, EventKind.ARRIVE):
         yield "energy_per_image", total_j.sum() / arrived, "J", "Energy of all camera nodes per arrived image"
-    least_s = node_lifetimes_s(trace).min()
+    least_s = energy.lifetimes_s(times, trace.config.energy).min()
     yield "lifetime", least_s, "s", "Until the first camera node's battery is empty, if all goes on like this"
 
 
@@ -254,16 +226,11 @@ def _bytes(trace: NetworkTrace, kind: EventKind, packet_kind: PacketKind | None 
     return int(sums.sum() if packet_kind is None else sums[:, packet_kind].sum())
 
 
-def _states_s(trace: NetworkTrace) -> NDArray[np.float64]:
-    """(N, S) seconds in each state."""
-    return _after(trace, trace.counters.states_ns).sum(axis=0) / NS_PER_S
+def _states_ns(trace: NetworkTrace) -> NDArray[np.int64]:
+    """(N, S) time in each state."""
+    return _after(trace, trace.counters.states_ns).sum(axis=0)
 
 
-def _times(trace: NetworkTrace) -> energy.RadioTimes:
-    states_s = _states_s(trace)
-    sent_s, asleep_s, received_s = (states_s[:, s] for s in (State.SENDING, State.ASLEEP, State.RECEIVING))
-    return energy.radio_times(elapsed_s(trace), sent_s, received_s, asleep_s)
-
-
-def _cameras(trace: NetworkTrace) -> NDArray[np.bool_]:
-    return np.isin(trace.roles, CAMERA_ROLES)
+def camera_nodes(trace: NetworkTrace) -> NDArray[np.bool_]:
+    """(N,) the nodes with a camera and a battery; sinks, access points and the cloud have mains."""
+    return np.isin(trace.roles, ("node", "vehicle"))

@@ -6,10 +6,9 @@ Powers are in watts and distances in metres, inside as well as in every argument
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal, TypeVar, overload
+from typing import Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +16,8 @@ from numpy.typing import NDArray
 from network_sim.config import RadioConfig
 
 FloatArray = NDArray[np.float64]
-Power = TypeVar("Power", float, FloatArray)
-Modulation = Literal["dbpsk", "dqpsk", "cck", "oqpsk"]
-"""How bytes are sent: IEEE 802.11b at 1, 2 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
+Modulation = Literal["cck", "oqpsk"]
+"""How bytes are sent: IEEE 802.11b at 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 _ROUNDING = 1e-9  # nodes exactly range_m apart hear each other, however their distance was computed
@@ -98,38 +96,6 @@ def power_law(
     return PathLoss(near.near_w, 2.0, far_w, exponent, break_m, near.least_m)
 
 
-def friis_w(
-    distance_m: Power, tx_power_w: float, wavelength_m: float, gain: float = 1.0, loss: float = 1.0
-) -> Power:
-    """Power received over free space; see ``free_space``."""
-    return free_space(tx_power_w, wavelength_m, gain, loss).power_w(distance_m)
-
-
-def two_ray_w(
-    distance_m: Power,
-    tx_power_w: float,
-    wavelength_m: float,
-    height_m: float,
-    gain: float = 1.0,
-    loss: float = 1.0,
-) -> Power:
-    """Power received over flat ground; see ``ground_reflection``."""
-    return ground_reflection(tx_power_w, wavelength_m, height_m, gain, loss).power_w(distance_m)
-
-
-def log_distance_w(
-    distance_m: Power,
-    tx_power_w: float,
-    wavelength_m: float,
-    exponent: float,
-    reference_m: float,
-    gain: float = 1.0,
-    loss: float = 1.0,
-) -> Power:
-    """Power received by a power law; see ``power_law``."""
-    return power_law(tx_power_w, wavelength_m, exponent, reference_m, gain, loss).power_w(distance_m)
-
-
 def path_loss(config: RadioConfig) -> PathLoss:
     """The law that a config names."""
     tx_power_w, length_m = watts(config.tx_power_dbm), wavelength_m(config.frequency_hz)
@@ -149,23 +115,6 @@ def watts(power_dbm: float) -> float:
 def ratio(decibels: float) -> float:
     """Factor of a number of decibels."""
     return 10.0 ** (decibels / 10.0)
-
-
-def dbpsk_bit_error_rate(sinr: float) -> float:
-    """802.11b at 1 Mb/s: ``exp(-Eb/N0) / 2`` (Proakis 2001, 5.2), noise in the 22 MHz of the channel."""
-    return 0.5 * math.exp(-22.0 * sinr)
-
-
-def dqpsk_bit_error_rate(sinr: float) -> float:
-    """802.11b at 2 Mb/s: the asymptote of Proakis 2001, 5.2, that Pei and Henderson 2009 (ns-3) take.
-
-    ``(1 + sqrt 2) / sqrt(8 pi sqrt 2 x) exp(-(2 - sqrt 2) x)`` of ``x = Eb/N0``; at most 1/2.
-    """
-    x = 11.0 * sinr
-    if x <= 0.0:
-        return 0.5
-    root = math.sqrt(2.0)
-    return min(0.5, (1.0 + root) / math.sqrt(8.0 * math.pi * root * x) * math.exp(-(2.0 - root) * x))
 
 
 _CCK_STEP = 0.01
@@ -213,13 +162,6 @@ def oqpsk_bit_error_rate(sinr: float) -> float:
     IEEE 802.15.4-2006, E.4.1.8.
     """
     return min(0.5, max(0.0, sum(factor * math.exp(power * sinr) for factor, power in _OQPSK_TERMS)))
-
-
-_BIT_ERROR_RATES: dict[Modulation, Callable[[float], float]] = {
-    "dbpsk": dbpsk_bit_error_rate,
-    "dqpsk": dqpsk_bit_error_rate,
-    "oqpsk": oqpsk_bit_error_rate,
-}
 
 
 class Radio:
@@ -278,4 +220,4 @@ class Radio:
         """
         if kind == "cck":
             return -math.expm1(size_bytes * math.log1p(-cck_symbol_error_rate(sinr)))
-        return -math.expm1(8 * size_bytes * math.log1p(-_BIT_ERROR_RATES[kind](sinr)))
+        return -math.expm1(8 * size_bytes * math.log1p(-oqpsk_bit_error_rate(sinr)))

@@ -12,6 +12,7 @@ from network_sim.collection import Collection, collection_names
 from network_sim.config import NetworkConfig
 from network_sim.conservation import check
 from network_sim.mac import Mac, make_mac
+from network_sim.mac.context import MacContext
 from network_sim.mac.medium import Medium
 from network_sim.mobility import StreetPlaces
 from network_sim.places import Places
@@ -96,7 +97,7 @@ def _drive(
 
     def mac(places: Places, up: Callable[[int], bool], receive: Callable[[Packet, int], None]) -> Mac:
         medium = Medium(env, Radio(config.radio, radio_rng), places, medium_rng)
-        return make_mac(config.mac.kind, env, medium, config, recorder, mac_rng, up, receive)
+        return make_mac(MacContext(env, medium, config, recorder, mac_rng, up, receive))
 
     street = start_street(env, config, recorder, mac, street_rng)
     for share in _run(env, config):

@@ -79,11 +79,6 @@ class Events:
     def __len__(self) -> int:
         return len(self.t_ns)
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of the columns in bytes."""
-        return sum(column.nbytes for column in self.columns())
-
     def columns(self) -> Iterator[NDArray[np.generic]]:
         """The columns in the order of ``COLUMNS``."""
         return (getattr(self, field.name) for field in fields(self))

@@ -30,10 +30,6 @@ class Timing:
     """Propagation from one station to another."""
 
 
-FHSS = Timing(
-    8184, 400, 8184, ack_us=240, rts_us=288, cts_us=240, slot_us=50, sifs_us=28, difs_us=128, delay_us=1
-)
-"""Bianchi's own example at 1 Mb/s (his Table II)."""
 DSSS_11 = Timing(
     8000,
     192 + 8 * 64 / 11,
@@ -55,8 +51,6 @@ class Saturated:
 
     throughput_bps: float
     """Payload, of all stations together."""
-    channel_share: float
-    """Share of time in which payload is on the air: Bianchi's S."""
     collision_probability: float
     """Of an attempt (p)."""
     attempt_probability: float
@@ -99,7 +93,6 @@ def bianchi(
     slot_us = idle * timing.slot_us + success * success_us + (1.0 - idle - success) * collision_us
     return Saturated(
         throughput_bps=success * timing.payload_bits / slot_us * 1e6,
-        channel_share=success * timing.payload_us / slot_us,
         collision_probability=p,
         attempt_probability=tau,
     )

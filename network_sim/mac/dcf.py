@@ -11,16 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import simpy
 
-from network_sim.config import NetworkConfig
+from network_sim.mac.context import MacContext
 from network_sim.mac.random_blocks import numbers_below
 from network_sim.types import Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:
-    from network_sim.mac.medium import Listener, Medium, Transmission
-    from network_sim.trace import Recorder
+    from network_sim.mac.medium import Listener, Transmission
 
 SLOT_NS = 20_000
 SIFS_NS = 10_000
@@ -162,43 +160,27 @@ class _Station:
 class Dcf:
     """Medium access of all stations of one channel."""
 
-    def __init__(
-        self,
-        env: simpy.Environment,
-        medium: Medium,
-        config: NetworkConfig,
-        recorder: Recorder,
-        rng: np.random.Generator,
-        up: Callable[[int], bool],
-        receive: Callable[[Packet, int], None],
-        wait_after_loss: bool = True,
-    ) -> None:
+    def __init__(self, context: MacContext, wait_after_loss: bool = True) -> None:
         """Stations that have heard and sent nothing yet.
 
         Args:
-            env: Its clock counts nanoseconds.
-            medium: The shared channel.
-            config: Says whether to use RTS/CTS.
-            recorder: Gets AIR, ACK, LOSS and DELIVER.
-            rng: Draws backoffs.
-            up: Whether a node is awake.
-            receive: Gets each packet once per ``send`` at most, and where it arrived.
+            context: Clock, channel and nodes; ``config.mac.rts`` says whether to use RTS/CTS.
             wait_after_loss: Follow the standard: an EIFS after damaged frames, and a sender waits for the
                 answer that does not come. False waits a DIFS only, as Bianchi's model assumes.
         """
-        self._env = env
-        self._medium = medium
-        self._rts = config.mac.rts
-        self._record = recorder.add_packet
-        self._up = up
-        self._receive = receive
+        self._env = context.env
+        self._medium = context.medium
+        self._rts = context.config.mac.rts
+        self._record = context.recorder.add_packet
+        self._up = context.up
+        self._receive = context.receive
         self._eifs_ns = EIFS_NS if wait_after_loss else DIFS_NS
         self._answer_wait_ns = ANSWER_WAIT_NS if wait_after_loss else 0
         self._stations: dict[int, _Station] = {}
         self._counting: dict[int, _Station] = {}
         self._resting: dict[int, _Station] = {}
         self._timer_ns = _NEVER
-        self._numbers = numbers_below(MAX_WINDOW, rng)
+        self._numbers = numbers_below(MAX_WINDOW, context.rng)
 
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.

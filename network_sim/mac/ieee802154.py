@@ -7,22 +7,19 @@ one event for backoff and assessment, and one for each part of the exchange.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Generator
+from typing import Any
 
-import numpy as np
 import simpy
 
-from network_sim.config import NetworkConfig
+from network_sim.mac.context import MacContext
 from network_sim.mac.random_blocks import numbers_below
-from network_sim.types import Cause, Delivery, EventKind, Packet
-
-if TYPE_CHECKING:
-    from network_sim.mac.medium import Medium
-    from network_sim.trace import Recorder
+from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet
 
 SYMBOL_NS = 16_000
 BYTE_NS = 2 * SYMBOL_NS
+LINK_BPS = 8 * NS_PER_S / BYTE_NS
+"""Bit rate on the air: 250 kbit/s."""
 BACKOFF_NS = 20 * SYMBOL_NS
 CCA_NS = 8 * SYMBOL_NS
 TURNAROUND_NS = 12 * SYMBOL_NS
@@ -41,8 +38,6 @@ MAX_BE = 5
 MAX_CSMA_BACKOFFS = 4
 MAX_FRAME_RETRIES = 3
 
-"""Random numbers drawn at once."""
-
 
 def spacing_ns(frame_bytes: int) -> int:
     """Silence of a sender after a frame of this size without its PHY header (SIFS or LIFS)."""
@@ -52,27 +47,17 @@ def spacing_ns(frame_bytes: int) -> int:
 class Ieee802154:
     """Medium access of all nodes of one channel."""
 
-    def __init__(
-        self,
-        env: simpy.Environment,
-        medium: Medium,
-        config: NetworkConfig,
-        recorder: Recorder,
-        rng: np.random.Generator,
-        up: Callable[[int], bool],
-        receive: Callable[[Packet, int], None],
-    ) -> None:
-        """``up`` tells whether a node is awake; ``receive`` gets each packet once per ``send`` at most."""
-        self._env = env
-        self._medium = medium
-        self._ack = config.mac.ack
-        self._recorder = recorder
-        self._up = up
-        self._receive = receive
+    def __init__(self, context: MacContext) -> None:
+        self._env = context.env
+        self._medium = context.medium
+        self._ack = context.config.mac.ack
+        self._recorder = context.recorder
+        self._up = context.up
+        self._receive = context.receive
         self._ready_ns: dict[int, int] = {}
         self._answers: dict[int, int] = {}
         """Until when in ns each receiver acknowledges a frame."""
-        self._numbers = numbers_below(1 << MAX_BE, rng)
+        self._numbers = numbers_below(1 << MAX_BE, context.rng)
 
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.

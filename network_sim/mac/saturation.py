@@ -5,9 +5,8 @@ No buffers and no images: what ``tests`` and claims compare with Bianchi's model
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import count
 from typing import Any
 
@@ -17,6 +16,7 @@ import simpy
 from network_sim.config import NetworkConfig, RunConfig
 from network_sim.counters import Counters
 from network_sim.mac import Mac, make_mac
+from network_sim.mac.context import MacContext
 from network_sim.mac.dcf import Dcf
 from network_sim.mac.medium import Medium
 from network_sim.places import laid_out
@@ -73,12 +73,10 @@ def saturation(
     rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]
     medium = Medium(env, Radio(config.radio, rngs[1]), laid_out(config.nodes, rngs[0]), rngs[2])
     recorder = Recorder(config.run.keep, nodes + 1, to_ns(config.run.warmup_s))
-    make: Callable[..., Mac] = partial(make_mac, config.mac.kind)
-    if not wait_after_loss:
-        if config.mac.kind != "ieee80211b":
-            raise ValueError(f"{config.mac.kind} has no EIFS")
-        make = partial(Dcf, wait_after_loss=False)
-    mac = make(env, medium, config, recorder, rngs[3], lambda node: True, lambda packet, node: None)
+    if not wait_after_loss and config.mac.kind != "ieee80211b":
+        raise ValueError(f"{config.mac.kind} has no EIFS")
+    context = MacContext(env, medium, config, recorder, rngs[3], lambda node: True, lambda packet, node: None)
+    mac = make_mac(context) if wait_after_loss else Dcf(context, wait_after_loss=False)
     ids = count()
     tallies = [_Tally() for _ in range(nodes)]
     begin_ns = rngs[4].integers(BEGIN_WITHIN_NS, size=nodes).tolist()

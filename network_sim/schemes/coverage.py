@@ -11,10 +11,6 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right, insort
 from collections import defaultdict
 
-import numpy as np
-
-from network_sim.types import NS_PER_S
-
 
 class Coverage:
     """Images that are there, by cell, and what one more would add."""
@@ -43,14 +39,3 @@ class Coverage:
         """An image that was counted on did not come."""
         taken = self._taken_ns[cell]
         del taken[bisect_left(taken, captured_ns)]
-
-
-def utility_s(cells: np.ndarray, captured_ns: np.ndarray, validity_ns: int) -> float:
-    """F(A) in cell-seconds of images of these cells (A,), taken at these times (A,)."""
-    if not len(cells):
-        return 0.0
-    order = np.lexsort((captured_ns, cells))
-    cells, captured_ns = cells[order], captured_ns[order]
-    # Each interval counts up to the next one of its cell.
-    until_next = np.where(cells[1:] == cells[:-1], captured_ns[1:] - captured_ns[:-1], validity_ns)
-    return float(np.minimum(until_next, validity_ns).sum() + validity_ns) / NS_PER_S

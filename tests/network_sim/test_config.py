@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from network_sim.config import PRESETS, NetworkConfig, NodesConfig
+from network_sim.config import NetworkConfig, NodesConfig
 from network_sim.places import FixedPlaces, laid_out
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
@@ -51,20 +51,6 @@ def test_an_impossible_value_is_one_sentence_that_names_it(setting, names):
 def test_no_config_takes_nan():
     with pytest.raises(InputError, match=r"nodes\.spacing_m is nan"):
         NodesConfig(spacing_m=math.nan)
-
-
-def test_the_thesis_link_is_that_of_the_thesis():
-    config = PRESETS["thesis-link"]
-    assert (config.nodes.count, config.nodes.images, config.nodes.image_bytes) == (3, 1, 921_615)
-    assert (config.nodes.payload_bytes, config.nodes.header_bytes) == (116, 0)
-    assert (config.mac.kind, config.mac.ack, config.nodes.retransmit) == ("ieee802154", True, True)
-
-
-def test_the_street_grid_is_that_of_the_spec():
-    config = PRESETS["street-grid"]
-    assert (config.run.horizon_s, config.run.warmup_s) == (5 * 3600, 30 * 60)
-    assert (config.street.access_points, config.mac.kind, config.mac.rts) == (4, "ieee80211b", False)
-    assert config.radio.model == "two-ray"
 
 
 @pytest.mark.parametrize("layout", ["star", "line", "grid", "random"])

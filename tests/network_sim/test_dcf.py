@@ -10,13 +10,14 @@ import pytest
 import simpy
 
 from network_sim.config import MacConfig, NetworkConfig, RadioConfig
+from network_sim.mac.context import MacContext
 from network_sim.mac.dcf import Dcf, data_ns
 from network_sim.mac.medium import Medium
 from network_sim.places import FixedPlaces
 from network_sim.radio import Radio
 from network_sim.trace import Recorder
 from network_sim.types import Cause, Delivery, EventKind, Packet, PacketKind
-from tests.network_sim.dealt import Dealt
+from tests.network_sim.fixed_backoffs import FixedBackoffs
 
 US = 1000
 SLOT = 20 * US
@@ -56,15 +57,16 @@ class Scene:
         self.received: list[tuple[int, int]] = []
         self.deliveries: dict[int, list[Delivery]] = {node: [] for node in range(len(at_m))}
         self.ended: dict[int, int] = {}
-        self.mac = Dcf(
+        context = MacContext(
             self.env,
             self.medium,
             config,
             self.recorder,
-            Dealt(*slots),
+            FixedBackoffs(*slots),
             lambda node: node not in self.down,
             lambda packet, node: self.received.append((packet.id, node)),
         )
+        self.mac = Dcf(context)
 
     def send(self, sender: int, *starts_ns: int, receiver: int = SINK) -> None:
         """Packets that are ready at these times, or when the one before is done."""
@@ -155,7 +157,7 @@ def test_the_same_slot_is_a_collision_and_the_window_doubles() -> None:
     it.send(C, 200 * US)
     it.run()
     first = EXCHANGE + DIFS + 3 * SLOT
-    # The dealt numbers: B 3, C 3, A's backoff after its packet 7, and after the collision B 63, C 40 of 64.
+    # The fixed backoffs: B 3, C 3, A's backoff after its packet 7, and after the collision B 63, C 40 of 64.
     assert it.losses(B) == it.losses(C) == [(first + DATA, Cause.COLLISION)]
     second = first + DATA + LOST + 40 * SLOT
     assert it.times(EventKind.AIR, C) == [first, second]

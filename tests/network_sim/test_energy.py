@@ -1,4 +1,4 @@
-"""Energy from times in states and from bits over a distance."""
+"""Energy from times in states, and how it adds up over a run."""
 
 from __future__ import annotations
 
@@ -6,27 +6,26 @@ import math
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from network_sim import energy as e
-from network_sim.config import EnergyConfig
-from packetmesh.errors import InputError
+from network_sim.config import PRESETS, EnergyConfig
+from network_sim.metrics import camera_nodes, metrics
+from network_sim.simulate import simulate
+from network_sim.states import State
+from network_sim.types import NS_PER_S
+from packetmesh.settings import with_settings
+from tests.network_sim.by_hand import small_run, trace_of
+
+
+def times_of(elapsed_s: float, tx_s: ArrayLike, rx_s: ArrayLike, sleep_s: ArrayLike) -> e.RadioTimes:
+    """Times of nodes from seconds (N,) that each sent, received and slept."""
+    states_s = {State.SENDING: tx_s, State.RECEIVING: rx_s, State.ASLEEP: sleep_s}
+    return e.radio_times(np.stack([np.asarray(states_s[s]) * NS_PER_S for s in State], axis=-1), elapsed_s)
 
 
 def times(elapsed_s: float, tx_s: float, rx_s: float, sleep_s: float) -> e.RadioTimes:
-    return e.radio_times(elapsed_s, np.array([tx_s]), np.array([rx_s]), np.array([sleep_s]))
-
-
-def test_first_order_radio_has_its_crossover_at_87_7_m_and_is_continuous_there() -> None:
-    assert pytest.approx(87.7, abs=0.01) == e.CROSSOVER_M
-    before, after = (e.first_order_tx_j(1.0, math.nextafter(e.CROSSOVER_M, goal)) for goal in (0.0, 1e3))
-    assert before == pytest.approx(after, rel=1e-12)
-
-
-def test_first_order_radio_at_known_distances() -> None:
-    assert e.first_order_tx_j(2000, 10.0) == pytest.approx(2000 * (50e-9 + 1e-9))
-    assert e.first_order_tx_j(2000, 100.0) == pytest.approx(2000 * (50e-9 + 130e-9))
-    assert e.first_order_rx_j(2000) == pytest.approx(100e-6)
-    assert e.first_order_tx_j(1, 0.0) == e.first_order_rx_j(1)
+    return times_of(elapsed_s, [tx_s], [rx_s], [sleep_s])
 
 
 def test_a_bit_sent_at_250_kbps_costs_209_nj() -> None:
@@ -61,22 +60,16 @@ def test_states_are_priced_apart_and_sum_to_the_total() -> None:
 def test_a_node_listens_whenever_it_does_nothing_else() -> None:
     rng = np.random.default_rng(0)
     shares = rng.dirichlet(np.ones(4), 50)
-    states = e.radio_times(90.0, 90.0 * shares[:, 0], 90.0 * shares[:, 1], 90.0 * shares[:, 2])
+    states = times_of(90.0, *(90.0 * shares[:, :3].T))
     np.testing.assert_allclose(states.idle_s, 90.0 * shares[:, 3], atol=1e-12)
     np.testing.assert_allclose(states.elapsed_s, 90.0)
     full = times(0.3, 0.1, 0.2, 0.0)
     assert full.idle_s[0] == 0.0
 
 
-@pytest.mark.parametrize("bad", [(1.0, 0.6, 0.3, 0.2), (1.0, -0.1, 0.3, 0.2), (1.0, 0.1, 0.3, -0.2)])
-def test_times_that_cannot_be_are_refused(bad: tuple[float, float, float, float]) -> None:
-    with pytest.raises(InputError, match=r"^Node 0 sends .* try times that do not overlap, none negative$"):
-        times(*bad)
-
-
 def test_a_battery_lasts_its_energy_over_the_mean_power() -> None:
     config = EnergyConfig(battery_j=36_000.0)
-    states = e.radio_times(100.0, np.array([0.0, 50.0]), np.zeros(2), np.array([100.0, 0.0]))
+    states = times_of(100.0, [0.0, 50.0], [0.0, 0.0], [100.0, 0.0])
     lifetimes_s = e.lifetimes_s(states, config)
     assert lifetimes_s[0] == pytest.approx(36_000.0 / (0.00006 + 0.1))
     assert lifetimes_s[1] == pytest.approx(36_000.0 / (2.7 + 0.5 * (0.0522 + 0.0564)))
@@ -87,3 +80,25 @@ def test_without_a_battery_or_consumption_a_node_lasts_for_ever() -> None:
     assert e.lifetimes_s(states, EnergyConfig()).tolist() == [math.inf]
     free = EnergyConfig(tx_w=0, rx_w=0, idle_w=0, sleep_w=0, platform_w=0, platform_sleep_w=0, battery_j=1.0)
     assert e.lifetimes_s(states, free).tolist() == [math.inf]
+
+
+def test_radio_energy_of_the_small_run_adds_up_minute_by_minute() -> None:
+    """The second camera: a frame of 2 s in each minute (1 W), 10 s asleep (8 W), else it listens (4 W)."""
+    trace = trace_of(small_run)
+    second = np.array([False, True, False])
+    found_j = e.cumulative_radio_j(trace.counters, second, trace.config.energy)
+    first_minute_j = 1.0 * 2 + 4.0 * 58
+    assert found_j.tolist() == [0.0, first_minute_j, first_minute_j + 1.0 * 2 + 8.0 * 10 + 4.0 * 48]
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_energy_never_falls_and_lies_between_sleep_and_full_power(preset: str) -> None:
+    short = ["run.horizon_s=150", "run.warmup_s=20", "street.vehicles=5", "run.keep=counters"]
+    trace = simulate(with_settings(PRESETS[preset], short))
+    counters, config, cameras = trace.counters, trace.config.energy, camera_nodes(trace)
+    spent_j = np.diff(e.cumulative_radio_j(counters, cameras, config))
+    node_s = np.diff(counters.edges_ns[counters.warmup_minutes :]) / NS_PER_S * cameras.sum()
+    assert len(spent_j) == 3
+    assert (spent_j >= config.sleep_w * node_s).all()
+    assert (spent_j <= max(config.tx_w, config.rx_w, config.idle_w) * node_s * (1 + 1e-12)).all()
+    assert spent_j.sum() == pytest.approx(metrics(trace)["energy_radio"].value)

@@ -31,15 +31,13 @@ def radio(seed: int = 0, **changes: object) -> r.Radio:
 
 
 def test_two_ray_gives_the_values_of_ns_2() -> None:
-    def power_w(distance_m: float) -> float:
-        return r.two_ray_w(distance_m, NS2_TX_W, NS2_WAVELENGTH_M, NS2_HEIGHT_M)
-
+    power_w = r.ground_reflection(NS2_TX_W, NS2_WAVELENGTH_M, NS2_HEIGHT_M).power_w
     assert r.crossover_m(NS2_HEIGHT_M, NS2_WAVELENGTH_M) == pytest.approx(86.14, rel=1e-4)
     assert power_w(100.0) == pytest.approx(1.42681e-8, rel=1e-4)
     assert power_w(250.0) == pytest.approx(3.65262e-10, rel=1e-4)
     assert power_w(550.0) == pytest.approx(1.55924e-11, rel=1e-4)
     assert power_w(220.0) == pytest.approx(6.0908e-10, rel=1e-4)
-    assert power_w(50.0) == r.friis_w(50.0, NS2_TX_W, NS2_WAVELENGTH_M)
+    assert power_w(50.0) == r.free_space(NS2_TX_W, NS2_WAVELENGTH_M).power_w(50.0)
 
 
 def test_inside_its_range_the_default_radio_is_free_space() -> None:
@@ -63,11 +61,11 @@ def test_two_ray_is_continuous_and_falls_with_the_fourth_power_beyond_the_crosso
 
 def test_log_distance_with_exponent_two_is_free_space() -> None:
     distances_m = np.geomspace(0.1, 1e4, 50)
-    free = r.friis_w(distances_m, 0.1, 0.125, 1.2, 1.1)
-    np.testing.assert_allclose(
-        r.log_distance_w(distances_m, 0.1, 0.125, 2.0, 7.0, 1.2, 1.1), free, rtol=1e-12
+    free = r.free_space(0.1, 0.125, 1.2, 1.1).power_w(distances_m)
+    square, steep = (
+        r.power_law(0.1, 0.125, exponent, 7.0, 1.2, 1.1).power_w(distances_m) for exponent in (2.0, 3.5)
     )
-    steep = r.log_distance_w(distances_m, 0.1, 0.125, 3.5, 7.0, 1.2, 1.1)
+    np.testing.assert_allclose(square, free, rtol=1e-12)
     near = distances_m <= 7.0
     np.testing.assert_allclose(steep[near], free[near], rtol=1e-12)
     np.testing.assert_allclose(steep[~near], (free * (distances_m / 7.0) ** -1.5)[~near], rtol=1e-12)
@@ -143,20 +141,6 @@ def test_without_fading_power_is_what_it_was() -> None:
     assert radio().faded_w(3.0) == 3.0
 
 
-def test_dbpsk_at_10_db() -> None:
-    assert r.dbpsk_bit_error_rate(10.0 / 22.0) == pytest.approx(2.26999649e-5, rel=1e-8)
-    assert r.dbpsk_bit_error_rate(0.0) == 0.5
-
-
-@pytest.mark.parametrize("x", [4.0, 8.0, 16.0])
-def test_dqpsk_approaches_the_exact_rate(x: float) -> None:
-    """Exact, Gray coded: ``Q1(a, b) - I0(a b) exp(-(a^2 + b^2) / 2) / 2`` (Proakis 2001, 5.2)."""
-    a2, b2 = 2.0 * x * (1.0 - math.sqrt(0.5)), 2.0 * x * (1.0 + math.sqrt(0.5))
-    bessel = np.i0(math.sqrt(a2 * b2)) * math.exp(-0.5 * (a2 + b2))
-    exact = stats.ncx2.sf(b2, 2, a2) - 0.5 * bessel
-    assert exact < r.dqpsk_bit_error_rate(x / 11.0) < exact * (1.0 + 0.8 / x)
-
-
 @pytest.mark.parametrize("sinr", [0.05, 0.4, 1.5, 3.0, 5.0, 8.0])
 def test_cck_is_two_biorthogonal_symbols(sinr: float) -> None:
     """The integral of Proakis 2001, 5.2, with the argument of Pei and Henderson 2009."""
@@ -192,7 +176,7 @@ def test_oqpsk_without_a_signal_is_a_coin() -> None:
     assert r.oqpsk_bit_error_rate(0.0) == pytest.approx(0.5, rel=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["dbpsk", "dqpsk", "cck", "oqpsk"])
+@pytest.mark.parametrize("kind", ["cck", "oqpsk"])
 def test_packet_errors_fall_with_the_signal_and_grow_with_the_size(kind: r.Modulation) -> None:
     here = radio()
     sinrs = np.concatenate([[0.0], np.geomspace(1e-3, 1e3, 400)]).tolist()

@@ -70,16 +70,16 @@ def test_a_metric_that_some_runs_lack_is_averaged_over_the_others():
 
 def test_runs_in_processes_come_back_in_their_order_with_progress():
     configs = replications(TINY, 3)
-    runs, said = answer(iterate_runs(configs))
+    runs, reports = answer(iterate_runs(configs))
     assert runs == [measured(config) for config in configs]
-    assert [step.fraction for step in said] == pytest.approx([1 / 3, 2 / 3, 1.0])
-    assert all(isinstance(step, Progress) for step in said)
+    assert [step.fraction for step in reports] == pytest.approx([1 / 3, 2 / 3, 1.0])
+    assert all(isinstance(step, Progress) for step in reports)
 
 
 def test_a_sweep_replicates_every_value_with_the_same_seeds():
-    found, said = answer(iterate_sweep(TINY, "nodes.count", ["1", "2"], 2))
+    found, reports = answer(iterate_sweep(TINY, "nodes.count", ["1", "2"], 2))
     assert list(found) == ["1", "2"]
-    assert len(said) == 4
+    assert len(reports) == 4
     direct, _ = answer(iterate_study([with_settings(TINY, ["nodes.count=2"])], 2))
     assert found["2"] == direct[0]
     assert found["1"]["image_delay_mean"].mean < found["2"]["image_delay_mean"].mean
@@ -96,6 +96,6 @@ def test_a_cluster_of_two_workers_gives_the_same_answers():
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
-        runs, said = answer(iterate_runs(configs, cluster.scheduler_address))
+        runs, reports = answer(iterate_runs(configs, cluster.scheduler_address))
     assert runs == [measured(config) for config in configs]
-    assert len(said) == 3
+    assert len(reports) == 3

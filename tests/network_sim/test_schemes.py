@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from network_sim.config import SchemeConfig
 from network_sim.schemes import make_scheme
-from network_sim.schemes.coverage import Coverage, utility_s
+from network_sim.schemes.coverage import Coverage
 from network_sim.schemes.greedy import Greedy, select
 from network_sim.schemes.pdc import FLOOR, Pdc, adapted, probabilities
-from network_sim.types import NS_PER_S, to_ns
+from network_sim.types import to_ns
 
 VALIDITY_S = 10
 IMAGES = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 40)), max_size=7)
@@ -33,12 +33,6 @@ def _covered(images: list[tuple[int, int]]) -> Coverage:
 
 def _select(known: list[tuple[int, int]], offered: list[tuple[int, int]], k: int | None) -> list[int]:
     return select(_covered(known), [cell for cell, _ in offered], [taken for _, taken in offered], k)
-
-
-@given(IMAGES)
-def test_utility_is_the_length_of_the_union(images: list[tuple[int, int]]) -> None:
-    cells, taken_s = np.array(images, dtype=np.int64).reshape(-1, 2).T
-    assert utility_s(cells, taken_s * NS_PER_S, to_ns(VALIDITY_S)) == _utility(images)
 
 
 @given(IMAGES, st.tuples(st.integers(0, 2), st.integers(0, 40)))

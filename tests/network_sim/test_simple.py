@@ -12,7 +12,10 @@ from scipy import stats
 
 from network_sim.config import MacConfig, NetworkConfig
 from network_sim.mac import Mac, make_mac
-from network_sim.queueing import md1_mean_wait_s
+from network_sim.mac.context import MacContext
+from network_sim.mac.medium import Medium
+from network_sim.places import FixedPlaces
+from network_sim.radio import Radio
 from network_sim.trace import Recorder
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet, PacketKind, to_s
 
@@ -24,17 +27,17 @@ def link(
     config = NetworkConfig(mac=MacConfig(kind=kind, link_bps=link_bps))
     recorder = Recorder("all", 2)
     received: list[tuple[int, int]] = []
-    mac = make_mac(
-        kind,
+    rng = np.random.default_rng(0)
+    context = MacContext(
         env,
-        None,
+        Medium(env, Radio(config.radio, rng), FixedPlaces(np.zeros((2, 2))), rng),
         config,
         recorder,
-        np.random.default_rng(0),
+        rng,
         lambda node: node not in down,
         lambda packet, receiver: received.append((env.now, packet.id)),
     )
-    return env, mac, received, recorder, config
+    return env, make_mac(context), received, recorder, config
 
 
 def packet_of(size_bytes: int, number: int = 0) -> Packet:
@@ -109,6 +112,6 @@ def test_each_wait_is_that_of_lindley() -> None:
 def test_mean_wait_is_that_of_an_md1_queue(load: float) -> None:
     means = [float(waits_s(load, 4000, seed)[0][400:].mean()) for seed in range(12)]
     half = stats.t.ppf(0.995, len(means) - 1) * np.std(means, ddof=1) / np.sqrt(len(means))
-    expected = md1_mean_wait_s(load * 1000.0, 1e-3)
+    expected = load * 1e-3 / (2.0 * (1.0 - load))  # Pollaczek and Khinchine, for a service of 1 ms
     assert abs(np.mean(means) - expected) <= half
     assert half < 0.1 * expected

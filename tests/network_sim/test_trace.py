@@ -191,14 +191,6 @@ def test_an_empty_run(keep: Keep) -> None:
     assert trace.counters.faults == ()
 
 
-def test_memory_of_an_event() -> None:
-    recorder = Recorder("all", 3, to_ns(60))
-    packet = np.arange(100_000)
-    recorder.add_many(packet * 1000, E.LOSS, 0, packet=packet)
-    events = recorder.trace(config_of("all"), NAMES, None, to_ns(HORIZON_S), ROLES).events
-    assert events.nbytes == 39 * len(events)
-
-
 def test_a_complete_log_gives_the_counters_again() -> None:
     trace = trace_of(random_run(5))
     np.testing.assert_equal(asdict(recount(trace)), asdict(trace.counters))

@@ -13,9 +13,9 @@ from app.screens.network.view import Curve, NetworkView, Pieces, Series, What
 from app.state import Spec
 from app.store import Store
 from network_sim.config import NetworkConfig
-from network_sim.metrics import CAMERA_ROLES, metrics
+from network_sim.energy import cumulative_radio_j
+from network_sim.metrics import camera_nodes, metrics
 from network_sim.simulate import iterate_simulation, street_of
-from network_sim.states import State
 from network_sim.trace import Events, NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns
 from packetmesh.progress import Progress, part
@@ -207,16 +207,9 @@ def _delays_s(events: Events, edges_s: FloatArray) -> FloatArray:
 
 def _radio_j(trace: NetworkTrace) -> Series:
     """Energy of the camera nodes' radios since the end of the warm-up."""
-    counters, energy = trace.counters, trace.config.energy
-    cameras = np.isin(trace.roles, CAMERA_ROLES)
-    after = slice(counters.warmup_minutes, None)
-    states_s = counters.states_ns[after][:, cameras].sum(axis=1) / NS_PER_S
-    edges_s = counters.edges_ns[after] / NS_PER_S
-    sent_s, asleep_s, received_s = (states_s[:, s] for s in (State.SENDING, State.ASLEEP, State.RECEIVING))
-    listened_s = np.diff(edges_s) * cameras.sum() - states_s.sum(axis=1)
-    used_j = energy.tx_w * sent_s + energy.rx_w * received_s + energy.sleep_w * asleep_s
-    used_j += energy.idle_w * listened_s
-    return Series(edges_s, np.append(0.0, np.cumsum(used_j)))
+    counters = trace.counters
+    edges_s = counters.edges_ns[counters.warmup_minutes :] / NS_PER_S
+    return Series(edges_s, cumulative_radio_j(counters, camera_nodes(trace), trace.config.energy))
 
 
 # The places.

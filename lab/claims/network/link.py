@@ -18,7 +18,7 @@ from lab.claims.network.tasks import transfer
 from lab.claims.network.trials import iterate_trials
 from network_sim.config import PRESETS, NetworkConfig
 from network_sim.images import encoded_bytes, pgm_bytes, ppm_bytes
-from network_sim.mac.throughput import LINK_BPS
+from network_sim.mac.ieee802154 import LINK_BPS
 from network_sim.replicate import replications
 from packetmesh.progress import Progress
 

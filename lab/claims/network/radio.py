@@ -15,7 +15,7 @@ from lab.claims.network.trials import iterate_trials
 from network_sim.config import PRESETS, NodesConfig
 from network_sim.mac.bianchi import bianchi
 from network_sim.mac.dcf import EIFS_NS
-from network_sim.radio import crossover_m, two_ray_w, wavelength_m
+from network_sim.radio import crossover_m, ground_reflection, wavelength_m
 from packetmesh.progress import Progress
 
 STREET = PRESETS["street-grid"]
@@ -80,7 +80,7 @@ def crowd_runs(folder: Path) -> Generator[Progress, None, tuple[Throughputs, Thr
 
 def _c32(runs: tuple[Throughputs, Throughputs]) -> Outcome:
     powers = {
-        d: two_ray_w(d, NS2_TX_W, wavelength_m(NS2_HZ), NS2_HEIGHT_M) / ns2_w - 1.0
+        d: ground_reflection(NS2_TX_W, wavelength_m(NS2_HZ), NS2_HEIGHT_M).power_w(d) / ns2_w - 1.0
         for d, ns2_w in NS2_POWERS_W.items()
     }
     worst_power = max(abs(error) for error in powers.values())

@@ -1,0 +1,37 @@
+"""What every medium access works with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import simpy
+
+from network_sim.config import NetworkConfig
+from network_sim.types import Packet
+
+if TYPE_CHECKING:
+    from network_sim.mac.medium import Medium
+    from network_sim.trace import Recorder
+
+
+@dataclass(frozen=True, slots=True)
+class MacContext:
+    """The clock, the channel and the nodes of one medium access."""
+
+    env: simpy.Environment
+    """Its clock counts nanoseconds."""
+    medium: Medium
+    """The shared channel; ideal and serial links do not use it."""
+    config: NetworkConfig
+    """Of the whole network; ``config.mac`` is this medium access."""
+    recorder: Recorder
+    """Gets AIR, ACK, LOSS and DELIVER."""
+    rng: np.random.Generator
+    """Draws backoffs."""
+    up: Callable[[int], bool]
+    """Whether a node is awake."""
+    receive: Callable[[Packet, int], None]
+    """Gets each packet once per ``send`` at most, and the node that it has reached."""
