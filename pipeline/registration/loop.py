@@ -8,6 +8,7 @@ from collections.abc import Generator
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.progress import drain
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import apply, rotation_angle_rad
 from pipeline.registration.acceleration import Acceleration
@@ -85,14 +86,12 @@ def register_timed(
     started = time.perf_counter()
     steps: list[RegistrationStep] = []
     elapsed_s: list[float] = []
-    remaining = iterate(source, target, config, T_init, method)
-    while True:
-        try:
-            steps.append(next(remaining))
-            elapsed_s.append(time.perf_counter() - started)
-        except StopIteration as end:
-            reason: str = end.value
-            break
+
+    def record(step: RegistrationStep) -> None:
+        steps.append(step)
+        elapsed_s.append(time.perf_counter() - started)
+
+    reason = drain(iterate(source, target, config, T_init, method), record)
     start = np.eye(4) if T_init is None else np.asarray(T_init, dtype=np.float64)
     T = steps[-1].T_target_source if steps else start
     result = RegistrationResult(T, tuple(steps), reason in ("converged", "stalled"), reason)
