@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from packetmesh.errors import InputError
 from packetmesh.settings import config_named
@@ -15,22 +15,28 @@ NetworkPreset = Literal[
     "packetmesh", "midas-small", "depth-anything-v2-small", "depth-anything-v2-metric", "monodepth2"
 ]
 Normalisation = Literal["imagenet", "unit", "bytes"]
-Method = Literal[
-    "icp",
-    "trimmed-icp",
-    "picp",
-    "ricp",
-    "mricp",
-    "ficp",
-    "hicp",
-    "ceicp-literal",
-    "ceicp-n",
-    "ceicp-a",
-    "ceicp-r",
-    "ceicp-ml",
-    "kernel-correlation",
-    "fast-robust-icp",
-]
+METHODS = {
+    "icp": "icp.Icp",
+    "trimmed-icp": "trimmed.TrimmedIcp",
+    "picp": "picp.Picp",
+    "ricp": "ricp.Ricp",
+    "mricp": "mricp.Mricp",
+    "ficp": "ficp.Ficp",
+    "hicp": "hicp.Hicp",
+    "ceicp-literal": "ceicp_literal.CeicpLiteral",
+    "ceicp-n": "ceicp.CeicpN",
+    "ceicp-a": "ceicp.CeicpA",
+    "ceicp-r": "ceicp_r.CeicpR",
+    "ceicp-ml": "ceicp_ml.CeicpMl",
+    "kernel-correlation": "kernel_correlation.KernelCorrelation",
+    "fast-robust-icp": "fast_robust.FastRobustIcp",
+}
+"""Every registration method by name, and its class below ``pipeline.registration``: a new method is a file
+with such a class and a line here. Classes are named, not imported, so that reading settings stays fast."""
+if TYPE_CHECKING:
+    Method = str
+else:
+    Method = Literal[tuple(METHODS)]
 Metric = Literal["point", "plane"]
 Direction = Literal["q2p", "p2q", "both"]
 FusionMode = Literal["union", "fill"]
@@ -150,6 +156,8 @@ class RegistrationConfig:
     """given: from the believed pose; global: from a pose found by matching features first."""
 
     def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise InputError(f"registration.method is {self.method}; try one of {', '.join(METHODS)}")
         _above("registration.gate_m", self.gate_m, 0.0)
         _at_least("registration.max_iterations", self.max_iterations, 1)
         _at_least("registration.max_points", self.max_points, 6)

@@ -34,6 +34,11 @@ class CeicpN(PairWeighting):
 
     fixed_gate_m: float
 
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpN:
+        """With the configured gate."""
+        return cls(config.gate_m)
+
     def weigh(self, matching: Matching) -> PairWeights:
         """Pairs within the gate; sigma^2 is their mean squared distance."""
         rows = np.flatnonzero(matching.distances_m <= self.fixed_gate_m)
@@ -55,20 +60,21 @@ class CeicpA(PairWeighting):
     sigma_0_m: float
     sigma_min_m: float
     decay: float
-    asking_points: int = 0
-    """Points that look for a partner, in all; zero lets all of them look at every scale."""
-    source_asks: bool = True
+    least_source_share: float = 1.0
+    """Share of the source's points that look for a partner while the kernel is wide."""
+    least_target_share: float = 1.0
+    """The same of the target's."""
     may_widen: bool = True
     """Whether the scale may still be doubled, once, after losing its pairs."""
 
-    @staticmethod
-    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpA:
-        """The first iteration, at sigma_0 = gate / 1.5; ``target`` is the thinned cloud."""
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpA:
+        """At sigma_0 = gate / 1.5."""
         sigma_min_m = config.sigma_min_m or _smallest_sigma_m(target, config.gate_m)
         sigma_0_m = max(START_SIGMA_OF_GATE * config.gate_m, sigma_min_m)
-        source_asks = config.direction == "q2p"
-        asking = 0 if config.direction == "both" else len(source if source_asks else target)
-        return CeicpA(sigma_0_m, sigma_0_m, sigma_min_m, config.sigma_decay, asking, source_asks)
+        source_share = min(1.0, COARSE_POINTS / len(source)) if config.direction == "q2p" else 1.0
+        target_share = min(1.0, COARSE_POINTS / len(target)) if config.direction == "p2q" else 1.0
+        return cls(sigma_0_m, sigma_0_m, sigma_min_m, config.sigma_decay, source_share, target_share)
 
     def weigh(self, matching: Matching) -> PairWeights:
         """Pairs within three sigma."""
@@ -87,17 +93,15 @@ class CeicpA(PairWeighting):
 
     @property
     def source_share(self) -> float:
-        """All that ask at the last scale, in proportion fewer where the kernel is wider."""
-        return self._asking_share if self.source_asks else 1.0
+        """All points at the last scale, in proportion fewer where the kernel is wider."""
+        return self._share(self.least_source_share)
 
     @property
     def target_share(self) -> float:
-        """As ``source_share``, when the target asks."""
-        return 1.0 if self.source_asks else self._asking_share
+        """As ``source_share``, where target points look for partners."""
+        return self._share(self.least_target_share)
 
-    @property
-    def _asking_share(self) -> float:
-        least = COARSE_POINTS / self.asking_points if self.asking_points else 1.0
+    def _share(self, least: float) -> float:
         return min(1.0, max(least, self.sigma_min_m / self.sigma_m))
 
     def following(self, kept: PairWeights, still: bool) -> CeicpA:

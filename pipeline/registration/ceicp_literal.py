@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 
 from packetmesh.errors import InputError
+from pipeline.config import RegistrationConfig
 from pipeline.registration.degenerate import DegenerateError
 from pipeline.registration.matching import Matching
 from pipeline.registration.weighting import PairWeighting, PairWeights
-from pipeline.types import FloatArray
+from pipeline.types import FloatArray, PointCloud
 
 Unit = Literal["mm", "m"]
 _PER_METRE = {"mm": 1000.0, "m": 1.0}
@@ -30,6 +31,11 @@ class CeicpLiteral(PairWeighting):
 
     fixed_gate_m: float
     unit: Unit
+
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpLiteral:
+        """With the configured gate and unit."""
+        return cls(config.gate_m, config.unit)
 
     def weigh(self, matching: Matching) -> PairWeights:
         """Pairs within the gate; mu and sigma are the mean and sample deviation of their distances."""

@@ -41,11 +41,11 @@ class CeicpMl(PairWeighting):
     steady: bool = False
     """Whether the scale has come to rest."""
 
-    @staticmethod
-    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpMl:
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpMl:
         """With the smallest scale of CEICP-A, and outliers anywhere in the target's box."""
         density = len(source) / box_volume_m3(target.points_m, config.gate_m)
-        return CeicpMl(
+        return cls(
             CeicpA.starting(config, source, target).sigma_min_m,
             OUTLIER_SHARE / (1.0 - OUTLIER_SHARE) * density,
             min(NEIGHBOURS, len(source)),

@@ -9,10 +9,8 @@ import numpy as np
 from pipeline.config import RegistrationConfig
 from pipeline.registration.ceicp import GATE_IN_SIGMAS, CeicpA, entropy_weights
 from pipeline.registration.matching import Matching
-from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.registration.weighting import MAD_TO_SIGMA, PairWeighting, PairWeights
 from pipeline.types import PointCloud
-
-_MAD_TO_SIGMA = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +25,14 @@ class CeicpR(PairWeighting):
     sigma_m: float = float("inf")
     """Scale of the previous iteration, which this one's does not exceed."""
 
-    @staticmethod
-    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpR:
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpR:
         """With the smallest scale of CEICP-A."""
-        return CeicpR(CeicpA.starting(config, source, target).sigma_min_m)
+        return cls(CeicpA.starting(config, source, target).sigma_min_m)
 
     def weigh(self, matching: Matching) -> PairWeights:
         """Pairs within three robust sigmas."""
-        robust_m = _MAD_TO_SIGMA * float(np.median(matching.distances_m))
+        robust_m = MAD_TO_SIGMA * float(np.median(matching.distances_m))
         sigma_m = min(self.sigma_m, max(self.sigma_min_m, robust_m))
         gate_m = GATE_IN_SIGMAS * sigma_m
         rows = np.flatnonzero(matching.distances_m <= gate_m)

@@ -39,11 +39,11 @@ class FastRobustIcp(PairWeighting):
     nu_m: float | None = None
     """The scale; None takes it from the first matching."""
 
-    @staticmethod
-    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> FastRobustIcp:
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> FastRobustIcp:
         """With the last scale from the target's spacing."""
         nu_min_m = LAST_NU_OF_SPACING[config.metric] * neighbourhood_m(target.points_m)
-        return FastRobustIcp(max(nu_min_m, SIGMA_MIN_OF_GATE * config.gate_m))
+        return cls(max(nu_min_m, SIGMA_MIN_OF_GATE * config.gate_m))
 
     def weigh(self, matching: Matching) -> PairWeights:
         """All pairs, by the Welsch function."""

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.registration.matching import Matching
-from pipeline.registration.trimmed import closest_rows, evenly
-from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.registration.weighting import PairWeighting, PairWeights, closest_rows, evenly
 from pipeline.types import FloatArray
 
 LAMBDA = 0.95
@@ -18,7 +17,7 @@ SMALLEST_FRACTION = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Ficp(PairWeighting):
-    """FICP: equal weights for the closest fraction f of the pairs, chosen anew at every matching.
+    """FICP: equal weights for the closest fraction f of the pairs, chosen at every matching.
 
     Source: Phillips, Liu, Tomasi, "Outlier robust ICP for minimizing fractional RMSD", 3DIM 2007.
     """

@@ -9,10 +9,10 @@ from scipy.spatial import cKDTree
 
 from pipeline.config import FusionMode
 from pipeline.registration.neighbourhood import local_spacing_m
+from pipeline.registration.weighting import MAD_TO_SIGMA
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud, PointSource
 
 FAR_SPACINGS = 2.0
-_MAD_TO_SIGMA = 1.4826
 
 
 def fuse(
@@ -68,7 +68,7 @@ def _inferred_sigma_m(sensor: PointCloud, inferred: PointCloud) -> FloatArray | 
     if not len(of_sensor):
         return None
     ratio = inferred.points_m[of_inferred, 2] / sensor.points_m[of_sensor, 2]
-    return _MAD_TO_SIGMA * float(np.median(np.abs(ratio - 1.0))) * inferred.points_m[:, 2]
+    return MAD_TO_SIGMA * float(np.median(np.abs(ratio - 1.0))) * inferred.points_m[:, 2]
 
 
 def _pixel_keys(pixels: IntArray) -> IntArray:

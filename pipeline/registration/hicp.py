@@ -9,9 +9,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.config import RegistrationConfig
-from pipeline.registration.matching import Matching
-from pipeline.registration.trimmed import closest_rows, evenly
-from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.registration.trimmed import TrimmedIcp
 from pipeline.types import ByteArray, FloatArray, PointCloud
 
 LEAST_SATURATION = 0.1
@@ -19,20 +17,18 @@ LEAST_SATURATION = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Hicp(PairWeighting):
+class Hicp(TrimmedIcp):
     """HICP: the closest share of the pairs, matched by x, y, z and hue; the distances are in space.
 
     Source: Men, Gebre, Pochiraju, "Color point cloud registration with 4D ICP algorithm", ICRA 2011,
     whose hue is a line from 0 to 1; here it is the circle that it is, so that reds meet.
     """
 
-    share: float
-    """Share of the pairs that is kept, above 0 up to 1."""
     hue_weight_m: float
     """Radius of the circle of hues."""
 
-    @staticmethod
-    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Hicp:
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Hicp:
         """For two clouds with colours.
 
         Raises:
@@ -43,11 +39,7 @@ class Hicp(PairWeighting):
                 raise InputError(
                     f"hicp matches by hue, but the {name} cloud has no colours; try another method."
                 )
-        return Hicp(config.trim, config.hue_weight_m)
-
-    def weigh(self, matching: Matching) -> PairWeights:
-        """The closest share, with equal weights."""
-        return evenly(closest_rows(matching.distances_m, self.share))
+        return cls(config.trim, config.hue_weight_m)
 
     def features(self, cloud: PointCloud) -> FloatArray | None:
         """(N, 2) places on the circle of hues."""

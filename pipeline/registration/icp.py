@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.registration.matching import Matching
-from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.registration.weighting import PairWeighting, PairWeights, evenly
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,5 +16,4 @@ class Icp(PairWeighting):
 
     def weigh(self, matching: Matching) -> PairWeights:
         """All pairs, with equal weights."""
-        count = len(matching.distances_m)
-        return PairWeights(np.arange(count), np.full(count, 1.0 / count))
+        return evenly(np.arange(len(matching.distances_m)))

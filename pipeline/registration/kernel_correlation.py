@@ -24,11 +24,13 @@ class KernelCorrelation(CeicpA):
     is its truncation to the nearest neighbour, with a lifted tail.
     """
 
-    @staticmethod
-    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> KernelCorrelation:
-        """The first iteration, on the schedule of CEICP-A."""
+    @classmethod
+    def starting(
+        cls, config: RegistrationConfig, source: PointCloud, target: PointCloud
+    ) -> KernelCorrelation:
+        """On the schedule of CEICP-A, with all points at every scale."""
         first = CeicpA.starting(config, source, target)
-        return KernelCorrelation(first.sigma_m, first.sigma_0_m, first.sigma_min_m, first.decay)
+        return cls(first.sigma_m, first.sigma_0_m, first.sigma_min_m, first.decay)
 
     def weigh(self, matching: Matching) -> PairWeights:
         """Pairs within three sigma."""

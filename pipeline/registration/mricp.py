@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from pipeline.config import RegistrationConfig
 from pipeline.registration.matching import Matching
-from pipeline.registration.trimmed import evenly
-from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.registration.weighting import PairWeighting, PairWeights, evenly
 from pipeline.types import PointCloud
 
 LEVELS = 4
-THINNING = 4
-"""Points of a level over those of the next coarser one."""
 FEWEST_POINTS = 64
-"""A level with fewer points than that says little, so that small clouds have fewer levels."""
+"""Points of a level at least: smaller clouds have fewer levels."""
 
 
 @dataclass(frozen=True, slots=True)
 class CoarseToFine(PairWeighting):
-    """A schedule of levels that ends with all points, at level 0.
+    """A schedule that uses one source point in ``thinning``^l at level l and ends with all, at level 0.
 
     The next finer level follows when this one has come to rest, at the latest after ``most_steps``, so
     that a coarse level that swings between two poses leaves iterations for the others.
     """
 
+    thinning: ClassVar[int]
+    """Points of a level over those of the next coarser one."""
     level: int
     most_steps: int
     steps: int = 0
@@ -36,6 +36,11 @@ class CoarseToFine(PairWeighting):
     def settled(self) -> bool:
         """Whether this is the finest level."""
         return self.level == 0
+
+    @property
+    def source_share(self) -> float:
+        """One point in ``thinning``^l."""
+        return float(self.thinning) ** -self.level
 
     def following(self, kept: PairWeights, still: bool) -> CoarseToFine:
         """At the next finer level, if this one is done."""
@@ -59,27 +64,24 @@ class Mricp(CoarseToFine):
     near the match of the neighbouring pixel, changes only the speed: here the k-d tree answers.
     """
 
-    @staticmethod
-    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Mricp:
+    thinning = 4
+
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Mricp:
         """At the coarsest level that the smaller cloud allows."""
-        level = coarsest_level(min(len(source), len(target)), THINNING, LEVELS)
-        return Mricp(level, max(1, config.max_iterations // LEVELS))
+        level = coarsest_level(min(len(source), len(target)), cls.thinning, LEVELS)
+        return cls(level, max(1, config.max_iterations // LEVELS))
 
     def weigh(self, matching: Matching) -> PairWeights:
         """All pairs of the level, with equal weights."""
         return evenly(np.arange(len(matching.distances_m)))
 
     @property
-    def source_share(self) -> float:
-        """One point in 4^l."""
-        return float(THINNING) ** -self.level
-
-    @property
     def target_share(self) -> float:
-        """One point in 4^l."""
-        return float(THINNING) ** -self.level
+        """As many as of the source."""
+        return self.source_share
 
     @property
     def tolerance(self) -> float:
         """Looser by the spacing of the level's points, which grows with 2^l on a surface."""
-        return float(np.sqrt(THINNING)) ** self.level
+        return float(np.sqrt(self.thinning)) ** self.level

@@ -9,14 +9,11 @@ import numpy as np
 from pipeline.config import RegistrationConfig
 from pipeline.registration.matching import Matching
 from pipeline.registration.mricp import CoarseToFine, coarsest_level
-from pipeline.registration.trimmed import evenly
-from pipeline.registration.weighting import PairWeights
+from pipeline.registration.weighting import MAD_TO_SIGMA, PairWeights, evenly
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 LEVELS = 5
-THINNING = 2
 REJECTION_SCALE = 2.5
-_MAD_TO_SIGMA = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,25 +24,23 @@ class Picp(CoarseToFine):
     estimation", ICIP 2003; the rejection, and its order, as in OpenCV's ``surface_matching/icp.cpp``.
     """
 
-    @staticmethod
-    def starting(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Picp:
+    thinning = 2
+
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Picp:
         """At the coarsest level that the source allows."""
-        return Picp(coarsest_level(len(source), THINNING, LEVELS), max(1, config.max_iterations // LEVELS))
+        level = coarsest_level(len(source), cls.thinning, LEVELS)
+        return cls(level, max(1, config.max_iterations // LEVELS))
 
     def weigh(self, matching: Matching) -> PairWeights:
         """Without the pairs beyond median + 2.5 robust sigmas; of those that share a point the closest."""
         distances_m = matching.distances_m
         median_m = np.median(distances_m)
-        spread_m = _MAD_TO_SIGMA * np.median(np.abs(distances_m - median_m))
+        spread_m = MAD_TO_SIGMA * np.median(np.abs(distances_m - median_m))
         rows = np.flatnonzero(distances_m <= median_m + REJECTION_SCALE * spread_m)
         rows = rows[closest_of_each(matching.target_rows[rows], distances_m[rows])]
         rows = rows[closest_of_each(matching.source_rows[rows], distances_m[rows])]
         return evenly(rows)
-
-    @property
-    def source_share(self) -> float:
-        """One point in 2^l."""
-        return float(THINNING) ** -self.level
 
     @property
     def tolerance(self) -> float:

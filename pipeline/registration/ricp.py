@@ -6,16 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.config import RegistrationConfig
 from pipeline.registration.matching import Matching
-from pipeline.registration.trimmed import evenly
-from pipeline.registration.weighting import PairWeighting, PairWeights
-from pipeline.types import FloatArray
+from pipeline.registration.weighting import MAD_TO_SIGMA, PairWeighting, PairWeights, evenly
+from pipeline.types import FloatArray, PointCloud
 
 SUBSETS = 60
 """Subsets an iteration; 34 find four good pairs with 99 % certainty among 40 % bad ones."""
 SUBSET_PAIRS = 4
 KEPT_SIGMAS = 2.5
-_MAD_TO_SIGMA = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +31,11 @@ class Ricp(PairWeighting):
     seed: int
     iteration: int = 0
 
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Ricp:
+        """With the configured seed."""
+        return cls(config.seed)
+
     def weigh(self, matching: Matching) -> PairWeights:
         """The pairs that the best candidate explains, with equal weights."""
         rng = np.random.default_rng((self.seed, self.iteration))
@@ -44,7 +48,7 @@ class Ricp(PairWeighting):
         squared_m2 = np.sum((moved_m - matching.target_m) ** 2, axis=2)
         medians_m2 = np.median(squared_m2, axis=1)
         best = int(np.argmin(medians_m2))
-        sigma_m = _MAD_TO_SIGMA * (1.0 + 5.0 / max(total - 4, 1)) * np.sqrt(medians_m2[best])
+        sigma_m = MAD_TO_SIGMA * (1.0 + 5.0 / max(total - 4, 1)) * np.sqrt(medians_m2[best])
         return evenly(np.flatnonzero(np.sqrt(squared_m2[best]) <= KEPT_SIGMAS * sigma_m))
 
     def following(self, kept: PairWeights, still: bool) -> Ricp:

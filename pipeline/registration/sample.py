@@ -9,6 +9,10 @@ import numpy as np
 from packetmesh.errors import InputError
 from pipeline.types import FloatArray, IntArray, PointCloud
 
+_KEY_PERIODS = (1e5, 2e5)
+"""Periods of the key over the mean squared distance, drawn by the seed: so many that points a hundredth of a
+millimetre apart have unrelated keys, so few that rounding hardly moves one."""
+
 
 @dataclass(frozen=True, slots=True)
 class Sample:
@@ -28,7 +32,14 @@ class Sample:
 def draw(cloud: PointCloud, max_points: int, seed: int, name: str) -> Sample:
     """At most ``max_points`` of the cloud; all of it when it is smaller.
 
-    Source and target are drawn with the same seed, so that a cloud registered to itself stays put.
+    Source and target are drawn with the same seed, so that a cloud registered to itself stays put. Which
+    points are drawn depends neither on their order nor on the frame or the unit.
+
+    Args:
+        cloud: any cloud.
+        max_points: how many to draw.
+        seed: another seed draws other points.
+        name: of the cloud in errors.
 
     Raises:
         InputError: fewer than three points, or coordinates that are not finite.
@@ -38,13 +49,26 @@ def draw(cloud: PointCloud, max_points: int, seed: int, name: str) -> Sample:
             f"The {name} cloud has {len(cloud)} points; registration needs at least three, "
             "so check its depth image or file."
         )
-    bad = np.count_nonzero(~np.isfinite(cloud.points_m).all(axis=1))
-    if bad:
+    if not np.isfinite(cloud.points_m).all():
+        bad = np.count_nonzero(~np.isfinite(cloud.points_m).all(axis=1))
         raise InputError(
             f"The {name} cloud has {bad} points with NaN or infinite coordinates; remove them first."
         )
     rows = np.arange(len(cloud))
     if len(cloud) > max_points:
-        rows = np.sort(np.random.default_rng(seed).choice(len(cloud), max_points, replace=False))
+        rows = np.sort(np.argpartition(random_keys(cloud.points_m, seed), max_points)[:max_points])
     chosen = cloud.select(rows)
     return Sample(replace(chosen, points_m=chosen.points_m.astype(np.float64)), rows)
+
+
+def random_keys(points_m: FloatArray, seed: int) -> FloatArray:
+    """(N,) numbers in [0, 1), as good as random, by which to choose among (N, 3) points.
+
+    A key follows from the point's distance to the cloud's centre over the cloud's size alone: it stays with
+    its point when the points come in another order, or when the whole cloud moves or is scaled.
+    """
+    arms = points_m - points_m.mean(axis=0)
+    squared = np.einsum("ni,ni->n", arms, arms)
+    periods = np.random.default_rng(seed).uniform(*_KEY_PERIODS)
+    phases = periods / max(float(squared.mean()), np.finfo(float).tiny) * squared
+    return phases - np.floor(phases)

@@ -1,6 +1,6 @@
 """What a registration method is: a rule that weighs the pairs of a matching.
 
-A new method is a subclass of ``PairWeighting`` in a file of its own, entered in ``methods.METHODS``.
+A new method is a subclass of ``PairWeighting`` in a file of its own, entered in ``pipeline.config.METHODS``.
 """
 
 from __future__ import annotations
@@ -8,9 +8,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
-from pipeline.config import Direction
+import numpy as np
+
+from pipeline.config import Direction, RegistrationConfig
 from pipeline.registration.matching import Matching
 from pipeline.types import FloatArray, IntArray, PointCloud
+
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +39,20 @@ class PairWeights:
 @dataclass(frozen=True, slots=True)
 class PairWeighting(ABC):
     """A method in the state of one iteration; plain defaults for all but the weights."""
+
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> PairWeighting:
+        """The method in the state of its first iteration.
+
+        Args:
+            config: the method's parameters.
+            source: the thinned cloud that moves.
+            target: the thinned cloud that stays.
+
+        Raises:
+            InputError: the clouds lack what the method needs.
+        """
+        return cls()
 
     @abstractmethod
     def weigh(self, matching: Matching) -> PairWeights:
@@ -100,3 +119,14 @@ class PairWeighting(ABC):
     def widened(self) -> PairWeighting | None:
         """A wider state to try when too few pairs are kept, or None."""
         return None
+
+
+def evenly(rows: IntArray) -> PairWeights:
+    """The pairs at (K,) ``rows``, all with the same weight."""
+    return PairWeights(rows, np.full(len(rows), 1.0 / max(len(rows), 1)))
+
+
+def closest_rows(distances_m: FloatArray, share: float) -> IntArray:
+    """(K,) rows of the smallest ``share`` of (M,) distances, rounded up, in their own order."""
+    count = int(np.ceil(share * len(distances_m) - 1e-9))
+    return np.sort(np.argsort(distances_m, kind="stable")[:count])

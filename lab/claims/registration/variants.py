@@ -14,8 +14,7 @@ from pipeline.registration.icp import Icp
 from pipeline.registration.matching import Matching
 from pipeline.registration.methods import METHODS, MethodStart
 from pipeline.registration.ricp import Ricp
-from pipeline.registration.trimmed import closest_rows, evenly
-from pipeline.registration.weighting import PairWeighting, PairWeights
+from pipeline.registration.weighting import PairWeighting, PairWeights, closest_rows, evenly
 from pipeline.types import PointCloud
 
 

@@ -88,23 +88,29 @@ def test_padding_reflects_and_comes_off_again(height_px, width_px):
     np.testing.assert_allclose(inner, (small[..., 0] / 255.0 - 0.485) / 0.229, atol=1e-5)
 
 
-def test_an_image_turned_over_left_and_right_gives_nearly_the_turned_over_depth(network):
-    rgb = load_demo("living-room").frames[0].rgb
-    straight = network.infer(rgb).z_m
-    turned = network.infer(np.ascontiguousarray(rgb[:, ::-1])).z_m[:, ::-1]
-    assert np.corrcoef(np.log(straight).ravel(), np.log(turned).ravel())[0, 1] > 0.8
+@pytest.mark.parametrize("name", DEMO_SCENES)
+def test_the_depth_of_a_mirrored_image_is_the_mirrored_depth(network, name):
+    """The graph averages an image's answer with its mirror image's, so this holds but for rounding."""
+    rgb = load_demo(name).frames[0].rgb
+    straight_m = network.infer(rgb).z_m
+    mirrored_m = network.infer(np.ascontiguousarray(rgb[:, ::-1])).z_m
+    np.testing.assert_allclose(mirrored_m[:, ::-1], straight_m, rtol=1e-5)
+    assert np.abs(np.log(mirrored_m / straight_m)).max() > 0.3  # the place itself is not symmetric
 
 
-def test_it_beats_a_constant_depth_on_the_demo_frames(network):
+def test_it_knows_the_shape_of_every_demo_frame_better_than_a_flat_wall_does(network):
+    """And its mean relative error is below 12 % and below 0.7 times that of the wall at the right distance."""
     errors, flat_errors = [], []
     for name in DEMO_SCENES:
         rig = load_demo(name)
         for frame, truth in zip(rig.frames, rig.truth.depth, strict=True):
             scaled = align_depth(network.infer(frame.rgb), truth, "median").depth.z_m
             flat = np.full_like(truth.z_m, np.nanmedian(truth.z_m))
-            errors.append(depth_errors(scaled, truth.z_m).abs_rel)
-            flat_errors.append(depth_errors(flat, truth.z_m).abs_rel)
-    assert np.mean(errors) < 0.95 * np.mean(flat_errors)
+            errors.append(depth_errors(scaled, truth.z_m))
+            flat_errors.append(depth_errors(flat, truth.z_m))
+    abs_rel, flat_abs_rel = (np.mean([row.abs_rel for row in rows]) for rows in (errors, flat_errors))
+    assert abs_rel < min(0.12, 0.7 * flat_abs_rel)
+    assert all(row.silog < flat.silog for row, flat in zip(errors, flat_errors, strict=True))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
