@@ -6,8 +6,16 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
 from typing import Any, TypeVar
 
 from packetmesh.errors import InputError, PacketMeshError
@@ -17,52 +25,75 @@ Answer = TypeVar("Answer")
 
 
 def run_batch(
-    function: Callable[[Task], Answer], tasks: Sequence[Task], scheduler: str | None = None
+    function: Callable[[Task], Answer],
+    tasks: Sequence[Task],
+    scheduler: str | None = None,
+    processes: int | None = None,
 ) -> Iterator[tuple[int, Answer]]:
-    """Each task's index and answer, in the order in which they end.
+    """Each task's index and answer, in the order of completion.
+
+    Only a few tasks are handed out ahead of those that run. Closing the iterator, or an error in a task,
+    drops what has not begun and waits for what has; an interrupt from the terminal ends that too.
 
     Args:
         function: importable by its name, as other processes call it.
         tasks: what it is called with, one by one.
-        scheduler: address of a Dask scheduler; None takes processes on this machine, one for each core.
+        scheduler: address of a Dask scheduler; None takes processes on this machine.
+        processes: how many of them at most, one for each core by default; a single one is this process.
 
     Raises:
         InputError: the scheduler cannot be reached, or ``distributed`` is not installed.
-        PacketMeshError: a process was killed.
+        PacketMeshError: a process was killed, or the cluster was lost.
     """
     if scheduler is not None:
         yield from _on_cluster(function, tasks, scheduler)
         return
-    processes = min(len(tasks), os.cpu_count() or 1)
+    processes = min(len(tasks), processes or os.cpu_count() or 1)
     if processes <= 1:
         yield from ((index, function(task)) for index, task in enumerate(tasks))
         return
-    # An interrupt ends this process's loop, and with it the pool; the others only finish what they do.
-    with ProcessPoolExecutor(
+    # The workers end silently at an interrupt, unless this process ignores interrupts (nohup): they do, too.
+    heeded = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+    pool = ProcessPoolExecutor(
         processes,
         mp_context=multiprocessing.get_context("spawn"),
         initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_IGN),
-    ) as pool:
-        futures = {pool.submit(function, task): index for index, task in enumerate(tasks)}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BrokenProcessPool:
-            raise PacketMeshError(
-                "A process of the simulation ended unexpectedly, perhaps out of memory; try fewer nodes, a "
-                "shorter run.horizon_s or run.keep=counters"
-            ) from None
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+        initargs=(signal.SIGINT, signal.SIG_DFL if heeded else signal.SIG_IGN),
+    )
+    try:
+        yield from _completed(pool, function, tasks, lambda: processes + 1)
+    except BrokenProcessPool:
+        raise PacketMeshError(
+            f"One of {processes} processes ended unexpectedly, perhaps for lack of memory; "
+            "try fewer processes or smaller tasks"
+        ) from None
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _completed(
+    pool: Executor,
+    function: Callable[[Task], Answer],
+    tasks: Sequence[Task],
+    most: Callable[[], int],
+) -> Iterator[tuple[int, Answer]]:
+    """Indices and answers as they come, while at most ``most()`` tasks are in the pool."""
+    remaining = iter(enumerate(tasks))
+    running: dict[Future[Answer], int] = {}
+    while True:
+        for index, task in islice(remaining, max(0, most() - len(running))):
+            running[pool.submit(function, task)] = index
+        if not running:
+            return
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            yield running.pop(future), future.result()
 
 
 def _on_cluster(
     function: Callable[[Any], Any], tasks: Sequence[Any], scheduler: str
 ) -> Iterator[tuple[int, Any]]:
     try:
-        from distributed import Client
-        from distributed import as_completed as ended
+        from distributed import Client, KilledWorker
     except ImportError:
         raise InputError(
             "--scheduler needs the package 'distributed': pip install 'packetmesh[cluster]', or leave it out"
@@ -75,8 +106,13 @@ def _on_cluster(
             "or leave --scheduler out"
         ) from None
     with client:
-        futures = {
-            future: index for index, future in enumerate(client.map(function, list(tasks), pure=False))
-        }
-        for future in ended(list(futures), loop=client.loop):
-            yield futures[future], future.result()
+        pool = client.get_executor(pure=False)
+        try:
+            yield from _completed(pool, function, tasks, lambda: 2 * sum(client.nthreads().values()) + 1)
+        except (CancelledError, KilledWorker) as error:
+            raise PacketMeshError(
+                f"The Dask cluster at {scheduler} was lost ({error}); look whether its scheduler and workers "
+                "still run and have enough memory"
+            ) from None
+        finally:
+            pool.shutdown(wait=False)
