@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from lab.claims.claim import Claim, Outcome
 from lab.claims.exhibits import Chart, Table
-from lab.claims.network.curves import curve
-from lab.claims.network.intervals import interval
+from lab.claims.network.intervals import curve, interval
 from network_sim.selection import all_cameras, at_random, greedy, greedy_by_cost, nearest, view_quality
 
 FloatArray = NDArray[np.float64]

@@ -6,7 +6,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from lab.benchmarks.cases import CASES, Benchmark
+from lab.benchmarks import CASES, Benchmark
 from lab.benchmarks.depth_network import BUDGET_BYTES, network_speed
 from lab.benchmarks.filling import (
     HIDDEN_SHARE,

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from lab.benchmarks import CASES, Benchmark, run_benchmarks
 from lab.benchmarks import surface as surface_speed
-from lab.benchmarks.cases import CASES, Benchmark, run_benchmarks
 from lab.benchmarks.surface import (
     OURS,
     PROGRAMS,

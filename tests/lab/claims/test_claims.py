@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from lab.benchmarks.cases import run_benchmarks
-from lab.claims import CLAIMS, Claim, run_experiments
-from lab.claims.claim import Outcome, bootstrap_ci95
+from lab.benchmarks import run_benchmarks
+from lab.claims.claim import Claim, Outcome, bootstrap_ci95
 from lab.claims.outliers import brute_force_keep, with_gross_outliers
+from lab.claims.registry import CLAIMS, run_claims
 from lab.claims.surface.clouds import single_node
 from packetmesh.errors import InputError
 from pipeline.acquisition import filter_outliers
@@ -67,9 +67,9 @@ def test_a_single_node_stands_at_its_true_pose_with_its_own_truth():
     assert len(alone.truth.depth) == len(alone.frames) == 1
 
 
-def test_unknown_names_are_told_with_the_known_ones():
+def test_an_unknown_name_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match="C10"):
-        list(run_experiments(["C99"]))
+        list(run_claims(["C99"]))
     with pytest.raises(InputError, match="reconstruct"):
         list(run_benchmarks(["nothing"]))
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from app.reports.reproduction import write_reproduction_report
-from lab.claims import CLAIMS
 from lab.claims.claim import Claim
 from lab.claims.depth import claims
 from lab.claims.depth.errors import (
@@ -255,7 +254,7 @@ def test_the_report_and_the_record_hold_everything(tmp_path):
     scenes = tuple(three_scenes((1.1, 1.2, 1.3)))
     verdicts = [
         Claim("C12", "c", "t", "tol", lambda: claims.judge_errors(scenes)).judge(),
-        CLAIMS["C13"].judge(),
+        claims.C13.judge(),
         Claim("C14", "c", "t", "tol", lambda: claims.judge_against_sensor(scenes)).judge(),
     ]
     path = tmp_path / "reproduce.html"
