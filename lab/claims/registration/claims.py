@@ -79,7 +79,8 @@ def _c16(results: Results) -> Outcome:
         {},
         len(beaten) == len(BEATEN),
         f"median ratio of the point errors of CEICP-A and its rivals over {judged[0].cases} trials: "
-        f"{ratios}; beyond the claim {reported}; by average Hausdorff distance the ratio to ICP is {ahd[0].ratio:.2f}",
+        f"{ratios}; beyond the claim {reported}; by average Hausdorff distance the ratio to ICP is "
+        f"{ahd[0].ratio:.2f}",
         exhibits,
     )
 

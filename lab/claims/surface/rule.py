@@ -112,8 +112,8 @@ def _experiment() -> Outcome:
         {},
         worst <= TOLERANCE,
         f"r_F = {r_F_m:.4f} m and sigma_D = {sigma_D_m:.4f} m give {predicted} m, at most {worst:.1%} from "
-        f"print, where even steps would be {ours['largest_deviation_even_steps']:.0%} off; two of the four radii "
-        "fix r_F and sigma_D, so only the two between them are a test",
+        f"print, where even steps would be {ours['largest_deviation_even_steps']:.0%} off; two of the four "
+        "radii fix r_F and sigma_D, so only the two between them are a test",
         (readings_table(), scenes_table()),
     )
 

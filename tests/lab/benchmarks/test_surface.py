@@ -13,8 +13,8 @@ from lab.benchmarks.surface import (
     available_programs,
     measure_speed,
     room_cloud,
-    run_alone,
     terrain,
+    time_alone,
 )
 from lab.claims.surface import growth
 from packetmesh.errors import InputError
@@ -81,8 +81,8 @@ def test_a_slow_first_round_is_the_only_one(tmp_path, monkeypatch):
     assert surface_speed.measure(OURS, tmp_path / "cloud.npy", (1.5,), rounds=3).rounds == 1
 
 
-def test_a_fresh_process_tells_its_own_memory():
-    run = run_alone(OURS, terrain(2000), "small", "one", (1.5,), rounds=1)
+def test_a_fresh_process_measures_its_own_memory():
+    run = time_alone(OURS, terrain(2000), "small", "one", (1.5,), rounds=1)
     assert (run.cloud, run.balls, run.points) == ("small", "one", 2000)
     assert run.peak_memory_bytes > 50e6
     assert run.added_memory_bytes < run.peak_memory_bytes
@@ -111,7 +111,7 @@ def test_the_case_takes_its_numbers_from_the_four_balls(monkeypatch):
             2.0,
         )
 
-    monkeypatch.setattr(surface_speed, "run_alone", alone)
+    monkeypatch.setattr(surface_speed, "time_alone", alone)
     monkeypatch.setattr(surface_speed, "room_cloud", lambda points, smoothed=True: terrain(100))
     monkeypatch.setattr(surface_speed, "MANY_POINTS", 400)
     monkeypatch.setattr(surface_speed, "available_programs", lambda: BOTH)
