@@ -59,12 +59,16 @@ def make_view(seed: int) -> View:
     incidence = -np.einsum("nvc,vc->nv", directions, normals.reshape(-1, 3))
     axes = -cameras_m / np.linalg.norm(cameras_m, axis=1, keepdims=True)
     in_picture = np.einsum("nvc,nc->nv", directions, axes) > COS_HALF_VIEW
-    visible = in_picture & (incidence > 0.0) & ~_hidden(cameras_m, directions, lengths_m, centers_m, radii_m)
+    visible = (
+        in_picture
+        & (incidence > 0.0)
+        & ~behind_a_sphere(cameras_m, directions, lengths_m, centers_m, radii_m)
+    )
     q = view_quality(visible, lengths_m, incidence, REFERENCE_M)
     return View(q, np.linalg.norm(cameras_m, axis=1), rng.uniform(*SIZES_BYTES, CAMERAS))
 
 
-def _hidden(
+def behind_a_sphere(
     cameras_m: FloatArray,
     directions: FloatArray,
     lengths_m: FloatArray,

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from lab.benchmarks import CASES, Benchmark, run_benchmarks
+from lab.benchmarks import CASES
 from lab.benchmarks import surface as surface_speed
 from lab.benchmarks.surface import (
     OURS,
@@ -17,7 +17,6 @@ from lab.benchmarks.surface import (
     time_alone,
 )
 from lab.claims.surface import growth
-from packetmesh.errors import InputError
 from pipeline.surface import spacing
 
 BOTH = (OURS, "open3d")
@@ -125,12 +124,6 @@ def test_the_case_takes_its_numbers_from_the_four_balls(monkeypatch):
     assert record["ratio"] == 0.5
     assert len(record["runs"]) == 16
     json.dumps(record, allow_nan=False)
-
-
-def test_the_record_without_runs_is_as_before():
-    assert Benchmark(2.0, {"fast": 4.0}, 10).record()["runs"] == ()
-    with pytest.raises(InputError, match="surface"):
-        next(run_benchmarks(["surfaces"]))
 
 
 def _run(points: int, seconds: float, program: str = OURS) -> surface_speed.SurfaceRun:

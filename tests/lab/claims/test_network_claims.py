@@ -174,11 +174,11 @@ def test_a_camera_behind_a_sphere_sees_nothing_of_what_is_behind():
     assert view.q.shape == (selection.CAMERAS, selection.SPHERES * selection.VOXELS_EACH)
     assert 0.0 <= view.q.min() < view.q.max() <= 1.0
     one_m = np.array([1.0])
-    blocked = selection._hidden(
+    blocked = selection.behind_a_sphere(
         np.zeros((1, 3)), np.array([[[0.0, 0.0, 1.0]]]), 5.0 * one_m[None], np.array([[0.0, 0.0, 2.0]]), one_m
     )
     assert blocked.all()
-    assert not selection._hidden(
+    assert not selection.behind_a_sphere(
         np.zeros((1, 3)), np.array([[[0.0, 0.0, 1.0]]]), one_m[None], np.array([[0.0, 0.0, 3.0]]), one_m
     ).any()
 
