@@ -15,7 +15,7 @@ def bench(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
         only: Cases to run; all without it.
         json: Print the results as one JSON object.
     """
-    from lab.benchmarks.cases import run_benchmarks
+    from lab.benchmarks import run_benchmarks
     from packetmesh.files import writable_folder, write_json
 
     writable_folder(out)

@@ -4,28 +4,31 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.cli.text import print_json, say
+from app.cli.text import print_json, say, say_progress
 
 
-def reproduce(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
-    """Compute the thesis's claims anew and set them beside its own numbers.
+def reproduce(
+    out: Path, only: tuple[str, ...] = (), scheduler: str | None = None, json: bool = False
+) -> None:
+    """Compute the thesis's claims and set ours beside its own numbers.
 
     Args:
-        out: Folder for reproduce.html and reproduce.json; keeps the trials of an interrupted run.
+        out: Folder for reproduce.html and reproduce.json; keeps the trials: an interrupted run resumes.
         only: Claims to compute (`--only C10 C16` or `--only C10,C16`); all without it.
+        scheduler: Address of a Dask scheduler that runs the trials; without it, this machine's cores do.
         json: Print the verdicts as one JSON object.
     """
     from app.reports.reproduction import write_reproduction_report
-    from lab.claims import run_experiments
+    from lab.claims.registry import run_claims
     from packetmesh.files import writable_folder, write_json
     from packetmesh.progress import Progress
 
     writable_folder(out)
     verdicts = {}
     names = [name for names in only for name in names.split(",")]
-    for event in run_experiments(names, out / "trials"):
+    for event in run_claims(names, out / "trials", scheduler):
         if isinstance(event, Progress):
-            say(f"{event.fraction:4.0%}  {event.stage}")
+            say_progress(event)
             continue
         say(f"{event.id}  {event.verdict}: {event.why}")
         verdicts[event.id] = event

@@ -8,20 +8,20 @@ from pathlib import Path
 
 from app.reports.exhibits import exhibit_html
 from app.reports.html import table, write_page
-from lab.claims import Verdict
+from lab.claims.claim import Verdict
 
 
 def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
     """Write one self-contained HTML page with every claim, its verdict and the numbers behind it."""
     reproduced = sum(verdict.verdict == "reproduced" for verdict in verdicts)
     body = (
-        "<h1>The thesis, computed anew</h1>"
+        "<h1>The thesis, computed again</h1>"
         f'<p class="lead">{reproduced} of {len(verdicts)} claims reproduced.</p>'
         '<p class="note">Shares run from 0 to 1, lengths are in metres; intervals are 95 %: by '
         "bootstrap, of the mean over frames or of the median over rooms, and by Student's t over independent "
         "runs of the network.</p>"
     )
-    write_page(path, "PacketMesh: the thesis, computed anew", body + "".join(map(_section, verdicts)))
+    write_page(path, "PacketMesh: the thesis, computed again", body + "".join(map(_section, verdicts)))
 
 
 def _section(verdict: Verdict) -> str:

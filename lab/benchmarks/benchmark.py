@@ -1,9 +1,16 @@
-"""What one case of the benchmarks gives."""
+"""What one case of the benchmarks gives, and a process of its own to measure it in."""
 
 from __future__ import annotations
 
+import multiprocessing
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, TypeVar
+
+import psutil
+
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,9 +30,25 @@ class Benchmark:
     runs: tuple[dict[str, Any], ...] = ()
     """Every single measurement, with what the case alone measures."""
     notes: tuple[str, ...] = ()
-    """What to tell people below the times."""
+    """Lines to be printed below the times."""
 
     def record(self) -> dict[str, Any]:
         """Plain values; ``ratio`` is our time over the fastest peer's, ``ratios`` over every one's."""
         ratios = {name: self.ours_s / peer_s for name, peer_s in self.peers.items()}
         return asdict(self) | {"ratio": max(ratios.values(), default=None), "ratios": ratios}
+
+
+def run_alone(function: Callable[..., Answer], *arguments: Any, timeout_s: float | None = None) -> Answer:
+    """What a function gives in a fresh process that does nothing else.
+
+    Raises:
+        TimeoutError: it took longer than ``timeout_s`` and was stopped.
+    """
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as process:
+        work = process.submit(function, *arguments)
+        try:
+            return work.result(timeout=timeout_s)
+        except TimeoutError:
+            for child in psutil.Process().children(recursive=True):
+                child.kill()
+            raise

@@ -28,15 +28,15 @@ class NetworkSpeed:
     """What really ran it."""
     file_bytes: int
     abs_rel: float | None
-    """What the file says of itself: AbsRel of the quantised network on held-out rooms."""
+    """From the file's metadata: AbsRel of the quantised network on held-out rooms."""
     quantisation_cost: float | None
-    """AbsRel that quantisation added to the float network's, as the file says; None if it does not."""
+    """AbsRel that quantisation added to the float network's, from the metadata; None without them."""
     within_time: bool
     """At most 50 ms."""
     within_size: bool
     """At most 40 MB."""
     within_cost: bool
-    """At most 0.01, and told by the file."""
+    """At most 0.01; False if the file does not record it."""
 
 
 def network_speed(network: DepthNetwork, rgb: ByteArray, rounds: int = ROUNDS) -> NetworkSpeed:
@@ -47,8 +47,7 @@ def network_speed(network: DepthNetwork, rgb: ByteArray, rounds: int = ROUNDS) -
         network.infer(rgb)
         seconds.append(time.perf_counter() - started)
     seconds = seconds[WARM_UP:]
-    said = {name: number(network.description.get(name)) for name in ("abs_rel", "float_abs_rel")}
-    abs_rel, float_abs_rel = said["abs_rel"], said["float_abs_rel"]
+    abs_rel, float_abs_rel = (number(network.description.get(name)) for name in ("abs_rel", "float_abs_rel"))
     cost = None if abs_rel is None or float_abs_rel is None else abs_rel - float_abs_rel
     elapsed_s, file_bytes = statistics.median(seconds), network.model_path.stat().st_size
     return NetworkSpeed(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -89,17 +88,14 @@ def _rates(run: Run) -> dict[str, float]:
 
 
 def _note(row: Row) -> str:
-    said = f"{row.mac}, {row.nodes} saturated: {_rates_text(row.network_sim)}"
+    text = f"{row.mac}, {row.nodes} saturated: {_rates_text(row.network_sim)}"
     if row.ns3:
-        said += (
+        text += (
             f"; ns-3: {_rates_text(row.ns3)}; wall time {row.time_ratio:.2f} and "
             f"throughput {row.ratio:.3f} of ns-3's ({row.verdict})"
         )
-    return said
+    return text
 
 
 def _rates_text(run: Run) -> str:
     return f"{run.simulated_s_per_s:,.1f} simulated s and {run.events_per_s:,.0f} kernel events in a second"
-
-
-CASES: dict[str, Callable[[], Benchmark]] = {"network": network}

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import statistics
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
+from lab.benchmarks.benchmark import run_alone
 from lab.worlds.demos import build_demo, sense_depth
 from lab.worlds.render import Renderer
 from packetmesh.memory import peak_memory_bytes
@@ -71,7 +70,7 @@ def speed_pair(points: int = POINTS, seed: int = 0) -> SpeedPair:
 
 
 def thinned(pair: SpeedPair) -> SpeedPair:
-    """The points that our method draws from the clouds, for the peers to have no more to do."""
+    """The random subsets that our method takes of the clouds, so that the peers have no more to do."""
     config = RegistrationConfig()
     clouds = [
         draw(cloud, config.max_points, config.seed, "speed").cloud for cloud in (pair.source, pair.target)
@@ -83,7 +82,7 @@ def measure_speed(peers_thinned: bool = False, rounds: int = ROUNDS) -> SpeedRes
     """Ours and every rival in turn, round by round, after one round to warm up.
 
     Args:
-        peers_thinned: give the rivals only the points that ours draws for itself, instead of all.
+        peers_thinned: give the rivals only the points that ours takes, instead of all.
     """
     pair = speed_pair()
     names = (OURS, *(name for name in RIVALS if name in available_peers()))
@@ -92,7 +91,7 @@ def measure_speed(peers_thinned: bool = False, rounds: int = ROUNDS) -> SpeedRes
     return SpeedResult(
         {name: statistics.median(run[name][0] for run in runs) for name in names},
         {name: statistics.median(run[name][1] for run in runs) for name in names},
-        {name: _alone(name, pairs[name]) for name in names},
+        {name: run_alone(_memory, name, pairs[name]) for name in names},
     )
 
 
@@ -106,12 +105,6 @@ def _run(name: str, pair: SpeedPair) -> tuple[float, float]:
         peer = run_peer(name, pair.source, pair.target, GATE_M, max_iterations=MAX_ITERATIONS)
         T, elapsed_s = peer.T_target_source, peer.elapsed_s
     return elapsed_s, point_error_m(T, pair.T_true, pair.source.points_m)
-
-
-def _alone(name: str, pair: SpeedPair) -> int:
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, mp_context=context) as process:
-        return process.submit(_memory, name, pair).result()
 
 
 def _memory(name: str, pair: SpeedPair) -> int:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import importlib.util
 import logging
-import multiprocessing
 import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import psutil
 
+from lab.benchmarks.benchmark import run_alone
 from packetmesh.memory import peak_memory_bytes
 from packetmesh.progress import drain
 from pipeline.config import PRESETS
@@ -168,7 +167,7 @@ def terrain(points: int, seed: int = 0, point_distance_m: float = 0.01, noise_m:
     return PointCloud(np.column_stack([x_m, y_m, z_m + rng.normal(0.0, noise_m, points)]), normals=normals)
 
 
-def run_alone(
+def time_alone(
     program: str, cloud: PointCloud, name: str, balls: str, multiples: Sequence[float], rounds: int = ROUNDS
 ) -> SurfaceRun:
     """One program over one cloud, in a fresh process.
@@ -184,20 +183,10 @@ def run_alone(
     Raises:
         TimeoutError: it took longer than ``MOST_S`` and was stopped.
     """
-    context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "cloud.npy"
-        np.save(
-            path, np.stack([cloud.points_m, _normals(cloud)])
-        )  # in a file: pickling would count as memory
-        with ProcessPoolExecutor(1, mp_context=context) as process:
-            work = process.submit(measure, program, path, multiples, rounds)
-            try:
-                run = work.result(timeout=MOST_S)
-            except TimeoutError:
-                for child in psutil.Process().children(recursive=True):
-                    child.kill()
-                raise
+        path = Path(folder) / "cloud.npy"  # pickling would count as memory
+        np.save(path, np.stack([cloud.points_m, _normals(cloud)]))
+        run = run_alone(measure, program, path, multiples, rounds, timeout_s=MOST_S)
     return replace(run, cloud=name, balls=balls)
 
 
@@ -272,6 +261,6 @@ def measure_speed(
     for cloud, name, balls, rivals in cases:
         for program in rivals:
             try:
-                yield run_alone(program, cloud, name, balls, BALLS[balls])
+                yield time_alone(program, cloud, name, balls, BALLS[balls])
             except TimeoutError:
                 logger.warning("%s took more than %.0f s for %s on the %s", program, MOST_S, balls, name)

@@ -63,8 +63,9 @@ class Claim:
     """What counts as reproduced."""
     experiment: Callable[..., Outcome]
     """Called with what ``prepare`` returned, if there is one, else with nothing."""
-    prepare: Callable[[Path], Generator[Progress, None, Any]] | None = None
-    """Long work that leaves its results in a folder; claims with the same one share a single run of it."""
+    prepare: Callable[[Path, str | None], Generator[Progress, None, Any]] | None = None
+    """Its trials, by the folder that keeps them and the address of a Dask scheduler; claims with the same
+    function share one call of it."""
 
     def judge(self, *prepared: Any) -> Verdict:
         """Run the experiment and compare."""
@@ -83,9 +84,9 @@ class Claim:
         )
 
 
-def bootstrap_ci95(values: FloatArray, seed: int = 0, draws: int = 2000) -> tuple[float, float]:
+def bootstrap_ci95(values: FloatArray, seed: int = 0, resamples: int = 2000) -> tuple[float, float]:
     """95 % percentile interval of the mean of (N,) ``values``."""
     values = np.asarray(values, float)
-    rows = np.random.default_rng(seed).integers(0, len(values), (draws, len(values)))
+    rows = np.random.default_rng(seed).integers(0, len(values), (resamples, len(values)))
     low, high = np.percentile(values[rows].mean(axis=1), (2.5, 97.5))
     return float(low), float(high)

@@ -22,7 +22,6 @@ from scipy.sparse.csgraph import connected_components
 from lab.training import dataset
 from lab.training.furniture import Catalogue
 from lab.training.varied_rooms import varied_room
-from lab.training.viewpoints import views
 from lab.worlds import shading
 from lab.worlds.film import Film, develop
 from lab.worlds.pixels import camera_rays
@@ -30,7 +29,7 @@ from lab.worlds.raycast import world_mesh
 from lab.worlds.render import Renderer
 from lab.worlds.rooms import random_room
 from lab.worlds.scene import Scene
-from lab.worlds.viewpoints import random_views
+from lab.worlds.viewpoints import random_views, varied_views
 from packetmesh.errors import InputError
 from pipeline.geometry import scaled
 from pipeline.open3d_runtime import o3d
@@ -102,7 +101,7 @@ def traced_views(
     rng = np.random.default_rng(seed)
     renderer = Renderer(scene, threads)
     if catalogue is not None:
-        seen = views(seed, scene, dataset.VIEWS_PER_ROOM, renderer, dataset.WIDTH_PX)
+        seen = varied_views(seed, scene, dataset.VIEWS_PER_ROOM, renderer, dataset.WIDTH_PX)
         cameras = [(intrinsics, pose) for pose, intrinsics in seen]
         focal_px = dataset.FOCAL_PX
     else:

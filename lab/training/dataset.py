@@ -73,12 +73,12 @@ def room_views(seed: int, catalogue: Catalogue | None = None) -> Iterator[tuple[
 
 def _varied_views(seed: int, catalogue: Catalogue) -> Iterator[tuple[ByteArray, FloatArray]]:
     from lab.training.varied_rooms import varied_room
-    from lab.training.viewpoints import views
     from lab.worlds.render import Renderer
+    from lab.worlds.viewpoints import varied_views
 
     scene, rng = varied_room(seed, catalogue), np.random.default_rng(seed)
     renderer = Renderer(scene, threads=1)
-    for T_world_camera, intrinsics in views(seed, scene, VIEWS_PER_ROOM, renderer, WIDTH_PX):
+    for T_world_camera, intrinsics in varied_views(seed, scene, VIEWS_PER_ROOM, renderer, WIDTH_PX):
         view = renderer.view(intrinsics, T_world_camera, "fast", rng)
         yield view.rgb, (view.z_m * (FOCAL_PX / intrinsics.fx_px)).astype(np.float16)
 

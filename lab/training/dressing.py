@@ -9,7 +9,7 @@ import numpy as np
 from lab.training.furniture import Entry
 from lab.training.models import Model, Surface
 from lab.worlds import textures
-from lab.worlds.room_finishes import draw_seed, random_material, recolored
+from lab.worlds.room_finishes import covered, draw_seed, random_material, recolored
 from lab.worlds.scene import Material, Part, Texture
 from pipeline.types import FloatArray
 
@@ -39,8 +39,7 @@ def dressed(
     if kind < 0.87:
         return [_darkened(part) for part in parts]
     soft = any(word in entry.name.lower() for word in _UPHOLSTERED)
-    material = _cloth(rng) if soft else random_material(rng)
-    return [part if part.material.emission > 0.0 else replace(part, material=material) for part in parts]
+    return covered(parts, _cloth(rng) if soft else random_material(rng))
 
 
 def placed_size_m(entry: Entry) -> FloatArray:

@@ -36,8 +36,6 @@ LITE_MEAN, LITE_DEVIATION = 127.0, 128.0
 """What Google's Lite networks subtract from 8-bit images and divide by, the same in every channel."""
 LITE_FEATURES = ("_conv_stem", "_bn0", "_blocks")
 """What the package calls the parts before its classifier."""
-FEATURES = ("/Relu_output_0", *(f"/Relu_{index}_output_0" for index in (9, 21, 39, 48)))
-"""The package's own features at strides 2, 4, 8, 16 and 32, (N, h, w, channels) each."""
 LICENCES = {
     "random": "Apache-2.0",
     "open-nsfw": "Apache-2.0; encoder trained on from Open-NSFW, Copyright 2016 Yahoo Inc., BSD-2-Clause",

@@ -10,8 +10,8 @@ from lab.worlds.furniture import placing
 from lab.worlds.primitives import box
 from lab.worlds.room_finishes import muted, random_floor, random_material, random_wall
 from lab.worlds.scene import Material, Part, Texture
+from lab.worlds.shell import shell, wall_length, wall_pose
 from lab.worlds.textures import paint
-from pipeline.geometry import rigid
 from pipeline.types import FloatArray
 
 _TEXEL_M = 0.004
@@ -19,22 +19,17 @@ _PHOTOGRAPHED = 0.4
 """Share of floors and walls that wear a photograph, where there are any."""
 
 
-def shell(rng: np.random.Generator, size_m: FloatArray, images: tuple[SurfaceImage, ...]) -> list[Part]:
-    """Floor, ceiling and four walls as slabs around a room of ``size_m`` that stands on the origin."""
-    x, y, z = size_m
-    white = muted(rng, 1, 0.5, 0.85)[0]
-    ceiling = Material(paint(white, 1, 0.04)) if rng.random() < 0.85 else random_wall(rng)
-    wall = _covered("Wall", rng, images) or random_wall(rng)
-    floor = _covered("Floor", rng, images) or random_floor(rng)
-    parts = [_slab((x, y, 0.1), (0.0, 0.0, -0.05), floor), _slab((x, y, 0.1), (0.0, 0.0, z + 0.05), ceiling)]
-    for axis in (0, 1):
-        for side in (-1.0, 1.0):
-            material = random_wall(rng) if rng.random() < 0.2 else wall
-            slab, at = np.array([x, y, z]), np.array([0.0, 0.0, 0.5 * z])
-            slab[axis], at[axis] = 0.1, side * (0.5 * size_m[axis] + 0.05)
-            slab[1 - axis] += 0.2
-            parts.append(_slab(slab, at, material))
-    return parts
+def photographed_shell(
+    rng: np.random.Generator, size_m: FloatArray, images: tuple[SurfaceImage, ...]
+) -> list[Part]:
+    """The shell of a room of ``size_m``, some floors and walls covered with photographs."""
+    return shell(
+        rng,
+        size_m,
+        0.5,
+        lambda rng: _covered("Wall", rng, images) or random_wall(rng),
+        lambda rng: _covered("Floor", rng, images) or random_floor(rng),
+    )
 
 
 def skirting(rng: np.random.Generator, size_m: FloatArray) -> list[Part]:
@@ -55,19 +50,6 @@ def mirror(rng: np.random.Generator) -> tuple[list[Part], FloatArray]:
     middle = 0.5 * size_m[2]
     frame = Part(*box(size_m), random_material(rng), placing.place(0.0, 0.0, 0.0, middle))
     return [frame, Part(*box(pane), glass, placing.place(0.0, -0.012, 0.0, middle))], size_m
-
-
-def wall_pose(
-    size_m: FloatArray, wall: int, along_m: float, inset_m: float = 0.0, z_m: float = 0.0
-) -> FloatArray:
-    """Pose against one of four walls, front (-y) to the room, ``along_m`` from the wall's middle."""
-    reach_m = 0.5 * (size_m[1] if wall % 2 == 0 else size_m[0]) - inset_m
-    return placing.place(0.0, 0.0, wall * np.pi / 2.0) @ placing.place(along_m, reach_m, 0.0, z_m)
-
-
-def wall_length(size_m: FloatArray, wall: int) -> float:
-    """How long one of the four walls is, metres."""
-    return float(size_m[0] if wall % 2 == 0 else size_m[1])
 
 
 def tiled(image: SurfaceImage, scale: float, gain: FloatArray) -> Texture:
@@ -103,9 +85,3 @@ def _covered(category: str, rng: np.random.Generator, images: tuple[SurfaceImage
     gain = rng.uniform(0.6, 1.2) * rng.uniform(0.85, 1.15, 3)
     texture = tiled(fitting[rng.integers(len(fitting))], rng.uniform(0.8, 2.0), gain)
     return Material(texture, rng.choice([0.0, rng.uniform(0.0, 0.35)]))
-
-
-def _slab(
-    size_m: FloatArray | tuple[float, ...], at_m: FloatArray | tuple[float, ...], material: Material
-) -> Part:
-    return Part(*box(tuple(size_m)), material, rigid(np.eye(3), np.asarray(at_m, float)))

@@ -9,10 +9,12 @@ import numpy as np
 from lab.training.dressing import dressed, placed_size_m
 from lab.training.furniture import Catalogue, Entry, Role
 from lab.training.models import GRID
-from lab.training.shells import mirror, shell, skirting, wall_length, wall_pose
+from lab.training.shells import mirror, photographed_shell, skirting
 from lab.worlds import pieces
 from lab.worlds.furniture import placing
+from lab.worlds.room_finishes import lamp_white
 from lab.worlds.scene import Light, Part, Scene
+from lab.worlds.shell import wall_length, wall_pose
 from pipeline.types import CameraIntrinsics, FloatArray
 
 CAMERA = CameraIntrinsics.pinhole(262.5, 262.5, 159.5, 119.5, 320, 240)
@@ -88,7 +90,7 @@ class RoomPlan:
 
 
 def varied_room(seed: int, catalogue: Catalogue) -> Scene:
-    """A closed, furnished, lit room without cameras (see ``vantage.views``); the same for the same seed."""
+    """A closed, furnished, lit room without cameras (see ``varied_views``); the same for the same seed."""
     plan = plan_room(seed, catalogue)
     lights, ambient = _lights(plan)
     return Scene(f"varied-room-{seed}", tuple(plan.parts), lights, ambient, (), CAMERA)
@@ -102,7 +104,8 @@ def plan_room(seed: int, catalogue: Catalogue) -> RoomPlan:
         size_m[:2] *= 1.5
     daylight = float(rng.choice([0.0, rng.uniform(0.8, 4.0)], p=[0.3, 0.7]))
     theme = str(rng.choice(_THEMES))
-    plan = RoomPlan(size_m, theme, daylight, catalogue, rng, shell(rng, size_m, catalogue.images))
+    parts = photographed_shell(rng, size_m, catalogue.images)
+    plan = RoomPlan(size_m, theme, daylight, catalogue, rng, parts)
     if rng.random() < 0.6:
         plan.parts += skirting(rng, size_m)
     _dress_walls(plan)
@@ -336,5 +339,5 @@ def _shining(lamp: Placed) -> FloatArray:
 
 def _white(rng: np.random.Generator) -> FloatArray:
     """(3,) light of a colour temperature from about 2700 to 8000 K, sometimes of a coloured lamp."""
-    white = np.array([1.0, 0.78, 0.52]) + rng.random() ** 0.7 * np.array([-0.12, 0.14, 0.55])
+    white = lamp_white(rng)
     return white * rng.uniform(0.3, 1.3, 3) if rng.random() < 0.08 else white

@@ -127,3 +127,13 @@ def _tinted(material: Material, gain: FloatArray) -> Material:
     return replace(
         material, texture=lambda points_m, normals: np.clip(texture(points_m, normals) * gain, 0.0, 0.95)
     )
+
+
+def covered(parts: list[Part], material: Material) -> list[Part]:
+    """The parts all of one material, but for those that shine."""
+    return [part if part.material.emission > 0.0 else replace(part, material=material) for part in parts]
+
+
+def lamp_white(rng: np.random.Generator) -> FloatArray:
+    """(3,) white of a colour temperature from about 2700 to 8000 K."""
+    return np.array([1.0, 0.78, 0.52]) + rng.random() ** 0.7 * np.array([-0.12, 0.14, 0.55])

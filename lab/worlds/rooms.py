@@ -12,11 +12,11 @@ from lab.worlds import pieces
 from lab.worlds.furniture import placing
 from lab.worlds.primitives import box
 from lab.worlds.render import Renderer
-from lab.worlds.room_finishes import muted, random_floor, random_material, random_wall, recolored
+from lab.worlds.room_finishes import covered, lamp_white, muted, random_material, recolored
 from lab.worlds.scene import Light, Material, Part, Scene
+from lab.worlds.shell import shell, wall_length, wall_pose
 from lab.worlds.textures import paint
 from lab.worlds.viewpoints import random_views
-from pipeline.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
 _Piece = TypeVar("_Piece")
@@ -54,7 +54,7 @@ def random_room(seed: int) -> Scene:
     size_m = np.array([rng.uniform(2.5, 6.0), rng.uniform(2.5, 6.0), rng.uniform(2.3, 3.0)])
     if rng.random() < 0.12:
         size_m[:2] *= 1.5
-    plan = _Plan(size_m, _shell(rng, size_m))
+    plan = _Plan(size_m, shell(rng, size_m, 0.55))
     windows = _dress_walls(plan, rng)
     _furnish_walls(plan, rng)
     _furnish_middle(plan, rng)
@@ -63,61 +63,22 @@ def random_room(seed: int) -> Scene:
     return replace(scene, cameras=tuple(random_views(scene, rng, 1, Renderer(scene))))
 
 
-def _shell(rng: np.random.Generator, size_m: FloatArray) -> list[Part]:
-    """Floor, ceiling and four walls as slabs outside of ``size_m``."""
-    x, y, z = size_m
-    white = muted(rng, 1, 0.55, 0.85)[0]
-    ceiling = Material(paint(white, 1, 0.04)) if rng.random() < 0.85 else random_wall(rng)
-    wall = random_wall(rng)
-    parts = [
-        _slab((x, y, 0.1), (0, 0, -0.05), random_floor(rng)),
-        _slab((x, y, 0.1), (0, 0, z + 0.05), ceiling),
-    ]
-    for axis in (0, 1):
-        for side in (-1.0, 1.0):
-            material = random_wall(rng) if rng.random() < 0.2 else wall
-            slab, at = np.array([x, y, z]), np.array([0.0, 0.0, 0.5 * z])
-            slab[axis], at[axis] = 0.1, side * (0.5 * size_m[axis] + 0.05)
-            slab[1 - axis] += 0.2
-            parts.append(_slab(slab, at, material))
-    return parts
-
-
-def _slab(
-    size_m: FloatArray | tuple[float, ...], at_m: FloatArray | tuple[float, ...], material: Material
-) -> Part:
-    return Part(*box(tuple(size_m)), material, rigid(np.eye(3), np.asarray(at_m, float)))
-
-
-def _wall_pose(
-    size_m: FloatArray, wall: int, along_m: float, inset_m: float = 0.0, z_m: float = 0.0
-) -> FloatArray:
-    """Pose against one of four walls, front (-y) to the room, ``along_m`` from the wall's middle."""
-    yaw = wall * np.pi / 2.0
-    depth = 0.5 * (size_m[1] if wall % 2 == 0 else size_m[0]) - inset_m
-    return placing.place(0.0, 0.0, yaw) @ placing.place(along_m, depth, 0.0, z_m)
-
-
-def _wall_length(size_m: FloatArray, wall: int) -> float:
-    return float(size_m[0] if wall % 2 == 0 else size_m[1])
-
-
 def _dress_walls(plan: _Plan, rng: np.random.Generator) -> list[FloatArray]:
     """Skirting, windows, doors, pictures and shelves; returns where daylight comes in."""
     windows = []
     skirting = Material(paint(muted(rng, 1, 0.1, 0.8)[0], 2)) if rng.random() < 0.6 else None
     for wall in range(4):
-        length = _wall_length(plan.size_m, wall)
+        length = wall_length(plan.size_m, wall)
         if skirting is not None:
             mesh = box((length, 0.018, rng.uniform(0.05, 0.12)))
-            plan.parts.append(Part(*mesh, skirting, _wall_pose(plan.size_m, wall, 0.0, 0.009, 0.03)))
+            plan.parts.append(Part(*mesh, skirting, wall_pose(plan.size_m, wall, 0.0, 0.009, 0.03)))
         start = -0.5 * length + rng.uniform(0.1, 0.5)
         while True:
             piece = _stocked(pieces.random_wall_piece, rng)
             start += 0.5 * piece.width_m
             if start + 0.5 * piece.width_m > 0.5 * length - 0.05:
                 break
-            T = _wall_pose(plan.size_m, wall, start, 0.0, piece.height_m)
+            T = wall_pose(plan.size_m, wall, start, 0.0, piece.height_m)
             plan.parts += pieces.moved(piece.parts, T)
             if piece.daylight:
                 windows.append((T @ np.array([0.0, -0.35, 0.6, 1.0]))[:3])
@@ -132,11 +93,11 @@ def _furnish_walls(plan: _Plan, rng: np.random.Generator) -> None:
         low, high = pieces.bounds(piece)
         for _ in range(10):
             wall = int(rng.integers(4))
-            reach = 0.5 * _wall_length(plan.size_m, wall) - 0.5 * (high[0] - low[0])
+            reach = 0.5 * wall_length(plan.size_m, wall) - 0.5 * (high[0] - low[0])
             if reach <= 0.0:
                 continue
             inset = high[1] + rng.choice([0.03, rng.uniform(0.03, 0.25)])
-            if plan.add_free(piece, _wall_pose(plan.size_m, wall, rng.uniform(-reach, reach), inset)):
+            if plan.add_free(piece, wall_pose(plan.size_m, wall, rng.uniform(-reach, reach), inset)):
                 break
 
 
@@ -169,8 +130,7 @@ def _varied(piece: list[Part], rng: np.random.Generator) -> list[Part]:
         return piece
     if kind < 0.88:
         return recolored(piece, rng)
-    material = random_material(rng)
-    return [part if part.material.emission > 0.0 else replace(part, material=material) for part in piece]
+    return covered(piece, random_material(rng))
 
 
 def _lights(
@@ -185,14 +145,10 @@ def _lights(
     for _ in range(int(rng.integers(0 if lights else 1, 3))):
         x, y = rng.uniform(-0.4, 0.4, 2) * size_m[:2]
         z = size_m[2] - rng.uniform(0.15, 0.5) if rng.random() < 0.8 else rng.uniform(1.3, 1.8)
-        lights.append(Light(np.array([x, y, z]), _white(rng) * rng.uniform(0.8, 3.5), rng.uniform(0.05, 0.4)))
-    ambient = 0.5 * (_white(rng) + 1.0) * rng.uniform(0.05, 0.4)
+        color = lamp_white(rng) * rng.uniform(0.8, 3.5)
+        lights.append(Light(np.array([x, y, z]), color, rng.uniform(0.05, 0.4)))
+    ambient = 0.5 * (lamp_white(rng) + 1.0) * rng.uniform(0.05, 0.4)
     return tuple(lights), ambient
-
-
-def _white(rng: np.random.Generator) -> FloatArray:
-    """(3,) white of a colour temperature from about 2700 to 8000 K."""
-    return np.array([1.0, 0.78, 0.52]) + rng.random() ** 0.7 * np.array([-0.12, 0.14, 0.55])
 
 
 def _intrinsics(rng: np.random.Generator) -> CameraIntrinsics:

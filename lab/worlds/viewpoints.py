@@ -1,6 +1,12 @@
-"""Where a person with a depth camera would stand in a room, and where they would point it."""
+"""Where a person with a depth camera would stand in a room, and where a camera hangs below the ceiling.
+
+Rooms are closed; parts[0] is the floor slab, parts[1] the ceiling slab, parts[:6] the shell.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TypeVar
 
 import numpy as np
 
@@ -10,10 +16,18 @@ from packetmesh.errors import InputError
 from pipeline.geometry import look_at, rigid, rotation_exp
 from pipeline.types import CameraIntrinsics, FloatArray, IntArray
 
+NEAREST_M = 0.3
+"""No pixel of a varied view is nearer."""
 _MARGIN_M = 0.25
 """Cameras keep this far from walls."""
 _CLOSE_UP_SHARE = 0.3
+_CEILING_SHARE = 0.25
+_CLEARANCE_M = 0.45
+"""From the box around any thing: at 75 degrees the corner of the image is 44 degrees off the axis, so that
+what is 0.42 m away may be 0.3 m deep."""
 _PREVIEW = CameraIntrinsics.pinhole(26.25, 26.25, 15.5, 11.5, 32, 24)
+
+_View = TypeVar("_View")
 
 
 def random_views(
@@ -22,7 +36,7 @@ def random_views(
     """T_world_camera of ``count`` plausible cameras: room views, and close-ups from above.
 
     Args:
-        scene: a closed room whose first part is the floor slab.
+        scene: a closed room.
         rng: source of all randomness.
         count: number of cameras.
         renderer: the scene's renderer, where there is one already.
@@ -31,26 +45,75 @@ def random_views(
         InputError: the room is so full that no camera sees anything.
     """
     renderer = renderer or Renderer(scene)
-    low, high = _inside(scene)
+    low, high = _inside(scene, np.max)
     things = _things(scene, low, high)
-    cameras: list[FloatArray] = []
-    for _ in range(200 * count):
-        if len(cameras) == count:
-            return cameras
+
+    def candidate() -> FloatArray | None:
         close = bool(len(things)) and rng.random() < _CLOSE_UP_SHARE
         camera = _close_up(rng, things, low, high) if close else _room_view(rng, low, high)
-        if camera is not None and _sees_enough(*renderer.parts_seen(_PREVIEW, camera), close):
-            cameras.append(camera)
-    if len(cameras) == count:
-        return cameras
-    raise InputError(f"Scene '{scene.name}' leaves no room for {count} cameras; take another seed.")
+        if camera is None:
+            return None
+        z_m, part = renderer.parts_seen(_PREVIEW, camera)
+        return camera if _sees_enough(z_m, part, close) else None
+
+    return list(_found(scene, count, 200, candidate))
 
 
-def _inside(scene: Scene) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest corner of the air in a room."""
-    floor = scene.parts[0]
+def varied_views(
+    seed: int, scene: Scene, count: int = 5, renderer: Renderer | None = None, width_px: int = 320
+) -> Iterator[tuple[FloatArray, CameraIntrinsics]]:
+    """T_world_camera and intrinsics (4:3) of cameras that see something and stand in nothing.
+
+    Three in four are held by people, at 1.0 to 1.8 m; the others hang at 2.2 to 3 m and look down. Their
+    horizontal fields of view are 45 to 75 degrees.
+
+    Args:
+        seed: of the views.
+        scene: a closed room.
+        count: number of views.
+        renderer: the scene's renderer, where there is one already.
+        width_px: of the images.
+
+    Raises:
+        InputError: the room is so full that no camera sees anything.
+    """
+    rng = np.random.default_rng([seed, 5333])
+    renderer = renderer or Renderer(scene)
+    low, high = _inside(scene, np.min)
+    box_lows, box_highs = _boxes(scene)
+
+    def candidate() -> tuple[FloatArray, CameraIntrinsics] | None:
+        pose = _overhead(rng, low, high) if rng.random() < _CEILING_SHARE else _handheld(rng, low, high)
+        fov_rad = np.radians(rng.uniform(45.0, 75.0))
+        outside_m = np.maximum(np.maximum(box_lows - pose[:3, 3], pose[:3, 3] - box_highs), 0.0)
+        if np.any(np.linalg.norm(outside_m, axis=1) < _CLEARANCE_M):
+            return None
+        z_m, part = renderer.parts_seen(_camera(fov_rad, _PREVIEW.width_px), pose)
+        near = z_m.min() <= NEAREST_M + 0.07 or np.median(z_m) <= 0.8 or np.percentile(z_m, 95.0) <= 1.3
+        return None if near or _is_bare(part, 0.7) else (pose, _camera(fov_rad, width_px))
+
+    yield from _found(scene, count, 300, candidate)
+
+
+def _found(scene: Scene, count: int, tries: int, candidate: Callable[[], _View | None]) -> Iterator[_View]:
+    """The first ``count`` candidates that are something, of ``tries`` for each."""
+    found = 0
+    for _ in range(tries * count):
+        if found == count:
+            return
+        view = candidate()
+        if view is not None:
+            found += 1
+            yield view
+    if found < count:
+        raise InputError(f"Scene '{scene.name}' leaves no room for {count} cameras; take another seed.")
+
+
+def _inside(scene: Scene, face: Callable[[FloatArray], float]) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest corner of the air in a room, up to the upper or lower face of the ceiling slab."""
+    floor, ceiling = scene.parts[:2]
     places = floor.vertices_m + floor.T_world_part[:3, 3]
-    top = max(float((part.vertices_m[:, 2] + part.T_world_part[2, 3]).max()) for part in scene.parts[1:6])
+    top = float(face(ceiling.vertices_m[:, 2] + ceiling.T_world_part[2, 3]))
     return np.array([*places.min(axis=0)[:2], places[:, 2].max()]), np.array([*places.max(axis=0)[:2], top])
 
 
@@ -61,15 +124,22 @@ def _things(scene: Scene, low: FloatArray, high: FloatArray) -> FloatArray:
     return centers[inside]
 
 
-def _room_view(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> FloatArray | None:
+def _boxes(scene: Scene) -> tuple[FloatArray, FloatArray]:
+    """(K, 3) low and high corners of the boxes around everything but the shell."""
+    corners = [
+        part.vertices_m @ part.T_world_part[:3, :3].T + part.T_world_part[:3, 3] for part in scene.parts[6:]
+    ]
+    lows = [places.min(axis=0) for places in corners]
+    return np.array(lows).reshape(-1, 3), np.array([places.max(axis=0) for places in corners]).reshape(-1, 3)
+
+
+def _room_view(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> FloatArray:
     """A camera at 0.5 to 2 m, pitched -38 to +10 degrees, that rather looks across the room."""
     x, y = rng.uniform(low[:2] + _MARGIN_M, high[:2] - _MARGIN_M)
     eye = np.array([x, y, low[2] + rng.uniform(0.5, min(2.0, high[2] - low[2] - 0.2))])
-    center = 0.5 * (low + high)
-    yaw = np.arctan2(center[1] - y, center[0] - x) + rng.normal(0.0, 0.9)
+    yaw = _yaw_to_middle(eye, low, high) + rng.normal(0.0, 0.9)
     pitch = np.radians(np.clip(rng.normal(-15.0, 12.0), -38.0, 10.0))
-    forward = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
-    return _rolled(look_at(eye, eye + forward), rng)
+    return _rolled(look_at(eye, eye + _direction(yaw, pitch)), rng, 0.03)
 
 
 def _close_up(
@@ -82,22 +152,72 @@ def _close_up(
         rng.uniform(0.0, 2.0 * np.pi),
         np.radians(rng.uniform(20.0, 65.0)),
     )
-    eye = target + distance * np.array(
-        [np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)]
-    )
+    eye = target + distance * _direction(yaw, pitch)
     if np.any(eye < low + 0.15) or np.any(eye > high - 0.15):
         return None
-    return _rolled(look_at(eye, target), rng)
+    return _rolled(look_at(eye, target), rng, 0.03)
 
 
-def _rolled(T_world_camera: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """A hand does not hold a camera level."""
-    return T_world_camera @ rigid(rotation_exp(np.array([0.0, 0.0, rng.normal(0.0, 0.03)])), np.zeros(3))
+def _handheld(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> FloatArray:
+    """A camera held at 1.0 to 1.8 m, tilted -45 to +10 degrees, rather towards the middle of the room."""
+    eye = _somewhere(rng, low, high, rng.uniform(1.0, 1.8), 0.35)
+    pitch = np.radians(np.clip(rng.normal(-15.0, 13.0), -45.0, 10.0))
+    yaw = _yaw_to_middle(eye, low, high) + rng.normal(0.0, 0.9)
+    return _rolled(look_at(eye, eye + _direction(yaw, pitch)), rng, 0.04)
+
+
+def _overhead(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> FloatArray:
+    """A camera mounted at 2.2 to 3 m that looks down by 20 to 80 degrees, often from a corner."""
+    height = rng.uniform(2.2, max(2.2, min(3.0, high[2] - low[2] - 0.1)))
+    eye = _somewhere(rng, low, high, height, 0.15)
+    if rng.random() < 0.5:
+        eye[:2] = np.where(rng.random(2) < 0.5, low[:2] + 0.3, high[:2] - 0.3)
+    pitch = np.radians(rng.uniform(-80.0, -20.0))
+    yaw = _yaw_to_middle(eye, low, high) + rng.normal(0.0, 0.4)
+    return _rolled(look_at(eye, eye + _direction(yaw, pitch)), rng, 0.02)
+
+
+def _somewhere(
+    rng: np.random.Generator, low: FloatArray, high: FloatArray, height_m: float, margin_m: float
+) -> FloatArray:
+    x, y = rng.uniform(low[:2] + margin_m, high[:2] - margin_m)
+    return np.array([x, y, low[2] + height_m])
+
+
+def _yaw_to_middle(eye: FloatArray, low: FloatArray, high: FloatArray) -> float:
+    middle = 0.5 * (low + high)
+    return float(np.arctan2(middle[1] - eye[1], middle[0] - eye[0]))
+
+
+def _direction(yaw_rad: float, pitch_rad: float) -> FloatArray:
+    """(3,) unit vector; upwards for a positive pitch."""
+    level = np.cos(pitch_rad)
+    return np.array([level * np.cos(yaw_rad), level * np.sin(yaw_rad), np.sin(pitch_rad)])
+
+
+def _rolled(T_world_camera: FloatArray, rng: np.random.Generator, sigma_rad: float) -> FloatArray:
+    """The camera turned a little about its axis, as nobody holds one level."""
+    roll = np.array([0.0, 0.0, rng.normal(0.0, sigma_rad)])
+    return np.asarray(T_world_camera @ rigid(rotation_exp(roll), np.zeros(3)))
+
+
+def _camera(fov_rad: float, width_px: int) -> CameraIntrinsics:
+    """A pinhole camera with square pixels and 4:3 images."""
+    height_px = width_px * 3 // 4
+    focal_px = 0.5 * width_px / np.tan(0.5 * fov_rad)
+    return CameraIntrinsics.pinhole(
+        focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1), width_px, height_px
+    )
+
+
+def _is_bare(part: IntArray, most: float) -> bool:
+    """Whether a ray leaves the room, or walls and ceiling fill more than ``most`` of the picture."""
+    return bool(np.any(part < 0) or np.mean((part >= 1) & (part < 6)) > most)
 
 
 def _sees_enough(z_m: FloatArray, part: IntArray, close: bool) -> bool:
     """Whether nothing sits before the lens and the picture is not just walls and ceiling."""
-    if np.any(part < 0) or np.mean((part >= 1) & (part < 6)) > (0.45 if close else 0.65):
+    if _is_bare(part, 0.45 if close else 0.65):
         return False
     nearest, middle, far = np.percentile(z_m, [2.0, 50.0, 95.0])
     if close:

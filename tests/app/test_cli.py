@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.cli import main
-from lab.benchmarks import cases as benchmarks
+from lab import benchmarks
 from lab.benchmarks.benchmark import Benchmark
 from pipeline.io.clouds import read_cloud
 from pipeline.io.demos import DEMO_SCENES

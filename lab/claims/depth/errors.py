@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -78,6 +80,29 @@ class SceneErrors:
         return float(np.mean([frame.beside_sensor[alignment] for frame in self.frames]))
 
 
+def site_trial(site: Site) -> dict[str, Any]:
+    """The errors of the shipped network on a site, as plain values."""
+    scene = scene_errors(site, DepthNetwork())
+    png = cv2.imencode(".png", scene.strip)[1].tobytes()
+    return {"frames": [asdict(frame) for frame in scene.frames], "strip": base64.b64encode(png).decode()}
+
+
+def from_trial(site: Site, result: dict[str, Any]) -> SceneErrors:
+    """What ``site_trial`` measured."""
+    frames = [
+        FrameErrors(
+            {name: DepthErrors(**errors) for name, errors in frame["aligned"].items()},
+            {name: np.array(total) for name, total in frame["total"].items()},
+            {name: np.array(pixels) for name, pixels in frame["pixels"].items()},
+            float("nan") if frame["sensor"] is None else frame["sensor"],
+            frame["beside_sensor"],
+        )
+        for frame in result["frames"]
+    ]
+    png = np.frombuffer(base64.b64decode(result["strip"]), np.uint8)
+    return SceneErrors(site, tuple(frames), cv2.imdecode(png, cv2.IMREAD_COLOR))
+
+
 def scene_errors(site: Site, network: DepthNetwork) -> SceneErrors:
     """Infer every image of a site and compare.
 
@@ -113,7 +138,7 @@ def frame_errors(
 
     Args:
         example: the image with its sensor.
-        inferred: (H, W) what the network said.
+        inferred: (H, W) by the network.
         judging_m: (H, W) the depths that count, NaN elsewhere.
         aligned_m: (H, W) each, the inferred depth by alignment.
         site: where it belongs.

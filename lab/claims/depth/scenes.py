@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -31,12 +31,13 @@ DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """Images that are told together."""
+    """Images whose errors are reported together."""
 
     name: str
     group: str
     """``held-out rooms``, ``demo scenes``, ``real frames`` or a user's set."""
-    examples: Callable[[], Iterator[Example]]
+    examples: Callable[[], Iterator[Example]] = field(repr=False)
+    """Fixed by the name and the code."""
     truth: bool = True
     """What judges is the truth; if not, it is the sensor's own depth, whose error nobody knows."""
     cap_m: float = INDOOR_CAP_M

@@ -1,1 +1,1 @@
-"""The thesis's claims about the network, computed anew, and how fast that goes."""
+"""The thesis's claims about the network (SPEC 8, C26 to C36)."""

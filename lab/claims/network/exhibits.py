@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from lab.claims.exhibits import Chart, Exhibit, Table
-from lab.claims.network.curves import curve
-from lab.claims.network.intervals import interval
+from lab.claims.network.intervals import curve, interval
 from lab.claims.network.study import (
     CAPPED_OBJECTS,
     CAPS,

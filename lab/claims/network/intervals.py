@@ -1,9 +1,10 @@
-"""95 % intervals of runs."""
+"""95 % intervals of runs, and lines of charts with them as bands."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
+from lab.claims.exhibits import Curve
 from network_sim.replicate import t_interval
 
 
@@ -11,3 +12,15 @@ def interval(values: Iterable[float]) -> tuple[float, float, float]:
     """Mean, low and high by Student's t; all three alike for a single value."""
     mean, half = t_interval(values)
     return mean, mean - (half or 0.0), mean + (half or 0.0)
+
+
+def curve(label: str, x: Sequence[float], runs: Sequence[Iterable[float]]) -> Curve:
+    """Means with their intervals: one group of runs for each ``x``."""
+    means, lows, highs = zip(*(interval(values) for values in runs), strict=True)
+    return Curve(label, tuple(float(value) for value in x), means, lows, highs)
+
+
+def plain_curve(label: str, x: Sequence[float], y: Sequence[float]) -> Curve:
+    """A line without a band."""
+    values = tuple(float(value) for value in y)
+    return Curve(label, tuple(float(value) for value in x), values, values, values)

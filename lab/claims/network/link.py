@@ -12,10 +12,9 @@ from scipy.special import stdtrit  # student's t; scipy.stats takes a second to 
 
 from lab.claims.claim import Claim, Outcome
 from lab.claims.exhibits import Chart, Exhibit, Table
-from lab.claims.network.curves import curve, plain_curve
-from lab.claims.network.intervals import interval
+from lab.claims.network.intervals import curve, interval, plain_curve
 from lab.claims.network.tasks import transfer
-from lab.claims.network.trials import iterate_trials
+from lab.trials import iterate_trials
 from network_sim.config import PRESETS, NetworkConfig
 from network_sim.images import encoded_bytes, pgm_bytes, ppm_bytes
 from network_sim.mac.ieee802154 import LINK_BPS
@@ -57,11 +56,11 @@ def model_b(images: int) -> NetworkConfig:
     return replace(config, mac=replace(config.mac, kind="serial", link_bps=SERIAL_BPS))
 
 
-def link_runs(folder: Path) -> Generator[Progress, None, LinkRuns]:
-    """Both models for every row of the table, as far as ``folder`` does not have them yet."""
+def link_runs(folder: Path, scheduler: str | None) -> Generator[Progress, None, LinkRuns]:
+    """Both models for every row of the table."""
     radio = [run for images in IMAGES for run in replications(model_a(images), RUNS)]
     serial = [model_b(images) for images in IMAGES]
-    found = yield from iterate_trials("image transfer", transfer, [*radio, *serial], folder)
+    found = yield from iterate_trials("C28, image transfer", transfer, [*radio, *serial], folder, scheduler)
     seconds = np.array([values["transfer_s"] for values in found], float)
     return LinkRuns(seconds[: len(radio)].reshape(len(IMAGES), RUNS), seconds[len(radio) :])
 
@@ -140,9 +139,9 @@ def _c27() -> Outcome:
         ("sinks", 1, 1),
         ("image, bytes", THESIS_KIB * 1024.0, LINK.nodes.image_bytes),
         ("payload of a packet, bytes", None, LINK.nodes.payload_bytes),
-        ("medium access", "not said", LINK.mac.kind),
-        ("acknowledged", "not said", "yes" if LINK.mac.ack else "no"),
-        ("fragments sent again", "not said", "yes" if LINK.nodes.retransmit else "no"),
+        ("medium access", "not stated", LINK.mac.kind),
+        ("acknowledged", "not stated", "yes" if LINK.mac.ack else "no"),
+        ("fragments sent again", "not stated", "yes" if LINK.nodes.retransmit else "no"),
     )
     return Outcome(
         {"link_bps": LINK_BPS, "nodes": float(nodes)},
@@ -161,14 +160,14 @@ def _c28(runs: LinkRuns) -> Outcome:
     ours |= {f"mape_{name.partition(':')[0].replace(' ', '_')}": mape(s) for name, s in models.items()}
     ours |= {"goodput_bps": 8.0 * LINK.nodes.image_bytes * LINK.nodes.count / float(seconds[0])}
     ci95 = {f"transfer_s_{n}": interval(runs.radio_s[row])[1:] for row, n in enumerate(IMAGES)}
-    told = ", ".join(f"{error:+.1%}" for error in errors(seconds))
+    row_errors = ", ".join(f"{error:+.1%}" for error in errors(seconds))
     best = mape(models["best line through the origin"])
     return Outcome(
         ours,
         ci95,
         mape(seconds) <= MOST_MAPE and bool(np.all(np.abs(errors(seconds)) <= MOST_ERROR)),
         f"Model A, without a free parameter, takes {seconds[0]:.1f} s for an image of each node, off by "
-        f"{told}, {mape(seconds):.1%} on average; a serial line of 57,600 baud by "
+        f"{row_errors}, {mape(seconds):.1%} on average; a serial line of 57,600 baud by "
         f"{mape(runs.serial_s):.1%}, the best line through the origin by {best:.1%}; "
         + _undecided(float(seconds[0]), float(runs.serial_s[0])),
         _table_4_6(runs, models),
@@ -214,13 +213,11 @@ def _table_4_6(runs: LinkRuns, models: dict[str, FloatArray]) -> tuple[Exhibit, 
 
 def _c29() -> Outcome:
     true_min = [seconds / 60.0 for seconds in THESIS_S]
-    wrong = [
-        n for n, said, true in zip(IMAGES, THESIS_MIN, true_min, strict=True) if abs(said - true) > 0.006
-    ]
     rows = tuple(
-        (n, seconds, said, true, 60.0 * (said - true))
-        for n, seconds, said, true in zip(IMAGES, THESIS_S, THESIS_MIN, true_min, strict=True)
+        (n, seconds, printed, true, 60.0 * (printed - true))
+        for n, seconds, printed, true in zip(IMAGES, THESIS_S, THESIS_MIN, true_min, strict=True)
     )
+    wrong = [n for n, _, printed, true, _ in rows if abs(printed - true) > 0.006]
     header = ("images", "thesis, s", "thesis, min", "min of these s", "difference, s")
     return Outcome(
         {"wrong_rows": float(len(wrong)), "largest_difference_s": max(abs(row[-1]) for row in rows)},

@@ -8,10 +8,9 @@ from pathlib import Path
 
 from lab.claims.claim import Claim, Outcome
 from lab.claims.exhibits import Chart, Table
-from lab.claims.network.curves import curve, plain_curve
-from lab.claims.network.intervals import interval
+from lab.claims.network.intervals import curve, interval, plain_curve
 from lab.claims.network.tasks import Crowd, saturated
-from lab.claims.network.trials import iterate_trials
+from lab.trials import iterate_trials
 from network_sim.config import PRESETS, NodesConfig
 from network_sim.mac.bianchi import bianchi
 from network_sim.mac.dcf import EIFS_NS
@@ -62,10 +61,12 @@ def crowd(stations: int, seed: int, wait_after_loss: bool, duration_s: float = D
     return Crowd(config, stations, duration_s, seed, wait_after_loss)
 
 
-def crowd_runs(folder: Path) -> Generator[Progress, None, tuple[Throughputs, Throughputs]]:
+def crowd_runs(
+    folder: Path, scheduler: str | None
+) -> Generator[Progress, None, tuple[Throughputs, Throughputs]]:
     """By the standard, with an EIFS after a collision, and as Bianchi assumes, without one."""
     tasks = [crowd(n, seed, wait) for wait in (True, False) for n in STATIONS for seed in range(RUNS)]
-    found = yield from iterate_trials("saturated stations", saturated, tasks, folder)
+    found = yield from iterate_trials("C32, saturated stations", saturated, tasks, folder, scheduler)
     bps = [float(values["throughput_bps"] or 0.0) for values in found]
     groups = [tuple(bps[first : first + RUNS]) for first in range(0, len(bps), RUNS)]
     count = len(STATIONS)
@@ -85,7 +86,7 @@ def _c32(runs: tuple[Throughputs, Throughputs]) -> Outcome:
     }
     worst_power = max(abs(error) for error in powers.values())
     setup = _setup_rows()
-    as_said = all(said == ours for _, said, ours in setup)
+    as_stated = all(thesis == ours for _, thesis, ours in setup)
     ours = {"power_error": worst_power, "crossover_m": crossover_m(NS2_HEIGHT_M, wavelength_m(NS2_HZ))}
     ci95: dict[str, tuple[float, float]] = {}
     for name, found in zip(("standard", "as_assumed"), runs, strict=True):
@@ -97,7 +98,7 @@ def _c32(runs: tuple[Throughputs, Throughputs]) -> Outcome:
     return Outcome(
         ours,
         ci95,
-        as_said and all(found.close for found in runs) and worst_power <= MOST_POWER_ERROR,
+        as_stated and all(found.close for found in runs) and worst_power <= MOST_POWER_ERROR,
         f"saturated throughput is off Bianchi's by {runs[1].errors[0]:+.2%} for one station and by "
         f"{assumed:.2%} at most for {STATIONS[1]} to {STATIONS[-1]}; with the EIFS of the standard, "
         f"in the model too, by {standard:.2%}; two-ray powers are off ns-2's by {worst_power:.1e} at most",
@@ -106,7 +107,7 @@ def _c32(runs: tuple[Throughputs, Throughputs]) -> Outcome:
 
 
 def _setup_rows() -> list[tuple[str, str | float, str | float]]:
-    """What the thesis says of the radio, beside the preset."""
+    """The radio by the thesis and by the preset."""
     return [
         ("medium access", "ieee80211b", STREET.mac.kind),
         ("RTS/CTS", "no", "yes" if STREET.mac.rts else "no"),

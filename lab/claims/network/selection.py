@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from lab.claims.claim import Claim, Outcome
 from lab.claims.exhibits import Chart, Table
-from lab.claims.network.curves import curve
-from lab.claims.network.intervals import interval
+from lab.claims.network.intervals import curve, interval
 from network_sim.selection import all_cameras, at_random, greedy, greedy_by_cost, nearest, view_quality
 
 FloatArray = NDArray[np.float64]
@@ -60,12 +59,16 @@ def make_view(seed: int) -> View:
     incidence = -np.einsum("nvc,vc->nv", directions, normals.reshape(-1, 3))
     axes = -cameras_m / np.linalg.norm(cameras_m, axis=1, keepdims=True)
     in_picture = np.einsum("nvc,nc->nv", directions, axes) > COS_HALF_VIEW
-    visible = in_picture & (incidence > 0.0) & ~_hidden(cameras_m, directions, lengths_m, centers_m, radii_m)
+    visible = (
+        in_picture
+        & (incidence > 0.0)
+        & ~behind_a_sphere(cameras_m, directions, lengths_m, centers_m, radii_m)
+    )
     q = view_quality(visible, lengths_m, incidence, REFERENCE_M)
     return View(q, np.linalg.norm(cameras_m, axis=1), rng.uniform(*SIZES_BYTES, CAMERAS))
 
 
-def _hidden(
+def behind_a_sphere(
     cameras_m: FloatArray,
     directions: FloatArray,
     lengths_m: FloatArray,

@@ -43,11 +43,11 @@ MOST_SUMMARY_DIFFERENCE = 0.02
 CROWDED = tuple(objects for objects in OBJECTS if objects >= 20)
 
 
-def large_images(folder: Path) -> Generator[Progress, None, Found]:
+def large_images(folder: Path, scheduler: str | None) -> Generator[Progress, None, Found]:
     """All schemes with images of 1,000 and of 30,000 bytes, a quarter of an hour each after the warm-up."""
     sizes = (STREET.scheme.image_bytes, LARGE_BYTES)
     cases = [Case(scheme, LARGE_OBJECTS, None, size) for size in sizes for scheme in SCHEMES]
-    return (yield from run_cases("larger images", cases, folder, LARGE_HORIZON_S))
+    return (yield from run_cases("C30, larger images", cases, folder, scheduler, LARGE_HORIZON_S))
 
 
 def least_jpeg_bytes(width_px: int, height_px: int) -> int:
@@ -69,14 +69,14 @@ def _c30(found: Found) -> Outcome:
     ours = {"least_jpeg_bytes": float(least), "bit_per_px": bit_per_px}
     ours |= {f"delivery_ratio_{name}_1kB": share for name, share in small.items()}
     ours |= {f"delivery_ratio_{name}_30kB": share for name, share in large.items()}
-    told = ", ".join(f"{name} {small[name]:.0%} and {large[name]:.0%}" for name in SCHEMES)
+    arrived = ", ".join(f"{name} {small[name]:.0%} and {large[name]:.0%}" for name in SCHEMES)
     return Outcome(
         ours,
         {},
         parameters and least <= scheme.image_bytes,
         f"the sizes are the preset's, as symbols: 1000 bytes are {bit_per_px:.3f} bit a pixel, and even a "
         f"grey area of 800 x 600 pixels takes {least:,} bytes as JPEG; of the images of {LARGE_OBJECTS} "
-        f"vehicles these shares arrive with 1 and with 30 kB: {told}",
+        f"vehicles these shares arrive with 1 and with 30 kB: {arrived}",
         (sizes_table(found, LARGE_OBJECTS, LARGE_HORIZON_S),),
     )
 
@@ -92,7 +92,7 @@ def _c31() -> Outcome:
         ("without a name; here r_L", 3.0, scheme.r_low, "scheme.r_low"),
         ("r_H", 8.0, scheme.r_high, "scheme.r_high"),
     )
-    equal = sum(said == ours for _, said, ours, _ in rows)
+    equal = sum(thesis == ours for _, thesis, ours, _ in rows)
     note = (
         "T stands for two parameters. The one without a name is most likely the low threshold that belongs "
         "to r_H: with S / T_v = 6 images a minute a cell is covered once, which lies between 3 and 8."

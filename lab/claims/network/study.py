@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lab.claims.network.intervals import interval
 from lab.claims.network.tasks import Values, street_values
-from lab.claims.network.trials import iterate_trials
+from lab.trials import iterate_trials
 from network_sim.config import PRESETS, NetworkConfig, SchemeName
 from network_sim.replicate import replications
 from packetmesh.progress import Progress
@@ -53,22 +53,23 @@ def standard_cases() -> tuple[Case, ...]:
     return tuple(dict.fromkeys([*grid, *(Case("greedy", CAPPED_OBJECTS, k) for k in CAPS)]))
 
 
-def street_study(folder: Path) -> Generator[Progress, None, Found]:
-    """The whole study, as far as ``folder`` does not have it yet."""
-    return (yield from run_cases("street grid", standard_cases(), folder))
+def street_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Found]:
+    """The whole study."""
+    return (yield from run_cases("C33 to C35, street grid", standard_cases(), folder, scheduler))
 
 
 def run_cases(
     stage: str,
     cases: Sequence[Case],
     folder: Path,
+    scheduler: str | None = None,
     horizon_s: float = STREET.run.horizon_s,
     runs: int = RUNS,
 ) -> Generator[Progress, None, Found]:
     """Runs of every case; the long ones begin first, so that the cores end together."""
     order = sorted(cases, key=lambda case: case.objects * case.image_bytes, reverse=True)
     tasks = [run for case in order for run in replications(case.config(horizon_s), runs)]
-    found = yield from iterate_trials(stage, street_values, tasks, folder)
+    found = yield from iterate_trials(stage, street_values, tasks, folder, scheduler)
     return {
         case: found[first : first + runs]
         for case, first in zip(order, range(0, len(found), runs), strict=True)

@@ -1,6 +1,6 @@
-"""What other processes are asked to do: single runs, each a function of its config alone.
+"""The trials of the network's claims: single runs, each a function of its config alone.
 
-Little is imported here, so that these processes begin at once.
+Little is imported here, so that the processes that run them start quickly.
 """
 
 from __future__ import annotations

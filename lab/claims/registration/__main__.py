@@ -1,14 +1,14 @@
-"""``python -m lab.claims.registration tune``: choose the parameters anew, on rooms of their own."""
+"""``python -m lab.claims.registration FOLDER``: choose the parameters again, on rooms of their own."""
 
 from __future__ import annotations
 
 import argparse
 import logging
-import tempfile
 from pathlib import Path
 
 from lab.claims.registration import tuned
 from lab.claims.registration.tuning import tune, write_tuned
+from packetmesh.progress import Progress, drain
 
 logger = logging.getLogger(__name__)
 
@@ -17,19 +17,15 @@ def main() -> None:
     """Tune and write the module ``tuned``."""
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     parser = argparse.ArgumentParser(prog="python -m lab.claims.registration")
-    parser.add_argument("command", choices=["tune"])
-    parser.add_argument("--folder", type=Path, help="keeps the results, so that a stopped run can go on")
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("folder", type=Path, help="keeps the trials, so that an interrupted run resumes")
+    parser.add_argument("--scheduler", help="address of a Dask scheduler; without it, this machine's cores")
     arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as temporary:
-        running = tune(arguments.folder or Path(temporary), workers=arguments.workers)
-        while True:
-            try:
-                progress = next(running)
-            except StopIteration as end:
-                write_tuned(end.value, Path(tuned.__file__))
-                return
-            logger.info("%4.0f%%  %s", 100.0 * progress.fraction, progress.stage)
+    chosen = drain(tune(arguments.folder, arguments.scheduler), _log)
+    write_tuned(chosen, Path(tuned.__file__))
+
+
+def _log(progress: Progress) -> None:
+    logger.info("%4.0f%%  %s", 100.0 * progress.fraction, progress.stage)
 
 
 if __name__ == "__main__":

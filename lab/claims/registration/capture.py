@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from lab.claims.registration.cases import wrong_start
+from lab.claims.registration.cases import Condition, make_case, wrong_start
+from lab.claims.registration.entrants import Entrant
 from packetmesh.errors import PacketMeshError
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import apply
@@ -19,6 +21,19 @@ ROTATIONS_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
 TRANSLATIONS_M = (0.1, 0.2, 0.3, 0.4, 0.6)
 HOME_RAD = float(np.radians(1.5))
 HOME_M = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureTask:
+    """The map of one entrant in one room."""
+
+    condition: Condition
+    """Its clouds."""
+    room: int
+    entrant: Entrant
+    gate_by_start: bool
+    """As in ``capture_range``."""
+    max_points: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +51,21 @@ class CaptureCell:
     def home(self) -> bool:
         """Within 1.5 degrees and 5 cm of the truth."""
         return self.rotation_error_rad < HOME_RAD and self.translation_error_m < HOME_M
+
+
+def map_capture(task: CaptureTask) -> list[dict[str, Any]]:
+    """The cells of one map, as plain values."""
+    case = make_case(task.condition, task.room).thinned(task.max_points)
+    cells = capture_range(
+        case.source,
+        case.target,
+        case.T_true,
+        task.entrant.config("q2p", task.condition.gate_m, task.max_points),
+        seed=task.room,
+        method=task.entrant.start(),
+        gate_by_start=task.gate_by_start,
+    )
+    return [asdict(cell) | {"entrant": task.entrant.name, "home": cell.home} for cell in cells]
 
 
 def capture_range(
@@ -60,8 +90,8 @@ def capture_range(
         translations_m: how far to move, for each rotation.
         seed: chooses the axes and directions; the same ones for every method.
         method: takes the place of the config's method, as in ``register``.
-        gate_by_start: tell the method how far away it starts: a gate of twice the translation, if that is
-            wider than the config's. SPEC 4.4 sets T_d so.
+        gate_by_start: the gate is twice the translation, if that is wider than the config's (SPEC 4.4 sets
+            T_d so); else it is the config's.
     """
     for row, rotation_deg in enumerate(rotations_deg):
         for column, translation_m in enumerate(translations_m):

@@ -51,7 +51,7 @@ def convergence_charts(results: Results, condition: str) -> tuple[Chart, ...]:
                 if (trials := results.trials(entrant, (condition,)))
             ),
             "Mean over the rooms and its 95 % bootstrap interval; a run that has ended keeps its last value. "
-            + ("Times are of this machine, two processes at once." if over == "seconds" else ""),
+            + ("Times are of this machine, with a trial on each of its cores." if over == "seconds" else ""),
         )
         for quantity, over, unit, x, of in kinds
     )
@@ -85,11 +85,7 @@ def capture_maps(results: Results) -> tuple[HeatMap, ...]:
                 rotations,
                 shares,
                 "Share of the rooms that end within 1.5 degrees and 5 cm, on the clouds of “easy”"
-                + (
-                    "."
-                    if entrant == FIXED_GATE
-                    else "; the gate is told the distance: twice the translation."
-                ),
+                + ("." if entrant == FIXED_GATE else "; the gate is twice the translation."),
             )
         )
     return tuple(maps)
@@ -106,6 +102,6 @@ def home_shares(results: Results, entrant: str) -> dict[tuple[float, float], flo
 
 def _mean_curve(label: str, x: FloatArray, values: Sequence[FloatArray]) -> Curve:
     columns = np.array(values).T
-    bands = [bootstrap_ci95(column, draws=400) for column in columns]
+    bands = [bootstrap_ci95(column, resamples=400) for column in columns]
     low, high = zip(*bands, strict=True)
     return Curve(label, tuple(x.tolist()), tuple(columns.mean(axis=1).tolist()), low, high)

@@ -1,23 +1,18 @@
-"""Who takes part in the benchmark, and with what parameters."""
+"""A method, a variant of one or another program, with its parameters."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
-from lab.claims.registration.tuned import TUNED
 from lab.claims.registration.variants import TUNABLE, VARIANTS
 from pipeline.config import Direction, Metric, RegistrationConfig
 from pipeline.registration.methods import METHODS, MethodStart
-from pipeline.registration.peers import PEERS, available_peers
+from pipeline.registration.peers import PEERS
 from pipeline.registration.weighting import PairWeighting
 from pipeline.types import PointCloud
 
 GATE_SCALE = "gate_scale"
 """The parameter that multiplies the condition's gate."""
-PLANE = ("icp", "icp-gated", "picp", "ficp", "fast-robust-icp", "ceicp-n", "ceicp-a", "ceicp-r")
-"""Methods that run with the point-to-plane metric as well."""
-FAST_PEERS = ("open3d-plane", "open3d-gicp", "small-gicp", "small-gicp-staged", "small-vgicp-staged")
-"""Other programs that take well under a second; CPD takes minutes for a condition."""
 _CONFIG_FIELDS = {part.name for part in fields(RegistrationConfig)}
 
 
@@ -78,51 +73,5 @@ class Entrant:
         return start if own else begin
 
 
-def tuned(entrant: Entrant) -> Entrant:
-    """The entrant with the value that tuning chose for it, if it was tuned."""
-    if entrant.name not in TUNED:
-        return entrant
-    parameter, value, _ = TUNED[entrant.name]
-    return replace(entrant, settings=((parameter, value), *entrant.settings))
-
-
-def methods(metric: Metric = "point") -> tuple[Entrant, ...]:
-    """Every method, and ICP with a gate, with one metric."""
-    names = ("icp", "icp-gated", *(name for name in METHODS if name != "icp"))
-    return tuple(Entrant(name, metric) for name in names if metric == "point" or name in PLANE)
-
-
-def peers() -> tuple[Entrant, ...]:
-    """The installed other programs that are fast enough."""
-    return tuple(Entrant(name) for name in available_peers() if name in FAST_PEERS)
-
-
-def ablations(metric: Metric) -> tuple[Entrant, ...]:
-    """CEICP with a part taken out; the thesis's own formula only exists point to point."""
-    name = "ceicp-a" if metric == "point" else "ceicp-a plane"
-    parts: tuple[tuple[str, str, tuple[tuple[str, float | str], ...]], ...] = (
-        ("ceicp-a-gaussian", f"{name}, w = p", ()),
-        ("ceicp-a-hard-gate", f"{name}, hard gate", ()),
-        ("ceicp-a-fixed-sigma", f"{name}, fixed sigma", ()),
-    )
-    shared = tuple(
-        Entrant(method, metric, label, _like(name) + settings) for method, label, settings in parts
-    )
-    if metric == "plane":
-        both = (*_like(name), ("direction", "both"))
-        return (*shared, Entrant("ceicp-a", metric, f"{name}, both directions", both))
-    return (
-        *shared,
-        Entrant("ceicp-n-gaussian", label="ceicp-n, w = p", settings=_like("ceicp-n")),
-        Entrant("ceicp-literal", label="ceicp-literal, metres", settings=(("unit", "m"),)),
-        Entrant(
-            "ceicp-literal-centroids",
-            label="ceicp-literal, weighted centroids",
-            settings=_like("ceicp-literal"),
-        ),
-    )
-
-
-def _like(name: str) -> tuple[tuple[str, float | str], ...]:
-    """The tuned setting of another entrant."""
-    return ((TUNED[name][0], TUNED[name][1]),) if name in TUNED else ()
+Lineup = tuple[tuple[Direction, Entrant], ...]
+"""Who takes part in a condition, and in which direction."""

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from lab.claims.registration.store import Task
 from pipeline.config import Direction
 from pipeline.types import FloatArray
 
 
 class Results:
-    """Every trial of a benchmark; values of different entrants come in the same order of cases."""
+    """Every trial of a benchmark; values of different entrants come in the same order of cases.
 
-    def __init__(self, stored: dict[Task, dict[str, Any]]) -> None:
+    Args:
+        trials: as ``run_case`` gives them, case by case.
+        cells: of the capture ranges.
+    """
+
+    def __init__(self, trials: Iterable[dict[str, Any]], cells: Iterable[dict[str, Any]] = ()) -> None:
         self._trials: dict[tuple[str, Direction, str], list[dict[str, Any]]] = {}
-        self.cells: list[dict[str, Any]] = []
-        """Capture-range cells."""
-        for result in stored.values():
-            self.cells += result.get("cells", [])
-            for trial, timing in zip(result.get("trials", []), result.get("timings", []), strict=True):
-                key = (trial["condition"], trial["direction"], trial["entrant"])
-                self._trials.setdefault(key, []).append(trial | timing)
+        self.cells = list(cells)
+        for trial in trials:
+            key = (trial["condition"], trial["direction"], trial["entrant"])
+            self._trials.setdefault(key, []).append(trial)
 
     @property
     def conditions(self) -> tuple[str, ...]:

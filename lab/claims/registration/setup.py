@@ -1,23 +1,21 @@
-"""What a benchmark consists of, and the key that says which stored results belong to it."""
+"""The benchmark behind the claims: its rooms, who takes part in which condition, and the trials."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-from dataclasses import asdict, dataclass, field
-from functools import cache
-from pathlib import Path
+from dataclasses import replace
 
-import pipeline
+from lab.claims.registration.capture import CaptureTask
 from lab.claims.registration.cases import CONDITIONS, Condition
-from lab.claims.registration.entrants import Entrant, ablations, methods, peers, tuned
-from pipeline.config import Direction
+from lab.claims.registration.entrants import Entrant, Lineup
+from lab.claims.registration.trials import CaseTask
+from lab.claims.registration.tuned import TUNED
+from pipeline.config import Metric
+from pipeline.registration.methods import METHODS
+from pipeline.registration.peers import available_peers
 
-Lineup = tuple[tuple[Direction, Entrant], ...]
-
-ROOMS = 30
-FIRST_ROOM = 100
-"""Rooms before it were looked at while the benchmark was made."""
+ROOMS = range(100, 130)
+"""Seeds of ``box_room``; rooms before them were looked at while the benchmark was made."""
+MAX_POINTS = 4000
 CAPTURE_ROOMS = 6
 CURVE_CONDITIONS = ("easy", "nodes-sensor")
 """Where convergence curves are recorded (Fig. 4.9)."""
@@ -36,6 +34,10 @@ SLOW = {
     "ceicp-ml": ("easy", "holes-x3", "nodes-sensor"),
 }
 """Methods that take several times as long as the rest, and the conditions that they take part in."""
+PLANE = ("icp", "icp-gated", "picp", "ficp", "fast-robust-icp", "ceicp-n", "ceicp-a", "ceicp-r")
+"""Methods that run with the point-to-plane metric as well."""
+FAST_PEERS = ("open3d-plane", "open3d-gicp", "small-gicp", "small-gicp-staged", "small-vgicp-staged")
+"""Other programs that take well under a second; CPD takes minutes for a condition."""
 FIXED_GATE = "ceicp-n, T_d 0.3 m"
 CAPTURED = (
     (Entrant("icp"), True),
@@ -44,58 +46,26 @@ CAPTURED = (
     (Entrant("ceicp-n"), True),
     (Entrant("ceicp-a", "plane"), True),
 )
-"""Whose capture range is mapped, and whether its gate is told how far off the start is."""
-_CODE = (
-    "registration",
-    "scenes",
-    "acquisition",
-    "config.py",
-    "geometry.py",
-    *(
-        f"experiments/registration/{name}.py"
-        for name in ("capture", "cases", "entrants", "trials", "variants")
-    ),
-)
-"""Parts of the pipeline that a result depends on, beside the lineups."""
+"""Whose capture range is mapped, and whether its gate grows with the distance of the start."""
 
 
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """One benchmark."""
-
-    rooms: tuple[int, ...]
-    """Seeds of ``box_room``."""
-    lineups: dict[str, Lineup]
-    """By condition, who takes part and in which direction."""
-    max_points: int = 4000
-    curves: tuple[str, ...] = CURVE_CONDITIONS
-    """Conditions with convergence curves."""
-    captured: tuple[tuple[Entrant, bool], ...] = ()
-    """Whose capture range is mapped, on the clouds of ``easy``; False keeps the gate at 0.3 m."""
-    capture_rooms: tuple[int, ...] = field(default=())
-
-    def key(self) -> str:
-        """Twelve digits that change with everything a result depends on, the code too, but not with the
-        rooms: results of more rooms can be added to those of fewer."""
-        contents = {
-            "conditions": {name: asdict(CONDITIONS[name]) for name in self.lineups},
-            "lineups": {name: [(d, asdict(e)) for d, e in lineup] for name, lineup in self.lineups.items()},
-            "max_points": self.max_points,
-            "curves": [self.curves, CURVED],
-            "captured": [(asdict(entrant), told) for entrant, told in self.captured],
-            "code": _code_digest(),
-        }
-        return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()[:12]
+def case_tasks() -> list[CaseTask]:
+    """A trial of each condition in each room, every entrant tuned."""
+    lineups = {name: standard_lineup(condition) for name, condition in CONDITIONS.items()}
+    return [
+        CaseTask(CONDITIONS[name], room, lineup, MAX_POINTS, CURVED if name in CURVE_CONDITIONS else ())
+        for room in ROOMS
+        for name, lineup in lineups.items()
+    ]
 
 
-def standard_setup(rooms: int = ROOMS) -> Setup:
-    """The benchmark behind the claims: all conditions, every entrant tuned."""
-    return Setup(
-        rooms=tuple(range(FIRST_ROOM, FIRST_ROOM + rooms)),
-        lineups={condition.name: standard_lineup(condition) for condition in CONDITIONS.values()},
-        captured=CAPTURED,
-        capture_rooms=tuple(range(FIRST_ROOM, FIRST_ROOM + min(rooms, CAPTURE_ROOMS))),
-    )
+def capture_tasks() -> list[CaptureTask]:
+    """The capture ranges in each of the first few rooms."""
+    return [
+        CaptureTask(CONDITIONS["easy"], room, entrant, by_start, MAX_POINTS)
+        for room in ROOMS[:CAPTURE_ROOMS]
+        for entrant, by_start in CAPTURED
+    ]
 
 
 def standard_lineup(condition: Condition) -> Lineup:
@@ -119,13 +89,47 @@ def standard_lineup(condition: Condition) -> Lineup:
     )
 
 
-@cache
-def _code_digest() -> str:
-    """Digest of the source files that results depend on."""
-    root = Path(pipeline.__file__).parent
-    files = sorted(
-        path
-        for part in _CODE
-        for path in ([root / part] if part.endswith(".py") else (root / part).rglob("*.py"))
+def tuned(entrant: Entrant) -> Entrant:
+    """The entrant with the value that tuning chose for it, if it was tuned."""
+    if entrant.name not in TUNED:
+        return entrant
+    parameter, value, _ = TUNED[entrant.name]
+    return replace(entrant, settings=((parameter, value), *entrant.settings))
+
+
+def methods(metric: Metric = "point") -> tuple[Entrant, ...]:
+    """Every method, and ICP with a gate, with one metric."""
+    names = ("icp", "icp-gated", *(name for name in METHODS if name != "icp"))
+    return tuple(Entrant(name, metric) for name in names if metric == "point" or name in PLANE)
+
+
+def peers() -> tuple[Entrant, ...]:
+    """The installed other programs that are fast enough."""
+    return tuple(Entrant(name) for name in available_peers() if name in FAST_PEERS)
+
+
+def ablations(metric: Metric) -> tuple[Entrant, ...]:
+    """CEICP with a part taken out; the thesis's own formula only exists point to point."""
+    name = "ceicp-a" if metric == "point" else "ceicp-a plane"
+    shared = tuple(
+        Entrant(f"ceicp-a-{part}", metric, f"{name}, {label}", _like(name))
+        for part, label in (("gaussian", "w = p"), ("hard-gate", "hard gate"), ("fixed-sigma", "fixed sigma"))
     )
-    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
+    if metric == "plane":
+        both = (*_like(name), ("direction", "both"))
+        return (*shared, Entrant("ceicp-a", metric, f"{name}, both directions", both))
+    return (
+        *shared,
+        Entrant("ceicp-n-gaussian", label="ceicp-n, w = p", settings=_like("ceicp-n")),
+        Entrant("ceicp-literal", label="ceicp-literal, metres", settings=(("unit", "m"),)),
+        Entrant(
+            "ceicp-literal-centroids",
+            label="ceicp-literal, weighted centroids",
+            settings=_like("ceicp-literal"),
+        ),
+    )
+
+
+def _like(name: str) -> tuple[tuple[str, float | str], ...]:
+    """The tuned setting of another entrant."""
+    return ((TUNED[name][0], TUNED[name][1]),) if name in TUNED else ()

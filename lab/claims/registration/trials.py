@@ -1,24 +1,24 @@
-"""One task of the benchmark: a condition in a room, done by every entrant from the same start."""
+"""A trial of the benchmark: a condition in a room, registered by every entrant from the same start."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from lab.claims.registration.cases import Case, Condition
-from lab.claims.registration.entrants import Entrant
+from lab.claims.registration.cases import Case, Condition, make_case
+from lab.claims.registration.entrants import Entrant, Lineup
 from packetmesh.errors import PacketMeshError
 from pipeline.config import Direction
 from pipeline.geometry import apply, inverse
-from pipeline.registration import register_timed, rotation_error_rad
+from pipeline.registration import register_timed
 from pipeline.registration.peers import run_peer
 from pipeline.surface import voxel_average
 from pipeline.types import FloatArray
 
-SUCCESS_CM = 2.0
 AHD_VOXEL_M = 0.08
 """Both clouds are thinned to this spacing before their distance is taken (SPEC 4.7)."""
 CURVE_ITERATIONS = (0, 1, 2, 3, 5, 8, 12, 20, 32, 50, 100)
@@ -28,8 +28,22 @@ DIGITS = 6
 
 
 @dataclass(frozen=True, slots=True)
+class CaseTask:
+    """One trial: everything that its result depends on."""
+
+    condition: Condition
+    room: int
+    """Seed of ``box_room``."""
+    lineup: Lineup
+    max_points: int
+    """Both clouds are thinned to this many points for all entrants alike."""
+    curved: tuple[str, ...] = ()
+    """Names of the entrants whose error after every iteration is recorded as well."""
+
+
+@dataclass(frozen=True, slots=True)
 class Trial:
-    """How one entrant did on one case; deterministic."""
+    """How one entrant did on one case; all but the times repeats bit for bit."""
 
     condition: str
     room: int
@@ -37,12 +51,9 @@ class Trial:
     entrant: str
     point_error_cm: float
     ahd_cm: float
-    rotation_error_deg: float
-    success: bool
-    """Point error below 2 cm."""
     iterations: int | None
     k90: int | None
-    """Iterations until 90 % of the error's drop; None without a drop, or where a program does not tell."""
+    """Iterations until 90 % of the error's drop; None without a drop, or for another program."""
     stop_reason: str
     start_error_cm: float
     overlap: float
@@ -50,16 +61,8 @@ class Trial:
     """Point error after 0, 1, ... iterations; empty where curves are not asked for."""
     curve_ahd_cm: tuple[float, ...] = ()
     """Average Hausdorff distance after each of ``CURVE_ITERATIONS``, the last one held."""
-
-
-@dataclass(frozen=True, slots=True)
-class Timing:
-    """How long that trial took; not deterministic."""
-
-    seconds: float
-    """From clouds to pose, trees and normals included."""
     elapsed_s: tuple[float, ...] = ()
-    """Until the end of each iteration, where curves are asked for."""
+    """From the clouds to the end of each iteration, trees and normals included; empty without curves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,40 +100,28 @@ class Ruler:
         return round(50.0 * float(onto_m + back_m), DIGITS)
 
 
-def run_task(
-    case: Case,
-    condition: Condition,
-    room: int,
-    lineup: Sequence[tuple[Direction, Entrant]],
-    max_points: int,
-    curved: Container[str] = (),
-) -> tuple[list[Trial], list[Timing]]:
-    """Every entrant of the lineup on the same points from the same start.
+def run_case(task: CaseTask) -> list[dict[str, Any]]:
+    """The trial of every entrant of the lineup, as plain values."""
+    case = make_case(task.condition, task.room)
+    return [asdict(trial) for trial in case_trials(task, case)]
 
-    Args:
-        case: the whole clouds.
-        condition: where the case comes from.
-        room: its number.
-        lineup: who takes part, and in which direction.
-        max_points: both clouds are thinned to this many points for all entrants alike.
-        curved: names of the entrants whose error after every iteration is recorded as well.
-    """
-    ruler, thinned = Ruler(case), case.thinned(max_points)
-    trials, timings = [], []
-    for direction, entrant in lineup:
-        run = run_entrant(entrant, thinned, direction, condition.gate_m)
+
+def case_trials(task: CaseTask, case: Case) -> list[Trial]:
+    """Every entrant of the lineup on the same points from the same start; ``case`` has the whole clouds."""
+    ruler, thinned = Ruler(case), case.thinned(task.max_points)
+    trials = []
+    for direction, entrant in task.lineup:
+        run = run_entrant(entrant, thinned, direction, task.condition.gate_m)
         errors_cm = [ruler.point_error_cm(T) for T in run.poses]
-        T, is_curve = run.poses[-1], direction == "q2p" and entrant.name in curved
+        is_curve = direction == "q2p" and entrant.name in task.curved
         trials.append(
             Trial(
-                condition.name,
-                room,
+                task.condition.name,
+                task.room,
                 direction,
                 entrant.name,
                 point_error_cm=errors_cm[-1],
-                ahd_cm=ruler.ahd_cm(T),
-                rotation_error_deg=round(float(np.degrees(rotation_error_rad(T, case.T_true))), DIGITS),
-                success=errors_cm[-1] < SUCCESS_CM,
+                ahd_cm=ruler.ahd_cm(run.poses[-1]),
                 iterations=run.iterations,
                 k90=None if entrant.is_peer else k90(errors_cm),
                 stop_reason=run.stop_reason,
@@ -138,11 +129,10 @@ def run_task(
                 overlap=round(case.overlap, DIGITS),
                 curve_error_cm=tuple(errors_cm) if is_curve else (),
                 curve_ahd_cm=_ahd_curve(ruler, run.poses) if is_curve else (),
+                elapsed_s=tuple(round(s, DIGITS) for s in run.elapsed_s) if is_curve else (),
             )
         )
-        elapsed_s = tuple(round(s, DIGITS) for s in run.elapsed_s)
-        timings.append(Timing(elapsed_s[-1] if elapsed_s else 0.0, elapsed_s if is_curve else ()))
-    return trials, timings
+    return trials
 
 
 def run_entrant(entrant: Entrant, case: Case, direction: Direction, gate_m: float) -> Run:

@@ -1,4 +1,4 @@
-"""What tuning chose; written by ``python -m lab.claims.registration tune``."""
+"""What tuning chose; written by ``python -m lab.claims.registration``."""
 
 from __future__ import annotations
 

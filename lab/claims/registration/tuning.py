@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from lab.claims.registration.entrants import GATE_SCALE, Entrant, methods, peers
+from lab.claims.registration.cases import CONDITIONS
+from lab.claims.registration.entrants import GATE_SCALE, Entrant, Lineup
 from lab.claims.registration.results import Results
-from lab.claims.registration.runner import run_trials
-from lab.claims.registration.setup import Lineup, Setup
+from lab.claims.registration.setup import MAX_POINTS, methods, peers
+from lab.claims.registration.trials import CaseTask, run_case
+from lab.trials import iterate_trials
 from packetmesh.files import atomic_path
 from packetmesh.progress import Progress
 from pipeline.config import Direction
 
-ROOMS = tuple(range(1000, 1004))
+ROOMS = range(1000, 1004)
 """Rooms that nothing else sees."""
 TUNING_CONDITIONS = ("easy", "holes-x3", "large-start", "nodes-sensor")
 GATES = (0.25, 0.5, 1.0, 2.0)
@@ -39,7 +42,7 @@ CANDIDATES: dict[str, tuple[str, tuple[float, ...]]] = {
 }
 """The parameter that matters most, and its values. Plain ICP has none; other programs get ``gate_scale``."""
 
-HEADER = '''"""What tuning chose; written by ``python -m lab.claims.registration tune``."""
+HEADER = '''"""What tuning chose; written by ``python -m lab.claims.registration``."""
 
 from __future__ import annotations
 
@@ -52,7 +55,7 @@ mean of the point error over the tuning cases, centimetres."""
 
 
 def tune(
-    folder: Path, rooms: tuple[int, ...] = ROOMS, workers: int = 2
+    folder: Path, scheduler: str | None = None
 ) -> Generator[Progress, None, dict[str, tuple[str, float, dict[float, float]]]]:
     """Try every value of every entrant on the tuning rooms.
 
@@ -60,8 +63,11 @@ def tune(
         By entrant: the parameter, the value with the least score, and all scores, centimetres.
     """
     lineup = tuning_lineup()
-    setup = Setup(rooms, dict.fromkeys(TUNING_CONDITIONS, lineup), curves=())
-    results = Results((yield from run_trials(setup, folder, workers)))
+    tasks = [
+        CaseTask(CONDITIONS[name], room, lineup, MAX_POINTS) for room in ROOMS for name in TUNING_CONDITIONS
+    ]
+    trials = yield from iterate_trials("tuning", run_case, tasks, folder, scheduler)
+    results = Results(chain(*trials))
     scores: dict[str, tuple[str, dict[float, float]]] = {}
     for _, entrant in lineup:
         ((parameter, value),) = entrant.settings

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Generator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.stats import linregress
 from scipy.stats import t as student_t
 
-from lab.benchmarks.surface import OURS, TERRAIN, SurfaceRun, roll_ours, run_alone, terrain
+from lab.benchmarks.surface import OURS, TERRAIN, SurfaceRun, roll_ours, terrain, time_alone
 from lab.claims.claim import Claim, Outcome
 from lab.claims.exhibits import Chart, Curve, Table
+from lab.trials import iterate_trials
+from packetmesh.progress import Progress
 from pipeline.types import PointCloud
 
 SIZES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
@@ -68,16 +72,26 @@ def storage_bytes(cloud: PointCloud, radii_m: Sequence[float]) -> int:
         tracemalloc.stop()
 
 
-def study(sizes: Sequence[int] = SIZES, open3d_sizes: Sequence[int] = OPEN3D_SIZES) -> Growth:
-    """Terrains of one density; each size and program in a fresh process, three rounds."""
-    ours, open3d, storage = [], [], []
-    for size in sizes:
-        cloud = terrain(size)
-        ours.append(run_alone(OURS, cloud, TERRAIN, "four", BALLS))
-        storage.append(storage_bytes(cloud, ours[-1].radii_m))
-        if size in open3d_sizes:
-            open3d.append(run_alone("open3d", cloud, TERRAIN, "four", BALLS))
-    return Growth(tuple(ours), tuple(open3d), tuple(storage))
+def size_trial(size: int) -> dict[str, Any]:
+    """A terrain of one size: ours, Open3D's, each timed in a fresh process, and the storage of ours."""
+    cloud = terrain(size)
+    ours = time_alone(OURS, cloud, TERRAIN, "four", BALLS)
+    open3d = time_alone("open3d", cloud, TERRAIN, "four", BALLS) if size in OPEN3D_SIZES else None
+    return {
+        "ours": asdict(ours),
+        "open3d": open3d and asdict(open3d),
+        "storage_bytes": storage_bytes(cloud, ours.radii_m),
+    }
+
+
+def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Growth]:
+    """Terrains of one density, one after the other on this machine: other work would disturb the times."""
+    found = yield from iterate_trials("C24, growth", size_trial, SIZES, folder, processes=1)
+    return Growth(
+        tuple(SurfaceRun(**entry["ours"]) for entry in found),
+        tuple(SurfaceRun(**entry["open3d"]) for entry in found if entry["open3d"]),
+        tuple(entry["storage_bytes"] for entry in found),
+    )
 
 
 def judge(growth: Growth) -> Outcome:
@@ -172,5 +186,6 @@ C24 = Claim(
     claim="Ball pivoting takes time and storage linear in the number of points",
     thesis="“linear”, without a number",
     tolerance="slopes of log time and log storage over log n from 0.9 to 1.2, for 10,000 to 1,000,000 points",
-    experiment=lambda: judge(study()),
+    experiment=judge,
+    prepare=study,
 )

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Generator, Iterable
+from dataclasses import asdict, dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,8 +14,11 @@ from lab.claims.claim import Claim, Outcome, bootstrap_ci95
 from lab.claims.exhibits import Exhibit, Table
 from lab.claims.surface.clouds import CHAINS, ChainClouds, chain_clouds
 from lab.claims.surface.figures import thesis_figures
+from lab.trials import iterate_trials
+from packetmesh.progress import Progress
 from pipeline.config import PRESETS
-from pipeline.io.demos import DEMO_SCENES, load_demo
+from pipeline.depth.inference import SHIPPED_MODEL
+from pipeline.io.demos import DEMO_SCENES, SCENES, load_demo
 from pipeline.surface import hit_depth, reconstruct_surface
 from pipeline.surface.radii import SIGMAS
 from pipeline.types import FloatArray
@@ -27,7 +33,7 @@ RULES: dict[str, tuple[float, ...]] = {
 """Multiples of sigma_D that are added to r_F."""
 JUDGED = "r_F + sigma_D"
 OWN_RULES = {"thesis": "r_F to r_F + sigma_D", "packetmesh": "r_F to r_F + 4 sigma_D"}
-"""Each chain's own, by which its accuracy is told."""
+"""Each chain's own, by which its accuracy is reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,26 +71,38 @@ def seen(clouds: ChainClouds, when: str, sigmas: tuple[float, ...]) -> Seen:
     )
 
 
-def study(scenes: Iterable[str] = tuple(DEMO_SCENES)) -> tuple[Measured, tuple[Exhibit, ...]]:
-    """Every node of the scenes as a rig of its own, by both chains; pictures of the very first."""
+def node_trial(node: tuple[str, int]) -> list[dict[str, Any]]:
+    """What a scene's node sees of its surfaces by both chains, before and after fusion, by every rule."""
+    scene, index = node
+    rig = load_demo(scene)
+    return [
+        {"of": [preset, when, rule], "seen": asdict(seen(clouds, when, sigmas))}
+        for preset in CHAINS
+        for clouds in [chain_clouds(rig, index, PRESETS[preset])]
+        for when in ("before", "after")
+        for rule, sigmas in RULES.items()
+    ]
+
+
+def study(
+    folder: Path, scheduler: str | None, scenes: Iterable[str] = tuple(DEMO_SCENES)
+) -> Generator[Progress, None, Measured]:
+    """Every node of the scenes as a rig of its own."""
+    nodes = [(scene, index) for scene in scenes for index in range(len(load_demo(scene).frames))]
+    found = yield from iterate_trials(
+        "C22, holes", node_trial, nodes, folder, scheduler, data=(SHIPPED_MODEL, SCENES)
+    )
     measured: Measured = {}
-    pictures: list[Exhibit] = []
-    for place, scene in enumerate(scenes):
-        rig = load_demo(scene)
-        for index in range(len(rig.frames)):
-            for preset, how in CHAINS.items():
-                clouds = chain_clouds(rig, index, PRESETS[preset])
-                measure(clouds, preset, measured)
-                if (place, index) == (0, 0):
-                    pictures.append(thesis_figures(clouds, how))
-    return measured, tuple(pictures)
+    for entry in chain(*found):
+        preset, when, rule = entry["of"]
+        measured.setdefault((preset, when, rule), []).append(Seen(**entry["seen"]))
+    return measured
 
 
-def measure(clouds: ChainClouds, preset: str, measured: Measured) -> None:
-    """Add a frame's surfaces by all rules, before and after fusion."""
-    for when in ("before", "after"):
-        for rule, sigmas in RULES.items():
-            measured.setdefault((preset, when, rule), []).append(seen(clouds, when, sigmas))
+def figures(scene: str = next(iter(DEMO_SCENES))) -> tuple[Exhibit, ...]:
+    """The thesis's figures on the first node of a scene, by both chains."""
+    rig = load_demo(scene)
+    return tuple(thesis_figures(chain_clouds(rig, 0, PRESETS[preset]), how) for preset, how in CHAINS.items())
 
 
 def judge(measured: Measured, pictures: tuple[Exhibit, ...] = ()) -> Outcome:
@@ -102,12 +120,12 @@ def judge(measured: Measured, pictures: tuple[Exhibit, ...] = ()) -> Outcome:
             series[f"loops_{when}_{preset}"] = _column(measured, preset, when, "loops")
     ours = {key: float(np.mean(values)) for key, values in series.items()}
     ratio = series["no_hit_ratio_thesis"]
-    told = "; ".join(_sentence(ours, preset, how) for preset, how in CHAINS.items())
+    by_chain = "; ".join(_sentence(ours, preset, how) for preset, how in CHAINS.items())
     return Outcome(
         ours=ours,
         ci95={key: bootstrap_ci95(values) for key, values in series.items()},
         reproduced=bootstrap_ci95(ratio)[1] <= 0.5,
-        why=f"{told}; halved by the union in {np.sum(ratio <= 0.5)} of {len(ratio)} frames",
+        why=f"{by_chain}; halved by the union in {np.sum(ratio <= 0.5)} of {len(ratio)} frames",
         exhibits=(rays_table(measured), loops_table(measured), *pictures),
     )
 
@@ -182,5 +200,6 @@ C22 = Claim(
     claim="Far fewer apparent holes after fusion for ball radii from r_F + sigma_D",
     thesis="“far fewer”, shown in pictures at 0.0102, 0.0131, 0.0156 and 0.0209 m",
     tolerance="rays without a surface at most halved: mean ratio and its 95 % interval at most 0.5",
-    experiment=lambda: judge(*study()),
+    experiment=lambda measured: judge(measured, figures()),
+    prepare=study,
 )

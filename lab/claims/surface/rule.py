@@ -104,14 +104,14 @@ def _experiment() -> Outcome:
     ours["largest_deviation_even_steps"] = deviation(
         predicted_radii_m(even, *inferred_spacing(PRINTED_M, even))
     )
-    told = ", ".join(f"{radius_m:.4f}" for radius_m in radii_m)
+    predicted = ", ".join(f"{radius_m:.4f}" for radius_m in radii_m)
     return Outcome(
         ours,
         {},
         worst <= TOLERANCE,
-        f"r_F = {r_F_m:.4f} m and sigma_D = {sigma_D_m:.4f} m give {told} m, at most {worst:.1%} from print, "
-        f"where even steps would be {ours['largest_deviation_even_steps']:.0%} off; two of the four radii "
-        "fix r_F and sigma_D, so only the two between them are a test",
+        f"r_F = {r_F_m:.4f} m and sigma_D = {sigma_D_m:.4f} m give {predicted} m, at most {worst:.1%} from "
+        f"print, where even steps would be {ours['largest_deviation_even_steps']:.0%} off; two of the four "
+        "radii fix r_F and sigma_D, so only the two between them are a test",
         (readings_table(), scenes_table()),
     )
 

@@ -55,7 +55,7 @@ def stairs_cloud(
 
     Args:
         target: the stairs.
-        seed: draws jitter and noise.
+        seed: of jitter and noise.
         point_distance_m: of the grid.
         noise_m: standard deviation in x, y and z.
     """

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lab.benchmarks.cases import Benchmark
+from lab.benchmarks import Benchmark
 from lab.benchmarks.registration import GATE_M, POINTS, speed_pair, thinned
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import rotation_angle_rad

@@ -5,19 +5,18 @@ import json
 import numpy as np
 import pytest
 
+from lab.benchmarks import CASES
 from lab.benchmarks import surface as surface_speed
-from lab.benchmarks.cases import CASES, Benchmark, run_benchmarks
 from lab.benchmarks.surface import (
     OURS,
     PROGRAMS,
     available_programs,
     measure_speed,
     room_cloud,
-    run_alone,
     terrain,
+    time_alone,
 )
 from lab.claims.surface import growth
-from packetmesh.errors import InputError
 from pipeline.surface import spacing
 
 BOTH = (OURS, "open3d")
@@ -81,8 +80,8 @@ def test_a_slow_first_round_is_the_only_one(tmp_path, monkeypatch):
     assert surface_speed.measure(OURS, tmp_path / "cloud.npy", (1.5,), rounds=3).rounds == 1
 
 
-def test_a_fresh_process_tells_its_own_memory():
-    run = run_alone(OURS, terrain(2000), "small", "one", (1.5,), rounds=1)
+def test_a_fresh_process_measures_its_own_memory():
+    run = time_alone(OURS, terrain(2000), "small", "one", (1.5,), rounds=1)
     assert (run.cloud, run.balls, run.points) == ("small", "one", 2000)
     assert run.peak_memory_bytes > 50e6
     assert run.added_memory_bytes < run.peak_memory_bytes
@@ -111,7 +110,7 @@ def test_the_case_takes_its_numbers_from_the_four_balls(monkeypatch):
             2.0,
         )
 
-    monkeypatch.setattr(surface_speed, "run_alone", alone)
+    monkeypatch.setattr(surface_speed, "time_alone", alone)
     monkeypatch.setattr(surface_speed, "room_cloud", lambda points, smoothed=True: terrain(100))
     monkeypatch.setattr(surface_speed, "MANY_POINTS", 400)
     monkeypatch.setattr(surface_speed, "available_programs", lambda: BOTH)
@@ -125,12 +124,6 @@ def test_the_case_takes_its_numbers_from_the_four_balls(monkeypatch):
     assert record["ratio"] == 0.5
     assert len(record["runs"]) == 16
     json.dumps(record, allow_nan=False)
-
-
-def test_the_record_without_runs_is_as_before():
-    assert Benchmark(2.0, {"fast": 4.0}, 10).record()["runs"] == ()
-    with pytest.raises(InputError, match="surface"):
-        next(run_benchmarks(["surfaces"]))
 
 
 def _run(points: int, seconds: float, program: str = OURS) -> surface_speed.SurfaceRun:

@@ -1,18 +1,23 @@
 """Claims are judged by their own numbers, and the numbers can be had by other means."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from lab.benchmarks.cases import run_benchmarks
-from lab.claims import CLAIMS, Claim, run_experiments
-from lab.claims.claim import Outcome, bootstrap_ci95
+from lab.benchmarks import run_benchmarks
+from lab.claims.claim import Claim, Outcome, bootstrap_ci95
 from lab.claims.outliers import brute_force_keep, with_gross_outliers
+from lab.claims.registry import CLAIMS, run_claims
 from lab.claims.surface.clouds import single_node
 from packetmesh.errors import InputError
 from pipeline.acquisition import filter_outliers
 from pipeline.config import AcquisitionConfig
 from pipeline.io.demos import load_demo
 from pipeline.types import PointCloud
+
+SPEC = Path(__file__).parents[3] / "docs" / "SPEC.md"
 
 
 def test_a_claim_is_reproduced_only_if_its_experiment_says_so():
@@ -67,15 +72,17 @@ def test_a_single_node_stands_at_its_true_pose_with_its_own_truth():
     assert len(alone.truth.depth) == len(alone.frames) == 1
 
 
-def test_unknown_names_are_told_with_the_known_ones():
+def test_an_unknown_name_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match="C10"):
-        list(run_experiments(["C99"]))
+        list(run_claims(["C99"]))
     with pytest.raises(InputError, match="reconstruct"):
         list(run_benchmarks(["nothing"]))
 
 
-def test_every_claim_says_what_the_thesis_says_and_what_counts():
+def test_the_claims_are_rows_of_the_specification_s_table():
+    rows = dict(re.findall(r"^\| (C\d+) \| (.*)$", SPEC.read_text("utf-8"), re.MULTILINE))
+    assert list(CLAIMS) == sorted(set(CLAIMS) & set(rows))
+    assert {*(f"C{n}" for n in (10, *range(12, 15), *range(16, 25), *range(26, 37)))} == set(CLAIMS)
     for name, claim in CLAIMS.items():
         assert claim.id == name
-        assert claim.thesis
-        assert claim.tolerance
+        assert all(len(text) > 3 for text in (claim.claim, claim.thesis, claim.tolerance))

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from app.reports.reproduction import write_reproduction_report
-from lab.claims import CLAIMS
 from lab.claims.claim import Claim
 from lab.claims.depth import claims
 from lab.claims.depth.errors import (
@@ -21,8 +20,10 @@ from lab.claims.depth.errors import (
     by_distance,
     distance_curve,
     frame_errors,
+    from_trial,
     picture_strip,
     scene_errors,
+    site_trial,
     within,
 )
 from lab.claims.depth.scenes import (
@@ -255,7 +256,7 @@ def test_the_report_and_the_record_hold_everything(tmp_path):
     scenes = tuple(three_scenes((1.1, 1.2, 1.3)))
     verdicts = [
         Claim("C12", "c", "t", "tol", lambda: claims.judge_errors(scenes)).judge(),
-        CLAIMS["C13"].judge(),
+        claims.C13.judge(),
         Claim("C14", "c", "t", "tol", lambda: claims.judge_against_sensor(scenes)).judge(),
     ]
     path = tmp_path / "reproduce.html"
@@ -277,11 +278,40 @@ def test_the_held_out_rooms_are_of_the_test_split_and_overlap_nowhere():
     assert len(set(seeds)) == len(seeds) == 15
 
 
-def test_a_held_out_room_is_measured_by_the_shipped_network():
-    result = scene_errors(held_out_scenes(rooms=1, views=1)[1], DepthNetwork())
-    assert len(result.frames) == 1
-    assert result.sensor_abs_rel() < 0.02 < result.beside_sensor(JUDGED)
-    assert result.mean("affine-aligned", "abs_rel") < 0.5
+def test_the_shipped_network_errs_less_than_half_of_a_flat_wall_and_of_its_own_depth_mirrored():
+    """A network that did not look at the image would do no better than these two."""
+    network = DepthNetwork()
+    room = held_out_scenes(rooms=1, views=1)[1]
+    (image,) = room.examples()
+    inferred = network.infer(image.rgb)
+    seen, flat, mirrored = (
+        scene_errors(site([image]), Answering(z_m))
+        for z_m in (inferred.z_m, np.ones_like(inferred.z_m), inferred.z_m[:, ::-1])
+    )
+    for alignment in ("median-scaled", "affine-aligned"):
+        error = seen.mean(alignment, "abs_rel")
+        assert error < 0.5 * flat.mean(alignment, "abs_rel")
+        assert error < 0.5 * mirrored.mean(alignment, "abs_rel")
+    assert seen.sensor_abs_rel() < 0.02 < seen.beside_sensor(JUDGED)
+    np.testing.assert_array_equal(
+        scene_errors(room, network).frames[0].total["raw"], seen.frames[0].total["raw"]
+    )
+
+
+def test_a_stored_site_is_the_measured_one():
+    room = held_out_scenes(rooms=1, views=1)[0]
+    measured = scene_errors(room, DepthNetwork())
+    again = from_trial(room, json.loads(json.dumps(finite(site_trial(room)))))
+    np.testing.assert_array_equal(again.strip, measured.strip)
+    for before, after in zip(measured.frames, again.frames, strict=True):
+        assert (after.aligned, after.sensor, after.beside_sensor) == (
+            before.aligned,
+            before.sensor,
+            before.beside_sensor,
+        )
+        for name in ALIGNMENTS:
+            np.testing.assert_array_equal(after.total[name], before.total[name])
+            np.testing.assert_array_equal(after.pixels[name], before.pixels[name])
 
 
 def test_real_folders_are_found_where_the_variable_says(tmp_path, monkeypatch):
@@ -317,11 +347,14 @@ def test_a_user_s_sets_are_named_by_a_variable(monkeypatch):
 def test_a_folder_of_pairs_is_measured_like_any_other_site(tmp_path, monkeypatch):
     rgb = np.random.default_rng(3).integers(0, 255, (96, 128, 3), np.uint8)
     z_mm = np.tile(np.linspace(1000, 4000, 128).astype(np.uint16), (96, 1))
-    cv2.imwrite(str(tmp_path / "color.png"), rgb)
+    cv2.imwrite(str(tmp_path / "color.png"), rgb[..., ::-1])
     cv2.imwrite(str(tmp_path / "depth.png"), z_mm)
     monkeypatch.setenv("PACKETMESH_DEPTH_SETS", f"folder={tmp_path}")
     (site,) = user_sets()
     result = scene_errors(site, DepthNetwork())
-    assert len(result.frames) == 1
     assert sum(result.frames[0].pixels["raw"]) == 96 * 128
-    assert 0.0 < result.mean(JUDGED, "abs_rel") < 1.0
+    inferred_m, true_m = DepthNetwork().infer(rgb).z_m, z_mm / 1000.0
+    scaled_m = inferred_m * np.median(true_m) / np.median(inferred_m)
+    for alignment, z_m in (("raw", inferred_m), (JUDGED, scaled_m)):
+        expected = np.mean(np.abs(z_m - true_m) / true_m)
+        assert result.mean(alignment, "abs_rel") == pytest.approx(expected, rel=1e-3)

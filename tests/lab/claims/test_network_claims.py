@@ -1,35 +1,23 @@
 """The network's claims: known answers of the fits, small studies, and runs that are kept."""
 
 import json
-from dataclasses import replace
-from functools import partial
+import os
 
 import numpy as np
 import pytest
 
-from lab.benchmarks.cases import Benchmark, run_benchmarks
-from lab.benchmarks.network import CASES, network
-from lab.claims import run_experiments
+from lab.benchmarks.network import network
+from lab.claims import registry
 from lab.claims.network import link, radio, selection, street, study
-from lab.claims.network.claims import CLAIMS
 from lab.claims.network.intervals import interval
 from lab.claims.network.tasks import STREET_METRICS, saturated, transfer
-from lab.claims.network.trials import iterate_trials, trial_key
 from network_sim.config import PRESETS
 from network_sim.selection import all_cameras
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress, drain
 from packetmesh.settings import with_settings
 
 TINY = with_settings(PRESETS["thesis-link"], ["nodes.image_bytes=2000", "run.horizon_s=10"])
-
-
-def answer(steps):
-    """What a generator returns, and what it said."""
-    said = []
-    while True:
-        try:
-            said.append(next(steps))
-        except StopIteration as stop:
-            return stop.value, said
 
 
 def fake(found_by_case):
@@ -58,16 +46,9 @@ def as_expected():
     return cases
 
 
-def test_every_claim_says_what_the_thesis_says_and_what_counts():
-    assert list(CLAIMS) == [f"C{number}" for number in range(26, 37)]
-    for name, claim in CLAIMS.items():
-        assert claim.id == name
-        assert claim.thesis
-        assert claim.tolerance
-
-
 def test_what_needs_no_run_is_judged_at_once():
-    verdicts = {v.id: v for v in run_experiments(["C26", "C27", "C29", "C31"], claims=CLAIMS)}
+    events = registry.run_claims(["C26", "C27", "C29", "C31"])
+    verdicts = {event.id: event for event in events if not isinstance(event, Progress)}
     assert {name: v.verdict for name, v in verdicts.items()} == {
         "C26": "reproduced",
         "C27": "reproduced",
@@ -122,26 +103,25 @@ def test_one_saturated_station_gets_what_bianchi_says():
     assert throughput_bps == pytest.approx(8000 / (1275.818182e-6 + 310e-6), rel=0.01)
 
 
-def test_trials_are_kept_and_not_done_again(tmp_path):
-    tasks = [TINY, with_settings(TINY, ["run.seed=1"])]
-    first, _ = answer(iterate_trials("links", transfer, tasks[:1], tmp_path))
-    (kept,) = (tmp_path / "network").iterdir()
-    kept.write_text(kept.read_text().replace(str(first[0]["transfer_s"]), "-1.0"))
-    both, said = answer(iterate_trials("links", transfer, tasks, tmp_path))
-    assert both[0] == {"transfer_s": -1.0}
-    assert both[1] == transfer(tasks[1])
-    assert said[0].fraction == 0.5
-    kept.write_text("half a file")
-    again, _ = answer(iterate_trials("links", transfer, tasks, tmp_path))
-    assert again == [first[0], both[1]]
+def test_an_interrupted_claim_resumes_and_gives_the_same_verdict(tmp_path, monkeypatch):
+    monkeypatch.setattr(link, "LINK", with_settings(link.LINK, ["nodes.image_bytes=2000"]))
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    whole = list(registry.run_claims(["C28"], tmp_path / "whole"))
+    run = registry.run_claims(["C28"], tmp_path / "cut")
+    before = [next(run) for _ in range(8)]
+    run.close()
+    after = list(registry.run_claims(["C28"], tmp_path / "cut"))
+    assert [event.fraction for event in whole[:-1]] == [k / 20 for k in range(21)]
+    assert all(event.stage.startswith("C28") for event in whole[:-1])
+    assert after[0].fraction == before[-1].fraction == 7 / 20
+    assert len(after) == 15
+    assert after[-1].record() == whole[-1].record()
 
 
-def test_the_key_of_a_trial_changes_with_its_task_and_its_function():
-    keys = {
-        trial_key(f, t) for f in (transfer, saturated) for t in (TINY, with_settings(TINY, ["run.seed=1"]))
-    }
-    assert len(keys) == 4
-    assert trial_key(transfer, TINY) in keys
+def test_the_scheduler_reaches_the_trials(tmp_path):
+    for name in ("C12", "C16", "C22", "C23", "C28", "C30", "C32", "C33"):
+        with pytest.raises(InputError, match="no Dask scheduler at nowhere://1"):
+            list(registry.run_claims([name], tmp_path, "nowhere://1"))
 
 
 def test_the_study_has_every_case_once_and_shares_seeds():
@@ -154,7 +134,7 @@ def test_the_study_has_every_case_once_and_shares_seeds():
 
 def test_small_runs_of_the_street_come_back_by_case(tmp_path):
     cases = (study.Case("greedy", 4, 3), study.Case("baseline", 6))
-    found, _ = answer(study.run_cases("small", cases, tmp_path, horizon_s=2100.0, runs=2))
+    found = drain(study.run_cases("small", cases, tmp_path, horizon_s=2100.0, runs=2))
     assert set(found) == set(cases)
     assert all(len(runs) == 2 for runs in found.values())
     assert study.mean(found, cases[1], "images_per_minute") > study.mean(found, cases[0], "images_per_minute")
@@ -194,11 +174,11 @@ def test_a_camera_behind_a_sphere_sees_nothing_of_what_is_behind():
     assert view.q.shape == (selection.CAMERAS, selection.SPHERES * selection.VOXELS_EACH)
     assert 0.0 <= view.q.min() < view.q.max() <= 1.0
     one_m = np.array([1.0])
-    blocked = selection._hidden(
+    blocked = selection.behind_a_sphere(
         np.zeros((1, 3)), np.array([[[0.0, 0.0, 1.0]]]), 5.0 * one_m[None], np.array([[0.0, 0.0, 2.0]]), one_m
     )
     assert blocked.all()
-    assert not selection._hidden(
+    assert not selection.behind_a_sphere(
         np.zeros((1, 3)), np.array([[[0.0, 0.0, 1.0]]]), one_m[None], np.array([[0.0, 0.0, 3.0]]), one_m
     ).any()
 
@@ -223,11 +203,3 @@ def test_the_benchmark_counts_simulated_time_and_events():
     assert total["simulated_s_per_s"] == pytest.approx(3 * 1860.0 / result.ours_s)
     assert total["events_per_s"] == pytest.approx(sum(run["events"] for run in runs) / result.ours_s)
     assert result.record()["ratio"] is None
-    assert list(CASES) == ["network"]
-
-
-def test_functions_of_other_packages_are_measured_in_a_process_of_their_own():
-    mine = Benchmark(1.5, {}, 10)
-    assert list(run_benchmarks(["mine"], {"mine": partial(replace, mine, ours_s=2.0)})) == [
-        ("mine", replace(mine, ours_s=2.0))
-    ]

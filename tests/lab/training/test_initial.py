@@ -8,7 +8,6 @@ torch = pytest.importorskip("torch", reason="torch is installed only to train (s
 onnx = pytest.importorskip("onnx")
 
 from lab.training.initial import (  # noqa: E402
-    FEATURES,
     MEAN_BGR,
     OPEN_NSFW,
     initial_network,
@@ -19,6 +18,9 @@ from lab.training.initial import (  # noqa: E402
 from lab.training.network import DepthNet, ResNet50  # noqa: E402
 from packetmesh.errors import InputError  # noqa: E402
 from pipeline.depth.preprocessing import MEAN, STANDARD_DEVIATION  # noqa: E402
+
+FEATURES = ("/Relu_output_0", *(f"/Relu_{index}_output_0" for index in (9, 21, 39, 48)))
+"""The package's own features at strides 2, 4, 8, 16 and 32, (N, h, w, channels) each."""
 
 needs_package = pytest.mark.skipif(
     find_spec(OPEN_NSFW[0].replace("-", "_")) is None, reason=f"{OPEN_NSFW[0]} is not installed"

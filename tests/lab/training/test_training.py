@@ -6,7 +6,6 @@ import pytest
 torch = pytest.importorskip("torch", reason="torch is installed only to train (see requirements-train.lock)")
 
 from lab.training import train as training  # noqa: E402
-from lab.training.curves import curve  # noqa: E402
 from lab.training.losses import (  # noqa: E402
     berhu,
     scale_invariant,
@@ -181,10 +180,11 @@ def test_a_paused_training_continues_where_it_stopped_and_spends_its_budget(room
     finished = torch.load(first.out / "last.pt", weights_only=True)["state"]
     assert finished["step"] > paused["step"] > 0
     assert finished["elapsed_s"] >= 4.8
-    curves = curve(first.out)
-    assert (np.diff(curves["step"]) > 0).all()
-    assert np.isfinite(curves["val_abs_rel"][curves["step"] == paused["step"]]).all()
-    assert curves["images_seen"][-1] == finished["images_seen"]
+    log = [json.loads(line) for line in (first.out / "log.jsonl").read_text().splitlines()]
+    steps = [entry["step"] for entry in log]
+    assert steps == sorted(steps)
+    assert any("val_abs_rel" in entry for entry in log if entry["step"] == paused["step"])
+    assert max(entry.get("images_seen", 0) for entry in log) == finished["images_seen"]
 
 
 @pytest.mark.filterwarnings("ignore:.*pin_memory")
@@ -214,25 +214,6 @@ def test_a_gpu_that_is_not_there_and_a_folder_without_rooms_are_refused(rooms, m
     (rooms / "validation_0000_rgb.npy").unlink()
     with pytest.raises(InputError, match="no validation shards"):
         train(_config(rooms))
-
-
-def test_the_curve_takes_repeated_steps_once_and_bears_a_cut_last_line(tmp_path):
-    lines = [
-        {"step": 20, "loss": 3.0},
-        {"step": 30, "val_abs_rel": 0.5},
-        {"step": 40, "loss": 9.0},
-        {"step": 60, "loss": 9.0},
-        {"step": 40, "loss": 2.0},
-        {"step": 40, "val_abs_rel": 0.4},
-    ]
-    text = "".join(json.dumps(line) + "\n" for line in lines)
-    (tmp_path / "log.jsonl").write_text(text + '{"step": 60, "lo')
-    curves = curve(tmp_path)
-    np.testing.assert_array_equal(curves["step"], [20, 30, 40])
-    np.testing.assert_array_equal(curves["loss"], [3.0, np.nan, 2.0])
-    np.testing.assert_array_equal(curves["val_abs_rel"], [np.nan, 0.5, 0.4])
-    with pytest.raises(InputError, match=r"no log\.jsonl"):
-        curve(tmp_path / "nowhere")
 
 
 def test_an_exported_network_takes_bytes_says_what_it_is_and_gives_the_checkpoints_depth(rooms, monkeypatch):

@@ -6,8 +6,8 @@ import pytest
 from lab.training import dataset
 from lab.training.furniture import Catalogue
 from lab.training.varied_rooms import plan_room, varied_room
-from lab.training.viewpoints import NEAREST_M, views
 from lab.worlds.render import Renderer
+from lab.worlds.viewpoints import NEAREST_M, varied_views
 from tests.lab.training.test_furniture import write_catalogue
 
 SEEDS = range(6)
@@ -83,7 +83,7 @@ def test_cameras_keep_their_heights_angles_and_distances(catalogue):
     for seed in SEEDS:
         scene = varied_room(seed, catalogue)
         renderer = Renderer(scene, threads=1)
-        for T_world_camera, intrinsics in views(seed, scene, 5, renderer):
+        for T_world_camera, intrinsics in varied_views(seed, scene, 5, renderer):
             depth_m = renderer.depth(intrinsics, T_world_camera)
             assert np.isfinite(depth_m).all()
             assert depth_m.min() > NEAREST_M
@@ -107,7 +107,7 @@ def test_shards_of_catalogue_rooms_have_the_size_of_others_and_the_trained_focal
     scene = varied_room(0, catalogue)
     renderer = Renderer(scene, threads=1)
     for (rgb, depth_m), (T_world_camera, camera) in zip(
-        [shards[0], shards[1]], views(0, scene, 2, renderer), strict=True
+        [shards[0], shards[1]], varied_views(0, scene, 2, renderer), strict=True
     ):
         assert rgb.shape == (240, 320, 3)
         assert rgb.std() > 3.0

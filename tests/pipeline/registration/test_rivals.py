@@ -92,7 +92,9 @@ def many(displacement):
         ball = rng.normal(size=(700, 3))
         ball = 0.25 * ball / np.linalg.norm(ball, axis=1, keepdims=True) + [0.6, 0.5, 0.55]
         points_m = np.concatenate([*faces, ball])
-        return PointCloud(points_m + [0.0, 0.2, 1.5], colors=(255 * np.clip(points_m, 0, 1)).astype(np.uint8))
+        return PointCloud(
+            points_m + np.array([0.0, 0.2, 1.5]), colors=(255 * np.clip(points_m, 0, 1)).astype(np.uint8)
+        )
 
     return look().transformed(inverse(displacement)), look()
 

@@ -1,16 +1,17 @@
 """C16 to C20 judge what the trials say, whatever that is; they share one run."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import pytest
 
 from app.reports.reproduction import write_reproduction_report
-from lab.claims import CLAIMS, run_experiments
+from lab.claims import registry
 from lab.claims.exhibits import Chart, HeatMap, Table
-from lab.claims.registration import claims
+from lab.claims.registration.cases import CONDITIONS
 from lab.claims.registration.results import Results
-from lab.claims.registration.setup import CURVED, standard_setup
+from lab.claims.registration.setup import CAPTURED, CURVED, standard_lineup
 from lab.claims.registration.trials import CURVE_ITERATIONS
 from packetmesh.files import finite
 from packetmesh.progress import Progress
@@ -29,8 +30,6 @@ def _trial(condition: str, room: int, direction: str, entrant: str, error_cm: fl
         "entrant": entrant,
         "point_error_cm": error_cm,
         "ahd_cm": 4.0,
-        "rotation_error_deg": 0.1,
-        "success": error_cm < 2.0,
         "iterations": iterations,
         "k90": iterations,
         "stop_reason": "converged",
@@ -38,54 +37,44 @@ def _trial(condition: str, room: int, direction: str, entrant: str, error_cm: fl
         "overlap": 0.6,
         "curve_error_cm": curve,
         "curve_ahd_cm": [4.0] * len(CURVE_ITERATIONS) if curve else [],
+        "elapsed_s": [0.01 * k for k in range(len(curve) - 1)],
     }
 
 
 def _results(error_cm=None, iterations=None, far_home=None) -> Results:
     """Made-up trials of the whole benchmark: everyone errs by 1 cm in 20 iterations but those named."""
     error_cm, iterations = error_cm or {}, iterations or {}
-    stored = {}
-    for room in range(ROOMS):
-        for condition, lineup in _lineups().items():
-            trials = [
-                _trial(
-                    condition,
-                    room,
-                    direction,
-                    name,
-                    error_cm.get(name, 1.0),
-                    iterations.get(name, 20) + room % 3,
-                )
-                for direction, name in lineup
-            ]
-            timings = [
-                {"seconds": 0.1, "elapsed_s": [0.01 * k for k in range(len(t["curve_error_cm"]) - 1)]}
-                for t in trials
-            ]
-            stored[condition, room] = {"trials": trials, "timings": timings}
-        cells = [
-            {
-                "entrant": entrant.name,
-                "rotation_deg": r,
-                "translation_m": t,
-                "home": r < 45 or t < 0.6 or bool(far_home),
-            }
-            for entrant, _ in standard_setup().captured
-            for r in (5.0, 45.0)
-            for t in (0.1, 0.6)
-        ]
-        stored["capture", room] = {"cells": cells}
-    return Results(stored)
+    trials = [
+        _trial(condition, room, direction, name, error_cm.get(name, 1.0), iterations.get(name, 20) + room % 3)
+        for room in range(ROOMS)
+        for condition, lineup in _lineups().items()
+        for direction, name in lineup
+    ]
+    cells = [
+        {
+            "entrant": entrant.name,
+            "rotation_deg": r,
+            "translation_m": t,
+            "home": r < 45 or t < 0.6 or bool(far_home),
+        }
+        for _ in range(ROOMS)
+        for entrant, _ in CAPTURED
+        for r in (5.0, 45.0)
+        for t in (0.1, 0.6)
+    ]
+    return Results(trials, cells)
 
 
 @cache
 def _lineups() -> dict:
-    setup = standard_setup()
-    return {name: [(d, entrant.name) for d, entrant in lineup] for name, lineup in setup.lineups.items()}
+    return {
+        name: [(direction, entrant.name) for direction, entrant in standard_lineup(condition)]
+        for name, condition in CONDITIONS.items()
+    }
 
 
 def _verdict(id_: str, **named) -> str:
-    return CLAIMS[id_].judge(_results(**named)).verdict
+    return registry.CLAIMS[id_].judge(_results(**named)).verdict
 
 
 def test_c16_needs_all_four_rivals_beaten():
@@ -98,7 +87,7 @@ def test_c16_needs_all_four_rivals_beaten():
 def test_c17_needs_at_most_six_tenths_of_icps_error():
     assert _verdict("C17", error_cm={"icp": 2.0}) == "reproduced"
     assert _verdict("C17", error_cm={"icp": 1.5}) == "not reproduced"
-    ours = CLAIMS["C17"].judge(_results(error_cm={"icp": 2.0})).ours
+    ours = registry.CLAIMS["C17"].judge(_results(error_cm={"icp": 2.0})).ours
     assert ours["point_error_ratio_ceicp-n"] == pytest.approx(0.5)
     assert ours["ahd_ratio_ceicp-n"] == 1.0
 
@@ -119,28 +108,24 @@ def test_c20_needs_a_farthest_start_that_fails():
     assert _verdict("C20", far_home=True) == "not reproduced"
 
 
-def test_equal_errors_are_told_as_ties():
-    why = CLAIMS["C16"].judge(_results(error_cm={"icp": 2.0})).why
+def test_equal_errors_are_reported_as_ties():
+    why = registry.CLAIMS["C16"].judge(_results(error_cm={"icp": 2.0})).why
     assert "ficp 1.00 (tie)" in why
     assert "hicp 1.00 (tie)" in why
 
 
-def test_the_five_share_one_run_and_its_progress_comes_first(monkeypatch, tmp_path):
+def test_claims_with_the_same_trials_share_one_run_whose_progress_comes_first(monkeypatch, tmp_path):
     runs = []
 
-    def prepare(folder):
-        runs.append(folder)
+    def prepare(folder, scheduler):
+        runs.append((folder, scheduler))
         yield Progress("trials", 0.5)
         return _results()
 
-    for id_ in IDS:
-        object.__setattr__(CLAIMS[id_], "prepare", prepare)
-    try:
-        events = list(run_experiments(IDS, tmp_path))
-    finally:
-        for id_ in IDS:
-            object.__setattr__(CLAIMS[id_], "prepare", claims.registration_results)
-    assert runs == [tmp_path]
+    shared = {id_: replace(registry.CLAIMS[id_], prepare=prepare) for id_ in IDS}
+    monkeypatch.setattr(registry, "CLAIMS", shared)
+    events = list(registry.run_claims(folder=tmp_path, scheduler="tcp://x"))
+    assert runs == [(tmp_path, "tcp://x")]
     assert isinstance(events[0], Progress)
     assert [verdict.id for verdict in events[1:]] == list(IDS)
 
@@ -148,7 +133,7 @@ def test_the_five_share_one_run_and_its_progress_comes_first(monkeypatch, tmp_pa
 @pytest.fixture(scope="module")
 def verdicts():
     results = _results(error_cm={"icp": 2.0})
-    return [CLAIMS[id_].judge(results) for id_ in IDS]
+    return [registry.CLAIMS[id_].judge(results) for id_ in IDS]
 
 
 def test_the_exhibits_hold_the_promised_tables_and_pictures(verdicts):

@@ -5,10 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lab.claims.registration.capture import capture_range
+from lab.claims.registration.capture import CaptureTask, capture_range, map_capture
 from lab.claims.registration.cases import CONDITIONS, Case, make_case
-from lab.claims.registration.entrants import Entrant, ablations, methods, peers, tuned
-from lab.claims.registration.trials import AHD_VOXEL_M, Ruler, k90, run_entrant, run_task
+from lab.claims.registration.entrants import Entrant
+from lab.claims.registration.results import Results
+from lab.claims.registration.setup import ablations, capture_tasks, case_tasks, methods, peers, tuned
+from lab.claims.registration.trials import (
+    AHD_VOXEL_M,
+    CaseTask,
+    Ruler,
+    case_trials,
+    k90,
+    run_case,
+    run_entrant,
+)
 from lab.claims.registration.tuned import TUNED
 from lab.claims.registration.tuning import CANDIDATES, tuning_lineup, write_tuned
 from pipeline.geometry import rigid, rotation_exp
@@ -68,10 +78,9 @@ def test_a_peer_brings_the_source_home_in_both_directions(case, direction):
 
 
 def test_every_entrant_of_the_benchmark_runs(small):
-    condition = replace(EASY, name="small")
     everyone = (*methods(), *methods("plane"), *peers(), *ablations("point"), *ablations("plane"))
-    trials, timings = run_task(small, condition, 2003, [("q2p", tuned(e)) for e in everyone], 600)
-    assert len(trials) == len(timings) == len(everyone) == len({trial.entrant for trial in trials})
+    trials = case_trials(CaseTask(EASY, 2003, tuple(("q2p", tuned(e)) for e in everyone), 600), small)
+    assert len(trials) == len(everyone) == len({trial.entrant for trial in trials})
     refused = {trial.entrant for trial in trials if trial.stop_reason.startswith("refused")}
     assert refused == {"ceicp-literal, metres"}
 
@@ -145,7 +154,7 @@ def test_the_tuning_module_that_is_written_says_what_was_chosen(tmp_path):
 def test_capture_range_covers_the_grid_and_depends_on_how_far_the_method_looks(case):
     small = case.thinned(1500)
     config = Entrant("ceicp-a", "plane").config("q2p", 0.3, 1500)
-    told, untold = (
+    grown, fixed = (
         list(
             capture_range(
                 small.source,
@@ -160,11 +169,11 @@ def test_capture_range_covers_the_grid_and_depends_on_how_far_the_method_looks(c
         )
         for gate_by_start in (True, False)
     )
-    assert [(c.rotation_deg, c.translation_m) for c in told] == [(5, 0.1), (5, 1.5), (30, 0.1), (30, 1.5)]
-    assert told[0] == untold[0]
-    assert told[0].home
-    assert not untold[3].home
-    assert untold[3].point_error_m > 0.3
+    assert [(c.rotation_deg, c.translation_m) for c in grown] == [(5, 0.1), (5, 1.5), (30, 0.1), (30, 1.5)]
+    assert grown[0] == fixed[0]
+    assert grown[0].home
+    assert not fixed[3].home
+    assert fixed[3].point_error_m > 0.3
 
 
 def test_a_start_out_of_the_gates_reach_is_a_miss_not_an_error(case):
@@ -175,3 +184,51 @@ def test_a_start_out_of_the_gates_reach_is_a_miss_not_an_error(case):
     )
     assert not cell.home
     assert cell.translation_error_m == pytest.approx(50.0)
+
+
+def test_a_trial_records_what_the_tables_need():
+    entrants = (Entrant("icp"), Entrant("ceicp-a", "plane"))
+    lineup = tuple(("q2p", entrant) for entrant in entrants)
+    tasks = [
+        CaseTask(EASY, 2000, lineup, 500, ("ceicp-a plane",)),
+        CaseTask(CONDITIONS["nodes-sensor"], 2000, lineup[1:], 500),
+    ]
+    results = Results(trial for task in tasks for trial in run_case(task))
+    assert results.conditions == ("easy", "nodes-sensor")
+    assert results.entrants(("easy",)) == ("icp", "ceicp-a plane")
+    assert results.entrants(("easy", "nodes-sensor")) == ("ceicp-a plane",)
+    (trial,) = results.trials("ceicp-a plane", ("easy",))
+    assert trial["point_error_cm"] < 0.3 * trial["start_error_cm"]
+    assert len(trial["curve_error_cm"]) == trial["iterations"] + 1 == len(trial["elapsed_s"]) + 1
+    assert trial["curve_error_cm"][-1] == trial["point_error_cm"]
+    assert trial["curve_ahd_cm"][-1] == trial["ahd_cm"]
+    assert 0 < trial["k90"] <= trial["iterations"]
+    assert list(trial["elapsed_s"]) == sorted(trial["elapsed_s"])
+    assert not results.trials("ceicp-a plane", ("nodes-sensor",))[0]["curve_error_cm"]
+
+
+def test_a_map_has_a_cell_for_every_start_and_the_nearest_comes_home():
+    cells = map_capture(CaptureTask(EASY, 2000, Entrant("ceicp-a", "plane"), True, 500))
+    assert len(cells) == 25
+    assert {cell["entrant"] for cell in cells} == {"ceicp-a plane"}
+    near = next(c for c in cells if (c["rotation_deg"], c["translation_m"]) == (5.0, 0.1))
+    assert near["home"]
+
+
+def test_the_standard_benchmark_is_what_the_specification_asks_for():
+    tasks = case_tasks()
+    assert len({task.room for task in tasks}) >= 30
+    assert len(tasks) == len({(task.condition.name, task.room) for task in tasks}) == 30 * len(CONDITIONS)
+    assert {task.max_points for task in tasks} == {4000}
+    assert {task.room for task in capture_tasks()} <= {task.room for task in tasks}
+    assert {task.room for task in tasks}.isdisjoint(range(1000, 2000))  # those of the tuning
+    table = {"icp", "picp", "ricp", "mricp", "ficp", "hicp", "ceicp-literal", "ceicp-n", "ceicp-a"}
+    lineups = {task.condition.name: task.lineup for task in tasks}
+    for name, lineup in lineups.items():
+        entrants = [(direction, entrant.name) for direction, entrant in lineup]
+        assert len(set(entrants)) == len(entrants)
+        if not name.startswith("overlap"):
+            assert {("q2p", method) for method in table} <= set(entrants)
+    back = {name: [e.name for d, e in lineup if d == "p2q"] for name, lineup in lineups.items()}
+    assert back["easy"] == back["holes-x3"] == ["icp", "icp-gated", "ficp", "hicp", "ceicp-n", "ceicp-a"]
+    assert back["nodes-sensor"] == ["ceicp-a plane"]

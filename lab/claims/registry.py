@@ -1,0 +1,60 @@
+"""All claims of the thesis, and how to compute them.
+
+A claim that does not come out is reported as not reproduced; that is a result, not an error.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from lab.claims import outliers
+from lab.claims.claim import Claim, Verdict
+from lab.claims.depth.claims import CLAIMS as DEPTH
+from lab.claims.network import link, radio, selection, street
+from lab.claims.registration.claims import CLAIMS as REGISTRATION
+from lab.claims.surface import detail, growth, holes, rule
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+
+_ALL: tuple[Claim, ...] = (
+    outliers.C10,
+    *DEPTH,
+    *REGISTRATION,
+    *(rule.C21, holes.C22, detail.C23, growth.C24),
+    *(*link.CLAIMS, *street.CLAIMS, *radio.CLAIMS, *selection.CLAIMS),
+)
+CLAIMS = {claim.id: claim for claim in sorted(_ALL, key=lambda claim: claim.id)}
+"""By number in SPEC 8, in its order."""
+
+
+def run_claims(
+    only: Iterable[str] = (), folder: Path | None = None, scheduler: str | None = None
+) -> Iterator[Progress | Verdict]:
+    """Compute the claims named, or all of them, with progress in between.
+
+    Args:
+        only: names of claims; empty for all.
+        folder: keeps the trials, so that an interrupted run resumes; None keeps nothing.
+        scheduler: address of a Dask scheduler for the trials; None takes this machine's cores.
+
+    Raises:
+        InputError: a name is not a claim, the folder cannot be written, or there is no such scheduler.
+    """
+    wanted = list(only) or list(CLAIMS)
+    unknown = [name for name in wanted if name not in CLAIMS]
+    if unknown:
+        raise InputError(f"There is no claim {', '.join(unknown)}; known are {', '.join(CLAIMS)}")
+    with tempfile.TemporaryDirectory() as temporary:
+        prepared: dict[Any, Any] = {}
+        for name in wanted:
+            claim = CLAIMS[name]
+            if claim.prepare is None:
+                yield Progress(name, 0.0)
+                yield claim.judge()
+                continue
+            if claim.prepare not in prepared:
+                prepared[claim.prepare] = yield from claim.prepare(folder or Path(temporary), scheduler)
+            yield claim.judge(prepared[claim.prepare])

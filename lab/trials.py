@@ -1,0 +1,163 @@
+"""Trials of claims: one store, one digest of what they depend on, one pool.
+
+A trial is a function of a task. Its result is a line of JSON in a file named by the function and the digest
+of its code, so that an interrupted run resumes, and a result never outlives the code that made it.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import platform
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import suppress
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any, TypeVar
+
+import packetmesh
+from packetmesh.batch import run_batch
+from packetmesh.files import finite, writable_folder
+from packetmesh.progress import Progress
+
+Task = TypeVar("Task")
+
+ROOT = Path(packetmesh.__file__).parents[1]
+PACKAGES = ("packetmesh", "network_sim", "pipeline", "lab")
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "opencv-python-headless",
+    "open3d",
+    "open3d-cpu",
+    "onnxruntime",
+    "simpy",
+    "small-gicp",
+)
+"""Those whose version can change a result, as far as they are installed."""
+
+
+def iterate_trials(
+    stage: str,
+    function: Callable[[Task], Any],
+    tasks: Sequence[Task],
+    folder: Path,
+    scheduler: str | None = None,
+    processes: int | None = None,
+    data: Iterable[Path] = (),
+) -> Generator[Progress, None, list[Any]]:
+    """Compute every task whose result is not in ``folder`` yet, storing each as it comes.
+
+    Args:
+        stage: names the trials in the progress.
+        function: importable by its name, as other processes call it; gives plain values (NaN becomes None).
+        tasks: frozen records or tuples; their ``repr`` says everything that a result depends on beside the
+            code and the data.
+        folder: keeps the results; made when it is missing.
+        scheduler: address of a Dask scheduler; None takes processes on this machine.
+        processes: on this machine; None takes one for each core.
+        data: files that results depend on, or folders of them.
+
+    Returns:
+        The results in the order of the tasks, read back from JSON.
+
+    Raises:
+        InputError: the folder cannot be written, or the scheduler cannot be reached.
+        PacketMeshError: a process was killed.
+    """
+    digest = trial_digest(function.__module__, tuple(data))
+    path = writable_folder(folder) / f"{function.__name__}-{digest}.ndjson"
+    results = _read(path)
+    keys = [repr(task) for task in tasks]
+    waiting = [(key, task) for key, task in zip(keys, tasks, strict=True) if key not in results]
+    done = len(keys) - len(waiting)
+    yield Progress(f"{stage}: {done} of {len(keys)} stored", done / max(len(keys), 1))
+    with path.open("a", encoding="utf-8") as file:
+        for index, result in run_batch(function, [task for _, task in waiting], scheduler, processes):
+            key = waiting[index][0]
+            line = json.dumps(finite({"task": key, "result": result}), allow_nan=False)
+            file.write(f"{line}\n")
+            file.flush()
+            results[key] = json.loads(line)["result"]
+            done += 1
+            yield Progress(f"{stage}: {done} of {len(keys)}", done / len(keys))
+    return [results[key] for key in keys]
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Results by task; a half-written last line is cut off, and a line that is no result is left out."""
+    if not path.exists():
+        return {}
+    contents = path.read_bytes()
+    whole = contents[: contents.rfind(b"\n") + 1]
+    if len(whole) < len(contents):
+        with path.open("r+b") as file:
+            file.truncate(len(whole))
+    results = {}
+    for line in whole.splitlines():
+        try:
+            entry = json.loads(line)
+            results[entry["task"]] = entry["result"]
+        except (ValueError, KeyError, TypeError):
+            continue
+    return results
+
+
+@cache
+def trial_digest(module: str, data: tuple[Path, ...] = (), root: Path = ROOT) -> str:
+    """Twelve digits that change with what a trial depends on beside its task.
+
+    That is the code of its module and of all of ours that it imports, directly or not, but not comments and
+    docstrings; Python and the libraries, by version; and the data.
+
+    Args:
+        module: where the trial's function is defined.
+        data: files and folders.
+        root: folder of our packages.
+    """
+    digest = hashlib.sha256(json.dumps(_versions()).encode())
+    for name, tree in sorted(_imported(module, root).items()):
+        digest.update(f"{name} {ast.dump(tree)}".encode())
+    for path in data:
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            if file.is_file():
+                digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def _imported(module: str, root: Path) -> dict[str, ast.Module]:
+    """The syntax trees of a module and of every module of ours that it needs, by name."""
+    found: dict[str, ast.Module] = {}
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name in found or (file := _source(name, root)) is None:
+            continue
+        found[name] = ast.parse(file.read_bytes())
+        for node in ast.walk(found[name]):
+            if isinstance(node, ast.Import):
+                waiting += [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                inside = [f"{node.module}.{alias.name}" for alias in node.names]
+                waiting += [full if _source(full, root) else node.module for full in inside]
+            elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+                node.value.value = None  # a docstring
+    return found
+
+
+def _source(module: str, root: Path) -> Path | None:
+    """The file of one of our modules; None for another's, or for what is no module."""
+    path = root.joinpath(*module.split("."))
+    file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return file if module.partition(".")[0] in PACKAGES and file.is_file() else None
+
+
+def _versions() -> list[str]:
+    versions = [platform.python_version()]
+    for library in LIBRARIES:
+        with suppress(metadata.PackageNotFoundError):
+            versions.append(f"{library} {metadata.version(library)}")
+    return versions
