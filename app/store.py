@@ -16,8 +16,8 @@ from pipeline.spec import Spec, StageName
 
 Step = TypeVar("Step")
 
-_newest: dict[str, tuple[str, Any]] = {}
-"""By stage, the name of the newest result that this process has computed or read, and the result."""
+_newest: dict[tuple[str, str], tuple[Path, Any]] = {}
+"""By folder and stage: the file of the newest result that this process has had, and the result."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +39,15 @@ class Store:
             compute: yields reports of its progress and returns the result.
         """
         stage = str(key[0])
-        name = f"{stage}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}"
-        if stage in _newest and _newest[stage][0] == name:
-            return _newest[stage][1]
-        path = Path(self.folder, name)
+        path = Path(self.folder, f"{stage}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}")
+        newest, value = _newest.get((self.folder, stage), (None, None))
+        if newest == path:
+            return value
         value = _read(path)
         if value is None:
             value = yield from compute()
             self._write(path, value)
-        _newest[stage] = (name, value)
+        _newest[self.folder, stage] = (path, value)
         return value
 
     def stage(self, spec: Spec, stage: StageName) -> Generator[Any, None, Any]:

@@ -63,7 +63,7 @@ def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
     """The numbers of a run; every length in metres, every share from 0 to 1."""
     before, after = reconstruction.before, reconstruction.after
     truth = None
-    if reconstruction.rig.truth is not None:
+    if reconstruction.truth_before or reconstruction.truth_after:
         truth = {"surface_before": reconstruction.truth_before, "surface_after": reconstruction.truth_after}
     return {
         "scene": reconstruction.spec.source.title,

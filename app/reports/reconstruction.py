@@ -90,7 +90,8 @@ def _truth(metrics: dict[str, Any]) -> Iterator[str]:
         "so near; accuracy: share of the mesh with a true surface so near; F-score: their harmonic mean.</p>"
     )
     yield table(
-        ("", "before", "after"), ((_truth_label(key), *_in_units(key, before, after)) for key in before)
+        ("", "before", "after"),
+        ((_truth_label(key), *_in_units(key, before, after)) for key in before or after),
     )
 
 
@@ -104,8 +105,10 @@ def _truth_label(key: str) -> str:
     return known.get(key, f"{name.replace('f_score', 'F-score')} at {distance.replace('cm', ' cm')} (%)")
 
 
-def _in_units(key: str, *records: dict[str, float]) -> tuple[float, ...]:
-    return tuple(record[key] * (1000.0 if key.endswith("_m") else 100.0) for record in records)
+def _in_units(key: str, *records: dict[str, float] | None) -> tuple[float | str, ...]:
+    """A measure of each surface; a dash for a surface without a triangle."""
+    unit = 1000.0 if key.endswith("_m") else 100.0
+    return tuple("–" if record is None else record[key] * unit for record in records)
 
 
 def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
