@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from network_sim.config import EnergyConfig
 from network_sim.counters import Counters
@@ -35,7 +35,7 @@ class RadioTimes:
         return self.tx_s + self.rx_s + self.idle_s + self.sleep_s
 
 
-def radio_times(states_ns: NDArray[np.int64], elapsed_s: ArrayLike) -> RadioTimes:
+def radio_times(states_ns: NDArray[np.int64], elapsed_s: float | FloatArray) -> RadioTimes:
     """Times of radios that listen whenever they do nothing else.
 
     Args:

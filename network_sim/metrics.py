@@ -1,8 +1,7 @@
-"""What a run amounts to: pure functions of its trace, each number with its unit and its definition.
+"""Metrics of a run: pure functions of its trace, each number with its unit and its definition.
 
-Nearly all come from the counters, so that they are the same whether the log was kept or not. What the data
-cannot say is absent. The warm-up is left out: what happened before it ended does not count, nor do packets
-and images that were created before.
+Nearly all come from the counters, so that they are the same whether the log was kept or not. A metric whose
+data are missing is absent. Events of the warm-up do not count, nor do packets and images created in it.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns, to_
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """A number and what it means."""
+    """A number with its unit and definition."""
 
     value: float
     unit: str
@@ -34,7 +33,7 @@ Rows = Iterator[tuple[str, float, str, str]]
 
 
 def metrics(trace: NetworkTrace) -> dict[str, Metric]:
-    """All metrics that the trace can give, by name; none if the run ended within the warm-up."""
+    """All metrics of the trace, by name; none if the run ended within the warm-up."""
     if trace.horizon_ns <= to_ns(trace.config.run.warmup_s):
         return {}
     groups = (_outcomes, _rates, _losses, _airtime, _queue, _energy, _overheads, _coverage)

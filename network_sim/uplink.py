@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Uplink:
-    """Sends what the sink hands it, in order; a packet that gets lost is not sent again.
+    """Sends packets in order; a lost one is not sent again.
 
     It records ENQUEUE and DELIVER, and LOSS and DROP with ``UPLINK``. It uses none of the nodes' radio, so
     there is no AIR: the duration of DELIVER or LOSS is the time it took to send.
