@@ -78,9 +78,7 @@ class Collection:
         """Why each node is down: ``NODE_DOWN`` if it failed, ``NONE`` if it sleeps; None if it is up."""
         self._asleep = False
         self._cameras = [self._camera(station) for station in self.stations[:-1]]
-        self._sink = Sink(self.shared, self.stations[-1], config.uplink)
-        if config.uplink.rate_bps is not None:
-            self._sink.connect_uplink(config.uplink, recorder, uplink_rng)
+        self._sink = Sink(self.shared, self.stations[-1], config.uplink, recorder, uplink_rng)
         medium = Medium(env, radio, self.places, medium_rng)
         up = self.shared.up.__getitem__
         self.shared.mac = make_mac(MacContext(env, medium, config, recorder, mac_rng, up, self._receive))

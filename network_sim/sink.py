@@ -11,7 +11,7 @@ import simpy
 from network_sim.config import UplinkConfig
 from network_sim.images import Image
 from network_sim.nodes import Shared, Station
-from network_sim.types import NS_PER_S, Cause, Packet, to_ns
+from network_sim.types import Cause, Packet
 from network_sim.uplink import Uplink
 
 if TYPE_CHECKING:
@@ -26,24 +26,23 @@ RUN_BYTES = 4
 class Sink:
     """Where all routes end."""
 
-    def __init__(self, shared: Shared, station: Station, uplink: UplinkConfig) -> None:
-        """``station`` sends the STATUS packets; see ``connect_uplink`` for the uplink."""
+    def __init__(
+        self,
+        shared: Shared,
+        station: Station,
+        uplink: UplinkConfig,
+        recorder: Recorder,
+        rng: np.random.Generator,
+    ) -> None:
+        """``station`` sends the STATUS packets; with an uplink rate, fragments go on to the cloud."""
         self._shared = shared
         self._station = station
         self._reported_ns: dict[int, int] = {}
         self._uplink: Uplink | None = None
-        self._byte_ns = 8 * NS_PER_S / uplink.rate_bps if uplink.rate_bps else 0.0
-        self._latency_ns = to_ns(uplink.latency_s)
-        self._free_ns = 0
-        self._in_uplink: dict[int, tuple[Packet, int]] = {}
-        self._watches_uplink = False
-
-    def connect_uplink(self, uplink: UplinkConfig, recorder: Recorder, rng: np.random.Generator) -> None:
-        """Forward fragments to the cloud from now on; ``rng`` decides which are lost."""
-        shared = self._shared
-        self._uplink = Uplink(
-            shared.env, uplink, recorder, rng, shared.sink, shared.destination, self._receive_at_cloud
-        )
+        if uplink.rate_bps is not None:
+            places = shared.sink, shared.destination
+            callbacks = self._receive_at_cloud, self._lost_in_uplink
+            self._uplink = Uplink(shared.env, uplink, recorder, rng, *places, *callbacks)
 
     def receive(self, packet: Packet) -> None:
         """A fragment arrived over the radio."""
@@ -55,7 +54,7 @@ class Sink:
             if image.count - image.at_sink.missing_count == 1 and self._shared.config.retransmit:
                 self._shared.env.process(self._request_missing(image))
         if new and self._uplink is not None:
-            self._forward(packet)
+            self._uplink.put(packet)
         else:
             book.received(packet, self._station.index)
         if not image.at_sink.missing_count:
@@ -104,37 +103,19 @@ class Sink:
         shared.requested[packet.id] = missing
         self._station.put(packet)
 
-    def _forward(self, packet: Packet) -> None:
-        """Put a packet on the uplink, which keeps order, and note when it must have reached the cloud."""
-        assert self._uplink is not None
-        now_ns = int(self._shared.env.now)
-        self._free_ns = max(now_ns, self._free_ns) + round(packet.size_bytes * self._byte_ns)
-        self._in_uplink[packet.id] = packet, self._free_ns + self._latency_ns
-        self._uplink.put(packet)
-        if not self._watches_uplink:
-            self._watches_uplink = True
-            self._shared.env.process(self._watch_uplink())
-
     def _receive_at_cloud(self, packet: Packet, cloud: int) -> None:
         book = self._shared.book
         image = book.images[packet.image]
-        del self._in_uplink[packet.id]
         image.at_cloud.add(image.index_of(packet))
         book.received(packet, cloud)
         if not image.at_cloud.missing_count:
             book.close(image, cloud)
 
-    def _watch_uplink(self) -> Generator[simpy.Event, Any, None]:
-        """Find packets that the uplink lost, and forward them again."""
-        env, book = self._shared.env, self._shared.book
-        while self._in_uplink:
-            packet, due_ns = next(iter(self._in_uplink.values()))
-            yield env.timeout(max(due_ns + 1 - env.now, 0))
-            if packet.id in self._in_uplink:
-                image = book.images[packet.image]
-                if self._shared.config.retransmit and not image.closed:
-                    index = image.index_of(packet)
-                    self._forward(book.fragment(image, index, packet.source, packet.destination))
-                del self._in_uplink[packet.id]
-                book.gone(packet, Cause.UPLINK)
-        self._watches_uplink = False
+    def _lost_in_uplink(self, packet: Packet) -> None:
+        """Forward the fragment again in a new packet, unless its image is closed."""
+        book = self._shared.book
+        image = book.images[packet.image]
+        if self._uplink is not None and self._shared.config.retransmit and not image.closed:
+            index = image.index_of(packet)
+            self._uplink.put(book.fragment(image, index, packet.source, packet.destination))
+        book.gone(packet, Cause.UPLINK)

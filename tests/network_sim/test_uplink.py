@@ -28,12 +28,16 @@ class Hop:
         self.env = simpy.Environment()
         self.recorder = Recorder("all", 2)
         self.arrived: list[tuple[int, int]] = []
+        self.lost: list[int] = []
         rng = np.random.default_rng(seed)
-        self.uplink = Uplink(self.env, config, self.recorder, rng, SINK, CLOUD, self._receive)
+        self.uplink = Uplink(self.env, config, self.recorder, rng, SINK, CLOUD, self._receive, self._lose)
 
     def _receive(self, packet: Packet, node: int) -> None:
         assert node == CLOUD
         self.arrived.append((self.env.now, packet.id))
+
+    def _lose(self, packet: Packet) -> None:
+        self.lost.append(packet.id)
 
     def put(self, packet: Packet, at_ns: int) -> None:
         self.env.timeout(at_ns).callbacks.append(lambda _: self.uplink.put(packet))
@@ -69,7 +73,7 @@ def test_what_gets_lost_is_dropped_and_nothing_else() -> None:
     assert sorted(arrived + dropped.packet.tolist()) == list(range(2000))
     assert stats.binomtest(len(dropped), 2000, 0.3).pvalue > 0.001
     lost = events.of(EventKind.LOSS)
-    assert lost.packet.tolist() == dropped.packet.tolist()
+    assert lost.packet.tolist() == dropped.packet.tolist() == hop.lost
 
 
 @pytest.mark.parametrize(("loss", "arrived"), [(0.0, 50), (1.0, 0)])
