@@ -13,7 +13,7 @@ import simpy
 from network_sim.config import RadioConfig
 from network_sim.mac.medium import MEMORY_NS, REFRESH_NS, Medium
 from network_sim.places import FixedPlaces
-from network_sim.radio import Radio
+from network_sim.radio import Radio, oqpsk_bit_error_rate
 from network_sim.types import Cause
 
 US = 1000
@@ -80,8 +80,10 @@ def test_spread_frames_are_lost_when_the_receiver_has_an_earlier_one() -> None:
         outcomes = it.run()
         assert outcomes[2, later_us] == Cause.COLLISION
         survived += outcomes[0, 0] == Cause.NONE
-    # IEEE 802.15.4-2006, E.4.1.8: at 0 dB nearly all of 1000 overlapped bits are right five times of six.
-    assert survived / 399 == pytest.approx(0.84, abs=0.06)
+    # IEEE 802.15.4-2006, E.4.1.8: each of the overlapped bits is wrong as at 0 dB.
+    overlapped_bits = 1000 * (1.0 - np.arange(1, 400) / 4000)
+    expected = np.mean((1.0 - oqpsk_bit_error_rate(1.0)) ** overlapped_bits)
+    assert survived / 399 == pytest.approx(expected, abs=3 * np.sqrt(expected * (1 - expected) / 399))
 
 
 def test_a_spread_frame_survives_a_weaker_one_and_not_a_stronger_one() -> None:
