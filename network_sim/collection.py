@@ -1,4 +1,4 @@
-"""Cameras that stand still around one sink: who is there, who fails, who sleeps (SPEC 6.1)."""
+"""Cameras that stand still around one sink: their topology, failures and duty cycle (SPEC 6.1)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from network_sim.mac import make_mac
 from network_sim.mac.context import MacContext
 from network_sim.mac.medium import Medium
 from network_sim.nodes import Camera, Shared, Station
-from network_sim.places import FixedPlaces, laid_out
+from network_sim.places import FixedPlaces, place_nodes
 from network_sim.radio import Radio
 from network_sim.routing import Routes, link_success, shortest_paths
 from network_sim.sink import Sink
@@ -28,49 +28,49 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Reachability:
-    """Who can reach the sink, before anything happens."""
+    """Which nodes have a route to the sink, before any fails."""
 
     names: tuple[str, ...]
     routes: Routes
 
     @property
     def disconnected(self) -> tuple[str, ...]:
-        """Names of the nodes without a way to the sink."""
+        """Names of the nodes without a route to the sink."""
         return tuple(self.names[node] for node in self.routes.unreachable)
 
 
 def reachability(config: NetworkConfig) -> Reachability:
-    """Who reaches the sink in the run of this config, without running it."""
+    """Which nodes have a route to the sink in the run of this config, without running it."""
     ground = np.random.default_rng(config.run.seed).spawn(1)[0]
-    places, _, success = _ground(config, ground)
+    places, _, success = _topology(config, ground)
     return Reachability(collection_names(config), shortest_paths(success, places.count - 1))
 
 
-def _ground(
+def _topology(
     config: NetworkConfig, rng: np.random.Generator
 ) -> tuple[FixedPlaces, Radio, NDArray[np.float64]]:
-    """Where everybody is, with what radio, and how good the links are: (N, N)."""
+    """Positions, radio, and (N, N) success probability of each link."""
     layout_rng, radio_rng = rng.spawn(2)
-    places, radio = laid_out(config.nodes, layout_rng), Radio(config.radio, radio_rng)
+    places, radio = place_nodes(config.nodes, layout_rng), Radio(config.radio, radio_rng)
     return places, radio, link_success(config, radio, places)
 
 
 def collection_names(config: NetworkConfig) -> tuple[str, ...]:
-    """Of the nodes, the sink and the cloud if there is one, in the order of their numbers."""
+    """Names of the nodes, the sink and the cloud if there is one, in the order of their numbers."""
     cloud = ("cloud",) if config.uplink.rate_bps is not None else ()
     return (*(f"node {node + 1}" for node in range(config.nodes.count)), "sink", *cloud)
 
 
 class Collection:
-    """A network at its start; it lives as its environment runs."""
+    """A network of fixed cameras; ``env`` runs it."""
 
     def __init__(
         self, env: simpy.Environment, config: NetworkConfig, recorder: Recorder, rng: np.random.Generator
     ) -> None:
-        """Every use of chance gets a stream of its own, spawned from ``rng``."""
+        """Each source of randomness has a stream of its own, spawned from ``rng``."""
         ground, medium_rng, mac_rng, self._rng, uplink_rng, pause_rng = rng.spawn(6)
         self._env, self._config, self._recorder = env, config, recorder
-        self.places, radio, self._success = _ground(config, ground)
+        self.places, radio, self._success = _topology(config, ground)
         self.shared = self._make_shared(pause_rng)
         self.stations = [Station(self.shared, node) for node in range(self.places.count)]
         self.names = collection_names(config)
@@ -78,17 +78,15 @@ class Collection:
         """Why each node is down: ``NODE_DOWN`` if it failed, ``NONE`` if it sleeps; None if it is up."""
         self._asleep = False
         self._cameras = [self._camera(station) for station in self.stations[:-1]]
-        self._sink = Sink(self.shared, self.stations[-1], config.uplink)
-        if config.uplink.rate_bps is not None:
-            self._sink.join_cloud(config.uplink, recorder, uplink_rng)
+        self._sink = Sink(self.shared, self.stations[-1], config.uplink, recorder, uplink_rng)
         medium = Medium(env, radio, self.places, medium_rng)
         up = self.shared.up.__getitem__
         self.shared.mac = make_mac(MacContext(env, medium, config, recorder, mac_rng, up, self._receive))
         if config.nodes.failures_per_h:
             for camera, station in zip(self._cameras, self.stations, strict=False):
-                env.process(self._fail(camera, station))
+                env.process(self._fail_and_recover(camera, station))
         if config.nodes.duty_cycle < 1.0:
-            env.process(self._doze())
+            env.process(self._sleep_and_wake())
 
     def _make_shared(self, rng: np.random.Generator) -> Shared:
         nodes, count = self._config.nodes, self.places.count
@@ -104,7 +102,7 @@ class Collection:
             routes=routes,
             unreachable=routes.unreachable,
             destination=sink if self._config.uplink.rate_bps is None else sink + 1,
-            confirms=self._config.mac.ack or self._config.mac.kind != "ieee802154",
+            acknowledged=self._config.mac.ack or self._config.mac.kind != "ieee802154",
             failed=[False] * count,
             up=[True] * count,
         )
@@ -122,7 +120,7 @@ class Collection:
 
     @property
     def roles(self) -> tuple[str, ...]:
-        """What each of them is."""
+        """Role of each name."""
         return tuple("node" if name.startswith("node") else name for name in self.names)
 
     @property
@@ -144,28 +142,28 @@ class Collection:
             self._sink.receive(packet)
         elif receiver == packet.destination:
             shared.book.received(packet, receiver)
-            self._cameras[receiver].told(packet.image, shared.asked.pop(packet.id))
+            self._cameras[receiver].on_status(packet.image, shared.requested.pop(packet.id))
         else:
             self.stations[receiver].put(packet)
 
-    def _fail(self, camera: Camera, station: Station) -> Generator[simpy.Event, Any, None]:
-        """Fail and recover at random for ever."""
+    def _fail_and_recover(self, camera: Camera, station: Station) -> Generator[simpy.Event, Any, None]:
+        """Random failures and recoveries of one node."""
         env, node, nodes = self._env, station.index, self._config.nodes
         while True:
             yield env.timeout(to_ns(self._rng.exponential(3600.0 / nodes.failures_per_h)))
             self.shared.failed[node] = True
-            self._refresh(node)
+            self._update_state(node)
             self._reroute()
             station.lose_buffer()
             yield env.timeout(to_ns(nodes.recovery_s))
             self.shared.failed[node] = False
-            self._refresh(node)
+            self._update_state(node)
             self._reroute()
-            camera.back.succeed()
-            camera.back = env.event()
+            camera.recovered.succeed()
+            camera.recovered = env.event()
 
-    def _doze(self) -> Generator[simpy.Event, Any, None]:
-        """All nodes wake and fall asleep together; the sink never sleeps."""
+    def _sleep_and_wake(self) -> Generator[simpy.Event, Any, None]:
+        """The duty cycle: all nodes wake and fall asleep together; the sink never sleeps."""
         env, nodes = self._env, self._config.nodes
         period_ns = to_ns(nodes.duty_period_s)
         awake_ns = max(1, round(nodes.duty_cycle * period_ns))
@@ -179,11 +177,11 @@ class Collection:
     def _set_asleep(self, asleep: bool) -> None:
         self._asleep = asleep
         for camera_station in self.stations[:-1]:
-            self._refresh(camera_station.index)
-        self._kick()
+            self._update_state(camera_station.index)
+        self._wake_all()
 
-    def _refresh(self, node: int) -> None:
-        """Record what has become of a node that failed, recovered, woke or fell asleep."""
+    def _update_state(self, node: int) -> None:
+        """Record the state of a node that failed, recovered, woke or fell asleep."""
         state: Cause | None = None
         if self.shared.failed[node]:
             state = Cause.NODE_DOWN
@@ -198,11 +196,11 @@ class Collection:
                 self._recorder.add(int(self._env.now), EventKind.DOWN, node, cause=state)
 
     def _reroute(self) -> None:
-        """Find the ways that avoid who has failed."""
+        """Find the routes that avoid failed nodes."""
         works = ~np.array(self.shared.failed)
         self.shared.routes = shortest_paths(self._success * np.outer(works, works), self.shared.sink)
-        self._kick()
+        self._wake_all()
 
-    def _kick(self) -> None:
+    def _wake_all(self) -> None:
         for station in self.stations:
-            station.kick()
+            station.wake()

@@ -1,4 +1,4 @@
-"""Nothing is lost without a trace: packets created = received + given up + still on their way."""
+"""Conservation of packets: created = received + dropped + in flight."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _BLOCK = 65536
 
 
 class InternalError(AssertionError):
-    """The simulator contradicts itself: a mistake in the program, not in what it was given."""
+    """A trace breaks an invariant of the simulator: a mistake in the program, not in its input."""
 
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """What became of the packets, or of the images, of the whole run, warm-up included."""
+    """Outcomes of the packets, or of the images, of the whole run, warm-up included."""
 
     created: int
     received: int
@@ -36,7 +36,7 @@ class Balance:
 
 
 def balance(trace: NetworkTrace) -> Balance:
-    """Of packets. Each number is counted by itself, so that the equation can fail."""
+    """The balance of packets. Each number is counted by itself, so that the equation can fail."""
     counters = trace.counters
     held = _count(counters, EventKind.ENQUEUE) - _count(counters, EventKind.DELIVER)
     return Balance(
@@ -48,7 +48,7 @@ def balance(trace: NetworkTrace) -> Balance:
 
 
 def image_balance(trace: NetworkTrace) -> Balance:
-    """Of images: taken = arrived + given up + still wanted."""
+    """The balance of images: taken = arrived + expired + open."""
     counters = trace.counters
     arrived = _count(counters, EventKind.ARRIVE)
     return Balance(
@@ -60,10 +60,10 @@ def image_balance(trace: NetworkTrace) -> Balance:
 
 
 def check(trace: NetworkTrace) -> None:
-    """Checks the balances, the way of every packet and image, and that the log says what the counters say.
+    """Checks the balances, the history of every packet and image, and that log and counters agree.
 
     Raises:
-        InternalError: something was lost without a trace, or came from nowhere.
+        InternalError: a packet or image is lost or created without its event, or log and counters differ.
     """
     faults = list(trace.counters.faults)
     for noun, sums in (("packets", balance(trace)), ("images", image_balance(trace))):

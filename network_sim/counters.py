@@ -1,4 +1,4 @@
-"""Counters of a run: what every metric that needs no single event is computed from.
+"""Counters of a run, from which the metrics that need no single events are computed.
 
 Counting is done for blocks of recorded rows, so that recording stays cheap. Counts are whole numbers, the
 same whether the log is kept or not.
@@ -51,7 +51,7 @@ class Counters:
     captured: int
     """Images of the whole run, by their ids."""
     faults: tuple[str, ...]
-    """What cannot have happened, in words; empty when all is well."""
+    """Violated invariants as sentences; empty when there are none."""
 
 
 class Tally:

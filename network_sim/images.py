@@ -1,4 +1,4 @@
-"""Images as the network sees them: their size, their fragments, and what has arrived of them."""
+"""Images in the network: their size, their fragments, and which of these have arrived."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def pgm_bytes(width_px: int, height_px: int) -> int:
 
 
 def encoded_bytes(image: np.ndarray, file_format: ImageFormat, quality: int = 90) -> int:
-    """Size of this very image as a file.
+    """Size of an image as a file.
 
     Args:
         image: (H, W, 3) uint8 colour, or (H, W) uint16 depth, which only pgm and png can hold.
@@ -61,48 +61,48 @@ def encoded_bytes(image: np.ndarray, file_format: ImageFormat, quality: int = 90
 class Fragments:
     """Which fragments of an image one place has."""
 
-    __slots__ = ("lacking", "present")
+    __slots__ = ("missing_count", "present")
 
     def __init__(self, count: int) -> None:
         """None of ``count`` yet."""
         self.present = bytearray(count)
-        self.lacking = count
+        self.missing_count = count
 
     def add(self, index: int) -> bool:
-        """Take a fragment; whether it is new."""
+        """Add a fragment; returns whether it is new."""
         if self.present[index]:
             return False
         self.present[index] = 1
-        self.lacking -= 1
+        self.missing_count -= 1
         return True
 
     def missing(self) -> list[int]:
-        """What is lacking, in order."""
+        """Indices of the missing fragments, rising."""
         return [index for index, present in enumerate(self.present) if not present]
 
 
 @dataclass(slots=True)
 class Image:
-    """One image, or colour and depth of one instant, on its way."""
+    """One image, or colour and depth of one instant, that is being sent."""
 
     id: int
     node: int
     captured_ns: int
     size_bytes: int
     data_bytes: int
-    """Most bytes of it in a packet."""
+    """Most bytes of it in one packet."""
     at_sink: Fragments = field(init=False)
     at_cloud: Fragments = field(init=False)
     packets: int = 0
-    """How many of its packets are waiting or on their way."""
-    sent_once: bool = False
-    """Its camera sends no more of it: when its packets have ended, so has it."""
-    lost_for: Cause = Cause.NONE
-    """Why the last lost packet of it was lost."""
+    """How many of its packets are queued or in flight."""
+    sending_over: bool = False
+    """Its camera sends no more fragments: with its last packet the image ends."""
+    loss_cause: Cause = Cause.NONE
+    """Cause of its last lost packet."""
     closed: bool = False
     """It has arrived or was given up."""
-    heard_ns: int = 0
-    """When the sink last got something new of it, or asked for it."""
+    last_news_ns: int = 0
+    """When the sink last received a new fragment, or requested the missing ones."""
 
     def __post_init__(self) -> None:
         self.at_sink, self.at_cloud = Fragments(self.count), Fragments(self.count)
@@ -118,7 +118,7 @@ class Image:
 
 
 class Book:
-    """Numbers images and packets, records what becomes of them, and knows when nothing is left to happen."""
+    """Gives images and packets their ids, records their events, and ends the run with the last of them."""
 
     def __init__(
         self, env: simpy.Environment, recorder: Recorder, data_bytes: int, header_bytes: int
@@ -138,7 +138,7 @@ class Book:
         self._packets = 0
 
     def capture(self, node: int, size_bytes: int) -> Image:
-        """A camera took an image."""
+        """Create and record an image that a camera took."""
         image = Image(len(self.images), node, int(self.env.now), size_bytes, self._data_bytes)
         self.images.append(image)
         self._open += 1
@@ -146,7 +146,7 @@ class Book:
         return image
 
     def close(self, image: Image, at: int, cause: Cause = Cause.NONE) -> None:
-        """The image is complete at the node ``at``, or given up for ``cause``; the first word counts."""
+        """The image is complete at the node ``at``, or given up for ``cause``; once closed it stays so."""
         if image.closed:
             return
         image.closed = True
@@ -155,17 +155,17 @@ class Book:
         self._recorder.add(
             int(self.env.now), kind, image.node, at, image=image.id, size_bytes=image.size_bytes, cause=cause
         )
-        self.look_for_end()
+        self.end_if_nothing_left()
 
     def fragment(self, image: Image, index: int, source: int, destination: int) -> Packet:
-        """A packet with a fragment of an image."""
+        """Create a packet with a fragment of an image."""
         first_byte = index * image.data_bytes
         count = min(image.data_bytes, image.size_bytes - first_byte)
         image.packets += 1
         return self._packet(PacketKind.IMAGE, source, destination, count, image.id, first_byte)
 
-    def message(self, source: int, destination: int, data_bytes: int, image: int) -> Packet:
-        """A packet that says what the sink lacks of an image."""
+    def status_packet(self, source: int, destination: int, data_bytes: int, image: int) -> Packet:
+        """Create a STATUS packet, with which the sink requests fragments of an image."""
         return self._packet(PacketKind.STATUS, source, destination, data_bytes, image, 0)
 
     def _packet(
@@ -179,44 +179,43 @@ class Book:
             source,
             destination,
             self._header_bytes + count,
-            int(self.env.now),
             image,
             first_byte,
             count,
         )
 
     def entered(self, packet: Packet, node: int) -> None:
-        """A packet came to a node's buffer."""
+        """Record that a packet entered a node's buffer."""
         self._record(EventKind.ENQUEUE, packet, node, -1)
 
     def dropped(self, packet: Packet, node: int, cause: Cause) -> None:
-        """A node gave a packet up."""
+        """Record that a node dropped a packet."""
         self._record(EventKind.DROP, packet, node, -1, cause)
         self.gone(packet, cause)
 
     def received(self, packet: Packet, at: int) -> None:
-        """A packet has reached its last node."""
+        """Record that a packet reached its last node."""
         self._record(EventKind.RECEIVE, packet, packet.source, at)
         self.gone(packet, Cause.NONE)
 
     def gone(self, packet: Packet, cause: Cause) -> None:
-        """A packet has ended, and whoever ended it has said so."""
+        """Count a packet whose end is recorded as gone."""
         self._under_way -= 1
         if packet.kind is PacketKind.IMAGE:
             image = self.images[packet.image]
             image.packets -= 1
             if cause:
-                image.lost_for = cause
-            self.look_for_loss(image)
-        self.look_for_end()
+                image.loss_cause = cause
+            self.give_up_if_lost(image)
+        self.end_if_nothing_left()
 
-    def look_for_loss(self, image: Image) -> None:
-        """Give an image up if the rest of it cannot come any more."""
-        if image.sent_once and not image.packets and not image.closed:
-            self.close(image, -1, image.lost_for)
+    def give_up_if_lost(self, image: Image) -> None:
+        """Give an image up when none of its fragments is sent any more."""
+        if image.sending_over and not image.packets and not image.closed:
+            self.close(image, -1, image.loss_cause)
 
-    def look_for_end(self) -> None:
-        """Say so if nothing is left to happen."""
+    def end_if_nothing_left(self) -> None:
+        """End the run when no image is open, no packet in flight and no camera active."""
         if not (self._under_way or self._open or self.cameras or self.ended.triggered):
             self.ended.succeed()
 

@@ -1,4 +1,4 @@
-"""What became of every packet, or of every image, by its id."""
+"""Outcome and delay of every packet, or of every image, by its id."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _UNSEEN = np.iinfo(np.int64).max
 
 @dataclass(frozen=True, slots=True)
 class Delays:
-    """A distribution of times that took from 1 us to 11 days; what is shorter counts as 1 us."""
+    """A distribution of delays from 1 us to 11 days; shorter ones count as 1 us."""
 
     count: int
     total_s: float
@@ -41,7 +41,7 @@ class Delays:
         return float(np.sqrt(max(self.squares_s2 - self.total_s**2 / self.count, 0.0) / (self.count - 1)))
 
     def percentile_s(self, percent: float) -> float:
-        """The time that this many per cent took at most, to within a bin; NaN without any."""
+        """The percentile of the delays, to within a bin; NaN without any."""
         if not self.count:
             return float("nan")
         wanted = max(percent / 100.0 * self.count, 1.0)
@@ -52,7 +52,7 @@ class Delays:
 
 
 def delays_of(times_ns: NDArray[np.int64]) -> Delays:
-    """The distribution of these times (D,)."""
+    """The distribution of delays (D,)."""
     times_s = times_ns / NS_PER_S
     place = np.floor(np.log10(np.maximum(times_s, SHORTEST_S) / SHORTEST_S) * BINS_PER_DECADE)
     histogram = np.bincount(np.clip(place, 0, _BINS - 1).astype(np.int64), minlength=_BINS)
@@ -61,7 +61,7 @@ def delays_of(times_ns: NDArray[np.int64]) -> Delays:
 
 @dataclass(frozen=True, slots=True)
 class Outcomes:
-    """What became of those that were created in a span of time."""
+    """Outcomes of the packets or images that were created in a span of time."""
 
     created: int
     arrived: int
@@ -70,7 +70,7 @@ class Outcomes:
 
 
 class Ledger:
-    """One line for each id: when it began, when it arrived, how many hold it, how often it was given up."""
+    """For each id: creation, arrival, number of nodes that hold it, number of drops."""
 
     def __init__(self, noun: str) -> None:
         self._noun = noun
@@ -82,7 +82,7 @@ class Ledger:
         self._losses = np.zeros(0, np.int16)
 
     def enter(self, ids: NDArray[np.int32], t_ns: NDArray[np.int64], kind: ArrayLike = 0) -> None:
-        """These came into being, or to one more node."""
+        """These were created, or entered one more node."""
         self._make_room(ids)
         np.add.at(self._held, ids, 1)
         np.minimum.at(self._first_ns, ids, t_ns)
@@ -94,29 +94,29 @@ class Ledger:
         np.subtract.at(self._held, ids, 1)
 
     def lose(self, ids: NDArray[np.int32]) -> None:
-        """These were given up by the node that held them."""
+        """These were dropped by the node that held them."""
         self.hand_on(ids)
         np.add.at(self._losses, ids, 1)
 
     def arrive(self, ids: NDArray[np.int32], t_ns: NDArray[np.int64]) -> None:
-        """These have reached their end."""
+        """These have reached their destination."""
         self._make_room(ids)
         np.add.at(self._arrivals, ids, 1)
         self._arrived_ns[ids] = t_ns
 
     def count(self) -> int:
-        """How many came into being."""
+        """How many were created."""
         return int(np.count_nonzero(self._first_ns != _UNSEEN))
 
     def outcomes(self, since_ns: int, kind: int = 0) -> Outcomes:
-        """Of those of this kind that came into being from ``since_ns`` on."""
+        """Outcomes of those of this kind that were created from ``since_ns`` on."""
         created = (self._first_ns != _UNSEEN) & (self._first_ns >= since_ns) & (self._kind == kind)
         arrived = created & (self._arrivals > 0)
         took_ns = self._arrived_ns[arrived] - self._first_ns[arrived]
         return Outcomes(int(created.sum()), int(arrived.sum()), delays_of(took_ns))
 
     def faults(self) -> list[str]:
-        """What cannot have happened, each with the first id to which it did."""
+        """Violated invariants, each with the first id that violates it."""
         seen, arrived, lost = self._first_ns != _UNSEEN, self._arrivals > 0, self._losses > 0
         rules = (
             ("has an end but no beginning", ~seen & (arrived | lost | (self._held != 0))),

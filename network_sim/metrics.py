@@ -1,8 +1,7 @@
-"""What a run amounts to: pure functions of its trace, each number with its unit and its definition.
+"""Metrics of a run: pure functions of its trace, each number with its unit and its definition.
 
-Nearly all come from the counters, so that they are the same whether the log was kept or not. What the data
-cannot say is absent. The warm-up is left out: what happened before it ended does not count, nor do packets
-and images that were created before.
+Nearly all come from the counters, so that they are the same whether the log was kept or not. A metric whose
+data are missing is absent. Events of the warm-up do not count, nor do packets and images created in it.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from packetmesh.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """A number and what it means."""
+    """A number with its unit and definition."""
 
     value: float
     unit: str

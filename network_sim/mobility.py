@@ -1,8 +1,9 @@
-"""Vehicles on a square grid of streets: where they are, which cells they see, when they meet access points.
+"""Vehicles on a square grid of streets: positions, cells that they see, contacts with access points.
 
 The scenario is our reconstruction (SPEC 6.2) of Bruno & Nurchis, "Efficient data collection in multimedia
 vehicular sensing platforms" (arXiv 1311.6013). All vehicles drive at one speed and take a turn at random at
-every crossing, never back. So a route is a row of crossings, and every question about it has a formula.
+every crossing, never back. So a route is a sequence of crossings, and positions, cells and contacts have
+closed forms.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ MAX_CELLS = 2**15
 
 @dataclass(frozen=True, slots=True)
 class Routes:
-    """Where every vehicle goes. A vehicle starts ``start_m`` into its first segment."""
+    """The route of every vehicle. A vehicle starts ``start_m`` into its first segment."""
 
     config: StreetConfig
     crossings: np.ndarray
@@ -71,7 +72,7 @@ class Contact:
 
 
 class StreetPlaces:
-    """Vehicles, then access points, wherever they are."""
+    """Positions of the vehicles, then of the access points."""
 
     static = False
 
@@ -92,7 +93,7 @@ class StreetPlaces:
         return self._vehicles + len(self._fixed)
 
     def position_m(self, node: int, now_ns: int) -> tuple[float, float]:
-        """Metres east and north of the south-western crossing."""
+        """Position of a node in metres east and north of the south-western crossing."""
         if node >= self._vehicles:
             return self._fixed[node - self._vehicles]
         driven = self._start[node] + self._segments_per_ns * now_ns

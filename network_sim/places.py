@@ -1,4 +1,4 @@
-"""Where the nodes are: the only thing that the medium needs to know of them."""
+"""Positions of the nodes, and the layouts of fixed ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Places(Protocol):
     """Positions of all nodes at any time."""
 
     static: bool
-    """Nobody moves: distances may be kept."""
+    """No node moves: distances may be cached."""
 
     @property
     def count(self) -> int:
@@ -36,7 +36,7 @@ class FixedPlaces:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Nodes and sink together."""
         return len(self._distances_m)
 
     def distance_m(self, a: int, b: int, now_ns: int) -> float:
@@ -44,8 +44,8 @@ class FixedPlaces:
         return self._distances_m[a][b]
 
 
-def laid_out(config: NodesConfig, rng: np.random.Generator) -> FixedPlaces:
-    """The nodes, then the sink, as ``config.layout`` wants them.
+def place_nodes(config: NodesConfig, rng: np.random.Generator) -> FixedPlaces:
+    """Positions of the nodes, then the sink, by ``config.layout``.
 
     Args:
         config: Count, layout and spacing.

@@ -1,4 +1,4 @@
-"""What arrives of a transmission: mean power over distance, shadowing, fading, bit errors (SPEC 6.3).
+"""Propagation and reception: mean power over distance, shadowing, fading, bit errors (SPEC 6.3).
 
 Powers are in watts and distances in metres, inside as well as in every argument; decibels only in the config.
 """
@@ -39,15 +39,15 @@ class PathLoss:
     """Mean power as one power law near the sender and another one far away."""
 
     near_w: float
-    """What the near law gives at 1 m."""
+    """Power of the near law at 1 m."""
     near_exponent: float
     far_w: float
-    """What the far law gives at 1 m."""
+    """Power of the far law at 1 m."""
     far_exponent: float
     break_m: float
     """Where the far law takes over; infinite if it never does."""
     least_m: float
-    """Nearer than this the power no longer grows: free space would deliver more than was sent."""
+    """Below this distance the power no longer grows: the law would exceed the transmitted power."""
 
     @overload
     def power_w(self, distance_m: float) -> float: ...
@@ -97,7 +97,7 @@ def power_law(
 
 
 def path_loss(config: RadioConfig) -> PathLoss:
-    """The law that a config names."""
+    """The path loss that a config names."""
     tx_power_w, length_m = watts(config.tx_power_dbm), wavelength_m(config.frequency_hz)
     gain, loss = config.antenna_gain, config.system_loss
     if config.model == "friis":
@@ -168,10 +168,10 @@ class Radio:
     """The radio that every node has: thresholds, the power over each link, errors."""
 
     def __init__(self, config: RadioConfig, rng: np.random.Generator) -> None:
-        """Draws nothing but the seed of the shadowing, so that it does not depend on who sends first."""
+        """Draws only the seed of the shadowing, so that shadowing does not depend on the order of frames."""
         law = path_loss(config)
         self.config = config
-        """What it was made from."""
+        """Its config."""
         self.mean_power_w = law.power_w
         """Mean received power at a distance, or at each of an array."""
         self.rx_threshold_w = law.power_w(config.range_m) * (1.0 - _ROUNDING)
@@ -216,7 +216,7 @@ class Radio:
         Args:
             sinr: signal over noise and interference, as a factor.
             size_bytes: bytes sent with this modulation.
-            kind: how they are sent.
+            kind: their modulation.
         """
         if kind == "cck":
             return -math.expm1(size_bytes * math.log1p(-cck_symbol_error_rate(sinr)))

@@ -72,7 +72,7 @@ def iterate_study(
 def iterate_sweep(
     config: NetworkConfig, key: str, values: Sequence[str], count: int, scheduler: str | None = None
 ) -> Generator[Progress, None, dict[str, Estimates]]:
-    """The same for each value of a setting, such as ``"scheme.k"``."""
+    """Estimates for each value of a setting, such as ``"scheme.k"``."""
     cases = [with_settings(config, [f"{key}={value}"]) for value in values]
     return dict(zip(values, (yield from iterate_study(cases, count, scheduler)), strict=True))
 

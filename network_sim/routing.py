@@ -1,4 +1,4 @@
-"""Which neighbour a node hands its packets to: shortest paths over links that can carry a frame."""
+"""Routes to the sink: shortest paths over links, by expected transmissions."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Routes:
 
     sink: int
     parents: tuple[int, ...]
-    """The next node on the way to the sink; -1 for the sink and for nodes without a way."""
+    """The next node towards the sink; -1 for the sink and for nodes without a route."""
     cost: tuple[float, ...]
-    """Expected transmissions to the sink; infinite without a way."""
+    """Expected transmissions to the sink; infinite without a route."""
 
     def hops(self, node: int) -> int:
-        """Links between a node and the sink; -1 if there is no way."""
+        """Links between a node and the sink; -1 without a route."""
         if math.isinf(self.cost[node]):
             return -1
         count = 0
@@ -37,7 +37,7 @@ class Routes:
         return count
 
     def next_hop(self, at: int, destination: int) -> int:
-        """The next node of a packet, towards the sink or down its tree; -1 if there is no way."""
+        """The next node of a packet, towards the sink or down its tree; -1 without a route."""
         if destination == self.sink:
             return self.parents[at]
         node = destination
@@ -47,20 +47,20 @@ class Routes:
 
     @property
     def unreachable(self) -> tuple[int, ...]:
-        """Nodes without a way to the sink."""
+        """Nodes without a route to the sink."""
         return tuple(node for node, cost in enumerate(self.cost) if math.isinf(cost))
 
 
 def shortest_paths(success: NDArray, sink: int) -> Routes:
-    """The cheapest way of every node (Dijkstra); a link costs its expected transmissions (ETX).
+    """The cheapest route of every node (Dijkstra); a link costs its expected transmissions (ETX).
 
     Args:
         success: (N, N) probability that a frame from row to column arrives; 0 is no link. Booleans give the
             fewest hops.
-        sink: Where all ways end.
+        sink: where all routes end.
 
     Returns:
-        Of equally cheap ways the one over the lower-numbered node, nearer to the sink.
+        Of equally cheap routes the one over the lower-numbered node, nearer to the sink.
     """
     both = np.asarray(success, float) * np.asarray(success, float).T
     with np.errstate(divide="ignore"):

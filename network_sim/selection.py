@@ -1,6 +1,6 @@
 """Which M of N cameras send, so that together they see the surface best (SPEC 6.3, thesis 3.6.2).
 
-``q`` (N, V) is how well camera i sees surface voxel v, from 0 to 1. A set S of cameras is worth
+``q`` (N, V) is the quality of camera i's view of surface voxel v, from 0 to 1. A set S of cameras has value
 ``F(S) = sum_v w_v (1 - prod over i in S of (1 - q_iv))``: monotone and submodular, so that taking the best
 next camera M times gives at least 1 - 1/e of the optimum (Nemhauser, Wolsey and Fisher 1978).
 """
@@ -117,7 +117,7 @@ def nearest(
 
 
 def all_cameras(q: FloatArray, weights: FloatArray | None = None) -> Selection:
-    """Every camera, in order: what selection is measured against."""
+    """Every camera, in order: the baseline of every selection."""
     _check(q, len(q), weights)
     return _as_given(q, list(range(len(q))), weights)
 

@@ -1,4 +1,4 @@
-"""The whole way through one run: from a config to a trace that has been checked."""
+"""One run, from a config to a trace that conserves its packets."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from packetmesh.progress import Progress, drain
 REPORTS = 100
 """Reports of progress in a run."""
 STREET_STREAMS = 4
-"""Independent uses of chance on a street grid; the first is the street's own."""
+"""Random streams of a street grid; the first is that of the street itself."""
 
 
 def simulate(config: NetworkConfig) -> NetworkTrace:
@@ -56,7 +56,7 @@ def iterate_simulation(config: NetworkConfig) -> Generator[Progress, None, Netwo
         config: topology, radio, medium access, images, and how long the run takes.
 
     Returns:
-        The trace, in which every packet is received, given up or on its way. It ends at the horizon, or when
+        The trace, in which every packet is received, dropped or in flight. It ends at the horizon, or when
         every image of a collection has arrived or was given up.
 
     Raises:
@@ -102,12 +102,12 @@ def _drive(
     street = start_street(env, config, recorder, mac, street_rng)
     for share in _run(env, config):
         yield Progress("street grid", share)
-    street.finish()
+    street.record_images()
     return recorder.trace(config, street.names, None, int(env.now), street.roles)
 
 
 def street_of(config: NetworkConfig) -> StreetPlaces:
-    """Where everybody is at any time in the street-grid run of this config, without running it."""
+    """Positions of all nodes at any time in the street-grid run of this config, without running it."""
     return street_places(config, np.random.default_rng(config.run.seed).spawn(STREET_STREAMS)[0])
 
 
@@ -116,7 +116,7 @@ def _recorder(config: NetworkConfig, nodes: int) -> Recorder:
 
 
 def _run(env: simpy.Environment, config: NetworkConfig) -> Generator[float, None, None]:
-    """Run to the horizon, with a stop after every hundredth of it; yields the share that is done."""
+    """Run to the horizon in a hundred steps; yields the share that is done."""
     horizon_ns = to_ns(config.run.horizon_s)
     for step in range(1, REPORTS + 1):
         until_ns = horizon_ns * step // REPORTS

@@ -1,7 +1,7 @@
 """The images of all vehicles.
 
-A vehicle takes one at a fixed interval, so they are only computed when they matter. The scenario is our
-reconstruction (SPEC 6.2) of Bruno & Nurchis (arXiv 1311.6013).
+A vehicle takes one at a fixed interval, so they are computed only when it meets an access point. The scenario
+is our reconstruction (SPEC 6.2) of Bruno & Nurchis (arXiv 1311.6013).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from network_sim.types import Cause, EventKind, to_ns
 
 
 class Snapshots:
-    """When each image was taken, what it shows, and which ones a vehicle still has to offer.
+    """Capture time and cell of each image, and which images a vehicle has still to offer.
 
     The buffer of a vehicle is a FIFO (SPEC 6.2): the last 200 images that it took. Image ``i`` of vehicle
     ``v`` has the number ``v * per_vehicle + i``.
@@ -38,22 +38,22 @@ class Snapshots:
         self.arrived = bytearray(vehicles * self._per_vehicle)
         """Whether the collector has each image."""
         self._next = [0] * vehicles
-        self._again: list[set[int]] = [set() for _ in range(vehicles)]
+        self._offer_later: list[set[int]] = [set() for _ in range(vehicles)]
 
     def offer(self, vehicle: int, now_ns: int) -> np.ndarray:
-        """Images (T,) in the buffer that were not offered yet, or in vain, oldest first."""
+        """Images (T,) in the buffer that were not offered yet or are to be offered again, oldest first."""
         newest = self._newest(vehicle, now_ns)
         oldest = max(newest - self._capacity + 1, 0)
         base = vehicle * self._per_vehicle
         images = np.arange(base + max(self._next[vehicle], oldest), base + newest + 1)
         self._next[vehicle] = newest + 1
-        again = sorted(image for image in self._again[vehicle] if image >= base + oldest)
-        self._again[vehicle].clear()
+        again = sorted(image for image in self._offer_later[vehicle] if image >= base + oldest)
+        self._offer_later[vehicle].clear()
         return np.concatenate([np.array(again, dtype=np.int64), images]) if again else images
 
-    def offer_again(self, vehicle: int, images: Iterable[int]) -> None:
-        """These were offered in vain."""
-        self._again[vehicle].update(images)
+    def offer_later(self, vehicle: int, images: Iterable[int]) -> None:
+        """Offer these images again: they were not collected."""
+        self._offer_later[vehicle].update(images)
 
     def tags(self, vehicle: int, images: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Cells (T,) and times in ns (T,) of images of a vehicle."""
@@ -61,7 +61,7 @@ class Snapshots:
         return self.routes.cells(vehicle, captured_ns, self._cell_m, self._directed), captured_ns
 
     def record(self, recorder: Recorder, now_ns: int, image_bytes: int) -> None:
-        """Record all images taken so far, and those thrown out of a full buffer before they had arrived."""
+        """Record all images taken so far, and those that a full buffer dropped before they had arrived."""
         arrived = np.frombuffer(self.arrived, dtype=bool)
         for vehicle in range(len(self._first_ns)):
             count = self._newest(vehicle, now_ns) + 1

@@ -19,7 +19,7 @@ Spans = NDArray[np.int64]
 
 
 class State(IntEnum):
-    """What a node's radio does. It listens for the rest of the time."""
+    """State of a node's radio; for the rest of the time it listens."""
 
     SENDING = 0
     ASLEEP = 1
@@ -74,7 +74,7 @@ class StateTimes:
             self._add(State.ASLEEP, np.array([[node, self._down_since_ns.pop(node), t_ns]]))
 
     def _settle(self, until_ns: int) -> None:
-        """Accounts for all that happened from the last time until this one."""
+        """Count the spans up to this time."""
         if until_ns <= self._settled_ns:
             return
         for node, since_ns in self._down_since_ns.items():

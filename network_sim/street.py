@@ -4,7 +4,7 @@ Our reconstruction (SPEC 6.2) of the scenario of Bruno & Nurchis, "Efficient dat
 vehicular sensing platforms" (arXiv 1311.6013), of which only the abstract and the first lines could be read.
 A vehicle that enters the range of an access point sends the tags of its new images, again every 10 s; the
 collector behind the access points, wired to them without delay, asks for some; the vehicle sends these. What
-was wanted but did not get through is offered again, as long as it is in the vehicle's buffer.
+was requested but did not arrive is offered again, as long as it is in the vehicle's buffer.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from network_sim.trace import Recorder
 from network_sim.types import EventKind, Packet, PacketKind, to_ns
 
 MacFactory = Callable[[Places, Callable[[int], bool], Callable[[Packet, int], None]], Mac]
-"""Makes the medium access of nodes at these places; told whether a node is up, and what to do on arrival."""
+"""Makes the medium access of nodes at these places, given whether a node is up and a receive callback."""
 _ENQUEUE, _RECEIVE, _ARRIVE = EventKind.ENQUEUE, EventKind.RECEIVE, EventKind.ARRIVE
 _IMAGE = PacketKind.IMAGE
 """An enumeration is slow to look up, and these are for every packet."""
@@ -47,19 +47,19 @@ def start_street(
     mac_factory: MacFactory,
     rng: np.random.Generator,
 ) -> Street:
-    """Set all vehicles off; the caller runs ``env`` to the horizon, then calls ``Street.finish``."""
+    """Start all vehicles; the caller runs ``env`` to the horizon, then calls ``Street.record_images``."""
     driving, cameras, requests = rng.spawn(3)
     routes = drive(config.street, config.run.horizon_s, driving)
     snapshots = Snapshots(config, routes, cameras)
     street = Street(env, config, recorder, mac_factory, snapshots, requests)
     points_m = access_points_m(config.street)
     for vehicle, meetings in enumerate(contacts(routes, points_m, config.radio.range_m)):
-        env.process(street.drive_on(vehicle, meetings))
+        env.process(street.follow(vehicle, meetings))
     return street
 
 
 def street_places(config: NetworkConfig, rng: np.random.Generator) -> StreetPlaces:
-    """Where everybody is at any time, if ``start_street`` is given such an ``rng``."""
+    """Positions of all nodes at any time of a run whose ``start_street`` gets an equal ``rng``."""
     routes = drive(config.street, config.run.horizon_s, rng.spawn(3)[0])
     return StreetPlaces(routes, access_points_m(config.street))
 
@@ -88,7 +88,7 @@ class Street:
         self._recorder = recorder
         self._snapshots = snapshots
         self._scheme = make_scheme(config.scheme, cell_numbers(config.street, config.scheme.cell_m), rng)
-        self._turns = [simpy.Resource(env) for _ in range(points)]
+        self._downlinks = [simpy.Resource(env) for _ in range(points)]
         self._ids = count()
         self._arrived = [-1] * len(self.names)
         most, size = config.scheme.datagram_bytes, config.scheme.image_bytes
@@ -97,15 +97,15 @@ class Street:
         always_up = ([True] * len(self.names)).__getitem__
         self._mac = mac_factory(self.places, always_up, self._receive)
 
-    def drive_on(self, vehicle: int, meetings: list[Contact]) -> Generator[simpy.Event, Any, None]:
-        """All meetings of one vehicle; it stays with an access point until it is out of its range."""
+    def follow(self, vehicle: int, meetings: list[Contact]) -> Generator[simpy.Event, Any, None]:
+        """Process of one vehicle: its contacts, each kept until the vehicle is out of range."""
         env, record = self._env, self._recorder.add
         for contact in meetings:
             yield env.timeout(max(contact.enter_ns - env.now, 0))
             next_ns = int(env.now)
             if next_ns >= contact.leave_ns:
                 continue
-            access_point = len(self.names) - len(self._turns) + contact.access_point
+            access_point = len(self.names) - len(self._downlinks) + contact.access_point
             record(next_ns, EventKind.JOIN, vehicle, access_point)
             while next_ns < contact.leave_ns:
                 yield env.timeout(next_ns - env.now)
@@ -115,18 +115,20 @@ class Street:
             yield env.timeout(max(contact.leave_ns - env.now, 0))
             record(contact.leave_ns, EventKind.LEAVE, vehicle, access_point)
 
-    def finish(self) -> None:
-        """Record the images that were taken and thrown out; called once, when the run is over."""
+    def record_images(self) -> None:
+        """Record the images that were taken and dropped from buffers; called once, when the run is over."""
         self._snapshots.record(self._recorder, int(self._env.now), self._config.image_bytes)
 
     def _exchange(self, vehicle: int, access_point: int, leave_ns: int) -> Generator[simpy.Event, Any, None]:
         """One summary, the request that answers it, and the upload."""
         env, scheme, snapshots = self._env, self._scheme, self._snapshots
         offered = snapshots.offer(vehicle, int(env.now))
-        heard = yield from self._offer(vehicle, access_point, leave_ns, offered)
+        heard = yield from self._send_summary(vehicle, access_point, leave_ns, offered)
         cells, captured_ns = snapshots.tags(vehicle, heard)
         wanted = scheme.wanted(cells, captured_ns, int(env.now))
-        asked = (yield from self._ask(vehicle, access_point, len(wanted))) if scheme.asks else len(wanted)
+        asked = len(wanted)
+        if scheme.asks:
+            asked = yield from self._send_request(vehicle, access_point, len(wanted))
         images, taken_ns = heard[wanted].tolist(), captured_ns[wanted].tolist()
         sent = yield from self._upload(vehicle, access_point, leave_ns, images[:asked], taken_ns)
         missed = set(images).difference(sent)
@@ -135,9 +137,9 @@ class Street:
                 scheme.missed(cell, image_ns)
             else:
                 scheme.received(cell, int(env.now))
-        snapshots.offer_again(vehicle, missed.union(set(offered.tolist()).difference(heard.tolist())))
+        snapshots.offer_later(vehicle, missed.union(set(offered.tolist()).difference(heard.tolist())))
 
-    def _offer(
+    def _send_summary(
         self, vehicle: int, access_point: int, leave_ns: int, images: np.ndarray
     ) -> Generator[simpy.Event, Any, np.ndarray]:
         """Send the tags of images (T,); returns those that arrived."""
@@ -149,21 +151,21 @@ class Street:
             if self._env.now >= leave_ns:
                 break
             size_bytes = len(tags) * config.tag_bytes
-            arrived = yield from self._carry(PacketKind.SUMMARY, vehicle, access_point, size_bytes)
+            arrived = yield from self._send(PacketKind.SUMMARY, vehicle, access_point, size_bytes)
             if arrived:
                 heard.append(tags)
         return np.concatenate(heard)
 
-    def _ask(self, vehicle: int, access_point: int, ids: int) -> Generator[simpy.Event, Any, int]:
+    def _send_request(self, vehicle: int, access_point: int, ids: int) -> Generator[simpy.Event, Any, int]:
         """Send a request for that many images; returns how many of its ids arrived, from the first."""
         config = self._config
         most = config.datagram_bytes // config.id_bytes
-        turns = self._turns[access_point - len(self.names)]
+        downlink = self._downlinks[access_point - len(self.names)]
         for first in range(0, ids, most):
             size_bytes = min(most, ids - first) * config.id_bytes
-            with turns.request() as turn:
-                yield turn
-                arrived = yield from self._carry(PacketKind.REQUEST, access_point, vehicle, size_bytes)
+            with downlink.request() as slot:
+                yield slot
+                arrived = yield from self._send(PacketKind.REQUEST, access_point, vehicle, size_bytes)
             if not arrived:
                 return first
         return ids
@@ -171,7 +173,7 @@ class Street:
     def _upload(
         self, vehicle: int, access_point: int, leave_ns: int, images: list[int], taken_ns: list[int]
     ) -> Generator[simpy.Event, Any, list[int]]:
-        """Send images while in range, unless they were thrown out meanwhile; returns those that arrived."""
+        """Send images while in range and in the buffer; returns those that arrived."""
         env, parts, kept_ns = self._env, self._parts, self._snapshots.kept_ns
         sent: list[int] = []
         for image, image_ns in zip(images, taken_ns, strict=False):
@@ -180,14 +182,14 @@ class Street:
                     return sent
                 if env.now >= image_ns + kept_ns:
                     break
-                arrived = yield from self._carry(_IMAGE, vehicle, access_point, size_bytes, image, first_byte)
+                arrived = yield from self._send(_IMAGE, vehicle, access_point, size_bytes, image, first_byte)
                 if not arrived:
                     break
             else:
                 sent.append(image)
         return sent
 
-    def _carry(
+    def _send(
         self,
         kind: PacketKind,
         source: int,
@@ -200,7 +202,7 @@ class Street:
         now_ns = int(self._env.now)
         whole_bytes = size_bytes + self._config.headers_bytes
         number = next(self._ids)
-        packet = Packet(number, kind, source, destination, whole_bytes, now_ns, image, first_byte, size_bytes)
+        packet = Packet(number, kind, source, destination, whole_bytes, image, first_byte, size_bytes)
         record = self._recorder.add_packet
         record(now_ns, _ENQUEUE, packet, source, destination, whole_bytes)
         delivery = yield from self._mac.send(packet, source, destination)
@@ -211,7 +213,7 @@ class Street:
         return False
 
     def _receive(self, packet: Packet, node: int) -> None:
-        """The medium access has brought a packet to a node: here, always its last one."""
+        """A packet reached a node, which here is always its last one."""
         now_ns = int(self._env.now)
         source, image = packet.source, packet.image
         self._arrived[source] = packet.id

@@ -1,12 +1,12 @@
-"""The trace: one append-only log of what happened, and counters that stay when the log is not kept.
+"""The trace: one append-only log of events, and counters that stay when the log is not kept.
 
-Who records keeps to these rules; ``network_sim.conservation`` checks them on every run.
+The log keeps these invariants; ``network_sim.conservation`` checks them on every run.
 
 1. Ids of packets and of images count up from 0. A fragment that is sent again by its camera is a new packet.
 2. Every packet that is handed to a node's buffer is ENQUEUEd there, on relays too, and also when the buffer
    is full: then a DROP with ``Cause.BUFFER``, of that packet or of the oldest, follows.
 3. It leaves that node once, by DELIVER (``node`` to ``peer``) or by DROP (``node``). A packet that has
-   arrived is never DROPped by its sender, even if the sender never hears of it.
+   arrived is never DROPped by its sender, even if the acknowledgement is lost.
 4. At the instant of DELIVER the next node ENQUEUEs the packet, or, if it is the last, RECEIVE is recorded
    (``node`` is the source, ``peer`` the last node).
 5. An image is CAPTUREd once (``node`` took it, ``peer`` is the road cell that it shows, or -1) and ends at
@@ -101,13 +101,13 @@ class Events:
 
 @dataclass(frozen=True, slots=True)
 class NetworkTrace:
-    """All that one run leaves behind."""
+    """The result of one run."""
 
     events: Events
     """The log: everything, only ``IMAGE_EVENTS`` or nothing, as ``config.run.keep`` says."""
     counters: Counters
     names: tuple[str, ...]
-    """Of the nodes, sink and cloud included, in the order of their numbers."""
+    """Names of the nodes, sink and cloud included, in the order of their numbers."""
     roles: tuple[str, ...]
     """"node", "vehicle", "access-point", "sink" or "cloud", one per name."""
     positions_m: NDArray[np.float64] | None
@@ -118,12 +118,12 @@ class NetworkTrace:
 
 
 class Recorder:
-    """Takes down what happens, in the order in which it is told.
+    """Appends events to the log and counts them.
 
     Args:
         keep: "all" keeps the log, "images" only ``IMAGE_EVENTS``, "counters" none of it.
         nodes: how many nodes there are, sink, access points and cloud included.
-        warmup_ns: the counters of what happens before are kept apart (``config.run.warmup_s``).
+        warmup_ns: events before it are counted apart (``config.run.warmup_s``).
     """
 
     def __init__(self, keep: Keep, nodes: int, warmup_ns: int = 0) -> None:
@@ -167,8 +167,8 @@ class Recorder:
         cause: Cause = Cause.NONE,
         duration_ns: int = 0,
     ) -> None:
-        """Records what ``node`` did with a packet for ``peer``; ``size_bytes`` with headers if on the air."""
-        number, packet_kind, _, _, _, _, image, first_byte, _ = packet
+        """Records an event of a packet at ``node``, towards ``peer``; ``size_bytes`` as in ``add``."""
+        number, packet_kind, _, _, _, image, first_byte, _ = packet
         rows = self._rows
         rows += self._pack(
             t_ns, duration_ns, number, image, first_byte, size_bytes, node, peer, kind, cause, packet_kind

@@ -1,4 +1,4 @@
-"""The words of the simulator: packets, what happens to them, and why they are lost; times in nanoseconds.
+"""Packets, the kinds of events, and the causes of losses; times in nanoseconds.
 
 Integers keep the order of events exact: two backoffs that end in the same slot end at the same instant, and
 the same seed gives the same trace to the byte.
@@ -12,7 +12,7 @@ from typing import NamedTuple
 NS_PER_S = 1_000_000_000
 BEGIN_WITHIN_NS = 10_000_000
 """Nodes that send from the start begin at random within this time. An exchange of IEEE 802.15.4 takes whole
-backoff periods: begun at once, all nodes would count on one grid for ever, as if they were synchronised."""
+backoff periods: if all began at once, they would stay synchronised for ever."""
 
 
 def to_ns(seconds: float) -> int:
@@ -33,13 +33,13 @@ class PacketKind(IntEnum):
     SUMMARY = 1
     """Tags of images that a node offers."""
     REQUEST = 2
-    """Ids of images that the collector wants."""
+    """Ids of images that the collector asks for."""
     STATUS = 3
-    """Which fragments of an image the sink still lacks."""
+    """Which fragments of an image the sink is missing."""
 
 
 class EventKind(IntEnum):
-    """What a line of the trace says."""
+    """What an event of the trace records."""
 
     CAPTURE = 0
     """A camera took an image: ``size_bytes`` as encoded."""
@@ -48,25 +48,25 @@ class EventKind(IntEnum):
     AIR = 2
     """A frame was on the air from ``t_ns`` for ``duration_ns``, sent by ``node`` to ``peer``."""
     ACK = 3
-    """The same of an acknowledgement, RTS or CTS: bytes on the air without a payload."""
+    """The same for an acknowledgement, RTS or CTS: a frame without payload."""
     LOSS = 4
     """An attempt failed at its end, for ``cause``; another may follow."""
     DELIVER = 5
     """A packet has reached ``peer``, the next node on its way; ``t_ns`` is when its frame ended."""
     DROP = 6
-    """A packet was given up by ``node``, for ``cause``."""
+    """``node`` dropped a packet, for ``cause``."""
     ARRIVE = 7
     """An image is complete at its destination."""
     EXPIRE = 8
-    """An image is incomplete at its deadline, or was thrown out of a camera's buffer, for ``cause``."""
+    """An image was given up, for ``cause``: incomplete at its deadline, or dropped from a camera's buffer."""
     DOWN = 9
     """A node failed or went to sleep."""
     UP = 10
-    """It is back."""
+    """A node recovered or woke up."""
     JOIN = 11
     """A vehicle came within range of the access point ``peer``."""
     LEAVE = 12
-    """It left it."""
+    """A vehicle left the range of the access point ``peer``."""
     RECEIVE = 13
     """A packet has reached its last node; ``node`` is its source, ``peer`` that node."""
 
@@ -78,17 +78,17 @@ class Cause(IntEnum):
     COLLISION = 1
     """Another transmission overlapped and was not weak enough to be captured."""
     NOISE = 2
-    """Bit errors: the signal was too near the noise."""
+    """Bit errors: the signal-to-noise ratio was too low."""
     RANGE = 3
     """The signal was below the receive threshold."""
     CHANNEL = 4
-    """The channel was busy at every allowed look (CSMA failure)."""
+    """The channel was busy at every clear channel assessment (CSMA failure)."""
     RETRIES = 5
     """Every allowed retransmission failed."""
     BUFFER = 6
     """The buffer was full."""
     DEADLINE = 7
-    """It was too late."""
+    """The deadline had passed."""
     NODE_DOWN = 8
     """The sender or receiver was down."""
     NO_ROUTE = 9
@@ -100,7 +100,7 @@ class Cause(IntEnum):
 
 
 class Packet(NamedTuple):
-    """What a node hands down to be carried to a neighbour, and the neighbour hands on.
+    """A packet, which nodes pass from one to the next.
 
     A named tuple, as millions of them are made: a frozen dataclass takes four times as long.
     """
@@ -109,10 +109,9 @@ class Packet(NamedTuple):
     kind: PacketKind
     source: int
     destination: int
-    """The last node of its way."""
+    """The last node of its route."""
     size_bytes: int
     """Payload of the medium access: application bytes with the headers of every layer above it."""
-    created_ns: int
     image: int = -1
     first_byte: int = 0
     byte_count: int = 0
@@ -120,10 +119,10 @@ class Packet(NamedTuple):
 
 
 class Delivery(NamedTuple):
-    """What came of handing a packet to the medium access."""
+    """Result of ``Mac.send`` for one packet."""
 
     ok: bool
     cause: Cause
-    """Why not; ``NONE`` if it was delivered."""
+    """Why it was not delivered; ``NONE`` if it was."""
     attempts: int
     """Frames sent for it."""

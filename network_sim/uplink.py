@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Uplink:
-    """Sends what the sink hands it, in order; a packet that gets lost is not sent again.
+    """Sends packets in order; a lost one is not sent again.
 
     It records ENQUEUE and DELIVER, and LOSS and DROP with ``UPLINK``. It uses none of the nodes' radio, so
     there is no AIR: the duration of DELIVER or LOSS is the time it took to send.
@@ -33,8 +33,9 @@ class Uplink:
         sink: int,
         cloud: int,
         receive: Callable[[Packet, int], None],
+        lost: Callable[[Packet], None],
     ) -> None:
-        """``receive(packet, cloud)`` is called for each packet that arrives.
+        """``receive(packet, cloud)`` gets each packet that arrives, ``lost(packet)`` each other one.
 
         Raises:
             InputError: ``config`` has no rate.
@@ -50,6 +51,7 @@ class Uplink:
         self._sink = sink
         self._cloud = cloud
         self._receive = receive
+        self._lost = lost
         self._waiting: deque[Packet] = deque()
         self._sending = False
 
@@ -69,6 +71,7 @@ class Uplink:
             if self._rng.random() < self._loss:
                 self._record(EventKind.LOSS, packet, Cause.UPLINK, duration_ns)
                 self._record(EventKind.DROP, packet, Cause.UPLINK)
+                self._env.process(self._report_loss(packet))
             else:
                 self._env.process(self._travel(packet, duration_ns))
         self._sending = False
@@ -77,6 +80,11 @@ class Uplink:
         yield self._env.timeout(self._latency_ns)
         self._record(EventKind.DELIVER, packet, duration_ns=duration_ns)
         self._receive(packet, self._cloud)
+
+    def _report_loss(self, packet: Packet) -> Generator[simpy.Event, Any, None]:
+        """The sink finds out right after the packet should have arrived."""
+        yield self._env.timeout(self._latency_ns + 1)
+        self._lost(packet)
 
     def _record(
         self, kind: EventKind, packet: Packet, cause: Cause = Cause.NONE, duration_ns: int = 0

@@ -6,9 +6,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # more only spin when tests run s
 
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from tests.paths import ROOT
+
+hypothesis.settings.register_profile("untimed", deadline=None)
+hypothesis.settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session")

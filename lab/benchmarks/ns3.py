@@ -60,7 +60,7 @@ CONSTANTS: dict[MacKind, dict[str, float]] = {
         "EIFS": dcf.EIFS_NS / 1e3,
         "data frame": dcf.data_ns(1000 + UDP_IP_BYTES) / 1e3,
         "ACK": dcf.ACK_NS / 1e3,
-        "ACK wait": dcf.ANSWER_WAIT_NS / 1e3,
+        "ACK wait": dcf.REPLY_WAIT_NS / 1e3,
         "CW at first": dcf.MIN_WINDOW - 1,
         "CW at most": dcf.MAX_WINDOW - 1,
         "attempts": dcf.ATTEMPTS,

@@ -1,4 +1,4 @@
-"""Medium access: how a packet gets from one node to the next."""
+"""Medium access: carries a packet from one node to a neighbour."""
 
 from __future__ import annotations
 

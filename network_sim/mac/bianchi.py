@@ -47,7 +47,7 @@ DSSS_11 = Timing(
 
 @dataclass(frozen=True, slots=True)
 class Saturated:
-    """What saturated stations get."""
+    """Saturation throughput and the probabilities behind it."""
 
     throughput_bps: float
     """Payload, of all stations together."""
@@ -73,11 +73,11 @@ def bianchi(
         window: W, backoffs of the first attempt to choose from.
         stages: m, doublings of the window.
         rts: with RTS/CTS, or basic access.
-        silence_us: before anyone counts on after a collision; a DIFS, as he assumes, when None. The
-            standard's stations wait for an EIFS (364 us in IEEE 802.11b).
+        silence_us: interframe space after a collision; None is a DIFS, as Bianchi assumes. Stations of the
+            standard wait for an EIFS (364 us in IEEE 802.11b).
 
     Returns:
-        His equations 7 to 13, which know no limit of retries.
+        Bianchi's equations 7 to 13, without a limit of retries.
     """
 
     p, tau = _attempts(stations, window, stages)

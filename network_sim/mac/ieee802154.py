@@ -1,8 +1,8 @@
 """Unslotted IEEE 802.15.4 at 2.4 GHz: CSMA/CA with acknowledgement and retries (SPEC 6.1).
 
-A node waits a random number of backoffs, listens (clear channel assessment), turns its radio round and sends.
-It is deaf while it turns round: whoever starts then collides. Nothing is computed per slot: an attempt costs
-one event for backoff and assessment, and one for each part of the exchange.
+A node waits a random number of backoff periods, assesses the channel (CCA), turns its radio round and sends.
+During the turnaround it is deaf: a frame that starts then collides. Nothing is computed per slot: an attempt
+costs one event for backoff and assessment, and one for each part of the exchange.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import simpy
 
 from network_sim.mac.context import MacContext
-from network_sim.mac.random_blocks import numbers_below
+from network_sim.mac.random_blocks import random_below
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet
 
 SYMBOL_NS = 16_000
@@ -55,16 +55,16 @@ class Ieee802154:
         self._up = context.up
         self._receive = context.receive
         self._ready_ns: dict[int, int] = {}
-        self._answers: dict[int, int] = {}
-        """Until when in ns each receiver acknowledges a frame."""
-        self._numbers = numbers_below(1 << MAX_BE, context.rng)
+        self._acking_until_ns: dict[int, int] = {}
+        """Until when in ns each receiver is busy with an acknowledgement."""
+        self._backoffs = random_below(1 << MAX_BE, context.rng)
 
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.
 
         Returns:
             ``ok`` is what the sender knows, ``cause`` what happened: without acknowledgements a packet that
-            did not arrive is ``ok`` with a cause; one that was given up although it arrived has ``ACK_LOST``.
+            did not arrive is ``ok`` with a cause; one that was dropped although it arrived has ``ACK_LOST``.
         """
         arrived = False
         for attempt in range(1 + (MAX_FRAME_RETRIES if self._ack else 0)):
@@ -77,20 +77,20 @@ class Ieee802154:
                 self._record(EventKind.DELIVER, packet, sender, receiver, packet.size_bytes)
                 self._receive(packet, receiver)
             if not self._ack:
-                self._rest(packet, sender)
+                self._begin_interframe_space(packet, sender)
                 return Delivery(self._up(sender), cause, 1)
             acknowledged = yield from self._acknowledge(packet, sender, receiver, cause)
             if acknowledged:
-                self._rest(packet, sender)
+                self._begin_interframe_space(packet, sender)
                 return Delivery(True, Cause.NONE, attempt + 1)
         return Delivery(False, Cause.ACK_LOST if arrived else Cause.RETRIES, 1 + MAX_FRAME_RETRIES)
 
     def _access(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Cause]:
-        """Wait for an idle channel; afterwards the sender has to send at once."""
+        """CSMA/CA: wait for an idle channel; returns why the sender may not send now, ``NONE`` if it may."""
         env = self._env
         wait_ns = max(self._ready_ns.get(sender, 0) - env.now, 0)
-        for busy_looks in range(MAX_CSMA_BACKOFFS + 1):
-            slots = next(self._numbers) & ((1 << min(MIN_BE + busy_looks, MAX_BE)) - 1)
+        for busy_assessments in range(MAX_CSMA_BACKOFFS + 1):
+            slots = next(self._backoffs) & ((1 << min(MIN_BE + busy_assessments, MAX_BE)) - 1)
             yield env.timeout(wait_ns + slots * BACKOFF_NS + CCA_NS)
             wait_ns = 0
             if not self._up(sender):
@@ -104,10 +104,12 @@ class Ieee802154:
     def _busy(self, node: int) -> bool:
         """Whether an assessment that ends now finds the channel busy, or the node has to acknowledge.
 
-        What counts is its end (as in ns-3's lr-wpan), so that the turnaround alone is the vulnerable time.
+        The end of the assessment decides (as in ns-3's lr-wpan): only the turnaround is vulnerable.
         """
         now_ns = int(self._env.now)
-        return now_ns < self._answers.get(node, 0) or self._medium.busy_between(node, now_ns - 1, now_ns)
+        return now_ns < self._acking_until_ns.get(node, 0) or self._medium.busy_between(
+            node, now_ns - 1, now_ns
+        )
 
     def _transmit(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Cause]:
         """Put the frame on the air; returns why it did not arrive."""
@@ -126,12 +128,12 @@ class Ieee802154:
     def _acknowledge(
         self, packet: Packet, sender: int, receiver: int, cause: Cause
     ) -> Generator[simpy.Event, Any, bool]:
-        """Answer of the receiver, unless the frame failed for ``cause``; the sender waits for it."""
+        """The acknowledgement, unless the frame failed for ``cause``; returns whether it was received."""
         env = self._env
         if cause:
             yield env.timeout(ACK_WAIT_NS)
             return False
-        self._answers[receiver] = int(env.now) + TURNAROUND_NS + ACK_NS
+        self._acking_until_ns[receiver] = int(env.now) + TURNAROUND_NS + ACK_NS
         yield env.timeout(TURNAROUND_NS)
         heard = False
         if self._up(receiver):
@@ -147,8 +149,8 @@ class Ieee802154:
             yield env.timeout(ACK_WAIT_NS - TURNAROUND_NS - ACK_NS)
         return heard
 
-    def _rest(self, packet: Packet, sender: int) -> None:
-        """The sender leaves the channel to others for the interframe space."""
+    def _begin_interframe_space(self, packet: Packet, sender: int) -> None:
+        """Keep the sender silent for the interframe space."""
         self._ready_ns[sender] = int(self._env.now) + spacing_ns(HEADER_BYTES + packet.size_bytes)
 
     def _record(

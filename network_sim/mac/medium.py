@@ -1,8 +1,8 @@
-"""One shared radio channel: who is on the air, who senses it, and which frames survive (SPEC 6.3).
+"""One shared radio channel: frames on the air, carrier sense, and which frames survive (SPEC 6.3).
 
 A frame is received when its power reaches the receive threshold, exceeds the largest sum of overlapping
 powers by the capture ratio, and its receiver was not sending meanwhile; the stronger frame survives whichever
-came first. IEEE 802.15.4 spreads its bits over so many chips that this would be too strict: its receivers
+began first. IEEE 802.15.4 spreads its bits over so many chips that this would be too strict: its receivers
 stay with the frame that came first, whose overlapped bits are wrong as often as the ratio of the powers says
 (as ns-3's lr-wpan has it). A node senses a frame from the carrier-sense threshold on, without fading. Signals
 travel in no time.
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from network_sim.radio import Modulation, Radio
 
 MEMORY_NS = 5_000_000
-"""How long the channel remembers an ended transmission: longer than any look back of a medium access."""
+"""How long ended transmissions are kept: longer than a medium access looks back."""
 REFRESH_NS = 100_000_000
-"""How often powers between moving nodes are computed anew: a vehicle moves about a metre meanwhile."""
+"""Interval at which powers between moving nodes are recomputed: a vehicle moves about a metre."""
 _NONE = Cause.NONE
 """An enumeration is slow to look up, and this is for every frame."""
 
@@ -65,12 +65,12 @@ class Transmission:
         self.start_ns = start_ns
         self.end_ns = end_ns
         self.reserved_ns = reserved_ns
-        """Until when it asks others to be silent: its end, or the end of the exchange it belongs to."""
+        """End of the reservation (NAV): the end of the frame, or of the exchange it belongs to."""
         self.power_w = power_w
         """At the receiver, with fading."""
         self.size_bytes = size_bytes
         self.modulation = modulation
-        """What ``Radio.error_rate`` is told of the frame."""
+        """For ``Radio.error_rate``."""
         self.overlaps: list[Transmission] = []
         """Frames that were on the air at the same time, in the order in which they began."""
         self.earlier = 0
@@ -78,11 +78,11 @@ class Transmission:
         self.heard: list[Listener] = []
         """Listeners that sense it."""
 
-    def largest_w(self, powers_w: list[float]) -> float:
+    def peak_interference_w(self, powers_w: list[float]) -> float:
         """The largest sum of overlapping powers at any instant of this frame.
 
         Args:
-            powers_w: Of the overlapping frames, in their order, at the place in question.
+            powers_w: received powers of ``overlaps``, in their order, at one node.
         """
         if len(powers_w) < 2:
             return sum(powers_w)
@@ -99,7 +99,7 @@ class Transmission:
 
 
 class Listener:
-    """A node that wants to be told when its channel becomes busy and idle."""
+    """Callbacks of a node for when its channel becomes busy and idle."""
 
     __slots__ = ("busy", "node", "on_busy", "on_idle")
 
@@ -123,7 +123,7 @@ class Medium:
             env: Its clock counts nanoseconds.
             radio: Powers and thresholds.
             places: Where the nodes are.
-            rng: Decides on bit errors.
+            rng: Draws bit errors.
         """
         self.env = env
         self.radio = radio
@@ -138,7 +138,7 @@ class Medium:
         self._cs_w = radio.cs_threshold_w
 
     def power_w(self, sender: int, receiver: int) -> float:
-        """What ``receiver`` gets from ``sender``, without fading; nothing if they are the same.
+        """Power at ``receiver`` of a frame of ``sender``, without fading; 0 if they are the same.
 
         Between moving nodes it is as of ``REFRESH_NS`` before the last frame, or later.
         """
@@ -149,7 +149,7 @@ class Medium:
         return power_w if power_w >= 0.0 else self._link_power_w(sender, receiver)
 
     def _new_row_w(self, sender: int) -> list[float]:
-        """Powers at all nodes; negative until somebody asks."""
+        """Powers at all nodes; negative until they are first used."""
         row_w = self._rows_w[sender] = [-1.0] * self.places.count
         row_w[sender] = 0.0
         return row_w
@@ -169,7 +169,7 @@ class Medium:
         begins_ns: int | None = None,
         reserve_ns: int = 0,
     ) -> Transmission:
-        """Put a frame on the air and tell the listeners that sense it.
+        """Put a frame on the air and call the listeners that sense it.
 
         Args:
             sender: Node.
@@ -177,12 +177,12 @@ class Medium:
             receiver: Node.
             size_bytes: Of the frame, and
             modulation: how it is sent, for bit errors; unused when the radio has no noise.
-            begins_ns: When it starts, now or later, as an answer does; whatever begins before that must
+            begins_ns: When it starts, now or later, as a reply does; a frame that begins before that must
                 end after it. None is now.
-            reserve_ns: How long after its end the frame asks everyone who can read it to be silent.
+            reserve_ns: Duration of the reservation (NAV) after its end, for every node that can read it.
 
         Returns:
-            What ``finish`` must be given, exactly at its end.
+            The frame, to be passed to ``finish`` exactly at its end.
         """
         start_ns = int(self.env.now) if begins_ns is None else begins_ns
         end_ns = start_ns + duration_ns
@@ -201,10 +201,10 @@ class Medium:
         self._active.append(frame)
         listeners = self._listeners
         if len(listeners) > 1 or (listeners and sender not in listeners):
-            self._tell_busy(frame)
+            self._notify_busy(frame)
         return frame
 
-    def _tell_busy(self, frame: Transmission) -> None:
+    def _notify_busy(self, frame: Transmission) -> None:
         sender, start_ns, least_w = frame.sender, frame.start_ns, self._cs_w
         row_w = self._rows_w[sender]
         for listener in tuple(self._listeners.values()):
@@ -224,7 +224,7 @@ class Medium:
         return cause
 
     def clear(self, frame: Transmission) -> None:
-        """Take a frame off the air at its end and tell the listeners that sense nothing any more."""
+        """Take a frame off the air at its end and call the listeners whose channel becomes idle."""
         self._active.remove(frame)
         recent, listeners = self._recent, self._listeners
         recent.append(frame)
@@ -232,23 +232,23 @@ class Medium:
         while recent[0].end_ns < end_ns - MEMORY_NS:
             recent.popleft()
         row_w = self._rows_w.get(frame.sender) or self._new_row_w(frame.sender)
-        least_w, alone = self._rx_w, not frame.overlaps
+        least_w, clean = self._rx_w, not frame.overlaps
         for listener in frame.heard:
             listener.busy -= 1
             node = listener.node
             if listener.busy or listeners.get(node) is not listener:
                 continue
-            if alone and row_w[node] >= least_w:
+            if clean and row_w[node] >= least_w:
                 listener.on_idle(frame.reserved_ns, False)
             else:
-                listener.on_idle(*self._read(frame, node))
+                listener.on_idle(*self._overheard(frame, node))
 
-    def _read(self, frame: Transmission, node: int) -> tuple[int, bool]:
-        """What a node that need not be addressed makes of a frame, without fading and noise.
+    def _overheard(self, frame: Transmission, node: int) -> tuple[int, bool]:
+        """Reception of a frame by any node that overhears it, without fading and noise.
 
         Returns:
             From when the channel is free, and whether the frame was damaged. A node that was sending itself
-            knows of neither a damage nor a reservation.
+            knows of neither damage nor reservation.
         """
         power_w, overlaps = self.power_w(frame.sender, node), frame.overlaps
         if overlaps:
@@ -256,14 +256,14 @@ class Medium:
                 return frame.end_ns, False
             most_w = power_w / self.radio.capture_ratio
             powers_w = [self.power_w(other.sender, node) for other in overlaps]
-            if max(powers_w) > most_w or frame.largest_w(powers_w) > most_w:
+            if max(powers_w) > most_w or frame.peak_interference_w(powers_w) > most_w:
                 return frame.end_ns, True
         if power_w < self._rx_w:
             return frame.end_ns, True
         return frame.reserved_ns, False
 
     def outcome(self, frame: Transmission) -> Cause:
-        """What became of a frame that ends now; to be asked once.
+        """Reception of a frame that ends now by its receiver; call it once, as it draws random numbers.
 
         Returns:
             ``NONE`` if its receiver has it; else ``COLLISION``, ``NOISE`` or ``RANGE``.
@@ -275,7 +275,7 @@ class Medium:
             if any(other.sender == receiver for other in frame.overlaps):
                 return Cause.COLLISION
             powers_w = [radio.faded_w(self.power_w(other.sender, receiver)) for other in frame.overlaps]
-            interference_w = frame.largest_w(powers_w)
+            interference_w = frame.peak_interference_w(powers_w)
             if frame.modulation == "oqpsk":
                 if self._lost_in_overlap(frame, powers_w, interference_w):
                     return Cause.COLLISION
@@ -301,16 +301,9 @@ class Medium:
         return self._rng.random() < self.radio.error_rate(sinr, overlapped_bytes, "oqpsk")
 
     @property
-    def alone(self) -> bool:
-        """Whether nothing is on the air, and not more than one node listens."""
+    def undisturbed(self) -> bool:
+        """Whether the channel is idle and at most one node listens."""
         return not self._active and len(self._listeners) < 2
-
-    def senses(self, node: int) -> bool:
-        """Whether somebody else's frame is on the air at this node now."""
-        now_ns = int(self.env.now)
-        return any(
-            frame.start_ns <= now_ns < frame.end_ns and self._sensed(frame, node) for frame in self._active
-        )
 
     def _sensed(self, frame: Transmission, node: int) -> bool:
         return self.power_w(frame.sender, node) >= self._cs_w
@@ -329,14 +322,14 @@ class Medium:
     def last_heard(self, node: int) -> tuple[int, bool]:
         """From when the channel is free at this node, and whether the last frame was damaged there.
 
-        The same as ``on_idle`` of a listener would have been told.
+        The arguments that ``on_idle`` of a listener would have got.
 
         Returns:
             ``-MEMORY_NS`` for the time if nothing was heard for that long.
         """
         for frame in reversed(self._recent):
             if self._sensed(frame, node):
-                return self._read(frame, node)
+                return self._overheard(frame, node)
         return -MEMORY_NS, False
 
     def subscribe(
@@ -346,8 +339,8 @@ class Medium:
 
         Args:
             node: One listener per node.
-            on_busy: Given the time in ns, which is ahead for an answer that begins later.
-            on_idle: Given the time from which the channel is free (now, or when the frame's reservation
+            on_busy: Gets the time in ns, which lies ahead for a reply that begins later.
+            on_idle: Gets the time from which the channel is free (now, or when the frame's reservation
                 ends), and whether the last frame was received with errors (EIFS).
         """
         listener = self._listeners[node] = Listener(node, on_busy, on_idle)
@@ -359,5 +352,5 @@ class Medium:
         return listener
 
     def unsubscribe(self, node: int) -> None:
-        """Call no longer."""
+        """End the callbacks of a node."""
         self._listeners.pop(node, None)

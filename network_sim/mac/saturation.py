@@ -1,6 +1,6 @@
-"""How much a medium access carries when every node always has a packet, all around one sink.
+"""Saturation throughput of a medium access: every node around one sink always has a packet.
 
-No buffers and no images: what ``tests`` and claims compare with Bianchi's model and with ns-3.
+Without buffers and images, for comparison with Bianchi's model and with ns-3.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from network_sim.mac import Mac, make_mac
 from network_sim.mac.context import MacContext
 from network_sim.mac.dcf import Dcf
 from network_sim.mac.medium import Medium
-from network_sim.places import laid_out
+from network_sim.places import place_nodes
 from network_sim.radio import Radio
 from network_sim.trace import Recorder
 from network_sim.types import BEGIN_WITHIN_NS, Cause, EventKind, Packet, PacketKind, to_ns
@@ -30,20 +30,20 @@ WARM_UP = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Saturation:
-    """What saturated nodes got."""
+    """Outcome of a run of saturated nodes."""
 
     throughput_bps: float
-    """Payload without our headers that reached the sink, of all nodes together."""
+    """Payload without the headers above the medium access that reached the sink, of all nodes together."""
     delivery_ratio: float
-    """Share of packets that reached it before they were given up."""
+    """Share of packets that reached the sink."""
     packets: int
-    """Packets that were delivered or given up."""
+    """Packets that were delivered or dropped."""
     attempts: int
     """Data frames sent for them."""
     losses: dict[Cause, int]
     """Attempts that failed, by cause."""
     packets_by_node: tuple[int, ...]
-    """How many of each node's packets reached it."""
+    """How many of each node's packets reached the sink."""
     kernel_events: int
     """Events of the simulation's kernel, warm-up included."""
 
@@ -61,7 +61,7 @@ def saturation(
         wait_after_loss: False lets IEEE 802.11b go on after a collision as Bianchi's model does.
 
     Raises:
-        ValueError: another medium access is asked to.
+        ValueError: another medium access has no EIFS.
     """
     config = replace(
         config,
@@ -71,7 +71,7 @@ def saturation(
     horizon_ns = to_ns(duration_s)
     env = simpy.Environment()
     rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]
-    medium = Medium(env, Radio(config.radio, rngs[1]), laid_out(config.nodes, rngs[0]), rngs[2])
+    medium = Medium(env, Radio(config.radio, rngs[1]), place_nodes(config.nodes, rngs[0]), rngs[2])
     recorder = Recorder(config.run.keep, nodes + 1, to_ns(config.run.warmup_s))
     if not wait_after_loss and config.mac.kind != "ieee80211b":
         raise ValueError(f"{config.mac.kind} has no EIFS")
@@ -100,7 +100,7 @@ class _Tally:
 def _summary(
     config: NetworkConfig, counters: Counters, tallies: list[_Tally], kernel_events: int
 ) -> Saturation:
-    """What was counted after the warm-up."""
+    """The outcome after the warm-up."""
     events = counters.count[counters.warmup_minutes :].sum(axis=(0, 2))
     lost = events[EventKind.LOSS]
     packets, arrived = (sum(getattr(tally, key) for tally in tallies) for key in ("packets", "arrived"))
@@ -126,11 +126,11 @@ def _saturate(
     tally: _Tally,
     begin_ns: int,
 ) -> Generator[simpy.Event, Any, None]:
-    """A node that hands on the next packet as soon as it knows what became of the last."""
+    """A node that sends the next packet as soon as the last is delivered or dropped."""
     sink, size_bytes, warmup_ns = config.nodes.count, config.nodes.payload_bytes, to_ns(config.run.warmup_s)
     yield env.timeout(begin_ns)
     while True:
-        packet = Packet(next(ids), PacketKind.IMAGE, node, sink, size_bytes, int(env.now))
+        packet = Packet(next(ids), PacketKind.IMAGE, node, sink, size_bytes)
         delivery = yield from mac.send(packet, node, sink)
         if env.now >= warmup_ns:
             tally.packets += 1

@@ -1,4 +1,4 @@
-"""Links that nobody else uses: an ideal radio link and a serial line (SPEC 6.1, Model B)."""
+"""Links without contention: an ideal radio link and a serial line (SPEC 6.1, Model B)."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet
 IDEAL_BITS = 8
 """Bits on the link for a byte."""
 SERIAL_BITS = 10
-"""The same of a serial line: a start bit, 8 data bits, no parity, a stop bit."""
+"""Bits for a byte on a serial line: a start bit, 8 data bits, no parity, a stop bit."""
 
 
 class OwnLink:
-    """Every sender has a link of its own: it loses nothing but what a sleeping node misses."""
+    """Every sender has a link of its own; only packets of nodes that are down are lost."""
 
     def __init__(self, context: MacContext) -> None:
         mac = context.config.mac

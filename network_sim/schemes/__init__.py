@@ -18,7 +18,7 @@ from network_sim.types import to_ns
 
 
 class Scheme(Protocol):
-    """What the collector decides."""
+    """Decides which of the offered images the collector requests."""
 
     asks: bool
     """Images come only on request."""
@@ -27,10 +27,10 @@ class Scheme(Protocol):
         """Positions of the images to upload, in that order, of those that a summary offers (T,)."""
 
     def received(self, cell: int, now_ns: int) -> None:
-        """An image has come."""
+        """An image arrived."""
 
     def missed(self, cell: int, captured_ns: int) -> None:
-        """An image that was wanted did not come."""
+        """A requested image did not arrive."""
 
 
 def make_scheme(config: SchemeConfig, cells: int, rng: np.random.Generator) -> Scheme:

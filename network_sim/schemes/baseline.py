@@ -6,16 +6,16 @@ import numpy as np
 
 
 class Baseline:
-    """Sends summaries as the others do, so that they compare, but nobody has to ask for an image."""
+    """Sends summaries as the other schemes do, to be comparable, but images need no request."""
 
     asks = False
 
     def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
-        """All that is offered, oldest first."""
+        """All offered images, oldest first."""
         return list(range(len(cells)))
 
     def received(self, cell: int, now_ns: int) -> None:
-        """Nothing is learnt."""
+        """BASELINE keeps no state."""
 
     def missed(self, cell: int, captured_ns: int) -> None:
-        """Nothing was counted on."""
+        """BASELINE keeps no state."""

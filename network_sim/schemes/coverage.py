@@ -1,4 +1,4 @@
-"""What a set of images covers: cells of the road network over time.
+"""Coverage of cells of the road network over time by a set of images.
 
 Our reconstruction (SPEC 6.2) of the coverage goal of Bruno & Nurchis (arXiv 1311.6013), of which only the
 abstract and the first lines could be read. An image of cell c taken at tau covers c during [tau, tau + T_v).
@@ -13,7 +13,7 @@ from collections import defaultdict
 
 
 class Coverage:
-    """Images that are there, by cell, and what one more would add."""
+    """The images of a set by cell, and the gain of one more."""
 
     def __init__(self, validity_ns: int) -> None:
         self.validity_ns = validity_ns
@@ -32,10 +32,10 @@ class Coverage:
         return end_ns - start_ns if end_ns > start_ns else 0
 
     def add(self, cell: int, captured_ns: int) -> None:
-        """One more image."""
+        """Add an image."""
         insort(self._taken_ns[cell], captured_ns)
 
     def remove(self, cell: int, captured_ns: int) -> None:
-        """An image that was counted on did not come."""
+        """Remove an image that did not arrive."""
         taken = self._taken_ns[cell]
         del taken[bisect_left(taken, captured_ns)]

@@ -1,9 +1,9 @@
-"""GREEDY(k): the collector asks for what adds most coverage.
+"""GREEDY(k): the collector requests the images that add most coverage.
 
 Our reconstruction (SPEC 6.2) of the centralised scheme of Bruno & Nurchis (arXiv 1311.6013). A request has at
 least 1 - 1/e of the coverage of the best request with as many ids (Nemhauser, Wolsey & Fisher 1978); lazy
-evaluation is Minoux's (1978): gains only fall, so one that was the largest when it was worked out anew is the
-largest.
+evaluation is Minoux's (1978): gains only fall, so a gain that is still the largest after it was recomputed is
+the largest.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ def select(coverage: Coverage, cells: list[int], captured_ns: list[int], k: int 
     heapify(heap)
     chosen: list[int] = []
     while heap and (k is None or len(chosen) < k):
-        promised, index = heappop(heap)
+        bound, index = heappop(heap)
         gain = gain_ns(cells[index], captured_ns[index])
-        if gain == -promised:
+        if gain == -bound:
             chosen.append(index)
             coverage.add(cells[index], captured_ns[index])
         elif gain >= least_ns:
@@ -46,7 +46,7 @@ def select(coverage: Coverage, cells: list[int], captured_ns: list[int], k: int 
 
 
 class Greedy:
-    """Counts on what it asked for until it hears that it did not come."""
+    """Counts requested images as covered until they are reported missing."""
 
     asks = True
 
@@ -59,8 +59,8 @@ class Greedy:
         return select(self.coverage, cells.tolist(), captured_ns.tolist(), self.k)
 
     def received(self, cell: int, now_ns: int) -> None:
-        """It was counted when it was asked for."""
+        """It was counted as covered with the request."""
 
     def missed(self, cell: int, captured_ns: int) -> None:
-        """An image that was asked for did not come."""
+        """A requested image did not arrive."""
         self.coverage.remove(cell, captured_ns)

@@ -13,13 +13,13 @@ from network_sim.config import SchemeConfig
 from network_sim.types import to_ns
 
 FLOOR = 0.02
-"""No cell is asked for less often than that."""
+"""Least probability of a request."""
 DECREASE = 0.7
 INCREASE = 0.1
 
 
 def probabilities(rates: np.ndarray, config: SchemeConfig) -> np.ndarray:
-    """p of each cell: 1 up to r_L, what covers it once from r_H, a straight line between, and a floor.
+    """Request probability p of each cell: 1 up to r_L, one cover from r_H on, linear between, and a floor.
 
     Args:
         rates: (C,) mean number of images offered in a control period.
@@ -35,7 +35,7 @@ def probabilities(rates: np.ndarray, config: SchemeConfig) -> np.ndarray:
 
 
 def adapted(previous: np.ndarray, rates: np.ndarray, config: SchemeConfig) -> np.ndarray:
-    """p of each cell from its last: a factor less above r_H received images, a step more below r_L."""
+    """The next p of each cell: times DECREASE above r_H received images, plus INCREASE below r_L."""
     fewer = np.where(rates > config.r_high, previous * DECREASE, previous)
     return np.clip(np.where(rates < config.r_low, fewer + INCREASE, fewer), FLOOR, 1.0)
 
@@ -65,16 +65,16 @@ class Pdc:
         return np.flatnonzero(self._rng.random(len(cells)) < self.probabilities[cells]).tolist()
 
     def received(self, cell: int, now_ns: int) -> None:
-        """An image has come."""
+        """An image arrived."""
         if self._by_received:
             self._advance(now_ns)
             self._counts[self._period % len(self._counts), cell] += 1
 
     def missed(self, cell: int, captured_ns: int) -> None:
-        """Nothing was counted on."""
+        """Only offered or received images count."""
 
     def _advance(self, now_ns: int) -> None:
-        """Set the probabilities anew at the end of every control period that has passed."""
+        """Update the probabilities at the end of every control period that has passed."""
         while self._period < now_ns // self._control_ns:
             self._period += 1
             rates = self._counts.sum(axis=0) / min(self._period, len(self._counts))

@@ -1,4 +1,4 @@
-"""Traces that no simulation made: one small enough to work out on paper, and one of any length."""
+"""Hand-written traces: one small enough to work out on paper, and random ones of any length."""
 
 from __future__ import annotations
 
@@ -55,48 +55,50 @@ def hop(
 def small_run(recorder: Recorder) -> None:
     """Two cameras and a sink, 60 s of warm-up, 120 s that count."""
 
-    def say(t_s: float, kind: EventKind, node: int, peer: int, packet: int, image: int, **more: Any) -> None:
+    def record(
+        t_s: float, kind: EventKind, node: int, peer: int, packet: int, image: int, **more: Any
+    ) -> None:
         recorder.add(to_ns(t_s), kind, node, peer, packet, image, **{"size_bytes": 500, **more})
 
-    say(10, E.CAPTURE, 0, 3, -1, 0)  # all of it within the warm-up
-    say(10, E.ENQUEUE, 0, 2, 0, 0)
-    say(hop(recorder, 10, 0, 2, 0), E.RECEIVE, 0, 2, 0, 0)
-    say(12, E.ARRIVE, 0, 2, -1, 0)
+    record(10, E.CAPTURE, 0, 3, -1, 0)  # all of it within the warm-up
+    record(10, E.ENQUEUE, 0, 2, 0, 0)
+    record(hop(recorder, 10, 0, 2, 0), E.RECEIVE, 0, 2, 0, 0)
+    record(12, E.ARRIVE, 0, 2, -1, 0)
 
-    say(70, E.CAPTURE, 0, 3, -1, 1)  # two packets, the first collides once
-    say(70, E.ENQUEUE, 0, 2, 1, 1)
-    say(70, E.ENQUEUE, 0, 2, 2, 1)
-    say(70, E.AIR, 0, 2, 1, 1, duration_ns=to_ns(2))
-    say(72, E.LOSS, 0, 2, 1, 1, cause=C.COLLISION)
-    say(hop(recorder, 72, 0, 2, 1), E.RECEIVE, 0, 2, 1, 1)
-    say(hop(recorder, 74, 0, 2, 2), E.RECEIVE, 0, 2, 2, 1)
-    say(76, E.ACK, 2, 0, 2, 1, duration_ns=to_ns(0.1))
-    say(76, E.ARRIVE, 0, 2, -1, 1, size_bytes=900)
+    record(70, E.CAPTURE, 0, 3, -1, 1)  # two packets, the first collides once
+    record(70, E.ENQUEUE, 0, 2, 1, 1)
+    record(70, E.ENQUEUE, 0, 2, 2, 1)
+    record(70, E.AIR, 0, 2, 1, 1, duration_ns=to_ns(2))
+    record(72, E.LOSS, 0, 2, 1, 1, cause=C.COLLISION)
+    record(hop(recorder, 72, 0, 2, 1), E.RECEIVE, 0, 2, 1, 1)
+    record(hop(recorder, 74, 0, 2, 2), E.RECEIVE, 0, 2, 2, 1)
+    record(76, E.ACK, 2, 0, 2, 1, duration_ns=to_ns(0.1))
+    record(76, E.ARRIVE, 0, 2, -1, 1, size_bytes=900)
 
-    say(85, E.ENQUEUE, 0, 2, 6, -1, size_bytes=40, packet_kind=PacketKind.SUMMARY)
+    record(85, E.ENQUEUE, 0, 2, 6, -1, size_bytes=40, packet_kind=PacketKind.SUMMARY)
     end_s = hop(recorder, 85, 0, 2, 6, size_bytes=40, duration_s=0.5, kind=PacketKind.SUMMARY)
-    say(end_s, E.RECEIVE, 0, 2, 6, -1, size_bytes=40, packet_kind=PacketKind.SUMMARY)
+    record(end_s, E.RECEIVE, 0, 2, 6, -1, size_bytes=40, packet_kind=PacketKind.SUMMARY)
 
-    say(100, E.CAPTURE, 1, 3, -1, 2)  # over a relay
-    say(100, E.ENQUEUE, 1, 0, 3, 2)
-    say(hop(recorder, 100, 1, 0, 3), E.ENQUEUE, 0, 2, 3, 2)
-    say(hop(recorder, 102, 0, 2, 3), E.RECEIVE, 1, 2, 3, 2)
-    say(104, E.ARRIVE, 1, 2, -1, 2, size_bytes=450)
+    record(100, E.CAPTURE, 1, 3, -1, 2)  # over a relay
+    record(100, E.ENQUEUE, 1, 0, 3, 2)
+    record(hop(recorder, 100, 1, 0, 3), E.ENQUEUE, 0, 2, 3, 2)
+    record(hop(recorder, 102, 0, 2, 3), E.RECEIVE, 1, 2, 3, 2)
+    record(104, E.ARRIVE, 1, 2, -1, 2, size_bytes=450)
 
-    say(120, E.CAPTURE, 1, 4, -1, 3)  # given up
-    say(120, E.ENQUEUE, 1, 0, 4, 3)
-    say(120, E.AIR, 1, 0, 4, 3, duration_ns=to_ns(2))
-    say(122, E.LOSS, 1, 0, 4, 3, cause=C.RANGE)
-    say(122, E.DROP, 1, 0, 4, 3, cause=C.RETRIES)
-    say(130, E.EXPIRE, 1, -1, -1, 3, cause=C.DEADLINE)
+    record(120, E.CAPTURE, 1, 4, -1, 3)  # given up
+    record(120, E.ENQUEUE, 1, 0, 4, 3)
+    record(120, E.AIR, 1, 0, 4, 3, duration_ns=to_ns(2))
+    record(122, E.LOSS, 1, 0, 4, 3, cause=C.RANGE)
+    record(122, E.DROP, 1, 0, 4, 3, cause=C.RETRIES)
+    record(130, E.EXPIRE, 1, -1, -1, 3, cause=C.DEADLINE)
 
-    say(140, E.DOWN, 1, -1, -1, -1)  # sleeps, and hears nothing of what is sent to it
-    say(150, E.UP, 1, -1, -1, -1)
-    say(160, E.DOWN, 0, -1, -1, -1, cause=C.NODE_DOWN)
-    say(170, E.UP, 0, -1, -1, -1)
-    say(175, E.CAPTURE, 0, 3, -1, 4)  # on its way when the run ends
-    say(175, E.ENQUEUE, 0, 2, 5, 4)
-    say(179, E.AIR, 0, 2, 5, 4, duration_ns=to_ns(2))
+    record(140, E.DOWN, 1, -1, -1, -1)  # sleeps, and hears nothing of what is sent to it
+    record(150, E.UP, 1, -1, -1, -1)
+    record(160, E.DOWN, 0, -1, -1, -1, cause=C.NODE_DOWN)
+    record(170, E.UP, 0, -1, -1, -1)
+    record(175, E.CAPTURE, 0, 3, -1, 4)  # on its way when the run ends
+    record(175, E.ENQUEUE, 0, 2, 5, 4)
+    record(179, E.AIR, 0, 2, 5, 4, duration_ns=to_ns(2))
 
 
 def random_run(seed: int, images: int = 400) -> Story:

@@ -42,12 +42,12 @@ def test_a_line_of_relays_carries_every_byte_once():
 
 def test_relays_tell_cameras_when_their_image_is_complete():
     trace = run(*LINE, "nodes.count=2", "nodes.images=2")
-    told = trace.events.where(trace.events.packet_kind == PacketKind.STATUS).of(EventKind.RECEIVE)
-    assert list(told.node) == [2, 2]
-    assert list(told.peer) == [1, 1]
+    status = trace.events.where(trace.events.packet_kind == PacketKind.STATUS).of(EventKind.RECEIVE)
+    assert list(status.node) == [2, 2]
+    assert list(status.peer) == [1, 1]
     taken = trace.events.of(EventKind.CAPTURE)
     second_ns = taken.t_ns[(taken.node == 1)][1]
-    assert second_ns == told.t_ns[0]
+    assert second_ns == status.t_ns[0]
 
 
 @pytest.mark.parametrize("images", [0, 3])
@@ -85,6 +85,11 @@ def test_without_acknowledgements_the_sink_asks_for_what_it_lacks():
     trace = run("mac.ack=false", "nodes.image_bytes=8000", "nodes.images=2")
     assert balance(trace).dropped[Cause.COLLISION] > 0
     assert image_balance(trace).received == 6
+    received = trace.events.of(EventKind.RECEIVE)
+    requests = received.where(received.packet_kind == PacketKind.STATUS)
+    assert set(requests.node) == {3}  # the sink
+    fragments = np.count_nonzero(received.packet_kind == PacketKind.IMAGE)
+    assert balance(trace).created - len(requests) > fragments >= 6 * -(-8000 // 116)
 
 
 def test_without_retransmission_an_image_with_a_lost_fragment_is_given_up():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from network_sim.config import NetworkConfig, NodesConfig
-from network_sim.places import FixedPlaces, laid_out
+from network_sim.places import FixedPlaces, place_nodes
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
 
@@ -55,7 +55,7 @@ def test_no_config_takes_nan():
 
 @pytest.mark.parametrize("layout", ["star", "line", "grid", "random"])
 def test_the_sink_stands_at_the_origin_behind_all_nodes(layout):
-    places = laid_out(NodesConfig(count=8, layout=layout), np.random.default_rng(3))
+    places = place_nodes(NodesConfig(count=8, layout=layout), np.random.default_rng(3))
     assert places.count == 9
     assert places.static
     np.testing.assert_array_equal(places.positions_m[-1], 0.0)
@@ -65,7 +65,7 @@ def test_the_sink_stands_at_the_origin_behind_all_nodes(layout):
 
 @pytest.mark.parametrize(("layout", "nearest"), [("star", 8), ("line", 1), ("grid", 2)])
 def test_spacing_is_the_distance_to_the_nearest(layout, nearest):
-    places = laid_out(NodesConfig(count=8, layout=layout, spacing_m=7.0), np.random.default_rng(0))
+    places = place_nodes(NodesConfig(count=8, layout=layout, spacing_m=7.0), np.random.default_rng(0))
     to_sink_m = np.array([places.distance_m(node, 8, 0) for node in range(8)])
     np.testing.assert_allclose(to_sink_m.min(), 7.0)
     assert np.count_nonzero(np.isclose(to_sink_m, 7.0)) == nearest
@@ -73,7 +73,7 @@ def test_spacing_is_the_distance_to_the_nearest(layout, nearest):
 
 def test_random_places_follow_their_stream():
     config = NodesConfig(count=20, layout="random")
-    first, again, other = (laid_out(config, np.random.default_rng(seed)).positions_m for seed in (1, 1, 2))
+    first, again, other = (place_nodes(config, np.random.default_rng(seed)).positions_m for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
 

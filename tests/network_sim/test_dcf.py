@@ -74,9 +74,7 @@ class Scene:
         def process() -> Generator[simpy.Event, Any, None]:
             for index, start_ns in enumerate(starts_ns):
                 yield self.env.timeout(max(start_ns - self.env.now, 0))
-                packet = Packet(
-                    10 * sender + index, PacketKind.IMAGE, sender, receiver, 1028, int(self.env.now)
-                )
+                packet = Packet(10 * sender + index, PacketKind.IMAGE, sender, receiver, 1028)
                 delivery = yield from self.mac.send(packet, sender, receiver)
                 self.deliveries[sender].append(delivery)
                 self.ended[sender] = int(self.env.now)

@@ -69,7 +69,7 @@ class Scene:
         def sending() -> Generator[simpy.Event, Any, None]:
             yield self.env.timeout(at_ns)
             for number in range(count):
-                packet = Packet(10 * sender + number, PacketKind.IMAGE, sender, receiver, size_bytes, at_ns)
+                packet = Packet(10 * sender + number, PacketKind.IMAGE, sender, receiver, size_bytes)
                 delivery = yield from self.mac.send(packet, sender, receiver)
                 self.deliveries.append((self.env.now, delivery))
 

@@ -67,7 +67,7 @@ def test_a_fragment_counts_once():
     fragments = Fragments(3)
     assert [fragments.add(index) for index in (1, 1, 0)] == [True, False, True]
     assert fragments.missing() == [2]
-    assert fragments.lacking == 1
+    assert fragments.missing_count == 1
 
 
 def test_a_book_ends_when_the_last_packet_and_image_have(book):
@@ -83,7 +83,7 @@ def test_a_book_ends_when_the_last_packet_and_image_have(book):
 def test_an_image_that_is_not_sent_again_is_given_up_with_its_last_packet(book):
     image = book.capture(0, 150)
     first, second = (book.fragment(image, index, 0, 2) for index in range(2))
-    image.sent_once = True
+    image.sending_over = True
     book.dropped(first, 0, Cause.CHANNEL)
     assert not image.closed
     book.received(second, 2)

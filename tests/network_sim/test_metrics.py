@@ -151,7 +151,7 @@ def test_every_metric_has_a_known_unit_and_a_definition_of_its_own() -> None:
     assert all(np.isfinite(metric.value) for metric in found.values())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.floats(2e-6, 9e5), min_size=1, max_size=80), st.floats(0.0, 100.0, exclude_min=True))
 def test_percentiles_are_within_a_bin(times_s: list[float], percent: float) -> None:
     times_ns = np.array([to_ns(t_s) for t_s in times_s])

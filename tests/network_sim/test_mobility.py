@@ -65,7 +65,7 @@ def test_distances_are_those_of_the_positions() -> None:
     assert places.distance_m(9, 2, now_ns) == places.distance_m(2, 9, now_ns)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 1000), range_m=st.floats(20.0, 450.0), at_crossings=st.booleans())
 def test_contacts_are_the_times_within_range(seed: int, range_m: float, at_crossings: bool) -> None:
     routes = _routes(StreetConfig(vehicles=2, blocks=4, speed_mps=13.0), seed)

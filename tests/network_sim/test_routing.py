@@ -21,7 +21,7 @@ def line_success(config: NetworkConfig, *at_m: float) -> np.ndarray:
     return link_success(config, Radio(config.radio, np.random.default_rng(0)), places)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 10**6))
 def test_costs_are_those_of_dijkstra(seed):
     rng = np.random.default_rng(seed)

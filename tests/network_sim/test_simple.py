@@ -41,7 +41,7 @@ def link(
 
 
 def packet_of(size_bytes: int, number: int = 0) -> Packet:
-    return Packet(number, PacketKind.IMAGE, 0, 1, size_bytes, 0)
+    return Packet(number, PacketKind.IMAGE, 0, 1, size_bytes)
 
 
 @pytest.mark.parametrize(

@@ -29,16 +29,16 @@ def test_events_are_sorted_by_time_and_then_by_order_of_recording() -> None:
     assert events.t_ns.tolist() == [to_ns(t_s) for t_s in (3, 3, 4, 5, 5)]
 
 
-def test_every_column_keeps_what_it_was_told() -> None:
-    told = (17, E.AIR, 1, 2, 3, 4, 921_600, 921_615, Cause.NOISE, 160 * 10**9, PacketKind.STATUS)
+def test_every_column_keeps_what_was_recorded() -> None:
+    recorded = (17, E.AIR, 1, 2, 3, 4, 921_600, 921_615, Cause.NOISE, 160 * 10**9, PacketKind.STATUS)
 
     def story(recorder: Recorder) -> None:
-        recorder.add(*told)
+        recorder.add(*recorded)
 
     events = trace_of(story).events
     first = ("t_ns", "kind", "node", "peer", "packet", "image", "first_byte", "size_bytes")
     names = (*first, "cause", "duration_ns", "packet_kind")
-    assert tuple(getattr(events, name)[0] for name in names) == told
+    assert tuple(getattr(events, name)[0] for name in names) == recorded
 
 
 def test_a_number_too_large_for_its_column_is_refused() -> None:

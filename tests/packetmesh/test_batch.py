@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -86,11 +87,15 @@ def test_an_interrupt_from_the_terminal_ends_tasks_that_run(tmp_path):
         start_new_session=True,
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
     )
-    assert process.stdout is not None
-    assert process.stdout.read(2) == ".."  # both processes have begun a task
-    os.killpg(process.pid, signal.SIGINT)
-    # The pipes close when the last process of the group has ended: none of them sleeps its ten minutes.
-    _, errors = process.communicate(timeout=60)
+    try:
+        assert process.stdout is not None
+        assert process.stdout.read(2) == ".."  # both processes have begun a task
+        os.killpg(process.pid, signal.SIGINT)
+        # The pipes close when the last process of the group has ended: none of them sleeps its ten minutes.
+        _, errors = process.communicate(timeout=60)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == -signal.SIGINT
     assert errors.count("Traceback") == 1
     assert errors.rstrip().endswith("KeyboardInterrupt")
