@@ -1,6 +1,5 @@
 """Files: images, intrinsics, clouds, meshes and rigs, checked when read and replaced whole when written."""
 
-from packetmesh.files import atomic_path
 from pipeline.io.clouds import read_cloud, write_cloud
 from pipeline.io.images import read_color, read_depth, write_color, write_depth_mm
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
@@ -9,7 +8,6 @@ from pipeline.io.rigs import MAX_NODES, load_frame, load_rig, save_rig
 
 __all__ = [
     "MAX_NODES",
-    "atomic_path",
     "load_frame",
     "load_rig",
     "read_cloud",

@@ -25,7 +25,9 @@ class KernelCorrelation(CeicpA):
     """
 
     @classmethod
-    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> KernelCorrelation:
+    def starting(
+        cls, config: RegistrationConfig, source: PointCloud, target: PointCloud
+    ) -> KernelCorrelation:
         """On the schedule of CEICP-A, with all points at every scale."""
         first = CeicpA.starting(config, source, target)
         return cls(first.sigma_m, first.sigma_0_m, first.sigma_min_m, first.decay)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.errors import ReconstructionError
 from pipeline.rays import Camera
 from pipeline.surface.pivoting import roll
 from pipeline.surface.quality import measured
@@ -41,14 +41,6 @@ def roll_over(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
         InputError: fewer than three points, no normals, or a radius that is not positive.
         ReconstructionError: the balls fall through everywhere.
     """
-    if len(cloud) < 3:
-        raise InputError(f"A surface needs at least 3 points, not {len(cloud)}; check the depth image")
-    if cloud.normals is None:
-        raise InputError("Ball pivoting needs normals and the cloud has none; try to estimate them first")
-    if not len(radii_m) or not min(radii_m) > 0.0:
-        raise InputError(
-            f"The ball radii are {list(radii_m)} m; try about one to four times the point spacing"
-        )
     radii_m = tuple(sorted({float(radius_m) for radius_m in radii_m}))
     triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
     if not len(triangles):

@@ -66,7 +66,7 @@ def loop_measures(vertices_m: FloatArray, loops: Sequence[IntArray]) -> tuple[Fl
 
 
 def loop_areas_m2(start_m: FloatArray, end_m: FloatArray, first: IntArray) -> FloatArray:
-    """(L, 3) area vectors of loops whose (E, 3) edges lead from ``start_m`` to ``end_m``, from ``first`` on."""
+    """(L, 3) area vectors of loops, from the (E, 3) ends of their edges and (L,) the first edge of each."""
     apex_m = np.repeat(start_m[first], np.diff(first, append=len(start_m)), axis=0)
     return 0.5 * np.add.reduceat(np.cross(start_m - apex_m, end_m - apex_m), first, axis=0)
 

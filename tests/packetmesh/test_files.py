@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from packetmesh.files import writable_folder
-from pipeline.io import atomic_path, write_cloud, write_color, write_depth_mm, write_intrinsics, write_mesh
+from packetmesh.files import atomic_path, writable_folder
+from pipeline.io import write_cloud, write_color, write_depth_mm, write_intrinsics, write_mesh
 from pipeline.types import CameraIntrinsics, DepthMap, PointCloud
 
 

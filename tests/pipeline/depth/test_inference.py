@@ -99,7 +99,7 @@ def test_the_depth_of_a_mirrored_image_is_the_mirrored_depth(network, name):
 
 
 def test_it_knows_the_shape_of_every_demo_frame_better_than_a_flat_wall_does(network):
-    """And its mean relative error is below 12 % and below 0.7 times that of the wall at the right distance."""
+    """Its mean relative error is below 12 %, and below 0.7 times that of a wall at the right distance."""
     errors, flat_errors = [], []
     for name in DEMO_SCENES:
         rig = load_demo(name)

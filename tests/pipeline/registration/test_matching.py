@@ -68,7 +68,9 @@ def test_reused_neighbours_are_those_of_a_new_search(seed, direction, pace, gate
         assert set(map(tuple, pairs.tolist())) <= everything  # beyond the gate, at most true neighbours
 
 
-@given(seed=st.integers(0, 2**32 - 1), shares=st.lists(st.sampled_from([0.1, 0.4, 1.0]), min_size=2, max_size=8))
+@given(
+    seed=st.integers(0, 2**32 - 1), shares=st.lists(st.sampled_from([0.1, 0.4, 1.0]), min_size=2, max_size=8)
+)
 @settings(max_examples=50, deadline=None, derandomize=True)
 def test_subsets_of_the_points_do_not_mix_their_neighbours(seed, shares):
     """Each share has its own neighbours, also when a smaller one comes back after a larger one."""

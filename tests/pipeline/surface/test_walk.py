@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.progress import drain
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import iterate_roll, roll
 from pipeline.surface.walk import Kind, ball_on_arc, hole_on_flat_ground, iterate_walk, nearest_rows
@@ -32,24 +33,15 @@ def room(rng, count):
     return points_m, np.eye(3)[axis]
 
 
-def end(walking):
-    """What a generator returns."""
-    while True:
-        try:
-            next(walking)
-        except StopIteration as stop:
-            return stop.value
-
-
 @st.composite
 def walks(draw):
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     points_m, normals = draw(st.sampled_from([ball, room]))(rng, draw(st.integers(60, 400)))
     radii_m = draw(st.sampled_from([(0.35,), (0.2, 0.5), (0.15, 0.3, 0.6)]))
     try:
-        return end(iterate_walk(points_m + draw(st.sampled_from([0.0, 30.0])), normals, radii_m))
+        return drain(iterate_walk(points_m + draw(st.sampled_from([0.0, 30.0])), normals, radii_m))
     except ReconstructionError:
-        return end(iterate_walk(points_m, normals, (0.9,)))
+        return drain(iterate_walk(points_m, normals, (0.9,)))
 
 
 @SETTINGS
@@ -102,7 +94,7 @@ def test_parents_and_kinds_tell_how_a_triangle_came_about(walk):
 def test_the_front_of_every_step_can_be_told_from_the_edges_that_found_nothing(batch):
     cloud = perforated_plane(0.5, 0.02, 0.08)
     radii_m = (0.016, 0.03)
-    walk = end(iterate_walk(cloud.points_m, cloud.normals, radii_m, batch))
+    walk = drain(iterate_walk(cloud.points_m, cloud.normals, radii_m, batch))
     steps = list(iterate_roll(cloud.points_m, cloud.normals, radii_m, batch))
     assert len(walk.step_ends) == len(steps)
     starts, ends = walk.triangles.reshape(-1), walk.triangles[:, [1, 2, 0]].reshape(-1)
@@ -123,7 +115,7 @@ def test_the_front_of_every_step_can_be_told_from_the_edges_that_found_nothing(b
 
 def test_a_sphere_has_one_seed_and_every_pivot_is_a_step():
     cloud = sphere(400)
-    walk = end(iterate_walk(cloud.points_m, cloud.normals, (0.2,)))
+    walk = drain(iterate_walk(cloud.points_m, cloud.normals, (0.2,)))
     assert np.flatnonzero(walk.kind == Kind.SEED).tolist() == [0]
     assert np.sum(walk.kind == Kind.JOIN) == 400 - 3
     assert len(walk.triangles) == 2 * 400 - 4
@@ -145,7 +137,7 @@ def test_progress_grows_and_the_walk_can_be_left():
 def test_a_ball_that_falls_through_everywhere_is_told():
     cloud = sphere(500)
     with pytest.raises(ReconstructionError, match=r"of up to 0\.01 m rests on three of these 500 points"):
-        end(iterate_walk(cloud.points_m, cloud.normals, (0.01,)))
+        drain(iterate_walk(cloud.points_m, cloud.normals, (0.01,)))
 
 
 def test_the_place_to_look_at_is_on_the_rim_of_a_hole():
