@@ -6,7 +6,7 @@ import logging
 import math
 import time
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.config import SurfaceConfig
+from pipeline.geometry import distinct_rows
 from pipeline.io.clouds import read_cloud
 from pipeline.io.meshes import mesh_suffix, write_mesh
 from pipeline.surface import radii, reconstruct_surface, smooth, spacing, voxel_average, voxel_for_count
@@ -70,13 +71,13 @@ class MeshOptions:
 
 @dataclass(frozen=True, slots=True)
 class MeshedCloud:
-    """The surface of a cloud and how it came about."""
+    """The surface of a cloud, and what it was made from."""
 
     surface: SurfaceResult
     points: int
-    """The ball rolled over."""
+    """How many points the ball rolled over."""
     normals: str
-    """Where they came from."""
+    """Origin of the points' normals: ``GIVEN``, ``GIVEN_TURNED``, ``ESTIMATED_...``."""
 
 
 def iterate_mesh_file(
@@ -139,19 +140,15 @@ def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
     surface, quality = meshed.surface, meshed.surface.quality
     euler = len(surface.vertices_m) - len(edges_and_faces(surface.triangles)[0]) + len(surface.triangles)
     closed = quality.boundary_loops == 0 and quality.non_manifold_edges == 0 and quality.components == 1
+    measures = asdict(quality)
+    del measures["no_hit_ray_share"]  # a cloud from a file has no cameras
     return {
         "points": meshed.points,
         "normals": meshed.normals,
         "radii_m": surface.radii_m,
         "vertices": len(surface.vertices_m),
         "triangles": len(surface.triangles),
-        "unused_points": quality.unused_points,
-        "boundary_loops": quality.boundary_loops,
-        "boundary_length_m": quality.boundary_length_m,
-        "hole_area_m2": quality.hole_area_m2,
-        "non_manifold_edges": quality.non_manifold_edges,
-        "components": quality.components,
-        "area_m2": quality.area_m2,
+        **measures,
         "euler": euler,
         "genus": (2 - euler) // 2 if closed else None,
     }
@@ -163,12 +160,10 @@ def usable_points(cloud: PointCloud) -> PointCloud:
     Raises:
         InputError: fewer than three points, or all of them in one place or on a line.
     """
-    order = np.lexsort(cloud.points_m.T)
-    sorted_m = cloud.points_m[order]
-    new = np.append(True, (sorted_m[1:] != sorted_m[:-1]).any(axis=1))
-    if not new.all():  # lexsort keeps the order of equals, so the first of them stays
-        _log.warning("%d repeated points are left out", len(cloud) - new.sum())
-        cloud = cloud.select(np.sort(order[new]))
+    first = distinct_rows(cloud.points_m)
+    if len(first) < len(cloud):
+        _log.warning("%d repeated points are left out", len(cloud) - len(first))
+        cloud = cloud.select(first)
     cloud = _known_normals(cloud)
     _check_shape(cloud.points_m)
     return cloud
@@ -211,7 +206,7 @@ def _known_normals(cloud: PointCloud) -> PointCloud:
     lengths = np.linalg.norm(cloud.normals, axis=1)
     known = np.isfinite(lengths) & (lengths > 0.0)
     if not known.any():
-        _log.warning("All normals of the file are zero or not finite; they are estimated anew")
+        _log.warning("All normals of the file are zero or not finite; they are estimated from the points")
         return replace(cloud, normals=None)
     if not known.all():
         _log.warning("%d points are left out: their normals are zero or not finite", (~known).sum())

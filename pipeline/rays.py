@@ -32,9 +32,7 @@ def hit_depths(vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Ca
     """The depth image of a mesh in each camera."""
     scene = triangle_scene(vertices_m, triangles)
     for camera in cameras:
-        directions = pixel_rays(camera.intrinsics) @ camera.T_world_camera[:3, :3].T
-        origins_m = np.broadcast_to(camera.T_world_camera[:3, 3], directions.shape)
-        z_m = first_hits(scene, origins_m, directions)  # ray parameter, and the directions have z = 1
+        z_m = camera_hits(scene, camera)["t_hit"].numpy()  # in units of directions that have z = 1
         yield DepthMap(np.where(np.isfinite(z_m), z_m, np.float32(np.nan)))
 
 
@@ -52,6 +50,13 @@ def first_hits(
     """(...) lengths of (..., 3) rays up to the first triangle, in units of their directions; inf for none."""
     rays = np.concatenate([origins_m, directions], axis=-1)
     return scene.cast_rays(tensor(rays, np.float32))["t_hit"].numpy()
+
+
+def camera_hits(scene: o3d.t.geometry.RaycastingScene, camera: Camera) -> dict[str, o3d.core.Tensor]:
+    """Open3D's (H, W) answers to the rays of all pixels, whose camera-frame directions have z = 1."""
+    directions = pixel_rays(camera.intrinsics) @ camera.T_world_camera[:3, :3].T
+    origins_m = np.broadcast_to(camera.T_world_camera[:3, 3], directions.shape)
+    return scene.cast_rays(tensor(np.concatenate([origins_m, directions], axis=-1), np.float32))
 
 
 def tensor(array: np.ndarray, dtype: type[np.generic]) -> o3d.core.Tensor:

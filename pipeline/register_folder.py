@@ -8,13 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from packetmesh.errors import ReconstructionError
 from packetmesh.files import atomic_path, write_json
 from packetmesh.settings import settings
 from pipeline.config import PipelineConfig, RegistrationConfig
 from pipeline.io.clouds import write_cloud
+from pipeline.io.poses import write_pose
 from pipeline.register_pair import DEFAULT_METHOD, Answer
 from pipeline.types import FloatArray, PointCloud
 
@@ -58,8 +57,12 @@ def write_register_folder(
     """Write transform.txt, aligned.ply, metrics.json, steps.csv and config.json, each whole or not at all.
 
     Args:
+        folder: made if it is missing.
+        answers: of all methods that ran.
         source: the cloud as it was read, to be moved by ``chosen_pose``.
-        command: what was asked for; ``config.json`` holds it beside the settings.
+        config: settings of the registration.
+        command: how the command line was called; ``config.json`` holds it beside the settings.
+        with_truth: whether ``metrics.json`` holds errors against a true pose.
 
     Raises:
         InputError: the folder cannot be written.
@@ -72,8 +75,7 @@ def write_register_folder(
     )
     write_json(folder / "metrics.json", answer_metrics(answers, with_truth))
     _write_steps(folder / "steps.csv", answers)
-    with atomic_path(folder / "transform.txt") as sibling:
-        np.savetxt(sibling, pose, fmt="%.17g")
+    write_pose(folder / "transform.txt", pose)
     write_cloud(folder / "aligned.ply", source.transformed(pose))
 
 

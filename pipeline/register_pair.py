@@ -1,18 +1,18 @@
-"""Any two clouds: whether they can be registered, and what our methods and the peers make of them."""
+"""Any two clouds: whether they can be registered, and where our methods and the peers place them."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
-from pipeline.config import Method, Metric, RegistrationConfig
-from pipeline.geometry import apply
+from pipeline.config import Metric, RegistrationConfig
+from pipeline.geometry import apply, distinct_rows, middle_extent_m
 from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
 from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.registration.methods import METHODS
@@ -32,14 +32,14 @@ LARGEST_M, SMALLEST_M = 1000.0, 0.001
 """Clouds larger or smaller than this are hardly in metres."""
 UNIT_RATIOS = (300.0, 3000.0)
 """If one cloud is about a thousand times as large as the other, one of them is in millimetres."""
-JUDGED_POINTS = 20_000
+EVALUATED_POINTS = 20_000
 """The clouds are thinned alike to about this many points before their distance is measured."""
 SHAPE_POINTS = 3000
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What one method made of the pair; ``T_target_source`` is None if it could not do anything."""
+    """The outcome of one method on a pair; ``T_target_source`` is None if it failed."""
 
     method: str
     T_target_source: FloatArray | None
@@ -108,7 +108,7 @@ def config_for(
     """
     method = methods[0] if len(methods) == 1 and methods[0] in METHODS else DEFAULT_METHOD
     return RegistrationConfig(
-        method=cast(Method, method),
+        method=method,
         metric=metric or ("point" if with_scale else "plane"),
         gate_m=gate_m,
         start=start,
@@ -123,7 +123,7 @@ def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> Point
     Raises:
         InputError: fewer than six distinct points, or a size that no cloud in metres has.
     """
-    _, first = np.unique(cloud.points_m, axis=0, return_index=True)
+    first = distinct_rows(cloud.points_m)
     if len(first) < LEAST_POINTS:
         raise InputError(
             f"The {name} cloud has {len(first)} distinct points; registration needs at least {LEAST_POINTS}, "
@@ -131,8 +131,8 @@ def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> Point
         )
     if len(first) < len(cloud):
         _log.warning("%d repeated points of the %s cloud are left out", len(cloud) - len(first), name)
-        cloud = cloud.select(np.sort(first))
-    extent_m = _extent_m(cloud)
+        cloud = cloud.select(first)
+    extent_m = middle_extent_m(cloud.points_m)
     if not SMALLEST_M <= extent_m <= LARGEST_M:
         unit = "millimetres" if extent_m > LARGEST_M else "kilometres"
         raise InputError(
@@ -156,7 +156,7 @@ def prepared_pair(
         InputError: points that cannot be used, or two units.
         ReconstructionError: a target whose shape leaves the motion open, or no global start was found.
     """
-    ratio = _extent_m(source) / max(_extent_m(target), 1e-300)
+    ratio = middle_extent_m(source.points_m) / max(middle_extent_m(target.points_m), 1e-300)
     if UNIT_RATIOS[0] < max(ratio, 1.0 / max(ratio, 1e-300)) < UNIT_RATIOS[1]:
         larger = "source" if ratio > 1.0 else "target"
         raise InputError(
@@ -173,19 +173,19 @@ def prepared_pair(
 
 
 def run_methods(methods: tuple[str, ...], pair: Pair, config: RegistrationConfig) -> Iterator[Answer]:
-    """Every method's answer from the same start; a method that cannot say anything says why."""
-    judge = _Judge(pair, config.gate_m)
+    """Every method's answer from the same start; a method that fails gives the reason as its stop reason."""
+    evaluate = _Evaluation(pair, config.gate_m)
     for name in methods:
         try:
             answer = _peer(name, pair, config) if name in PEERS else _ours(name, pair, config)
         except PacketMeshError as error:
             yield Answer(name, None, 0, f"failed: {error}", float("nan"))
             continue
-        yield judge.judged(answer)
+        yield evaluate(answer)
 
 
 def _ours(name: str, pair: Pair, config: RegistrationConfig) -> Answer:
-    config = replace(config, method=cast(Method, name), start="given")
+    config = replace(config, method=name, start="given")
     result, times_s = register_timed(pair.source, pair.target, config, pair.T_init)
     elapsed_s = float(times_s[-1]) if len(times_s) else float("nan")
     T = result.T_target_source if result.steps else None
@@ -200,13 +200,13 @@ def _peer(name: str, pair: Pair, config: RegistrationConfig) -> Answer:
     return Answer(name, result.T_target_source, result.iterations, result.stop_reason, result.elapsed_s)
 
 
-class _Judge:
-    """Measures answers; what only depends on the pair is made once."""
+class _Evaluation:
+    """Measures answers by the distances they leave; thins the clouds and builds the tree once."""
 
     def __init__(self, pair: Pair, gate_m: float) -> None:
         self._pair, self._gate_m = pair, gate_m
-        voxel_m = voxel_for_count(pair.target.points_m, JUDGED_POINTS)
-        if max(len(pair.source), len(pair.target)) > JUDGED_POINTS:
+        voxel_m = voxel_for_count(pair.target.points_m, EVALUATED_POINTS)
+        if max(len(pair.source), len(pair.target)) > EVALUATED_POINTS:
             thin = [
                 voxel_average(PointCloud(cloud.points_m), voxel_m) for cloud in (pair.source, pair.target)
             ]
@@ -215,7 +215,7 @@ class _Judge:
         self._source_m, self._target_m = thin[0].points_m, thin[1].points_m
         self._tree = cKDTree(self._target_m)
 
-    def judged(self, answer: Answer) -> Answer:
+    def __call__(self, answer: Answer) -> Answer:
         """The answer with its distances."""
         if answer.T_target_source is None:
             return answer
@@ -233,11 +233,6 @@ class _Judge:
                 else point_error_m(answer.T_target_source, T_true, self._source_m)
             ),
         )
-
-
-def _extent_m(cloud: PointCloud) -> float:
-    """The widest side of the box around the middle nine tenths of the points."""
-    return float(np.ptp(np.quantile(cloud.points_m, (0.05, 0.95), axis=0), axis=0).max())
 
 
 def _check_shape(target: PointCloud, seed: int) -> None:

@@ -7,6 +7,7 @@ unknown depth is NaN.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
@@ -19,6 +20,7 @@ FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
 BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
+AnyPath = str | os.PathLike[str]
 
 
 class PointSource(IntEnum):

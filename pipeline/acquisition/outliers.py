@@ -1,14 +1,14 @@
-"""The outlier filter of the thesis and two that do not eat far surfaces (eqs. 3.5-3.6, SPEC 2)."""
+"""The outlier filter of the thesis, and two that keep far surfaces (eqs. 3.5-3.6, SPEC 2)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
 from pipeline.config import AcquisitionConfig
+from pipeline.geometry import neighbour_distances_m
 from pipeline.types import BoolArray, FloatArray, PointCloud
 
 _MAD_TO_SIGMA = 1.4826
@@ -19,7 +19,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class FilterResult:
-    """A cloud split in two, and why."""
+    """A cloud split into kept points and outliers, with the score that decided."""
 
     kept: PointCloud
     outliers: PointCloud
@@ -47,7 +47,7 @@ def filter_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: floa
             f"The cloud has {len(cloud)} points, too few to compare each with {config.outlier_neighbours} "
             "neighbours; check the depth image or lower outlier_neighbours."
         )
-    score = mean_neighbour_distance_m(cloud.points_m, config.outlier_neighbours)
+    score = neighbour_distances_m(cloud.points_m, config.outlier_neighbours).mean(axis=1)  # eq. 3.5
     if config.outlier_mode != "thesis":
         z_m = cloud.points_m[:, 2]
         if z_m.min() <= 0:
@@ -63,9 +63,3 @@ def filter_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: floa
         threshold = score.mean() + config.outlier_t * score.std()
     keep = score <= threshold * (1.0 + _ROUNDING)
     return FilterResult(cloud.select(keep), cloud.select(~keep), keep, score, float(threshold))
-
-
-def mean_neighbour_distance_m(points_m: FloatArray, neighbours: int) -> FloatArray:
-    """(N,) mean distance of each point to its nearest others (eq. 3.5)."""
-    distances_m, _ = cKDTree(points_m).query(points_m, k=neighbours + 1, workers=-1)
-    return distances_m[:, 1:].mean(axis=1)

@@ -44,7 +44,6 @@ def align_depth(
     sensor: DepthMap,
     mode: AlignmentMode = "local",
     disparity: bool = False,
-    seed: int = 0,
 ) -> AlignmentResult:
     """Map inferred depth to the sensor's metres.
 
@@ -55,7 +54,6 @@ def align_depth(
             ``affine_inverse`` fit a line robustly; ``local`` adds a smooth correction to the first line.
         disparity: whether the network knows disparity up to scale and shift, so that ``local`` corrects
             that line instead of depth's.
-        seed: of the random draws that start a fit among many outliers.
 
     Raises:
         InputError: the two maps differ in size.
@@ -74,7 +72,7 @@ def align_depth(
             f"{MIN_OVERLAP_PX}: use a frame with more sensor depth, or alignment none."
         )
     align = local_inverse if mode == "local" and disparity else ALIGNMENTS[mode]
-    aligned, coefficients = align(z, p, overlap, np.random.default_rng(seed))
+    aligned, coefficients = align(z, p, overlap, np.random.default_rng(0))
     aligned = np.where(positive(aligned), aligned, np.nan)
     shared = positive(aligned) & overlap
     residual_m = aligned[shared] - p[shared]

@@ -9,12 +9,13 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES
-from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, Path, check_count
+from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count
+from pipeline.types import AnyPath
 
 _COLUMNS = {"points": POSITION, "colors": COLOR, "normals": NORMAL}
 
 
-def parse_npz(path: Path, data: bytes) -> np.ndarray:
+def parse_npz(path: AnyPath, data: bytes) -> np.ndarray:
     """The points as a structured array; nothing in the archive is executed (no pickles).
 
     Raises:
@@ -39,7 +40,7 @@ def parse_npz(path: Path, data: bytes) -> np.ndarray:
     return _table(path, arrays)
 
 
-def _table(path: Path, arrays: dict[str, np.ndarray]) -> np.ndarray:
+def _table(path: AnyPath, arrays: dict[str, np.ndarray]) -> np.ndarray:
     count = len(np.atleast_1d(arrays["points"]))
     check_count(path, count)
     for name, array in arrays.items():

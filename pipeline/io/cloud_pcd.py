@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, Path, check_count, number_rows, truncated
+from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count, table_of
+from pipeline.types import AnyPath
 
 _MAX_HEADER_BYTES = 10_000
 _TYPES = {
@@ -15,7 +16,7 @@ _TYPES = {
 _OUR_NAMES = {"normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
 
 
-def parse_pcd(path: Path, data: bytes) -> np.ndarray:
+def parse_pcd(path: AnyPath, data: bytes) -> np.ndarray:
     """The points as a structured array with the names of PLY files; packed colours unpacked.
 
     Raises:
@@ -38,12 +39,7 @@ def parse_pcd(path: Path, data: bytes) -> np.ndarray:
     if kind not in ("ascii", "binary"):
         raise InputError(f"The point cloud {path} has an unusual PCD header; try to export it as PLY")
     check_count(path, count)
-    if kind == "ascii":
-        return _unpacked(_ascii_table(path, data[start:], count, dtype))
-    there = (len(data) - start) // dtype.itemsize
-    if there < count:
-        raise truncated(path, there, count)
-    return _unpacked(np.frombuffer(data, dtype, count, start))
+    return _unpacked(table_of(path, data[start:], count, dtype, ascii_text=kind == "ascii"))
 
 
 def _header(text: str) -> dict[str, list[str]]:
@@ -67,17 +63,6 @@ def _layout(header: dict[str, list[str]]) -> tuple[int, np.dtype]:
     if count < 0 or min(repeats) < 1 or sum(repeats) > 1000:
         raise ValueError
     return count, np.dtype(fields)
-
-
-def _ascii_table(path: Path, body: bytes, count: int, dtype: np.dtype) -> np.ndarray:
-    names = dtype.names or ()
-    widths = [int(np.prod(dtype[name].shape)) for name in names]
-    rows = number_rows(path, body, count, sum(widths))
-    table = np.empty(count, dtype)
-    with np.errstate(invalid="ignore"):
-        for name, width, end in zip(names, widths, np.cumsum(widths), strict=True):
-            table[name] = rows[:, end - 1] if width == 1 else rows[:, end - width : end]
-    return table
 
 
 def _unpacked(table: np.ndarray) -> np.ndarray:

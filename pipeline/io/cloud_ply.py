@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.cloud_table import Path, check_count, number_rows, truncated
+from pipeline.io.cloud_table import check_count, table_of
+from pipeline.types import AnyPath
 
 _MAX_HEADER_BYTES = 10_000
 TYPES = {
@@ -17,7 +18,7 @@ TYPES = {
 }  # fmt: skip
 
 
-def parse_ply(path: Path, data: bytes) -> np.ndarray:
+def parse_ply(path: AnyPath, data: bytes) -> np.ndarray:
     """The vertex element, the first of the file, as a structured array; ASCII and both binary orders.
 
     Raises:
@@ -34,12 +35,9 @@ def parse_ply(path: Path, data: bytes) -> np.ndarray:
             f"The point cloud {path} has an unusual PLY header; try to export it with points as first element"
         ) from None
     check_count(path, count)
-    if order == "a":
-        return _ascii_table(path, data[start:], count, dtype)
-    there = (len(data) - start) // dtype.itemsize
-    if there < count:
-        raise truncated(path, there, count)
-    return np.frombuffer(data, dtype.newbyteorder(order), count, start)
+    if order != "a":
+        dtype = dtype.newbyteorder(order)
+    return table_of(path, data[start:], count, dtype, ascii_text=order == "a")
 
 
 def _parse_header(lines: list[str]) -> tuple[Literal["a", "<", ">"], int, np.dtype]:
@@ -63,13 +61,3 @@ def _parse_header(lines: list[str]) -> tuple[Literal["a", "<", ">"], int, np.dty
     if order is None or count < 0 or not properties:
         raise ValueError
     return order, count, np.dtype(properties)
-
-
-def _ascii_table(path: Path, body: bytes, count: int, dtype: np.dtype) -> np.ndarray:
-    names = dtype.names or ()
-    rows = number_rows(path, body, count, len(names))
-    table = np.empty(count, dtype)
-    with np.errstate(invalid="ignore"):
-        for name, column in zip(names, rows.T, strict=True):
-            table[name] = column
-    return table

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import logging
-import os
 
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.types import PointCloud
+from pipeline.types import AnyPath, PointCloud
 
-Path = str | os.PathLike[str]
 _log = logging.getLogger(__name__)
 
 MAX_POINTS = 20_000_000
@@ -18,7 +16,7 @@ POSITION, NORMAL, COLOR = ("x", "y", "z"), ("nx", "ny", "nz"), ("red", "green", 
 LABEL = "source"
 
 
-def cloud_of(path: Path, table: np.ndarray) -> PointCloud:
+def cloud_of(path: AnyPath, table: np.ndarray) -> PointCloud:
     """The points of a structured array whose fields are named as in PLY files.
 
     Colours that are no integers run from 0 to 1. Points that are not finite are left out.
@@ -55,7 +53,7 @@ def columns(table: np.ndarray, names: tuple[str, ...], dtype: type) -> np.ndarra
     return np.stack([table[name].astype(dtype) for name in names], axis=1)
 
 
-def check_count(path: Path, count: int) -> None:
+def check_count(path: AnyPath, count: int) -> None:
     """Refuse more than ``MAX_POINTS`` points."""
     if count > MAX_POINTS:
         raise InputError(
@@ -64,14 +62,35 @@ def check_count(path: Path, count: int) -> None:
         )
 
 
-def truncated(path: Path, there: int, count: int) -> InputError:
+def truncated(path: AnyPath, there: int, count: int) -> InputError:
     """The error of a file that ends before its last point."""
     return InputError(
         f"The point cloud {path} ends after {there} of its {count} points; try to copy or export it again"
     )
 
 
-def number_rows(path: Path, body: bytes, count: int, width: int) -> np.ndarray:
+def table_of(path: AnyPath, body: bytes, count: int, dtype: np.dtype, ascii_text: bool) -> np.ndarray:
+    """``count`` rows of a structured array from the body of a file: lines of numbers, or the rows' own bytes.
+
+    Raises:
+        InputError: fewer rows, or a line of another length.
+    """
+    if not ascii_text:
+        there = len(body) // dtype.itemsize
+        if there < count:
+            raise truncated(path, there, count)
+        return np.frombuffer(body, dtype, count)
+    names = dtype.names or ()
+    widths = [int(np.prod(dtype[name].shape)) for name in names]
+    rows = number_rows(path, body, count, sum(widths))
+    table = np.empty(count, dtype)
+    with np.errstate(invalid="ignore"):
+        for name, width, end in zip(names, widths, np.cumsum(widths), strict=True):
+            table[name] = rows[:, end - 1] if width == 1 else rows[:, end - width : end]
+    return table
+
+
+def number_rows(path: AnyPath, body: bytes, count: int, width: int) -> np.ndarray:
     """(count, width) float64 numbers from the first lines of text that are not blank.
 
     Raises:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, Path, check_count, number_rows
+from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count, number_rows
+from pipeline.types import AnyPath
 
 _NAMES = {"r": "red", "g": "green", "b": "blue", "normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
 _UNIT_TOLERANCE = 0.02
 """How far from one the lengths of triples may be that are taken for normals."""
 
 
-def parse_text(path: Path, data: bytes) -> np.ndarray:
+def parse_text(path: AnyPath, data: bytes) -> np.ndarray:
     """The points as a structured array.
 
     A first line of words names the columns (x, y, z, r, g, b, nx, ny, nz in any order). Without one the

@@ -12,11 +12,11 @@ from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
 from pipeline.io.cloud_npz import parse_npz
 from pipeline.io.cloud_pcd import parse_pcd
 from pipeline.io.cloud_ply import TYPES, parse_ply
-from pipeline.io.cloud_table import COLOR, LABEL, NORMAL, POSITION, Path, cloud_of
+from pipeline.io.cloud_table import COLOR, LABEL, NORMAL, POSITION, cloud_of
 from pipeline.io.cloud_text import parse_text
-from pipeline.types import PointCloud
+from pipeline.types import AnyPath, PointCloud
 
-_PARSERS: dict[str, Callable[[Path, bytes], np.ndarray]] = {
+_PARSERS: dict[str, Callable[[AnyPath, bytes], np.ndarray]] = {
     ".ply": parse_ply,
     ".pcd": parse_pcd,
     ".npz": parse_npz,
@@ -24,7 +24,7 @@ _PARSERS: dict[str, Callable[[Path, bytes], np.ndarray]] = {
 }
 
 
-def read_cloud(path: Path) -> PointCloud:
+def read_cloud(path: AnyPath) -> PointCloud:
     """Points with normals, colours and source labels, where the file has them.
 
     The suffix tells the format: .ply (also without a suffix), .pcd, .npz, or text in .xyz, .txt, .asc and
@@ -49,7 +49,7 @@ def read_cloud(path: Path) -> PointCloud:
     return cloud_of(path, _PARSERS[suffix](path, read_bytes(path, MAX_GEOMETRY_BYTES, "point cloud")))
 
 
-def write_cloud(path: Path, cloud: PointCloud) -> None:
+def write_cloud(path: AnyPath, cloud: PointCloud) -> None:
     """Write a binary PLY: float positions and normals, uchar colours and source label.
 
     Raises:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import zlib
 
 import cv2
@@ -10,7 +9,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, atomic_path, read_bytes
-from pipeline.types import ByteArray, DepthMap
+from pipeline.types import AnyPath, ByteArray, DepthMap
 
 COMMON_DEPTH_SCALES = (1.0, 100.0, 256.0, 1000.0, 5000.0, 10000.0)
 """Units per metre that RGB-D data sets use."""
@@ -20,10 +19,8 @@ _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _JPEG_SIGNATURE = b"\xff\xd8"
 _JPEG_END = b"\xff\xd9"
 
-Path = str | os.PathLike[str]
 
-
-def read_color(path: Path) -> ByteArray:
+def read_color(path: AnyPath) -> ByteArray:
     """(H, W, 3) RGB of a PNG or JPEG file; grey images get three equal channels.
 
     Raises:
@@ -33,7 +30,7 @@ def read_color(path: Path) -> ByteArray:
     return np.ascontiguousarray(bgr[..., ::-1])
 
 
-def read_depth(path: Path, depth_scale: float = 1000.0) -> DepthMap:
+def read_depth(path: AnyPath, depth_scale: float = 1000.0) -> DepthMap:
     """Metric depth of a 16-bit PNG, whose value 0 means unknown.
 
     Args:
@@ -62,7 +59,7 @@ def read_depth(path: Path, depth_scale: float = 1000.0) -> DepthMap:
     return DepthMap(z_m)
 
 
-def write_color(path: Path, rgb: ByteArray) -> None:
+def write_color(path: AnyPath, rgb: ByteArray) -> None:
     """Write (H, W, 3) RGB in the format of the suffix.
 
     Raises:
@@ -72,7 +69,7 @@ def write_color(path: Path, rgb: ByteArray) -> None:
         sibling.write_bytes(cv2.imencode(sibling.suffix, rgb[..., ::-1])[1].tobytes())
 
 
-def write_depth_mm(path: Path, depth: DepthMap) -> None:
+def write_depth_mm(path: AnyPath, depth: DepthMap) -> None:
     """Write a 16-bit PNG in millimetres, 0 where the depth is unknown.
 
     Raises:
@@ -88,7 +85,7 @@ def write_depth_mm(path: Path, depth: DepthMap) -> None:
         sibling.write_bytes(cv2.imencode(".png", depth_mm.astype(np.uint16))[1].tobytes())
 
 
-def _decode(path: Path, flags: int, what: str) -> np.ndarray:
+def _decode(path: AnyPath, flags: int, what: str) -> np.ndarray:
     data = read_bytes(path, MAX_IMAGE_BYTES, what)
     if not data.startswith((_PNG_SIGNATURE, _JPEG_SIGNATURE)):
         raise InputError(f"The {what} {path} is neither a PNG nor a JPEG file; try to convert it to PNG")
@@ -133,7 +130,7 @@ def _size_px(data: bytes) -> tuple[int, int]:
     return 0, 0
 
 
-def _check_scale(path: Path, median_units: float, depth_scale: float) -> None:
+def _check_scale(path: AnyPath, median_units: float, depth_scale: float) -> None:
     nearest_m, farthest_m = PLAUSIBLE_MEDIAN_M
     median_m = median_units / depth_scale
     if nearest_m <= median_m <= farthest_m:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from dataclasses import replace
 from typing import Any
@@ -12,17 +11,15 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, read_text
-from pipeline.types import CameraIntrinsics
+from pipeline.types import AnyPath, CameraIntrinsics
 
 _BROWN_CONRADY = {"", "plumb_bob", "rational_polynomial"}
 """Distortion models whose first five coefficients are k1, k2, p1, p2, k3."""
 _YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTILINE)
 _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?(?![\w.])")
 
-Path = str | os.PathLike[str]
 
-
-def read_intrinsics(path: Path) -> CameraIntrinsics:
+def read_intrinsics(path: AnyPath) -> CameraIntrinsics:
     """Intrinsics from JSON or YAML.
 
     Three styles: ``width height fx fy cx cy [distortion]``; Open3D's ``intrinsic_matrix``, which is
@@ -46,7 +43,7 @@ def read_intrinsics(path: Path) -> CameraIntrinsics:
     return replace(camera, distortion=camera.distortion[:5])
 
 
-def write_intrinsics(path: Path, intrinsics: CameraIntrinsics) -> None:
+def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics) -> None:
     """Write the JSON style ``width height fx fy cx cy distortion``, exact to the last bit.
 
     Raises:
@@ -65,7 +62,7 @@ def write_intrinsics(path: Path, intrinsics: CameraIntrinsics) -> None:
         sibling.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n")
 
 
-def _parse_json(text: str, path: Path) -> dict[str, Any]:
+def _parse_json(text: str, path: AnyPath) -> dict[str, Any]:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -115,7 +112,7 @@ def _data(value: Any) -> Any:
     return value["data"] if isinstance(value, dict) else value
 
 
-def _check(path: Path, camera: CameraIntrinsics, distortion_model: str) -> None:
+def _check(path: AnyPath, camera: CameraIntrinsics, distortion_model: str) -> None:
     """Raise InputError for a camera that cannot be."""
 
     def wrong(what: str, hint: str) -> InputError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +11,11 @@ import trimesh
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
 from pipeline.geometry import rigid
-from pipeline.types import Surface
+from pipeline.types import AnyPath, Surface
 
 MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")
 _T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.zeros(3))
 """glTF has y up and the world frame z; the file's root node carries this rotation."""
-
-AnyPath = str | os.PathLike[str]
 
 
 def write_mesh(path: AnyPath, surface: Surface) -> None:

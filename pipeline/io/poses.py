@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, read_text
-from pipeline.types import FloatArray
+from pipeline.types import AnyPath, FloatArray
 
 _RIGID_TOLERANCE = 1e-4
-
-AnyPath = str | os.PathLike[str]
 
 
 def read_pose(path: AnyPath) -> FloatArray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +12,11 @@ from pipeline.io.images import read_color, read_depth, write_color, write_depth_
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.io.poses import read_pose, write_pose
 from pipeline.io.truth import read_truth, write_truth
-from pipeline.types import RgbdFrame, Rig
+from pipeline.types import AnyPath, RgbdFrame, Rig
 
 MAX_NODES = 6
 LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
 """T_world_camera of a node that says nothing about its pose: at the origin, upright, looking along +y."""
-
-AnyPath = str | os.PathLike[str]
 
 
 def load_frame(

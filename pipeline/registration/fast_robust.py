@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from pipeline.config import RegistrationConfig
+from pipeline.geometry import neighbour_distances_m
 from pipeline.registration.ceicp import SIGMA_MIN_OF_GATE
 from pipeline.registration.matching import Matching
 from pipeline.registration.weighting import PairWeighting, PairWeights
@@ -74,6 +74,4 @@ class FastRobustIcp(PairWeighting):
 
 def neighbourhood_m(points_m: FloatArray) -> float:
     """Median over (N, 3) points of their median distance to the nearest six others."""
-    count = min(SPACING_NEIGHBOURS + 1, len(points_m))
-    distances_m, _ = cKDTree(points_m).query(points_m, k=count, workers=-1)
-    return float(np.median(np.median(distances_m[:, 1:], axis=1)))
+    return float(np.median(np.median(neighbour_distances_m(points_m, SPACING_NEIGHBOURS), axis=1)))

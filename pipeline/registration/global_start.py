@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
+from pipeline.geometry import middle_extent_m
 from pipeline.types import FloatArray, PointCloud
 
 VOXELS_ACROSS = 50
@@ -28,7 +29,7 @@ def default_voxel_m(target: PointCloud) -> float:
     """
     if not len(target):
         raise InputError("The target cloud has no points; a start pose cannot be found, so check its file.")
-    extent_m = float(np.ptp(np.quantile(target.points_m, (0.05, 0.95), axis=0), axis=0).max())
+    extent_m = middle_extent_m(target.points_m)
     if not extent_m > 0.0:
         raise InputError("The target cloud's points are all in one place; check its depth image or file.")
     return extent_m / VOXELS_ACROSS

@@ -1,22 +1,24 @@
-"""What the nearest neighbours of a point tell: spacing and surface normal."""
+"""Spacing and surface normals of a cloud, from the nearest neighbours of its points."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pipeline.geometry import neighbour_distances_m
 from pipeline.types import FloatArray
+
+NORMAL_NEIGHBOURS, SPACING_NEIGHBOURS = 20, 4
 
 
 def median_spacing_m(points_m: FloatArray) -> float:
     """Median distance of (N, 3) points to their nearest other point."""
-    distances_m, _ = cKDTree(points_m).query(points_m, k=2, workers=-1)
-    return float(np.median(distances_m[:, 1]))
+    return float(np.median(neighbour_distances_m(points_m, 1)))
 
 
-def pca_normals(points_m: FloatArray, neighbours: int = 20) -> FloatArray:
-    """(N, 3) unit normals of the planes through each point's neighbours, towards a camera at the origin."""
-    count = min(neighbours, len(points_m))
+def pca_normals(points_m: FloatArray) -> FloatArray:
+    """(N, 3) unit normals of the planes through each point's nearest 20, towards a camera at the origin."""
+    count = min(NORMAL_NEIGHBOURS, len(points_m))
     _, nearest = cKDTree(points_m).query(points_m, k=count, workers=-1)
     patches_m = points_m[nearest]
     patches_m = patches_m - patches_m.mean(axis=1, keepdims=True)
@@ -26,10 +28,8 @@ def pca_normals(points_m: FloatArray, neighbours: int = 20) -> FloatArray:
     return np.where(away[:, None], -normals, normals)
 
 
-def local_spacing_m(points_m: FloatArray, neighbours: int = 4) -> FloatArray:
-    """(N,) mean distance of each point to its nearest others; zero for a lone point."""
+def local_spacing_m(points_m: FloatArray) -> FloatArray:
+    """(N,) mean distance of each point to its nearest four others; zero for a lone point."""
     if len(points_m) < 2:
         return np.zeros(len(points_m))
-    count = min(neighbours + 1, len(points_m))
-    distances_m, _ = cKDTree(points_m).query(points_m, k=count, workers=-1)
-    return distances_m[:, 1:].mean(axis=1)
+    return neighbour_distances_m(points_m, SPACING_NEIGHBOURS).mean(axis=1)

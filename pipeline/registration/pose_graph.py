@@ -1,4 +1,4 @@
-"""Many pairs of one rig to one set of poses: loops betray wrong pairs, the rest agree by least squares."""
+"""The pose graph of a rig: wrong registrations are found by loops, the others agree by least squares."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.geometry import apply, inverse
 from pipeline.registration.metrics import point_error_m
+from pipeline.registration.neighbourhood import median_spacing_m
 from pipeline.types import FloatArray, PointCloud
 
 LOOP_TOLERANCE_M = 0.05
@@ -55,11 +56,11 @@ class PoseGraph:
     """False for the edges that were rejected because they contradict the loops."""
 
 
-def graph_points(cloud: PointCloud, seed: int = 0) -> FloatArray:
+def graph_points(cloud: PointCloud) -> FloatArray:
     """(N, 3) at most ``GRAPH_POINTS`` of a node's points."""
     if len(cloud) <= GRAPH_POINTS:
         return cloud.points_m
-    return cloud.points_m[np.random.default_rng(seed).choice(len(cloud), GRAPH_POINTS, replace=False)]
+    return cloud.points_m[np.random.default_rng(0).choice(len(cloud), GRAPH_POINTS, replace=False)]
 
 
 def pose_edge(
@@ -72,8 +73,8 @@ def pose_edge(
     """
     moved_m = apply(T_target_source, points_m[source])
     distances_m, nearest = cKDTree(points_m[target]).query(moved_m, workers=-1)
-    spacing_m = np.median(cKDTree(points_m[target]).query(points_m[target], k=2)[0][:, 1])
-    close = points_m[target][nearest[distances_m <= max(INFORMATION_GATE_M, spacing_m)]]
+    gate_m = max(INFORMATION_GATE_M, median_spacing_m(points_m[target]))
+    close = points_m[target][nearest[distances_m <= gate_m]]
     overlap_m = distances_m[distances_m <= FIT_GATE_M]
     return PoseEdge(
         source,
@@ -93,19 +94,16 @@ def _information(points_m: FloatArray) -> FloatArray:
     return np.einsum("nki,nkj->ij", jacobian, jacobian)
 
 
-def solve_pose_graph(
-    points_m: Sequence[FloatArray], edges: Sequence[PoseEdge], loop_tolerance_m: float = LOOP_TOLERANCE_M
-) -> PoseGraph:
+def solve_pose_graph(points_m: Sequence[FloatArray], edges: Sequence[PoseEdge]) -> PoseGraph:
     """Poses that agree best with the edges, after those that contradict the loops are taken out.
 
     Args:
         points_m: (N, 3) points of every node, in its own frame: errors are measured at them.
         edges: registrations, at most one for each pair of nodes.
-        loop_tolerance_m: largest loop error of edges that are right.
     """
-    used = _consistent(points_m, edges, loop_tolerance_m)
-    start = chained(len(points_m), [edge for edge, keep in zip(edges, used, strict=True) if keep])
-    poses = _optimised(start, [edge for edge, keep in zip(edges, used, strict=True) if keep])
+    used = _consistent(points_m, edges)
+    kept = [edge for edge, keep in zip(edges, used, strict=True) if keep]
+    poses = _optimised(chained(len(points_m), kept), kept)
     return PoseGraph(tuple(poses), tuple(_loop_error_m(points_m, edge, edges) for edge in edges), tuple(used))
 
 
@@ -124,17 +122,15 @@ def chained(nodes: int, edges: Sequence[PoseEdge]) -> list[FloatArray]:
             poses[edge.target] = other @ inverse(edge.T_target_source)
 
 
-def _consistent(
-    points_m: Sequence[FloatArray], edges: Sequence[PoseEdge], loop_tolerance_m: float
-) -> list[bool]:
-    """Drops the worst fitting edge that no loop confirms, until every loop that is left closes."""
+def _consistent(points_m: Sequence[FloatArray], edges: Sequence[PoseEdge]) -> list[bool]:
+    """Which edges stay when the worst fitting of those that no loop confirms goes, until all loops close."""
     used = [True] * len(edges)
     while True:
         left = [edge for edge, keep in zip(edges, used, strict=True) if keep]
         suspects = [
             place
             for place, edge in enumerate(edges)
-            if used[place] and _loop_error_m(points_m, edge, left) > loop_tolerance_m
+            if used[place] and _loop_error_m(points_m, edge, left) > LOOP_TOLERANCE_M
         ]
         if not suspects:
             return used

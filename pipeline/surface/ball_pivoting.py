@@ -6,7 +6,7 @@ from collections.abc import Generator, Sequence
 
 import numpy as np
 
-from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain
 from pipeline.rays import Camera
 from pipeline.surface.pivoting import ALL_AT_ONCE, BallPivotStep, iterate_roll
@@ -42,14 +42,6 @@ def iterate_ball(
     >>> [len(step.triangles) for step in pm.iterate_ball(cloud, [1.0], batch=12)]
     [12, 12, 8]
     """
-    if len(cloud) < 3:
-        raise InputError(f"A surface needs at least 3 points, not {len(cloud)}; check the depth image")
-    if cloud.normals is None:
-        raise InputError("Ball pivoting needs normals and the cloud has none; try to estimate them first")
-    if not len(radii_m) or not min(radii_m) > 0.0:
-        raise InputError(
-            f"The ball radii are {list(radii_m)} m; try about one to four times the point spacing"
-        )
     radii_m = tuple(sorted({float(radius_m) for radius_m in radii_m}))
     rolled = yield from iterate_roll(cloud.points_m, cloud.normals, radii_m, batch)
     if not len(rolled.triangles):

@@ -43,22 +43,32 @@ def connected_parts(edges: IntArray, vertices: int) -> IntArray:
     return connected_components(graph, directed=False)[1]
 
 
+def loop_edges(loops: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
+    """(E, 2) directed edges of all closed loops, one loop after the other, and (L,) where each begins."""
+    sizes = np.array([len(loop) for loop in loops])
+    first = np.cumsum(sizes) - sizes
+    starts = np.concatenate(loops)
+    following = np.arange(len(starts)) + 1
+    following[first + sizes - 1] = first
+    return np.stack([starts, starts[following]], axis=1), first
+
+
 def loop_measures(vertices_m: FloatArray, loops: Sequence[IntArray]) -> tuple[FloatArray, FloatArray]:
     """(L,) lengths in m and (L,) areas in square metres of closed loops.
 
     The area is that of the fan of triangles from a loop's first vertex, added as vectors, which is
     exact for flat loops that are not convex.
     """
-    sizes = np.array([len(loop) for loop in loops])
-    owner = np.repeat(np.arange(len(loops)), sizes)
-    first = np.cumsum(sizes) - sizes
-    following = np.arange(len(owner)) + 1
-    following[first + sizes - 1] = first
-    start_m = vertices_m[np.concatenate(loops)]
-    end_m, apex_m = start_m[following], start_m[first[owner]]
+    edges, first = loop_edges(loops)
+    start_m, end_m = vertices_m[edges].swapaxes(0, 1)
     lengths_m = np.add.reduceat(np.linalg.norm(end_m - start_m, axis=1), first)
-    twice_areas_m2 = np.add.reduceat(np.cross(start_m - apex_m, end_m - apex_m), first, axis=0)
-    return lengths_m, 0.5 * np.linalg.norm(twice_areas_m2, axis=1)
+    return lengths_m, np.linalg.norm(loop_areas_m2(start_m, end_m, first), axis=1)
+
+
+def loop_areas_m2(start_m: FloatArray, end_m: FloatArray, first: IntArray) -> FloatArray:
+    """(L, 3) area vectors of loops, from the (E, 3) ends of their edges and (L,) the first edge of each."""
+    apex_m = np.repeat(start_m[first], np.diff(first, append=len(start_m)), axis=0)
+    return 0.5 * np.add.reduceat(np.cross(start_m - apex_m, end_m - apex_m), first, axis=0)
 
 
 def _boundary_successors(triangles: IntArray) -> dict[int, list[int]]:

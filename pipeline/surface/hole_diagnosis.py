@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
+from pipeline.geometry import distinct_rows
 from pipeline.rays import first_hits, triangle_scene
 from pipeline.surface.fill import skin_points_m
 from pipeline.surface.holes import Hole, beyond_m, half_edges, is_closed
@@ -214,7 +215,7 @@ def _cut(
         min(wanted_m, float(np.partition(distances_m, last)[last])), radius_m + 2.0 * GROWTH * ball_m
     )
     rows = np.flatnonzero(distances_m <= reach_m)
-    rows = rows[np.sort(np.unique(points_m[rows], axis=0, return_index=True)[1])]
+    rows = rows[distinct_rows(points_m[rows])]
     return rows, nearest[rows], reach_m
 
 

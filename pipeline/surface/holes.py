@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from pipeline.surface.boundary import (
     LONGEST_HOLE_M,
     boundary_loops,
     connected_parts,
     edges_and_faces,
+    loop_areas_m2,
+    loop_edges,
     loop_measures,
 )
 from pipeline.types import BoolArray, FloatArray, IntArray
@@ -57,7 +56,7 @@ def find_holes(vertices_m: FloatArray, triangles: IntArray) -> tuple[Hole, ...]:
     lengths_m, areas_m2 = loop_measures(vertices_m, loops)
     parts = connected_parts(edges_and_faces(triangles)[0], len(vertices_m))
     rims = _rims(lengths_m, parts[[loop[0] for loop in loops]])
-    edges, first = _edges_of(loops)
+    edges, first = loop_edges(loops)
     islands = _run_around(vertices_m, triangles, edges, first) & ~rims
     centers_m = _centers_m(vertices_m[edges], first)
     ends = rims | islands
@@ -80,16 +79,6 @@ def open_area_m2(vertices_m: FloatArray, triangles: IntArray) -> float:
     return sum((hole.area_m2 for hole in find_holes(vertices_m, triangles) if hole.open), 0.0)
 
 
-def _edges_of(loops: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
-    """(E, 2) edges of all loops, and (L,) where each loop's begin."""
-    sizes = np.array([len(loop) for loop in loops])
-    first = np.cumsum(sizes) - sizes
-    starts = np.concatenate(loops)
-    following = np.arange(len(starts)) + 1
-    following[first + sizes - 1] = first
-    return np.stack([starts, starts[following]], axis=1), first
-
-
 def _rims(lengths_m: FloatArray, part: IntArray) -> BoolArray:
     """(L,) True for loops that are no holes, longest of their part or 1 m and longer."""
     order = np.lexsort((lengths_m, part))
@@ -100,9 +89,7 @@ def _rims(lengths_m: FloatArray, part: IntArray) -> BoolArray:
 
 def _run_around(vertices_m: FloatArray, triangles: IntArray, edges: IntArray, first: IntArray) -> BoolArray:
     """(L,) True for loops that run anticlockwise about the mean normal of the triangles along them."""
-    apex_m = np.repeat(vertices_m[edges[first, 0]], np.diff(first, append=len(edges)), axis=0)
-    starts_m, ends_m = vertices_m[edges].swapaxes(0, 1)
-    enclosed = np.add.reduceat(np.cross(starts_m - apex_m, ends_m - apex_m), first, axis=0)
+    enclosed = loop_areas_m2(vertices_m[edges[:, 0]], vertices_m[edges[:, 1]], first)
     face = half_edges(triangles, edges) // 3
     a, b, c = vertices_m[triangles[face]].swapaxes(0, 1)
     normals = np.cross(b - a, c - a) * (face >= 0)[:, None]
@@ -148,8 +135,7 @@ def is_closed(triangles: IntArray, added: BoolArray, loop: IntArray) -> bool:
     twin = half_edges(triangles, reverse) // 3
     face = np.arange(len(twin)) // 3
     joined = (twin >= 0) & added[face] & added[twin]
-    graph = coo_matrix((np.ones(joined.sum()), (face[joined], twin[joined])), 2 * (len(added),))
-    patch = connected_components(graph, directed=False)[1]
+    patch = connected_parts(np.stack([face[joined], twin[joined]], axis=1), len(added))
     at_loop = np.unique(patch[back // 3][added[back // 3]])
     return not np.any((twin < 0) & added[face] & np.isin(patch[face], at_loop))
 

@@ -13,6 +13,8 @@ from packetmesh.errors import InputError
 from pipeline.open3d_runtime import o3d
 from pipeline.types import FloatArray, IntArray, PointCloud
 
+NEIGHBOURS = 20
+"""Points, itself included, that make a point's tangent plane."""
 GRAPH_NEIGHBOURS = 10
 """Neighbours of a point that it can get its side from."""
 _LEAST_WEIGHT = 1e-6
@@ -21,7 +23,7 @@ _FLAT = 0.02
 """A part whose volume is a smaller share of what it could be has no outside."""
 
 
-def estimate_normals(cloud: PointCloud, viewpoint_m: FloatArray, neighbours: int = 20) -> PointCloud:
+def estimate_normals(cloud: PointCloud, viewpoint_m: FloatArray, neighbours: int = NEIGHBOURS) -> PointCloud:
     """``cloud`` with unit normals, by principal components, that point to the side of the viewpoint.
 
     Args:
@@ -41,9 +43,7 @@ def estimate_normals(cloud: PointCloud, viewpoint_m: FloatArray, neighbours: int
     return turned_to_viewpoint(_with_normals(cloud, neighbours), viewpoint_m)
 
 
-def oriented_normals(
-    cloud: PointCloud, viewpoint_m: FloatArray | None = None, neighbours: int = 20
-) -> PointCloud:
+def oriented_normals(cloud: PointCloud, viewpoint_m: FloatArray | None = None) -> PointCloud:
     """``cloud`` with unit normals that point to the viewpoint, or consistently outwards without one.
 
     Without a viewpoint, neighbours agree along a minimum spanning tree of their tangent planes (Hoppe et
@@ -53,16 +53,15 @@ def oriented_normals(
     Args:
         cloud: at least three points.
         viewpoint_m: (3,) the observing camera, in the cloud's frame.
-        neighbours: how many points, itself included, make a point's tangent plane.
 
     Raises:
-        InputError: fewer than three points or neighbours.
+        InputError: fewer than three points.
     """
     middle_m = np.median(cloud.points_m, axis=0) if len(cloud) else np.zeros(3)
     near = PointCloud(cloud.points_m - middle_m)  # the principal components lose digits far away
     if viewpoint_m is not None:
-        return replace(cloud, normals=estimate_normals(near, viewpoint_m - middle_m, neighbours).normals)
-    near = _with_normals(near, neighbours)
+        return replace(cloud, normals=estimate_normals(near, viewpoint_m - middle_m).normals)
+    near = _with_normals(near, NEIGHBOURS)
     assert near.normals is not None
     return replace(cloud, normals=_turned_outwards(near.points_m, near.normals))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.geometry import pixel_rays
-from pipeline.rays import Camera, tensor, triangle_scene
+from pipeline.rays import Camera, camera_hits, triangle_scene
 from pipeline.types import ByteArray, SurfaceResult
 
 MISSED = (255, 0, 255)
@@ -16,17 +16,17 @@ def mesh_picture(surface: SurfaceResult, camera: Camera, colored: bool = True) -
     """(H, W, 3) picture of a mesh from a camera; rays that hit nothing show ``MISSED``.
 
     Args:
-        colored: Use the vertex colours; without, a grey surface whose shading shows its shape.
+        surface: what is seen.
+        camera: from where.
+        colored: use the vertex colours; without, a grey surface whose shading shows its shape.
     """
-    directions = pixel_rays(camera.intrinsics) @ camera.T_world_camera[:3, :3].T
-    origins_m = np.broadcast_to(camera.T_world_camera[:3, 3], directions.shape)
-    rays = tensor(np.concatenate([origins_m, directions], axis=-1), np.float32)
-    hits = triangle_scene(surface.vertices_m, surface.triangles).cast_rays(rays)
+    hits = camera_hits(triangle_scene(surface.vertices_m, surface.triangles), camera)
     hit = np.isfinite(hits["t_hit"].numpy())
     triangle = surface.triangles[hits["primitive_ids"].numpy()[hit].astype(np.int64)]
     u, v = np.moveaxis(hits["primitive_uvs"].numpy()[hit], -1, 0)[..., None]
     normals = hits["primitive_normals"].numpy()[hit]
-    view = directions[hit] / np.linalg.norm(directions[hit], axis=1, keepdims=True)
+    view = pixel_rays(camera.intrinsics)[hit] @ camera.T_world_camera[:3, :3].T
+    view /= np.linalg.norm(view, axis=1, keepdims=True)
     light = 0.35 + 0.65 * np.abs(np.sum(normals * view, axis=1, keepdims=True))
     if colored and surface.colors is not None:
         corner = surface.colors[triangle].astype(np.float64)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
 from pipeline.config import SurfaceConfig
+from pipeline.geometry import neighbour_distances_m
 from pipeline.types import FloatArray
 
 SIGMAS = {"thesis": (0.0, 0.25, 0.5, 1.0), "thesis+": (0.0, 1.0, 2.0, 4.0)}
@@ -23,7 +23,7 @@ def nearest_distances_m(points_m: FloatArray) -> FloatArray:
     """
     if len(points_m) < 2:
         raise InputError(f"A cloud of {len(points_m)} points has no spacing; try one of at least 2")
-    return cKDTree(points_m).query(points_m, k=2, workers=-1)[0][:, 1]
+    return neighbour_distances_m(points_m, 1)[:, 0]
 
 
 def spacing(points_m: FloatArray) -> tuple[float, float]:
@@ -44,15 +44,12 @@ def radii(config: SurfaceConfig, r_F_m: float, sigma_D_m: float) -> tuple[float,
     """The ball radii of a config, metres, ascending and each once.
 
     Raises:
-        InputError: no radius, or one that is not positive.
+        InputError: a radius that is not positive, as of points that all coincide.
     """
     if config.radius_rule == "manual":
         chosen = config.radii_m
     else:
         chosen = tuple(r_F_m + factor * sigma_D_m for factor in SIGMAS[config.radius_rule])
-    if not chosen:
-        raise InputError("There is no ball radius; try about one to four times the point spacing")
-    for radius_m in chosen:
-        if not (math.isfinite(radius_m) and radius_m > 0.0):
-            raise InputError(f"A ball radius is {radius_m} m; try about one to four times the point spacing")
+    if not all(math.isfinite(radius_m) and radius_m > 0.0 for radius_m in chosen):
+        raise InputError(f"A ball radius is {min(chosen)} m; try about one to four times the point spacing")
     return tuple(np.unique(chosen).tolist())

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.geometry import apply, inverse, pixel_rays, project, undistorted_rays
+from pipeline.geometry import apply, inverse, project, undistorted_rays
 from pipeline.open3d_runtime import o3d
-from pipeline.rays import Camera, first_hits, tensor, triangle_scene
+from pipeline.rays import Camera, camera_hits, first_hits, triangle_scene
 from pipeline.types import BoolArray, FloatArray, IntArray, PointSource, SurfaceResult
 
 _FOLDED = 1e-3
@@ -63,11 +63,11 @@ class Known:
 
 
 @dataclass(frozen=True, slots=True)
-class _Sight:
-    """How one camera sees some points beside a surface."""
+class Sight:
+    """How one camera sees (N, 3) points beside a surface."""
 
     in_image: BoolArray
-    """(N,)."""
+    """(N,) True where a pixel sees the point or what stands before it."""
     hidden: BoolArray
     """(N,) True where the surface stands before the point."""
     past: BoolArray
@@ -89,7 +89,7 @@ def ray_parts(surface: SurfaceResult, views: Sequence[View]) -> RayParts:
     counts = np.zeros(5)
     for view in views:
         sensor, network = _known_pixels(view)
-        triangle = _first_triangles(scene, view.camera)
+        triangle = camera_hits(scene, view.camera)["primitive_ids"].numpy()  # beyond all of them for none
         hit = triangle < len(inferred)
         on_inferred = np.zeros(hit.shape, dtype=bool)
         on_inferred[hit] = inferred[triangle[hit]]
@@ -124,7 +124,7 @@ def known_there(points_m: FloatArray, surface: SurfaceResult, views: Sequence[Vi
     in_image, visible, past = np.zeros((3, len(points_m)), dtype=bool)
     counts = np.zeros(3)
     for view in views:
-        seen = _sight(points_m, scene, view.camera, slack_m)
+        seen = sight(points_m, scene, view.camera, slack_m)
         in_image |= seen.in_image
         visible |= seen.in_image & ~seen.hidden
         past |= seen.past
@@ -156,27 +156,29 @@ def _known_pixels(view: View) -> tuple[BoolArray, BoolArray]:
     return view.sensor_valid, network
 
 
-def _sight(
+def sight(
     points_m: FloatArray, scene: o3d.t.geometry.RaycastingScene, camera: Camera, slack_m: float
-) -> _Sight:
+) -> Sight:
     """How a camera sees (N, 3) points; what the surface does within ``slack_m`` of them does not count."""
     in_camera_m = apply(inverse(camera.T_world_camera), points_m)
     in_image = in_camera_m[:, 2] > slack_m
-    pixels = np.zeros((len(points_m), 2), dtype=np.int64)
     uv = project(camera.intrinsics, in_camera_m[in_image])
     size_px = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
     inside = np.all((uv > -0.5) & (uv < size_px - 0.5), axis=1)
     rays = undistorted_rays(camera.intrinsics, uv[inside])
     wanted = in_camera_m[in_image][inside]
     inside[inside] = np.all(np.abs(rays - wanted / wanted[:, 2:]) < _FOLDED, axis=1)
-    pixels[np.flatnonzero(in_image)[inside]] = np.rint(uv[inside])
     in_image[in_image] = inside
+    pixels = np.zeros((len(points_m), 2), dtype=np.int64)
+    pixels[in_image] = np.rint(uv[inside])
     eye_m = camera.T_world_camera[:3, 3]
-    sight_m = points_m - eye_m
-    distance_m = np.maximum(np.linalg.norm(sight_m, axis=1), 1e-9)
-    hit_m = first_hits(scene, np.broadcast_to(eye_m, sight_m.shape), sight_m / distance_m[:, None])
-    past = np.isfinite(hit_m) & (hit_m > distance_m + slack_m)
-    return _Sight(in_image, in_image & (hit_m < distance_m - slack_m), in_image & past, pixels)
+    to_point_m = points_m[in_image] - eye_m
+    distance_m = np.linalg.norm(to_point_m, axis=1)
+    hit_m = first_hits(scene, np.broadcast_to(eye_m, to_point_m.shape), to_point_m / distance_m[:, None])
+    hidden, past = np.zeros((2, len(points_m)), dtype=bool)
+    hidden[in_image] = hit_m < distance_m - slack_m
+    past[in_image] = np.isfinite(hit_m) & (hit_m > distance_m + slack_m)
+    return Sight(in_image, hidden, past, pixels)
 
 
 def _inferred_triangles(surface: SurfaceResult) -> BoolArray:
@@ -184,11 +186,3 @@ def _inferred_triangles(surface: SurfaceResult) -> BoolArray:
     if surface.source is None:
         return np.zeros(len(surface.triangles), dtype=bool)
     return np.sum(surface.source[surface.triangles] == PointSource.INFERRED, axis=1) >= 2
-
-
-def _first_triangles(scene: o3d.t.geometry.RaycastingScene, camera: Camera) -> IntArray:
-    """(H, W) triangle that each pixel's ray meets first; a number beyond all triangles for none."""
-    directions = pixel_rays(camera.intrinsics) @ camera.T_world_camera[:3, :3].T
-    origins_m = np.broadcast_to(camera.T_world_camera[:3, 3], directions.shape)
-    rays = np.concatenate([origins_m, directions], axis=-1)
-    return scene.cast_rays(tensor(rays, np.float32))["primitive_ids"].numpy()

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.geometry import apply, inverse, project
+from pipeline.geometry import apply, inverse
 from pipeline.open3d_runtime import o3d
-from pipeline.rays import Camera, first_hits, hit_depths, tensor, triangle_areas_m2, triangle_scene
-from pipeline.types import BoolArray, FloatArray, IntArray, RigTruth
+from pipeline.rays import Camera, hit_depths, tensor, triangle_areas_m2, triangle_scene
+from pipeline.surface.ray_parts import sight
+from pipeline.types import FloatArray, IntArray, RigTruth
 
 TOLERANCES_M = (0.01, 0.03, 0.05)
 SAMPLES = 20_000
@@ -129,23 +130,9 @@ def _seen_samples(
     points_m = sample_surface(truth.vertices_m, truth.triangles, _DRAWS_A_SAMPLE * SAMPLES, rng)
     seen = np.zeros(len(points_m), dtype=bool)
     for camera in true_cameras:
-        seen |= _seen(points_m, true_scene, camera)
+        seen_here = sight(points_m, true_scene, camera, _SELF_HIT_M)
+        seen |= seen_here.in_image & ~seen_here.hidden
     return points_m[seen][:SAMPLES]
-
-
-def _seen(points_m: FloatArray, scene: o3d.t.geometry.RaycastingScene, camera: Camera) -> BoolArray:
-    """(N,) True where the point is in the image and nothing stands before it."""
-    in_camera_m = apply(inverse(camera.T_world_camera), points_m)
-    inside = in_camera_m[:, 2] > _SELF_HIT_M
-    uv = project(camera.intrinsics, in_camera_m[inside])
-    size_px = (camera.intrinsics.width_px, camera.intrinsics.height_px)
-    inside[inside] = np.all((uv > -0.5) & (uv < np.array(size_px) - 0.5), axis=1)
-    eye_m = camera.T_world_camera[:3, 3]
-    sight_m = points_m[inside] - eye_m
-    distance_m = np.linalg.norm(sight_m, axis=1, keepdims=True)
-    first_hit_m = first_hits(scene, np.broadcast_to(eye_m, sight_m.shape), sight_m / distance_m)
-    inside[inside] = first_hit_m >= distance_m[:, 0] - _SELF_HIT_M
-    return inside
 
 
 def _distances_m(scene: o3d.t.geometry.RaycastingScene, points_m: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import Progress
-from pipeline.surface.holes import find_holes
+from pipeline.surface.holes import find_holes, half_edges
 from pipeline.surface.pivoting import BallPivotStep, iterate_roll
 from pipeline.types import ByteArray, FloatArray, IntArray
 
@@ -156,7 +156,7 @@ def _walk_of(
     centers_m = np.concatenate([step.ball_centers_m for step in steps])
     counts = np.array([len(step.triangles) for step in steps])
     radius_index = np.repeat(balls, counts)
-    twins = _half_edges(triangles, triangles[:, [1, 0, 2, 1, 0, 2]].reshape(-1, 2))
+    twins = half_edges(triangles, triangles[:, [1, 0, 2, 1, 0, 2]].reshape(-1, 2)).astype(np.int32)
     parent = _parents(twins)
     start_m, turn_rad = _arcs(vertices_m, triangles, centers_m, np.array(radii_m)[radius_index], parent)
     return Walk(
@@ -174,16 +174,6 @@ def _walk_of(
         glued_by=_glued_by(twins),
         left_front=_left_front(triangles, steps, balls, len(radii_m)),
     )
-
-
-def _half_edges(triangles: IntArray, edges: IntArray) -> IntArray:
-    """(E,) the half-edge of each of (E, 2) directed edges, -1 for none; no directed edge is there twice."""
-    vertices = int(triangles.max()) + 1
-    keys = triangles.reshape(-1).astype(np.int64) * vertices + triangles[:, [1, 2, 0]].reshape(-1)
-    order = np.argsort(keys)
-    wanted = edges[:, 0].astype(np.int64) * vertices + edges[:, 1]
-    found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(order) - 1)]
-    return np.where(keys[found] == wanted, found, -1).astype(np.int32)
 
 
 def _parents(twins: IntArray) -> IntArray:
@@ -210,9 +200,9 @@ def _left_front(
 ) -> IntArray:
     """A half-edge is on one ball's front without a break, so the last step in which it is there tells all."""
     left = np.zeros((radii, 3 * len(triangles)), np.int32)
-    half_edges = _half_edges(triangles, np.concatenate([step.front_edges for step in steps]))
+    fronts = half_edges(triangles, np.concatenate([step.front_edges for step in steps]))
     ends = np.cumsum([len(step.front_edges) for step in steps])
-    for step, front in enumerate(np.split(half_edges, ends[:-1])):
+    for step, front in enumerate(np.split(fronts, ends[:-1])):
         left[balls[step], front] = step + 1
     return left
 

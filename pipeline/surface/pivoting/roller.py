@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
+from pipeline.geometry import distinct_rows
 from pipeline.surface.pivoting.front import FACES, HEAD, SETTLED, TAIL, grown, new_front
 from pipeline.surface.pivoting.grid import build_grid
 from pipeline.surface.pivoting.roll import advance, restart
@@ -111,7 +112,7 @@ class Roller:
             pass
         return self.rolled
 
-    def iterate(self, radius_m: float, batch: int = 2000) -> Generator[BallPivotStep]:
+    def iterate(self, radius_m: float, batch: int) -> Generator[BallPivotStep]:
         """The same in steps of ``batch`` triangles; progress is that of this radius.
 
         A generator closed early leaves its triangles; a larger ball can go on from there.
@@ -168,7 +169,7 @@ class Roller:
 
 
 def iterate_roll(
-    points_m: FloatArray, normals: FloatArray | None, radii_m: Sequence[float], batch: int = 2000
+    points_m: FloatArray, normals: FloatArray | None, radii_m: Sequence[float], batch: int
 ) -> Generator[BallPivotStep, None, Rolled]:
     """Roll balls over an oriented cloud, the smallest first, in steps of ``batch`` triangles.
 
@@ -193,9 +194,7 @@ def iterate_roll(
     for index, radius_m in enumerate(radii_m):
         for step in roller.iterate(radius_m, batch):
             progress = (index + step.progress) / len(radii_m)
-            yield BallPivotStep(
-                step.triangles, step.ball_centers_m, step.radius_m, step.front_edges, progress
-            )
+            yield replace(step, progress=progress)
     return roller.rolled
 
 
@@ -212,9 +211,9 @@ def compile_all() -> None:
 
 def _distinct(points_m: FloatArray) -> IntArray:
     """(m,) ascending indices of the points, of those at one place only the first."""
-    if np.diff(np.sort(points_m[:, 0])).all():  # mostly so, and much faster told
+    if np.diff(np.sort(points_m[:, 0])).all():  # the usual case, found in a fraction of the time
         return np.arange(len(points_m))
-    return np.sort(np.unique(points_m, axis=0, return_index=True)[1])
+    return distinct_rows(points_m)
 
 
 def _check_radius(radius_m: float) -> None:

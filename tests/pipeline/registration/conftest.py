@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.geometry import inverse, rigid, rotation_exp
 from pipeline.types import PointCloud
 
 
@@ -24,3 +24,11 @@ def corner() -> PointCloud:
 def motion() -> np.ndarray:
     """A rigid motion of 3 degrees and 3 cm."""
     return rigid(rotation_exp(np.deg2rad(3.0) * np.array([2.0, -1.0, 2.0]) / 3.0), [0.02, -0.01, 0.02])
+
+
+@pytest.fixture(scope="session")
+def halves(corner) -> tuple[PointCloud, PointCloud, np.ndarray]:
+    """Two overlapping random parts of the same place, and the motion of 3 cm and 2 degrees between them."""
+    rows = np.random.default_rng(3).permutation(len(corner))
+    T = rigid(rotation_exp(np.array([0.02, -0.03, 0.01])), [0.02, 0.01, -0.02])
+    return corner.select(rows[:900]).transformed(inverse(T)), corner.select(rows[600:]), T

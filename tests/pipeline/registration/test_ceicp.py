@@ -5,19 +5,14 @@ from hypothesis import strategies as st
 
 from pipeline.config import RegistrationConfig
 from pipeline.registration.ceicp import CeicpA, CeicpN, entropy_weights
-from pipeline.registration.matching import Matching
 from pipeline.types import PointCloud
-
-
-def _matching(distances_m) -> Matching:
-    rows, points = np.arange(len(distances_m)), np.zeros((len(distances_m), 3))
-    return Matching(rows, rows, points, points, np.asarray(distances_m, dtype=float))
+from tests.pipeline.registration.pairs import pairs_at
 
 
 @given(distances=st.lists(st.floats(0.0, 1.0), min_size=5, max_size=60), gate_m=st.floats(0.01, 2.0))
 @settings(max_examples=100, deadline=None)
 def test_weights_of_n_are_a_falling_distribution(distances, gate_m):
-    kept = CeicpN(gate_m).weigh(_matching(distances))
+    kept = CeicpN(gate_m).weigh(pairs_at(distances))
     assert np.flatnonzero(np.asarray(distances) <= gate_m).tolist() == kept.rows.tolist()
     if not len(kept.rows):
         return
@@ -34,7 +29,7 @@ def test_weights_of_n_are_a_falling_distribution(distances, gate_m):
 def test_weights_of_a_fall_over_its_whole_gate(seed, sigma_m):
     """245 pairs are enough in the worst case (SPEC 4.4)."""
     distances_m = np.sort(np.random.default_rng(seed).uniform(0.0, 4.0 * sigma_m, 400))
-    kept = CeicpA(sigma_m, sigma_m, sigma_m, 0.85).weigh(_matching(distances_m))
+    kept = CeicpA(sigma_m, sigma_m, sigma_m, 0.85).weigh(pairs_at(distances_m))
     assert (distances_m[kept.rows] <= 3.0 * sigma_m).all()
     assert (np.diff(kept.weights) < 0).all()
     assert (kept.weights > 0).all()
@@ -58,7 +53,7 @@ def test_weights_do_not_know_the_unit():
 
 
 def test_perfect_matches_weigh_the_same():
-    kept = CeicpN(0.3).weigh(_matching(np.zeros(10)))
+    kept = CeicpN(0.3).weigh(pairs_at(np.zeros(10)))
     np.testing.assert_allclose(kept.weights, 0.1)
     assert kept.entropy_nat == pytest.approx(np.log(10))
 

@@ -7,32 +7,19 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.geometry import inverse
 from pipeline.registration import point_error_m, register
 from pipeline.registration.ceicp_literal import CeicpLiteral, density_information
 from pipeline.registration.degenerate import DegenerateError
-from pipeline.registration.matching import Matching
 from pipeline.types import PointCloud
+from tests.pipeline.registration.pairs import pairs_at
 
 LITERAL = RegistrationConfig("ceicp-literal", "point")
 
 
-@pytest.fixture(scope="module")
-def halves(corner):
-    """Two different random halves of the same place, the source 3 cm and 2 degrees off."""
-    rows = np.random.default_rng(3).permutation(len(corner))
-    T = rigid(rotation_exp(np.array([0.02, -0.03, 0.01])), [0.02, 0.01, -0.02])
-    return corner.select(rows[:900]).transformed(inverse(T)), corner.select(rows[600:]), T
-
-
-def _matching(distances_m) -> Matching:
-    rows, points = np.arange(len(distances_m)), np.zeros((len(distances_m), 3))
-    return Matching(rows, rows, points, points, np.asarray(distances_m, dtype=float))
-
-
 def test_weights_follow_the_formula_in_the_unit():
     distances_m = np.array([0.0, 0.004, 0.01, 0.03, 0.5])
-    kept = CeicpLiteral(0.3, "mm").weigh(_matching(distances_m))
+    kept = CeicpLiteral(0.3, "mm").weigh(pairs_at(distances_m))
     d = 1000.0 * distances_m[:4]
     sigma = np.std(d, ddof=1)
     f = np.exp(-((d - d.mean()) ** 2) / (2 * sigma**2)) / (sigma * np.sqrt(2 * np.pi))
@@ -83,7 +70,7 @@ def test_millimetres_end_where_the_density_exceeds_one(corner, motion):
     assert "below 0.399 mm" in result.stop_reason
     assert point_error_m(result.T_target_source, motion, corner.points_m) < 0.002
     with pytest.raises(DegenerateError, match="f is a density"):
-        CeicpLiteral(0.3, "mm").weigh(_matching(np.zeros(10)))
+        CeicpLiteral(0.3, "mm").weigh(pairs_at(np.zeros(10)))
 
 
 @pytest.mark.parametrize("method", ["ceicp-literal", "ceicp-n", "ceicp-a", "ceicp-r"])

@@ -12,28 +12,23 @@ from pipeline.registration.ceicp import CeicpA, entropy_weights
 from pipeline.registration.ceicp_ml import CeicpMl, box_volume_m3, responsibilities
 from pipeline.registration.ceicp_r import CeicpR
 from pipeline.registration.kernel_correlation import KernelCorrelation
-from pipeline.registration.matching import Matching
 from pipeline.types import PointCloud
+from tests.pipeline.registration.pairs import pairs_at
 
 AWAY = rigid(rotation_exp(np.array([0.4, 1.1, -0.7])), [3.0, -2.0, 5.0])
-
-
-def _matching(distances_m) -> Matching:
-    rows, points = np.arange(len(distances_m)), np.zeros((len(distances_m), 3))
-    return Matching(rows, rows, points, points, np.asarray(distances_m, dtype=float))
 
 
 def test_the_scale_of_r_is_robust_and_only_shrinks():
     method = CeicpR(sigma_min_m=0.01)
     distances_m = np.append(np.linspace(0.0, 0.1, 11), [3.0, 4.0])  # median 0.06
-    kept = method.weigh(_matching(distances_m))
+    kept = method.weigh(pairs_at(distances_m))
     assert kept.sigma_m == pytest.approx(1.4826 * 0.06)
     assert kept.rows.tolist() == list(range(11))
     np.testing.assert_allclose(kept.weights, entropy_weights(distances_m[:11], kept.sigma_m)[0])
     method = method.following(kept, still=False)
-    assert method.weigh(_matching(2.0 * distances_m)).sigma_m == kept.sigma_m
-    assert method.weigh(_matching(0.5 * distances_m)).sigma_m == pytest.approx(0.5 * kept.sigma_m)
-    assert method.weigh(_matching(0.01 * distances_m)).sigma_m == 0.01
+    assert method.weigh(pairs_at(2.0 * distances_m)).sigma_m == kept.sigma_m
+    assert method.weigh(pairs_at(0.5 * distances_m)).sigma_m == pytest.approx(0.5 * kept.sigma_m)
+    assert method.weigh(pairs_at(0.01 * distances_m)).sigma_m == 0.01
 
 
 def test_r_needs_no_gate(corner, motion):
@@ -67,7 +62,7 @@ def test_responsibilities_leave_room_for_the_outlier(seed, sigma_m, outlier):
 def test_an_alien_point_has_no_say():
     """One target point far from everything: its pairs weigh nothing, those of the others share the sum."""
     distances_m = np.append(np.tile([0.01, 0.02, 0.03, 0.04, 0.05], 20), np.full(5, 2.0))
-    kept = CeicpMl(0.01, outlier_density=50.0, count=5, sigma_m=0.02).weigh(_matching(distances_m))
+    kept = CeicpMl(0.01, outlier_density=50.0, count=5, sigma_m=0.02).weigh(pairs_at(distances_m))
     assert kept.rows.max() < 100
     assert kept.weights.sum() == pytest.approx(1.0, abs=1e-12)
     by_point = kept.weights.reshape(20, 5)
@@ -78,16 +73,14 @@ def test_an_alien_point_has_no_say():
 
 def test_the_first_scale_of_ml_is_the_mean_square_over_three():
     distances_m = np.full(50, 0.3)
-    kept = CeicpMl(0.01, outlier_density=1e-9, count=5).weigh(_matching(distances_m))
+    kept = CeicpMl(0.01, outlier_density=1e-9, count=5).weigh(pairs_at(distances_m))
     assert kept.sigma_m == pytest.approx(0.3 / np.sqrt(3.0))
     np.testing.assert_allclose(kept.weights, 1.0 / 50.0)
 
 
-def test_em_lowers_the_cross_entropy(corner):
+def test_em_lowers_the_cross_entropy(halves):
     """Neither a new scale nor a new motion raises -sum log(sum_i N(p_j; x_i) + outlier)."""
-    rows = np.random.default_rng(3).permutation(len(corner))
-    T = rigid(rotation_exp(np.array([0.02, -0.03, 0.01])), [0.02, 0.01, -0.02])
-    source, target = corner.select(rows[:900]).transformed(inverse(T)), corner.select(rows[600:])
+    source, target, T = halves
     config = RegistrationConfig("ceicp-ml", "point")
     outlier_density = CeicpMl.starting(config, source, target).outlier_density
     T_before, entropies, sigma_m = np.eye(4), [], None
@@ -132,7 +125,7 @@ def test_kernel_correlation_is_a_gaussian_on_the_schedule_of_a(corner):
     while not method.settled:
         assert (method.sigma_m, method.gate_m) == (reference.sigma_m, reference.gate_m)
         distances_m = method.sigma_m * np.array([0.0, 1.0, 2.0, 3.5])
-        kept = method.weigh(_matching(distances_m))
+        kept = method.weigh(pairs_at(distances_m))
         expected = np.exp([0.0, -0.5, -2.0])
         np.testing.assert_allclose(kept.weights, expected / expected.sum(), rtol=1e-12)
         method, reference = method.following(kept, False), reference.following(kept, False)

@@ -20,6 +20,7 @@ from pipeline.registration.picp import Picp
 from pipeline.registration.ricp import Ricp, rigid_fits
 from pipeline.registration.trimmed import TrimmedIcp
 from pipeline.types import PointCloud
+from tests.pipeline.registration.pairs import pairs_at
 
 AWAY = rigid(rotation_exp(np.array([0.4, 1.1, -0.7])), [3.0, -2.0, 5.0])
 EVERY = [
@@ -52,12 +53,6 @@ def halves(coloured, displacement):
     """Two different random halves of the same place, displaced."""
     rows = np.random.default_rng(3).permutation(len(coloured))
     return coloured.select(rows[:900]).transformed(inverse(displacement)), coloured.select(rows[600:])
-
-
-def _matching(distances_m, target_rows=None) -> Matching:
-    rows, points = np.arange(len(distances_m)), np.zeros((len(distances_m), 3))
-    targets = rows if target_rows is None else np.asarray(target_rows)
-    return Matching(rows, targets, points, points, np.asarray(distances_m, dtype=float))
 
 
 # What every method owes.
@@ -121,6 +116,7 @@ def test_moving_both_clouds_moves_the_answer(halves, config):
     moved = register(source.transformed(AWAY), target.transformed(AWAY), config)
     expected = AWAY @ result.T_target_source @ inverse(AWAY)
     np.testing.assert_allclose(moved.T_target_source, expected, atol=1e-6)
+    assert len(moved.steps) == len(result.steps)
 
 
 @pytest.mark.parametrize("config", EVERY)
@@ -138,7 +134,7 @@ def test_every_step_keeps_pairs_with_weights_that_sum_to_one(halves, config):
 def test_trimming_keeps_the_closest_share():
     distances_m = np.array([0.5, 0.1, 0.4, 0.2, 0.3])
     for share, rows in ((0.2, [1]), (0.6, [1, 3, 4]), (0.61, [1, 2, 3, 4]), (1.0, [0, 1, 2, 3, 4])):
-        kept = TrimmedIcp(share).weigh(_matching(distances_m))
+        kept = TrimmedIcp(share).weigh(pairs_at(distances_m))
         assert kept.rows.tolist() == rows
         np.testing.assert_allclose(kept.weights, 1.0 / len(rows))
 
@@ -148,7 +144,7 @@ def test_ficp_picks_exactly_the_inliers(inliers):
     rng = np.random.default_rng(inliers)
     distances_m = rng.permutation(np.r_[np.full(inliers, 0.01), rng.uniform(0.5, 1.0, 200 - inliers)])
     assert inlier_fraction(distances_m) == pytest.approx(inliers / 200)
-    kept = Ficp().weigh(_matching(distances_m))
+    kept = Ficp().weigh(pairs_at(distances_m))
     assert kept.rows.tolist() == np.flatnonzero(distances_m == 0.01).tolist()
 
 
@@ -160,14 +156,14 @@ def test_ficp_minimises_the_fractional_rmsd():
 
 
 def test_picp_pairs_one_to_one_with_the_closest():
-    kept = Picp(0, 20).weigh(_matching([0.3, 0.1, 0.2, 0.15, 0.3], target_rows=[7, 7, 5, 5, 9]))
+    kept = Picp(0, 20).weigh(pairs_at([0.3, 0.1, 0.2, 0.15, 0.3], target_rows=[7, 7, 5, 5, 9]))
     assert kept.rows.tolist() == [1, 3, 4]
 
 
 def test_picp_rejects_before_it_pairs():
     """Median 0.10, MAD 0.01: pairs beyond 0.10 + 2.5 * 1.4826 * 0.01 = 0.137 go."""
     distances_m = [0.09, 0.09, 0.10, 0.10, 0.10, 0.11, 0.11, 0.13, 0.14]
-    assert Picp(0, 20).weigh(_matching(distances_m)).rows.tolist() == list(range(8))
+    assert Picp(0, 20).weigh(pairs_at(distances_m)).rows.tolist() == list(range(8))
 
 
 def test_picp_keeps_every_point_once_in_both_directions(halves):
@@ -307,24 +303,24 @@ def test_hicp_asks_for_colours(coloured, corner):
 
 def test_welsch_weights_follow_the_formula():
     distances_m = np.array([0.0, 0.02, 0.05, 2.0])
-    kept = FastRobustIcp(0.001, nu_m=0.02).weigh(_matching(distances_m))
+    kept = FastRobustIcp(0.001, nu_m=0.02).weigh(pairs_at(distances_m))
     expected = np.exp(-(distances_m**2) / (2.0 * 0.02**2))
     np.testing.assert_allclose(kept.weights, expected / expected.sum(), atol=1e-15)
     assert kept.energy == pytest.approx(np.mean(1.0 - expected))
-    far = FastRobustIcp(0.001, nu_m=0.001).weigh(_matching(10.0 + distances_m))
+    far = FastRobustIcp(0.001, nu_m=0.001).weigh(pairs_at(10.0 + distances_m))
     assert far.weights.tolist() == [1.0, 0.0, 0.0, 0.0]
 
 
 def test_the_welsch_scale_halves_at_rest_from_three_medians_down():
     method = FastRobustIcp(nu_min_m=0.1)
     assert not method.settled
-    kept = method.weigh(_matching([0.1, 0.2, 0.3]))
+    kept = method.weigh(pairs_at([0.1, 0.2, 0.3]))
     assert kept.sigma_m == pytest.approx(0.6)
     method = method.following(kept, still=False)
     scales_m = []
     while not method.settled:
         scales_m.append(method.nu_m)
-        kept = method.weigh(_matching([5.0, 5.0, 5.0]))
+        kept = method.weigh(pairs_at([5.0, 5.0, 5.0]))
         assert method.following(kept, still=False).nu_m == method.nu_m
         method = method.following(kept, still=True)
     np.testing.assert_allclose([*scales_m, method.nu_m], [0.6, 0.3, 0.15, 0.1])

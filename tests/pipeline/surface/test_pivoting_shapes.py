@@ -7,7 +7,7 @@ from packetmesh.errors import InputError
 from pipeline.open3d_runtime import o3d
 from pipeline.rays import triangle_areas_m2
 from pipeline.surface import boundary_loops, estimate_normals, spacing, voxel_average
-from pipeline.surface.boundary import edges_and_faces, loop_measures
+from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import Roller, iterate_roll, roll
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import perforated_plane, rectangle, sphere
@@ -68,13 +68,6 @@ def test_the_surface_of_a_cube_of_lattice_points_is_closed():
     assert len(triangles) == 6 * 25 * 2
     assert np.all(edges_and_faces(triangles)[1] == 2)
     assert triangle_areas_m2(points, triangles).sum() == pytest.approx(150.0)
-
-
-def test_a_disc_left_out_of_a_plane_is_the_only_hole():
-    cloud = perforated_plane(0.3, 0.0025, 0.08)
-    loops = boundary_loops(roll(cloud.points_m, cloud.normals, (0.0025,)).triangles)
-    assert len(loops) == 2
-    assert loop_measures(cloud.points_m, loops)[1].min() == pytest.approx(np.pi * 0.08**2, rel=0.05)
 
 
 def test_a_larger_ball_goes_on_and_closes_the_hole():
