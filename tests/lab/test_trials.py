@@ -47,8 +47,10 @@ def test_what_is_stored_is_not_computed_again(tmp_path):
 
 def test_an_interrupted_run_resumes_where_it_stopped(tmp_path):
     steps = iterate_trials("squares", Squaring(), TASKS, tmp_path, processes=1)
-    for _ in range(3):
+    for stored in range(3):
         next(steps)
+        lines = [line for path in tmp_path.iterdir() for line in path.read_text().splitlines()]
+        assert len(lines) == stored  # on disk before the next trial begins
     steps.close()
     results, fractions, done = run(tmp_path)
     assert fractions == [0.4, 0.6, 0.8, 1.0]
