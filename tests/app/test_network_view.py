@@ -6,13 +6,13 @@ import sys
 import numpy as np
 import pytest
 
-from app.screens.network.curves import polyline
+from app.drawing.curves import polyline
 from app.screens.network.draw import Flights, ground_of
 from app.screens.network.gantt import WIDTH_PX, Window, areas, cursor_html, gantt_html, paint, row_px, visible
 from app.screens.network.job import simulate_job, view_of
 from app.screens.network.labels import ACCESS, NETWORKS, SCHEMES, ways
 from app.screens.network.numbers import metric_tables, runs_summary, value_text
-from app.screens.network.view import MetricRow, NetworkRun, Series, What
+from app.screens.network.view import MetricRow, NetworkRun, What
 from network_sim.config import PRESETS, NetworkConfig, RunConfig
 from network_sim.trace import Recorder
 from network_sim.types import Cause, EventKind, PacketKind
@@ -142,18 +142,16 @@ def test_the_ground_holds_all_ranges_at_one_scale(view):
 
 def test_curves_agree_with_the_events(view):
     series = view.series
-    assert np.nansum(series["Throughput"].values) * 0.02 / 60 == pytest.approx(0.8)
-    np.testing.assert_allclose(np.nanmax(series["Delay"].values), 0.014)
-    assert sorted(series["Delivery"].values[np.isfinite(series["Delivery"].values)]) == [0.0, 100.0]
+    assert np.nansum(series["throughput"].values) * 0.02 / 60 == pytest.approx(0.8)
+    np.testing.assert_allclose(np.nanmax(series["delay"].values), 0.014)
+    assert sorted(series["delivery"].values[np.isfinite(series["delivery"].values)]) == [0.0, 100.0]
     energy = view.config.energy
     sent_s, slept_s, all_s = 0.008, 0.001, 0.04
     received_s = 0.001
     expected_j = sent_s * energy.tx_w + slept_s * energy.sleep_w + received_s * energy.rx_w
     expected_j += (all_s - sent_s - slept_s - received_s) * energy.idle_w
-    assert series["Energy"].values[-1] == pytest.approx(expected_j)
-    line = polyline(
-        np.array([0.0, 1.0, 2.0, 3.0]), Series(np.array([0.0, 1.0, 2.0]), np.array([1.0, np.nan, 3.0]))
-    )
+    assert series["energy"].values[-1] == pytest.approx(expected_j)
+    line = polyline(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 1.0, 2.0]), np.array([1.0, np.nan, 3.0]))
     np.testing.assert_array_equal(line, [1.0, 2.0, 3.0, np.nan])
 
 
