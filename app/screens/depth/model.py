@@ -9,7 +9,7 @@ import viser
 
 from app.screens.depth.labels import NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
 from app.screens.depth.view import ModelChoice, ModelView
-from app.tables import Row, number, table
+from app.tables import number, table
 from app.ui import Ui
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
@@ -162,14 +162,10 @@ class ModelFolder:
 def model_table(view: ModelView) -> str:
     """HTML: what was found when the network was tried, and what its file says."""
     rows = [
-        Row("Answers", "What its numbers mean.", (f"{view.kind} depth",)),
-        Row(
-            "Provider",
-            "The execution provider that onnxruntime really used.",
-            (view.provider,),
-        ),
-        Row("First picture", "The first takes longer.", (number(view.inference_s, 0, "ms", 1000.0),)),
-        Row("File", "Its size.", (number(view.size_bytes, 1, "MB", 1e-6),)),
+        ("Answers", "What its numbers mean.", f"{view.kind} depth"),
+        ("Provider", "The execution provider that onnxruntime really used.", view.provider),
+        ("First picture", "The first takes longer.", number(view.inference_s, 0, "ms", 1000.0)),
+        ("File", "Its size.", number(view.size_bytes, 1, "MB", 1e-6)),
     ]
-    rows += [Row(key, "From the file's own metadata.", (text,)) for key, text in view.description.items()]
+    rows += [(key, "From the file's own metadata.", text) for key, text in view.description.items()]
     return table(rows)

@@ -48,7 +48,7 @@ def metric_tables(views: Sequence[NetworkView]) -> tuple[str, str]:
 def _row(name: str, metrics: Sequence[MetricRow | None]) -> Row:
     definition = next(metric.definition for metric in metrics if metric is not None)
     title = name.replace("_", " ")
-    return Row(title[0].upper() + title[1:], f"{definition}.", tuple(map(value_text, metrics)))
+    return (title[0].upper() + title[1:], f"{definition}.", *tuple(map(value_text, metrics)))
 
 
 def value_text(metric: MetricRow | None) -> str:

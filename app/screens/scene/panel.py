@@ -13,7 +13,7 @@ from app.drawing.cameras import add_camera
 from app.drawing.clouds import add_cloud, clear
 from app.records import SceneView
 from app.state import Source, Spec, Step
-from app.tables import Row, number, table
+from app.tables import number, table
 from app.ui import Panel
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS
@@ -124,31 +124,27 @@ class ScenePanel(Panel):
             self._depth.image, self._depth.label = node.depth.rgb, node.depth.caption
             self._numbers.content = table(
                 [
-                    Row(
-                        "Points",
-                        "Depth pixels that became points.",
-                        (f"{node.sensor.total:,}",),
-                    ),
-                    Row(
+                    ("Points", "Depth pixels that became points.", f"{node.sensor.total:,}"),
+                    (
                         "Sensor coverage",
                         "Share of the pixels for which the sensor knows a depth.",
-                        (number(node.coverage, 1, "%", 100),),
+                        number(node.coverage, 1, "%", 100),
                     ),
-                    Row(
+                    (
                         "Holes",
                         "Share of the pixels without depth: shadows of the projector, dark, shiny or steep "
                         "surfaces, out of range.",
-                        (number(1 - node.coverage, 1, "%", 100),),
+                        number(1 - node.coverage, 1, "%", 100),
                     ),
-                    Row(
+                    (
                         "Depth range",
                         "2nd to 98th percentile of the known depths.",
-                        (f"{node.nearest_m:.2f} to {node.farthest_m:.2f} m",),
+                        f"{node.nearest_m:.2f} to {node.farthest_m:.2f} m",
                     ),
-                    Row(
+                    (
                         "Nodes",
                         "Camera nodes of this rig; a single RGB-D pair is a rig of one.",
-                        (str(len(view.nodes)),),
+                        str(len(view.nodes)),
                     ),
                 ]
             )
