@@ -14,7 +14,7 @@ from app.drawing.clouds import add_cloud, clear
 from app.records import SceneView
 from app.state import Source, Spec, Step
 from app.tables import number, table
-from app.ui import Panel
+from app.ui import Panel, keep_upload
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS
 
@@ -161,15 +161,8 @@ class ScenePanel(Panel):
         self.ui.post(self._keep_file, kind, event.target.value)
 
     def _keep_file(self, kind: str, file: viser.UploadedFile) -> None:
-        if len(file.content) > UPLOAD_LIMIT_BYTES:
-            raise InputError(
-                f"{file.name} has {len(file.content) >> 20} MB; the app takes up to "
-                f"{UPLOAD_LIMIT_BYTES >> 20} MB, so use packetmesh reconstruct for larger files."
-            )
-        suffix = Path(file.name).suffix.lower()[:8]
-        path = self.session.folder / f"{kind}_{len(list(self.session.folder.iterdir())):03d}{suffix}"
-        path.write_bytes(file.content)
-        self._files[kind] = path
+        instead = "use packetmesh reconstruct for larger files"
+        self._files[kind] = keep_upload(file, self.session.folder, kind, UPLOAD_LIMIT_BYTES, instead)
         missing = [name for name in ("color", "depth", "intrinsics") if name not in self._files]
         self._have.content = (
             f"Still needed: {', '.join(missing)}." if missing else "All there: press the button."
