@@ -6,9 +6,9 @@ import numpy as np
 
 from app.drawing.curves import Curves
 from app.records import RaceView
-from app.screens.fuse.clock import RaceClock
 from app.screens.fuse.draw import MARKS
 from app.screens.fuse.histogram import HistogramChart
+from app.screens.fuse.player import RaceClock
 from app.ui import Ui
 
 FIRST = f"{MARKS[0]} first"
