@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import TypeAlias
 
 _CELL = "padding: 2px 8px 2px 0; vertical-align: top;"
 _NAME = "border-bottom: 1px dotted #999; cursor: help;"
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One quantity."""
-
-    name: str
-    hint: str
-    """What it means, in a sentence."""
-    values: tuple[str, ...]
-    """With units, one for each column."""
+Row: TypeAlias = tuple[str, ...]
+"""One quantity: its name, what it means in a sentence, and its value with the unit for each column."""
 
 
 def table(rows: Sequence[Row], columns: Sequence[str] = ()) -> str:
@@ -27,14 +20,13 @@ def table(rows: Sequence[Row], columns: Sequence[str] = ()) -> str:
     if columns:
         heads = "".join(f'<th style="{_CELL} text-align: right">{html.escape(c)}</th>' for c in columns)
         lines.append(f"<tr><th></th>{heads}</tr>")
-    for row in rows:
-        hint = html.escape(row.hint, quote=True)
-        name = f'<span style="{_NAME}" title="{hint}">{html.escape(row.name)}</span>'
-        values = "".join(
+    for name, hint, *values in rows:
+        text = f'<span style="{_NAME}" title="{html.escape(hint, quote=True)}">{html.escape(name)}</span>'
+        cells = "".join(
             f'<td style="{_CELL} text-align: right; font-variant-numeric: tabular-nums">{html.escape(v)}</td>'
-            for v in row.values
+            for v in values
         )
-        lines.append(f'<tr><td style="{_CELL}">{name}</td>{values}</tr>')
+        lines.append(f'<tr><td style="{_CELL}">{text}</td>{cells}</tr>')
     return (
         '<div style="padding: 0 0.8em 0.8em 0.8em; font-size: 13px; overflow-x: auto">'
         f'<table style="border-collapse: collapse; width: 100%">{"".join(lines)}</table></div>'

@@ -15,6 +15,7 @@ import viser
 from app.debounce import Debounce
 from app.state import Results, Spec, Step
 from app.store import Store
+from packetmesh.errors import InputError
 from pipeline.config import PipelineConfig
 from pipeline.types import FloatArray
 
@@ -78,6 +79,23 @@ class Ui:
         """End all timers and threads of the screens."""
         for close in self.closers:
             close()
+
+
+def keep_upload(file: viser.UploadedFile, folder: Path, kind: str, limit_bytes: int, instead: str) -> Path:
+    """The file where an upload is kept, under a name of our own.
+
+    Raises:
+        InputError: it is larger than the limit; ``instead`` says what to do then.
+    """
+    if len(file.content) > limit_bytes:
+        raise InputError(
+            f"{file.name} has {len(file.content) >> 20} MB; the app takes up to {limit_bytes >> 20} MB, so "
+            f"{instead}."
+        )
+    suffix = Path(file.name).suffix.lower()[:8]
+    path = folder / f"{kind}_{len(list(folder.iterdir())):03d}{suffix}"
+    path.write_bytes(file.content)
+    return path
 
 
 class Workbench(Protocol):

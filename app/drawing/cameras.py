@@ -71,14 +71,11 @@ def look(clients: Iterable[viser.ClientHandle], stage: Stage, wide: bool = False
     for client in clients:
         half_angle = np.tan(0.5 * client.camera.fov) * client.camera.aspect
         fitting = 0.5 * width_m / max(half_angle * float(np.linalg.norm(back_m)), 1e-9)
-        with client.atomic():
-            client.camera.position = stage.middle_m + max(1.35 if wide else 1.0, fitting) * back_m
-            client.camera.look_at = stage.middle_m
+        turn(client, stage.middle_m, stage.middle_m + max(1.35 if wide else 1.0, fitting) * back_m)
 
 
-def look_closely(clients: Iterable[viser.ClientHandle], center_m: FloatArray, stand_m: FloatArray) -> None:
-    """Turn every browser's view to a place, standing at another."""
-    for client in clients:
-        with client.atomic():
-            client.camera.position = stand_m
-            client.camera.look_at = center_m
+def turn(client: viser.ClientHandle, center_m: FloatArray, stand_m: FloatArray) -> None:
+    """Turn a browser's view to a place, standing at another."""
+    with client.atomic():
+        client.camera.position = stand_m
+        client.camera.look_at = center_m

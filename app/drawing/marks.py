@@ -1,11 +1,18 @@
-"""Lines that mark a value on a chart."""
+"""Histograms, and lines that mark a value on them."""
 
 from __future__ import annotations
 
+import math
+
 import plotly.graph_objects as go
 
+from app.drawing.colors import NEUTRAL, css
+from pipeline.types import FloatArray, IntArray
 
-def mark(figure: go.Figure, x: float, label: str, color: str, side: str) -> None:
+
+def mark(
+    figure: go.Figure, x: float, label: str, color: str, side: str, dash: str = "solid", log: bool = False
+) -> None:
     """A line over the whole height; the labels stand above it, on sides where they do not meet.
 
     Args:
@@ -14,10 +21,13 @@ def mark(figure: go.Figure, x: float, label: str, color: str, side: str) -> None
         label: HTML.
         color: CSS.
         side: of the label that is at ``x``: left, center or right.
+        dash: of the line.
+        log: whether the axis is logarithmic.
     """
-    figure.add_shape(type="line", x0=x, x1=x, y0=0, y1=1, yref="paper", line={"color": color, "width": 1.5})
+    line = {"color": color, "width": 1.5, "dash": dash}
+    figure.add_shape(type="line", x0=x, x1=x, y0=0, y1=1, yref="paper", line=line)
     figure.add_annotation(
-        x=x,
+        x=math.log10(x) if log else x,  # unlike shapes, annotations count a logarithmic axis in exponents
         y=1.0,
         yref="paper",
         yanchor="bottom",
@@ -25,4 +35,30 @@ def mark(figure: go.Figure, x: float, label: str, color: str, side: str) -> None
         text=label,
         showarrow=False,
         font={"color": color},
+    )
+
+
+def bar_figure(x_title: str, y_title: str) -> go.Figure:
+    """An empty histogram."""
+    figure = go.Figure()
+    figure.update_layout(
+        template="plotly_white",
+        margin={"l": 62, "r": 10, "t": 24, "b": 34},
+        xaxis={"title": x_title},
+        yaxis={"title": y_title, "nticks": 4},
+        showlegend=False,
+        bargap=0,
+        font={"size": 11},
+    )
+    return figure
+
+
+def add_bars(figure: go.Figure, edges: FloatArray, counts: IntArray, unit: str, what: str) -> None:
+    """Add (B,) counts of ``what`` between (B + 1,) edges in a unit."""
+    figure.add_bar(
+        x=0.5 * (edges[1:] + edges[:-1]),
+        y=counts,
+        width=edges[1] - edges[0],
+        marker_color=css(NEUTRAL),
+        hovertemplate=f"%{{x:.1f}} {unit}: %{{y}} {what}<extra></extra>",
     )

@@ -18,10 +18,8 @@ from app.drawing.pictures import (
     difference_picture,
 )
 from app.records import ColorBar, Picture, ResidualView
-from app.screens.depth.colorbar import captions_html
-from app.screens.depth.compare import CompareArea
+from app.screens.depth.compare import CompareArea, captions_html, split
 from app.screens.depth.residuals import residual_figure
-from app.screens.depth.split import split
 from pipeline.types import DepthMap
 from tests.app.fakes import ui_of
 

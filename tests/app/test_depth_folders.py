@@ -188,7 +188,7 @@ def test_an_upload_is_kept_in_the_folder_listed_and_tried(model, tmp_path):
 
 def test_a_huge_upload_is_one_sentence_and_not_kept(model, tmp_path):
     content = type("Huge", (), {"__len__": lambda self: LIMIT_BYTES + 1})()
-    with pytest.raises(InputError, match=r"big\.onnx has 128 MB; the app takes networks up to 128 MB"):
+    with pytest.raises(InputError, match=r"big\.onnx has 128 MB; the app takes up to 128 MB"):
         model.upload("big.onnx", content)
     assert model.asked == []
     assert not list(tmp_path.iterdir())

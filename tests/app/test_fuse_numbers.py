@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from app.screens.fuse.capture_plot import capture_html, capture_sentence, cell_name
+from app.screens.fuse.capture import capture_html, capture_sentence, cell_name
 from app.screens.fuse.draw import gizmo_pose, start_of
 from app.screens.fuse.histogram import kernel, weights
 from app.screens.fuse.numbers import race_table, verdict

@@ -13,7 +13,7 @@ from app.screens.network.gantt import WIDTH_PX, Window, areas, cursor_html, gant
 from app.screens.network.job import network_job, view_of
 from app.screens.network.labels import ACCESS, NETWORKS, SCHEMES, ways
 from app.screens.network.numbers import metric_tables, runs_summary, value_text
-from app.screens.network.view import Series, What
+from app.screens.network.view import What
 from app.state import Spec
 from network_sim.config import PRESETS, NetworkConfig, RunConfig
 from network_sim.metrics import Metric
@@ -155,9 +155,7 @@ def test_curves_agree_with_the_events(view):
     expected_j = sent_s * energy.tx_w + slept_s * energy.sleep_w + received_s * energy.rx_w
     expected_j += (all_s - sent_s - slept_s - received_s) * energy.idle_w
     assert series["energy"].values[-1] == pytest.approx(expected_j)
-    line = polyline(
-        np.array([0.0, 1.0, 2.0, 3.0]), Series(np.array([0.0, 1.0, 2.0]), np.array([1.0, np.nan, 3.0]))
-    )
+    line = polyline(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 1.0, 2.0]), np.array([1.0, np.nan, 3.0]))
     np.testing.assert_array_equal(line, [1.0, 2.0, 3.0, np.nan])
 
 

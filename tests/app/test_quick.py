@@ -8,8 +8,7 @@ import pytest
 
 from app.debounce import Debounce
 from app.screens.surface import quick
-from app.screens.surface.detail import FEWEST_POINTS, LOOKS, SLOW_S, Detail
-from app.screens.surface.quick import QuickLook
+from app.screens.surface.quick import FEWEST_POINTS, LOOKS, SLOW_S, Detail, QuickLook
 from app.screens.surface.view import QUICK_POINTS, PaintedView, PaintRequest
 from tests.app.fakes import ui_of
 

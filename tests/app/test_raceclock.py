@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.screens.fuse.clock import MOST_TICKS, RaceClock
+from app.screens.fuse.player import MOST_TICKS, RaceClock
 
 
 def clock(*xs, unit=1, in_ms=False):

@@ -1,5 +1,6 @@
 """The lesson about ball radii: what a stop sets, bad settings, and whether what it says is true."""
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -147,8 +148,12 @@ def stop_named(title):
     return stop.look, " ".join(stop.text.split())
 
 
-def percent(share):
-    return f"{100.0 * share:.0f} %"
+def about(text, pattern, shares, points=2.0):
+    """Whether the percentages that the text names are those shares, within some points."""
+    found = re.search(pattern, text)
+    assert found is not None, pattern
+    named = [float(number) for number in found.groups()]
+    return np.allclose(named, 100.0 * np.array(shares), atol=points, rtol=0.0)
 
 
 def missed(surface):
@@ -160,75 +165,75 @@ def unused(surface, cloud):
 
 
 def test_too_small_a_ball_uses_fewer_than_one_point_in_ten(room):
-    look, text = stop_named("Too small a ball")
+    look, _ = stop_named("Too small a ball")
     assert unused(room.roll(look, room.fused), room.fused) > 0.9
-    assert "**fewer than one point in ten**" in text
-    assert f"already need {1.0 / np.sqrt(3.0):.2f} r_F" in text
-    assert f"ball is {2.0 * look.radius_in_r_F:.1f} r_F wide" in text
+    assert look.radius_in_r_F > 1.0 / np.sqrt(3.0)  # wide enough for three points that are r_F apart
 
 
 def test_r_F_uses_half_of_the_points_and_covers_a_tenth_and_the_thesis_closes_the_rest(room):
-    look, text = stop_named("A ball of r_F")
+    look, _ = stop_named("A ball of r_F")
     least = room.roll(look, room.fused)
-    assert 0.4 < unused(least, room.fused) < 0.5
+    assert unused(least, room.fused) < 0.5
     assert 0.85 < missed(least) < 0.9
-    assert "More than half of the points" in text
-    assert "**nearly nine in ten**" in text
     look, text = stop_named("The thesis's radii")
     thesis = room.roll(look, room.fused)
     largest_m = room.r_F_m + room.sigma_D_m
     alone = reconstruct_surface(room.fused, (largest_m,), room.cameras)
-    assert f"from {percent(missed(least))} to **{percent(missed(thesis))}**" in text
-    assert f"{1000 * largest_m:.0f} mm here" in text
-    assert f"alone it leaves {percent(missed(alone))}" in text
+    assert about(text, r"from (\d+) % to \*\*(\d+) %", (missed(least), missed(thesis)))
+    assert about(text, r"(\d+) mm here", (10.0 * largest_m,))
+    assert about(text, r"alone it leaves (\d+) %", (missed(alone),))
+    assert abs(missed(alone) - missed(thesis)) < 0.1 * (missed(least) - missed(thesis))
 
 
 def test_too_large_a_ball_loses_rays_points_and_truth(room, four_balls):
     look, text = stop_named("Too large a ball")
     large = room.roll(look, room.fused)
-    assert f"leave {percent(missed(four_balls))} of the rays without surface" in text
-    assert f"this one {percent(missed(large))}" in text
-    assert 0.38 < unused(large, room.fused) < 0.42
-    assert "two in five points stay unused" in text
+    assert missed(large) > 1.3 * missed(four_balls)
+    assert about(
+        text,
+        r"leave (\d+) % of the rays without surface, this one (\d+) %",
+        (missed(four_balls), missed(large)),
+    )
+    assert 0.35 < unused(large, room.fused) < 0.45
     score, best = (room.truth(surface)["f_score_5cm"] for surface in (large, four_balls))
-    assert f"*F-score* is {percent(score)} instead of {percent(best)}" in text
+    assert score < best - 0.05
+    assert about(text, r"\*F-score\* is (\d+) % instead of (\d+) %", (score, best))
     radius_m = look.radius_in_r_F * room.r_F_m
-    assert f"rests {100 * radius_m:.0f} cm away" in text
-    assert f"cuts off up to {100 * radius_m / np.sqrt(2.0):.0f} cm" in text
+    assert about(text, r"rests (\d+) cm away", (radius_m,), 1.0)
+    assert about(text, r"cuts off up to (\d+) cm", (radius_m / np.sqrt(2.0),), 1.0)
 
 
 def test_one_ball_after_the_other_leaves_fewer_points_than_the_largest_alone(room, four_balls):
     text = stop_named("One ball after the other")[1]
     largest_m = four_balls.radii_m[-1]
     alone = reconstruct_surface(room.fused, (largest_m,), room.cameras)
-    assert percent(missed(alone)) == percent(missed(four_balls))
-    assert f"Drag the radius to {1000 * largest_m:.0f} mm" in text
-    assert f"As few rays miss, {percent(missed(alone))}" in text
-    assert f"leaves {percent(unused(alone, room.fused))} of the points unused" in text
-    assert f"the four together leave {percent(unused(four_balls, room.fused))}" in text
+    assert abs(missed(alone) - missed(four_balls)) < 0.01
+    assert unused(alone, room.fused) > 2.0 * unused(four_balls, room.fused)
+    assert about(text, r"Drag the radius to (\d+) mm", (10.0 * largest_m,))
+    assert about(text, r"As few rays miss, (\d+) %", (missed(alone),))
+    shares = (unused(alone, room.fused), unused(four_balls, room.fused))
+    assert about(text, r"leaves (\d+) % of the points unused; the four together leave (\d+) %", shares)
 
 
 def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, four_balls):
     look, text = stop_named("Why holes stay: noise")
     noisy = clouds(room.rig, room.nodes, room.poses, look.smoothing_passes)
     torn = noisy.roll(look, noisy.fused)
-    assert 1.4 < missed(torn) / missed(four_balls) < 1.65
-    assert f"**Half as many rays again miss** ({percent(missed(torn))})" in text
-    assert 1.9 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 2.3
+    assert 1.3 < missed(torn) / missed(four_balls) < 1.7
+    assert 1.7 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 2.7
     old_normals = room.roll(look, replace(room.fused, normals=noisy.fused.normals))
     new_normals = noisy.roll(look, replace(noisy.fused, normals=room.fused.normals))
-    assert f"old normals close as well ({percent(missed(old_normals))})" in text
-    assert f"smoothed normals do not ({percent(missed(new_normals))})" in text
+    assert missed(old_normals) <= missed(four_balls) < missed(torn) <= missed(new_normals)
+    pattern = r"old normals close as well \((\d+) %\); noisy points with smoothed normals do not \((\d+) %\)"
+    assert about(text, pattern, (missed(old_normals), missed(new_normals)))
 
 
 def test_no_ball_closes_before_fusion_what_the_sensor_did_not_see(room, four_balls):
     look, text = stop_named("Which holes no ball can close")
     assert look.shown == BOTH
     before = room.roll(look, room.sensor)
-    sentence = (
-        f"left **{percent(missed(before))}** of the rays miss, on the right **{percent(missed(four_balls))}**"
-    )
-    assert sentence in text
+    pattern = r"left \*\*(\d+) %\*\* of the rays miss, on the right \*\*(\d+) %"
+    assert about(text, pattern, (missed(before), missed(four_balls)))
     views = [
         View(camera, frame.depth.valid, node.alignment.depth.valid)
         for camera, frame, node in zip(room.cameras, room.rig.frames, room.nodes, strict=True)
@@ -237,7 +242,8 @@ def test_no_ball_closes_before_fusion_what_the_sensor_did_not_see(room, four_bal
     assert 0.75 < (parts.missed_inferred + parts.missed_unknown) / missed(before) < 0.85
     singles = (SurfaceLook(rule="manual", radius_in_r_F=factor) for factor in (2.0, 4.0, 6.0, 8.0))
     best = min(missed(room.roll(single, room.sensor)) for single in singles)
-    assert f"even the best radius leaves {percent(best)}" in text
+    assert best > 2.0 * missed(four_balls)
+    assert about(text, r"even the best radius leaves (\d+) %", (best,))
 
 
 def test_what_is_guessed_is_a_quarter_and_three_tenths_of_it_is_off(room, four_balls):
@@ -246,15 +252,16 @@ def test_what_is_guessed_is_a_quarter_and_three_tenths_of_it_is_off(room, four_b
     a, b, c = four_balls.vertices_m[four_balls.triangles].swapaxes(0, 1)
     area_m2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     share = area_m2[guessed[four_balls.triangles].any(axis=1)].sum() / area_m2.sum()
-    assert 0.22 < guessed.mean() < 0.28
-    assert 0.36 < share < 0.4
+    assert 0.2 < guessed.mean() < 0.3
+    assert 0.33 < share < 0.43
     near = distances_to_truth_m(four_balls.vertices_m, room.rig.truth, room.cameras) <= 0.05
     assert near[~guessed].mean() > 0.999
-    assert 0.67 < near[guessed].mean() < 0.73
+    assert 0.65 < near[guessed].mean() < 0.75
     before, after = (
         room.truth(surface)["f_score_5cm"] for surface in (room.roll(SurfaceLook(), room.sensor), four_balls)
     )
-    assert f"F-score falls from {percent(before)} to {percent(after)}" in text
+    assert after < before
+    assert about(text, r"F-score falls from (\d+) % to (\d+) %", (before, after))
 
 
 def test_poisson_closes_nearly_everything_and_is_no_better(room, four_balls):
@@ -263,5 +270,7 @@ def test_poisson_closes_nearly_everything_and_is_no_better(room, four_balls):
     poisson = poisson_surface(room.fused, room.r_F_m)
     assert no_hit_ray_share(poisson.vertices_m, poisson.triangles, room.cameras) < 0.002
     theirs, ours = room.truth(poisson), room.truth(four_balls)
-    assert f"F-score is {percent(theirs['f_score_5cm'])}, the ball's {percent(ours['f_score_5cm'])}" in text
+    assert theirs["f_score_5cm"] < ours["f_score_5cm"]
+    scores = (theirs["f_score_5cm"], ours["f_score_5cm"])
+    assert about(text, r"F-score is (\d+) %, the ball's (\d+) %", scores)
     assert theirs["accuracy_1cm"] < ours["accuracy_1cm"] - 0.03

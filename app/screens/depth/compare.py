@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from app.records import Picture
-from app.screens.depth.colorbar import captions_html
-from app.screens.depth.split import split
+from app.drawing.colors import css
+from app.records import ColorBar, Picture
 from app.ui import Ui
+from pipeline.types import ByteArray
 
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
+LINE_PX = 3
+_ROW = "display: flex; justify-content: space-between"
 QUALITY = 92
 """Of JPEG, which takes a tenth of PNG's time and a sixth of its bytes: the slider is dragged."""
 
@@ -92,3 +95,45 @@ class CompareArea:
             self._captions.content = captions_html(left, right)
         self._drawn = wanted
         self._image.image = split(left.rgb, right.rgb, wanted[2] / 100.0)
+
+
+def split(left: ByteArray, right: ByteArray, share: float) -> ByteArray:
+    """One picture left of the line, the other right of it.
+
+    Args:
+        left: (H, W, 3) RGB.
+        right: (H, W, 3) RGB.
+        share: of the width that shows ``left``, 0 to 1; at both ends there is no line.
+
+    Returns:
+        (H, W, 3), with a white line edged in black.
+    """
+    width = left.shape[1]
+    column = round(share * width)
+    rgb = right.copy()
+    rgb[:, :column] = left[:, :column]
+    if 0 < column < width:
+        start = min(max(0, column - 1), max(0, width - LINE_PX))
+        rgb[:, start : start + LINE_PX] = 0
+        rgb[:, column : column + 1] = 255
+    return rgb
+
+
+def captions_html(left: Picture, right: Picture) -> str:
+    """Two columns under the picture: the caption and the colour bar of either side."""
+    columns = "".join(
+        f'<div style="flex: 1; min-width: 0"><b>{side}</b> {html.escape(picture.caption)}.'
+        f"{'' if picture.bar is None else bar_html(picture.bar)}</div>"
+        for side, picture in (("Left:", left), ("Right:", right))
+    )
+    return f'<div style="display: flex; gap: 1em; padding: 0 0.8em 0.8em; font-size: 12px">{columns}</div>'
+
+
+def bar_html(bar: ColorBar) -> str:
+    """The colours from left to right over their labels."""
+    stops = ", ".join(css(stop) for stop in bar.stops)
+    labels = "".join(f"<span>{html.escape(label)}</span>" for label in bar.labels)
+    return (
+        f'<div style="height: 0.7em; background: linear-gradient(to right, {stops}); border-radius: 2px; '
+        f'margin-top: 0.3em"></div><div style="{_ROW}">{labels}</div>'
+    )

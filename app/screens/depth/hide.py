@@ -12,7 +12,7 @@ from app.screens.depth.brush import BrushDrawing, clicked_disc
 from app.screens.depth.compare import CompareArea
 from app.screens.depth.labels import FILLS
 from app.screens.depth.view import Disc, HiddenView, HideRequest, SeenSample
-from app.tables import Row, number, table
+from app.tables import number, table
 from app.ui import Ui
 from pipeline.types import FloatArray
 
@@ -161,15 +161,13 @@ def fills_table(view: HiddenView) -> str:
         "share of all hidden pixels. Filled: share that got a depth at all. Time without the network's own."
     )
     rows = [
-        Row(
+        (
             FILLS[row.name],
             hint,
-            (
-                number(row.abs_rel, 3),
-                number(row.within_share, 0, "%", 100.0),
-                number(row.filled_share, 0, "%", 100.0),
-                number(row.elapsed_s, 0, "ms", 1000.0),
-            ),
+            number(row.abs_rel, 3),
+            number(row.within_share, 0, "%", 100.0),
+            number(row.filled_share, 0, "%", 100.0),
+            number(row.elapsed_s, 0, "ms", 1000.0),
         )
         for row in view.rows
     ]

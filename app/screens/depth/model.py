@@ -9,9 +9,8 @@ import viser
 
 from app.screens.depth.labels import NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
 from app.screens.depth.view import ModelChoice, ModelView
-from app.tables import Row, number, table
-from app.ui import Ui
-from packetmesh.errors import InputError
+from app.tables import number, table
+from app.ui import Ui, keep_upload
 from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
 
 SHIPPED, AS_IT_SAYS = "the network that ships", "as the file says"
@@ -140,13 +139,8 @@ class ModelFolder:
         )
 
     def _keep(self, file: viser.UploadedFile) -> None:
-        if len(file.content) > LIMIT_BYTES:
-            raise InputError(
-                f"{file.name} has {len(file.content) >> 20} MB; the app takes networks up to "
-                f"{LIMIT_BYTES >> 20} MB, so name larger ones with depth.model on the command line."
-            )
-        path = self._folder / f"network_{len(list(self._folder.iterdir())):03d}.onnx"
-        path.write_bytes(file.content)
+        instead = "name larger networks with depth.model on the command line"
+        path = keep_upload(file, self._folder, "network", LIMIT_BYTES, instead)
         self._model.value = self._add(Path(file.name).name, str(path))
         self._picked()
 
@@ -162,14 +156,10 @@ class ModelFolder:
 def model_table(view: ModelView) -> str:
     """HTML: what was found when the network was tried, and what its file says."""
     rows = [
-        Row("Answers", "What its numbers mean.", (f"{view.kind} depth",)),
-        Row(
-            "Provider",
-            "The execution provider that onnxruntime really used.",
-            (view.provider,),
-        ),
-        Row("First picture", "The first takes longer.", (number(view.inference_s, 0, "ms", 1000.0),)),
-        Row("File", "Its size.", (number(view.size_bytes, 1, "MB", 1e-6),)),
+        ("Answers", "What its numbers mean.", f"{view.kind} depth"),
+        ("Provider", "The execution provider that onnxruntime really used.", view.provider),
+        ("First picture", "The first takes longer.", number(view.inference_s, 0, "ms", 1000.0)),
+        ("File", "Its size.", number(view.size_bytes, 1, "MB", 1e-6)),
     ]
-    rows += [Row(key, "From the file's own metadata.", (text,)) for key, text in view.description.items()]
+    rows += [(key, "From the file's own metadata.", text) for key, text in view.description.items()]
     return table(rows)

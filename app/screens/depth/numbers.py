@@ -32,26 +32,26 @@ def residual_table(node: DepthNode) -> str:
     """HTML: what was fitted, and what it leaves."""
     return table(
         [
-            Row(
+            (
                 "Fitted line",
                 "z is the network's depth, z′ the aligned one; C is a smooth correction, different for every "
                 "pixel, that only the local mode has.",
-                (fitted_line(node),),
+                fitted_line(node),
             ),
-            Row(
+            (
                 "Median",
                 "Half of the pixels have a larger aligned minus sensor depth; far from 0 is a bias.",
-                (number(node.residuals.median_m, 2, "cm", 100),),
+                number(node.residuals.median_m, 2, "cm", 100),
             ),
-            Row(
+            (
                 "RMS",
                 "Root mean square of aligned minus sensor depth where both are known.",
-                (number(node.residuals.rms_m, 1, "cm", 100),),
+                number(node.residuals.rms_m, 1, "cm", 100),
             ),
-            Row(
+            (
                 "Pixels compared",
                 "Those with sensor depth and inferred depth.",
-                (f"{int(node.residuals.counts.sum()):,}",),
+                f"{int(node.residuals.counts.sum()):,}",
             ),
         ]
     )
@@ -62,20 +62,20 @@ def confidence_table(node: DepthNode) -> str:
     judged = node.judged
     return table(
         [
-            Row(
+            (
                 "Let in",
                 "Share of the inferred pixels without sensor depth that fusion may use.",
-                (number(judged.kept_share, 1, "%", 100),),
+                number(judged.kept_share, 1, "%", 100),
             ),
-            Row(
+            (
                 "Flying",
                 "Share of them that hang between two surfaces at a depth step; they are left out.",
-                (number(judged.flying_share, 1, "%", 100),),
+                number(judged.flying_share, 1, "%", 100),
             ),
-            Row(
+            (
                 "Out of reach",
                 "Share of them that are farther from any measured pixel than the reach; left out, too.",
-                (number(judged.out_of_reach_share, 1, "%", 100),),
+                number(judged.out_of_reach_share, 1, "%", 100),
             ),
         ]
     )
@@ -84,30 +84,26 @@ def confidence_table(node: DepthNode) -> str:
 def _network_rows(node: DepthNode) -> list[Row]:
     duration = "remembered" if node.inference_s is None else number(node.inference_s, 0, "ms", 1000)
     return [
-        Row(
+        (
             "Network ran on",
             "The execution provider that onnxruntime really used, and its time.",
-            (f"{node.provider}, {duration}",),
+            f"{node.provider}, {duration}",
         ),
-        Row(
-            "Alignment",
-            "How inferred depth was made metric.",
-            (node.alignment_mode,),
-        ),
-        Row(
+        ("Alignment", "How inferred depth was made metric.", node.alignment_mode),
+        (
             "Residual",
             "RMS difference of aligned and sensed depth where both are known.",
-            (number(node.residuals.rms_m, 1, "cm", 100),),
+            number(node.residuals.rms_m, 1, "cm", 100),
         ),
-        Row(
+        (
             "Inliers",
             "Share of those pixels whose aligned depth is within 5 % of the sensor's.",
-            (number(node.inlier_share, 0, "%", 100),),
+            number(node.inlier_share, 0, "%", 100),
         ),
-        Row(
+        (
             "Error in holes",
             "Median error of the inferred depth where the sensor is blind, against the truth.",
-            (number(node.truth_error_m, 1, "cm", 100),),
+            number(node.truth_error_m, 1, "cm", 100),
         ),
     ]
 
@@ -116,7 +112,7 @@ def _point_rows(node: DepthNode) -> list[Row]:
     kept, rejected = node.sensor.total, node.outliers.total
     share = rejected / max(1, kept + rejected)
     return [
-        Row("Outliers", "Sensor points that the filter rejects.", (f"{rejected:,} ({share:.1%})",)),
-        Row("Sensor points", "Points that pass the filter.", (f"{kept:,}",)),
-        Row("Filled points", "Inferred points that fusion adds.", (f"{node.filled.total:,}",)),
+        ("Outliers", "Sensor points that the filter rejects.", f"{rejected:,} ({share:.1%})"),
+        ("Sensor points", "Points that pass the filter.", f"{kept:,}"),
+        ("Filled points", "Inferred points that fusion adds.", f"{node.filled.total:,}"),
     ]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from app.drawing.curves import Curves
-from app.screens.fuse.clock import RaceClock
 from app.screens.fuse.draw import MARKS
 from app.screens.fuse.histogram import HistogramChart
+from app.screens.fuse.player import RaceClock
 from app.screens.fuse.view import RaceView
 from app.ui import Ui
 

@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from viser import transforms
 
-from app.drawing.cameras import Stage
+from app.drawing.cameras import Stage, turn
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import SOURCE, TARGET
 from app.drawing.poses import move, place
@@ -21,8 +21,8 @@ FAINT, STRONG = np.array([235.0, 235.0, 235.0]), np.array([20.0, 20.0, 20.0])
 POINT_M = 0.009
 GAP = 1.05
 """Distance of two lanes in widths, or heights, of the scene."""
-AWAY = {1: 1.0, 2: 1.35, 3: 2.3, 4: 2.3}
-"""How far the viewer stands, in distances for one lane."""
+AWAY = 2.3
+"""How far the viewer of two rows of lanes stands, in distances for one lane."""
 MARKS = "①②③④"
 
 
@@ -100,12 +100,10 @@ def start_of(pose: FloatArray, center_m: FloatArray) -> Start:
     return Start(tuple(turn_deg), tuple((100.0 * (pose[:3, 3] - center_m)).round(2).tolist()))
 
 
-def look_at_lanes(clients: Iterable[viser.ClientHandle], stage: Stage, lanes: int) -> None:
-    """Step back until every lane is in the picture."""
+def look_at_rows(clients: Iterable[viser.ClientHandle], stage: Stage) -> None:
+    """Step back until both rows of lanes are in the picture."""
     for client in clients:
-        with client.atomic():
-            client.camera.position = stage.middle_m + AWAY[lanes] * (stage.viewpoint_m - stage.middle_m)
-            client.camera.look_at = stage.middle_m
+        turn(client, stage.middle_m, stage.middle_m + AWAY * (stage.viewpoint_m - stage.middle_m))
 
 
 def _offsets_m(view: RaceView, stage: Stage) -> list[FloatArray]:

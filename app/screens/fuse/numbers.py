@@ -51,7 +51,7 @@ def race_table(lanes: tuple[RaceLane, ...]) -> str:
     """A column for each lane; every row's name explains itself."""
 
     def row(name: str, hint: str, value: Callable[[RaceLane], str]) -> Row:
-        return Row(name, hint, tuple(value(lane) for lane in lanes))
+        return (name, hint, *(value(lane) for lane in lanes))
 
     rows = [
         row("Iterations", "Matchings and pose updates until it stopped.", lambda x: str(x.iterations)),
@@ -113,15 +113,13 @@ def places_table(view: FuseView) -> str:
 
 
 def _place_row(row: RegistrationRow) -> Row:
-    return Row(
+    return (
         f"{row.source} → {row.target}",
         f"{row.method.upper()}: {row.stop_reason}. Errors: RMS distance of the points from the truth. "
         f"{_loop(row)}",
-        (
-            str(row.iterations),
-            number(row.error_before_m, 1, "cm", 100),
-            number(row.error_after_m, 2, "cm", 100),
-        ),
+        str(row.iterations),
+        number(row.error_before_m, 1, "cm", 100),
+        number(row.error_after_m, 2, "cm", 100),
     )
 
 

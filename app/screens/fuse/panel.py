@@ -7,6 +7,8 @@ from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any, ClassVar, TypeAlias, get_args
 
+import viser
+
 from app.controls import Choice, Controls
 from app.drawing.cameras import Stage, stage_of
 from app.drawing.clouds import add_cloud, clear
@@ -15,7 +17,7 @@ from app.lesson import LessonFolder, read_lesson
 from app.records import DepthView
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
-from app.screens.fuse.draw import RaceDrawing, gizmo_pose, look_at_lanes
+from app.screens.fuse.draw import RaceDrawing, gizmo_pose, look_at_rows
 from app.screens.fuse.labels import MODES
 from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.numbers import places_table, race_table, verdict
@@ -73,6 +75,7 @@ class FusePanel(Panel):
         self._gizmo: Any = None
         self._seek_at: int | None = 0
         self._lanes = 0
+        self._placed: list[viser.PointCloudHandle] = []
         gui.add_markdown(TEXT)
         self._single = gui.add_markdown(SINGLE, visible=False)
         self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, RaceLook()), self._take_stop)
@@ -131,8 +134,8 @@ class FusePanel(Panel):
 
     def on_show(self) -> None:
         """Race at the latest when somebody looks."""
+        self._lanes = 0
         self._start()
-        self.ui.post(self._stand_back, True)
 
     # What races.
 
@@ -153,7 +156,6 @@ class FusePanel(Panel):
             self._setup.choose_mode(RACES[self._shown.value])
             self._start()
         self._arrange()
-        self._stand_back()
 
     def _take_stop(self, stop: RaceLook) -> None:
         """Set the controls as a stop of the lesson says, and race."""
@@ -222,7 +224,6 @@ class FusePanel(Panel):
             self._player.seek_at(self._seek_at)
             self._seek_at = 0
             self._arrange()
-        self._stand_back()
 
     def _clocked(self) -> None:
         if self._view is not None and self._player.clock is not None:
@@ -280,14 +281,13 @@ class FusePanel(Panel):
     def _stage(self) -> Stage:
         return stage_of(self.session.results.view("scene").nodes)
 
-    def _stand_back(self, anew: bool = False) -> None:
+    def look(self) -> bool:
         """Have more than two lanes in the picture; the session sees to one or two."""
-        if not self.ui.shows(self.drawn_below):
-            return
         lanes = len(self._view.lanes) if self._view is not None and self._shown.value in RACES else 1
-        if (anew or lanes != self._lanes) and max(lanes, self._lanes) > 2:
-            look_at_lanes(self.session.clients(), self._stage(), lanes)
+        if lanes > 2 and self._lanes <= 2:
+            look_at_rows(self.session.clients(), self._stage())
         self._lanes = lanes
+        return lanes > 2
 
     def _draw_result(self, view: FuseView) -> None:
         depth: DepthView | None = self.session.results.view("depth")
@@ -310,9 +310,9 @@ class FusePanel(Panel):
                 frame.visible = visible
         self.session.frame_view()
         view: FuseView | None = self.session.results.view("fuse")
-        if view is not None and hasattr(self, "_placed"):
+        if view is not None:
             poses = view.believed if self._shown.value == BEFORE else view.registered
-            for handle, T in zip(self._placed, poses, strict=True):
+            for handle, T in zip(self._placed, poses, strict=False):
                 move(handle, T)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
+from app.drawing.cameras import turn
 from app.drawing.clouds import clear
 from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, NEUTRAL
 from app.screens.network.labels import ANSWER, PACKET_COLORS
@@ -87,9 +88,8 @@ def look_at_ground(clients: Iterable[viser.ClientHandle], ground: Ground) -> Non
         across = 0.5 * width / max(slope * client.camera.aspect, 1e-9)
         along = 0.5 * ground.depth * np.sin(ELEVATION_RAD) / max(slope, 1e-9)
         distance = 1.08 * max(across, along) + 0.5 * ground.depth * np.cos(ELEVATION_RAD)
-        with client.atomic():
-            client.camera.position = distance * np.array([0.0, -np.cos(ELEVATION_RAD), np.sin(ELEVATION_RAD)])
-            client.camera.look_at = np.zeros(3)
+        stand = distance * np.array([0.0, -np.cos(ELEVATION_RAD), np.sin(ELEVATION_RAD)])
+        turn(client, np.zeros(3), stand)
 
 
 class NetworkDrawing:

@@ -49,9 +49,7 @@ def metric_tables(views: Sequence[NetworkView]) -> tuple[str, str]:
 def _row(name: str, metrics: Sequence[Metric | None]) -> Row:
     definition = next(metric.definition for metric in metrics if metric is not None)
     title = name.replace("_", " ")
-    return Row(
-        title[0].upper() + title[1:], f"{definition}.", tuple(value_text(name, metric) for metric in metrics)
-    )
+    return (title[0].upper() + title[1:], f"{definition}.", *(value_text(name, metric) for metric in metrics))
 
 
 def value_text(name: str, metric: Metric | None) -> str:

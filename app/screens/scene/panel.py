@@ -13,8 +13,8 @@ from app.drawing.cameras import add_camera
 from app.drawing.clouds import add_cloud, clear
 from app.records import SceneView
 from app.state import Spec, Step
-from app.tables import Row, number, table
-from app.ui import Panel
+from app.tables import number, table
+from app.ui import Panel, keep_upload
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS
 from pipeline.io.demos import DEMO_SCENES
@@ -121,31 +121,27 @@ class ScenePanel(Panel):
             self._depth.image, self._depth.label = node.depth.rgb, node.depth.caption
             self._numbers.content = table(
                 [
-                    Row(
-                        "Points",
-                        "Depth pixels that became points.",
-                        (f"{node.sensor.total:,}",),
-                    ),
-                    Row(
+                    ("Points", "Depth pixels that became points.", f"{node.sensor.total:,}"),
+                    (
                         "Sensor coverage",
                         "Share of the pixels for which the sensor knows a depth.",
-                        (number(node.coverage, 1, "%", 100),),
+                        number(node.coverage, 1, "%", 100),
                     ),
-                    Row(
+                    (
                         "Holes",
                         "Share of the pixels without depth: shadows of the projector, dark, shiny or steep "
                         "surfaces, out of range.",
-                        (number(1 - node.coverage, 1, "%", 100),),
+                        number(1 - node.coverage, 1, "%", 100),
                     ),
-                    Row(
+                    (
                         "Depth range",
                         "2nd to 98th percentile of the known depths.",
-                        (f"{node.nearest_m:.2f} to {node.farthest_m:.2f} m",),
+                        f"{node.nearest_m:.2f} to {node.farthest_m:.2f} m",
                     ),
-                    Row(
+                    (
                         "Nodes",
                         "Camera nodes of this rig; a single RGB-D pair is a rig of one.",
-                        (str(len(view.nodes)),),
+                        str(len(view.nodes)),
                     ),
                 ]
             )
@@ -162,15 +158,8 @@ class ScenePanel(Panel):
         self.ui.post(self._keep_file, kind, event.target.value)
 
     def _keep_file(self, kind: str, file: viser.UploadedFile) -> None:
-        if len(file.content) > UPLOAD_LIMIT_BYTES:
-            raise InputError(
-                f"{file.name} has {len(file.content) >> 20} MB; the app takes up to "
-                f"{UPLOAD_LIMIT_BYTES >> 20} MB, so use packetmesh reconstruct for larger files."
-            )
-        suffix = Path(file.name).suffix.lower()[:8]
-        path = self.session.folder / f"{kind}_{len(list(self.session.folder.iterdir())):03d}{suffix}"
-        path.write_bytes(file.content)
-        self._files[kind] = path
+        instead = "use packetmesh reconstruct for larger files"
+        self._files[kind] = keep_upload(file, self.session.folder, kind, UPLOAD_LIMIT_BYTES, instead)
         missing = [name for name in ("color", "depth", "intrinsics") if name not in self._files]
         self._have.content = (
             f"Still needed: {', '.join(missing)}." if missing else "All there: press the button."

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from app.screens.surface.sweep_plot import BELOW, sweep_figure, sweep_sentence
 from app.screens.surface.view import SuggestionRow, SweepView
-from app.tables import Row, number, table
+from app.tables import number, table
 from app.ui import Ui
 
 TEXT = """A ball bridges the triangles around a point if it is as wide as the largest of their circumcircles.
@@ -109,11 +109,7 @@ def suggestions_html(rows: tuple[SuggestionRow, ...]) -> str:
         return f"<div style='padding: 0 0.8em; font-size: 13px'>{NO_ADVICE}</div>"
     return table(
         [
-            Row(
-                row.name,
-                row.sentence,
-                (number(row.radius_m, 1, "mm", 1000.0), number(row.share, 0, "%", 100.0)),
-            )
+            (row.name, row.sentence, number(row.radius_m, 1, "mm", 1000.0), number(row.share, 0, "%", 100.0))
             for row in rows
         ],
         ("radius", "closes"),

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.screens.surface.draw_holes import HoleDrawing, picked_hole
 from app.screens.surface.view import ExplainView, FilledView, HoleView, PartsView, Which
-from app.tables import Row, number, table
+from app.tables import number, table
 from app.ui import Ui
 from pipeline.types import FloatArray
 
@@ -236,7 +236,7 @@ def reason_text(answer: ExplainView) -> str:
 def shares_table(answer: ExplainView) -> str:
     """HTML: who has a depth for the pixels that look into the hole; empty if no camera does."""
     rows = [
-        Row(name, hint, (number(share, 0, "%", 100.0),))
+        (name, hint, number(share, 0, "%", 100.0))
         for name, hint, share in (
             (
                 "Sensor measured",

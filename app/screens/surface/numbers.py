@@ -15,7 +15,7 @@ def quality_table(view: SurfaceView, baselines: Mapping[str, MeshView], has_trut
     columns: dict[str, MeshView | None] = {"before": view.before, "after fusion": view.after, **baselines}
 
     def row(name: str, hint: str, value: Callable[[MeshView], str]) -> Row:
-        return Row(name, hint, tuple("…" if mesh is None else value(mesh) for mesh in columns.values()))
+        return (name, hint, *("…" if mesh is None else value(mesh) for mesh in columns.values()))
 
     rows = [
         row(

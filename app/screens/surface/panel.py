@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from app.controls import Controls
-from app.drawing.cameras import look_closely, stage_of
+from app.drawing.cameras import stage_of, turn
 from app.lesson import LessonFolder, read_lesson
 from app.records import MeshView, SceneView
 from app.screens.surface.advice import AdviceFolder
@@ -345,7 +345,8 @@ class SurfacePanel(Panel):
         self._rolling.load(view)
         self._arrange()
         if self._rolling.focus is not None:
-            look_closely(self.session.clients(), *self._rolling.focus)
+            for client in self.session.clients():
+                turn(client, *self._rolling.focus)
         else:
             self.session.frame_view(anew=True)
 

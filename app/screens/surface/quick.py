@@ -7,12 +7,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from app.acknowledgement import DrawAcknowledgement
-from app.screens.surface.detail import Detail
-from app.screens.surface.view import PaintedView, PaintRequest
+from app.screens.surface.view import QUICK_POINTS, PaintedView, PaintRequest
 from app.ui import Workbench
 
 QUIET_S = 0.4
 """When the radius has not moved for so long, it rests."""
+
+FEWEST_POINTS = QUICK_POINTS // 4
+SLOW_S, FAST_S = 0.25, 0.11
+"""A look that takes longer than the one is halved; shorter than the other, doubled. As half the points take
+about half the time, the two must differ by more than a factor of two, or the detail would swing."""
+LOOKS = 2
+"""So many in a row must agree, as one may be late by chance."""
 
 
 class QuickLook:
@@ -84,3 +90,22 @@ class QuickLook:
     def _rest(self) -> None:
         self._next = None
         self._on_rest()
+
+
+class Detail:
+    """The number of points, which follows what a browser manages."""
+
+    def __init__(self) -> None:
+        self.points = QUICK_POINTS
+        self._times_s: list[float] = []
+
+    def took(self, seconds: float) -> None:
+        """A look at so many points was rolled, sent and drawn in this time."""
+        self._times_s.append(seconds)
+        if len(self._times_s) < LOOKS:
+            return
+        if min(self._times_s) > SLOW_S:
+            self.points = max(self.points // 2, FEWEST_POINTS)
+        elif max(self._times_s) < FAST_S:
+            self.points = min(self.points * 2, QUICK_POINTS)
+        self._times_s.clear()

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import plotly.graph_objects as go
 
-from app.drawing.colors import BRAND, DELIVERED, INFERRED, LOSS, NEUTRAL, SOURCE, css
-from app.drawing.marks import mark
+from app.drawing.colors import BRAND, DELIVERED, INFERRED, LOSS, SOURCE, css
+from app.drawing.marks import add_bars, bar_figure, mark
 from app.screens.surface.view import SpacingView
 
 THESIS = {"r<sub>F</sub>": 0.0, "r<sub>F</sub>+¼σ": 0.25, "r<sub>F</sub>+½σ": 0.5, "r<sub>F</sub>+σ": 1.0}
@@ -30,27 +30,14 @@ def spacing_figure(
         radii_m: balls in use.
         suggested_m: balls that the points suggest.
     """
-    figure = go.Figure()
+    figure = bar_figure("nearest neighbour and ball radii, mm", "points")
     figure.update_layout(
-        template="plotly_white",
-        margin={"l": 62, "r": 10, "t": 20, "b": 34},
-        xaxis={"title": "nearest neighbour and ball radii, mm", "rangemode": "tozero", "anchor": "y"},
-        yaxis={"title": "points", "domain": [0.0, BARS_TOP], "nticks": 4},
-        showlegend=False,
-        bargap=0,
-        font={"size": 11},
+        xaxis={"rangemode": "tozero", "anchor": "y"}, yaxis={"domain": [0.0, BARS_TOP]}, margin={"t": 20}
     )
     if view is None:
         return figure
     figure.update_layout(yaxis2=_mark_axis())
-    edges_mm = 1000.0 * view.edges_m
-    figure.add_bar(
-        x=0.5 * (edges_mm[1:] + edges_mm[:-1]),
-        y=view.counts,
-        width=edges_mm[1] - edges_mm[0],
-        marker_color=css(NEUTRAL),
-        hovertemplate="%{x:.1f} mm: %{y} points<extra></extra>",
-    )
+    add_bars(figure, 1000.0 * view.edges_m, view.counts, "mm", "points")
     thesis_m = [view.r_F_m + factor * view.sigma_D_m for factor in THESIS.values()]
     _marks(figure, OF_THESIS, thesis_m, tuple(THESIS))
     _marks(figure, ADVISED, suggested_m)

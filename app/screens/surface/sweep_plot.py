@@ -9,6 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from app.drawing.colors import DELIVERED, INFERRED, LOSS, NEUTRAL, SOURCE, TARGET, css
+from app.drawing.marks import mark
 from app.screens.surface.view import SweepRow, SweepView
 
 NO_HIT, ACCURATE, LEFT, RIGHT = css(LOSS), css(TARGET), css(NEUTRAL), css(INFERRED)
@@ -65,8 +66,9 @@ def _fill(figure: go.Figure, view: SweepView, below: str) -> None:
         unused = [100 * row.unused_share for row in rows]
         _curve(figure, rows, unused, "y2", LEFT, ".1f", "% of the points unused")
         _curve(figure, rows, [row.hole_area_m2 for row in rows], "y3", RIGHT, ".3f", "m² of holes")
-    _line(figure, view.r_F_m, "r<sub>F</sub>", css(DELIVERED), "right")
-    _line(figure, view.r_F_m + view.sigma_D_m, "r<sub>F</sub>+σ<sub>D</sub>", css(SOURCE), "left")
+    widest_mm = 1000.0 * (view.r_F_m + view.sigma_D_m)
+    mark(figure, 1000.0 * view.r_F_m, "r<sub>F</sub>", css(DELIVERED), "right", "dot", log=True)
+    mark(figure, widest_mm, "r<sub>F</sub>+σ<sub>D</sub>", css(SOURCE), "left", "dot", log=True)
 
 
 def sweep_sentence(view: SweepView) -> str:
@@ -137,22 +139,4 @@ def _curve(
         line={"color": color, "width": 2},
         marker={"size": 5},
         hovertemplate=f"%{{x:.1f}} mm: %{{y:{digits}}} {unit}<extra></extra>",
-    )
-
-
-def _line(figure: go.Figure, at_m: float, label: str, color: str, side: str) -> None:
-    """A line over both plots; its label stands beside its upper end, so that two labels never meet."""
-    x = 1000.0 * at_m
-    figure.add_shape(
-        type="line", x0=x, x1=x, y0=0, y1=1, yref="paper", line={"color": color, "width": 1.5, "dash": "dot"}
-    )
-    figure.add_annotation(
-        x=math.log10(x),  # unlike shapes, annotations count a logarithmic axis in exponents
-        y=1.0,
-        yref="paper",
-        yanchor="bottom",
-        xanchor=side,
-        text=label,
-        showarrow=False,
-        font={"color": color},
     )
