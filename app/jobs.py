@@ -1,38 +1,34 @@
-"""The door to the jobs: the serving process names them here and never imports what they need."""
+"""The door to the computing processes: the serving process names jobs and never imports what they need.
+
+A job is a function in a module of a screen whose name ends in ``job``, and its address is what stands
+behind ``app.screens.``: ``fuse.race_job:race_job``. The job of a step is ``STEP.job:STEP_job``.
+"""
 
 from __future__ import annotations
 
 import importlib
+import pkgutil
 from typing import Any
 
-JOBS = {
-    "scene": "app.screens.scene.job:scene_job",
-    "depth": "app.screens.depth.job:depth_job",
-    "hide": "app.screens.depth.hide_job:hide_job",
-    "model": "app.screens.depth.model_job:model_job",
-    "fuse": "app.screens.fuse.job:fuse_job",
-    "surface": "app.screens.surface.job:surface_job",
-    "paint": "app.screens.surface.paint_job:paint_job",
-    "sweep": "app.screens.surface.sweep_job:sweep_job",
-    "walk": "app.screens.surface.walk_job:walk_job",
-    "explain": "app.screens.surface.holes_job:explain_job",
-    "fill": "app.screens.surface.holes_job:fill_job",
-    "baseline": "app.screens.surface.baselines_job:baseline_job",
-    "race": "app.screens.fuse.race_job:race_job",
-    "capture": "app.screens.fuse.capture_job:capture_job",
-    "network": "app.screens.network.job:network_job",
-    "export": "app.screens.export.job:export_job",
-}
+SCREENS = "app.screens"
 
 
 def run(job: str, *arguments: Any) -> Any:
-    """Start a job by name, in a computing process."""
-    module, _, function = JOBS[job].partition(":")
-    return getattr(importlib.import_module(module), function)(*arguments)
+    """Start a job by its address, in a computing process."""
+    module, _, function = job.partition(":")
+    return getattr(importlib.import_module(f"{SCREENS}.{module}"), function)(*arguments)
+
+
+def run_step(step: str, *arguments: Any) -> Any:
+    """Start the job of a step."""
+    return run(f"{step}.job:{step}_job", *arguments)
 
 
 def warm_up() -> None:
-    """Import everything heavy, and load or compile the ball, before the first job comes."""
-    for address in JOBS.values():
-        importlib.import_module(address.partition(":")[0])
+    """Import every screen's jobs, and load or compile the ball, before the first job comes."""
+    screens = importlib.import_module(SCREENS)
+    for screen in pkgutil.iter_modules(screens.__path__, f"{SCREENS}."):
+        for module in pkgutil.iter_modules(importlib.import_module(screen.name).__path__, f"{screen.name}."):
+            if module.name.endswith("job"):
+                importlib.import_module(module.name)
     importlib.import_module("pipeline.surface.pivoting").compile_all()

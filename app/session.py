@@ -205,7 +205,7 @@ class Session:
             return
         track.running, track.submitted = step, key
         track.lane.submit(
-            jobs.run,
+            jobs.run_step,
             step,
             self.store,
             self.spec,

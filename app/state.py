@@ -8,6 +8,7 @@ from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from app.records import Shown
 from network_sim.config import NetworkConfig
 from pipeline import spec
 from pipeline.spec import StageName
@@ -33,6 +34,8 @@ STAGE_OF: Mapping[Step, StageName] = {
 class Spec(spec.Spec):
     """Everything that a session asks for."""
 
+    shown: Shown = "after"
+    """The surface that is drawn, and so exported."""
     networks: tuple[NetworkConfig, ...] = ()
     """Runs of the camera network, beside each other; none until somebody looks."""
 

@@ -223,7 +223,7 @@ class Bench:
                 self.results.fail(step, key, self.refuse)
                 self.panel.on_failure(step, self.refuse)
             else:
-                view = end(jobs.run(step, self.store, self.spec))
+                view = end(jobs.run_step(step, self.store, self.spec))
                 self.results.put(step, key, view)
                 self.panel.on_view(step, view)
 

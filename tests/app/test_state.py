@@ -9,6 +9,7 @@ import tyro
 from app.cli import options
 from app.controls import put
 from app.state import CHAIN, Results, Spec
+from network_sim.config import NetworkConfig
 from packetmesh.settings import with_settings
 from pipeline.config import PRESETS, load_config
 from pipeline.sources import Demo, ImagePair, RigFolder
@@ -115,3 +116,14 @@ def test_the_command_parses_back_to_the_same(spec, monkeypatch):
 
 def test_presets_are_the_pipelines():
     assert SPEC.with_preset("thesis").config == PRESETS["thesis"]
+
+
+def test_what_is_shown_and_the_networks_runs_leave_the_chain_fresh():
+    results = Results()
+    for step in CHAIN:
+        results.put(step, SPEC.key(step), step)
+    other = replace(SPEC, shown="poisson", networks=(NetworkConfig(),))
+    assert results.first_stale(other) is None
+    assert results.first_stale(other, ("network",)) == "network"
+    assert results.first_stale(SPEC, ("network",)) is None
+    assert other.command() == SPEC.command()

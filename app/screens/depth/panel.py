@@ -182,7 +182,11 @@ class DepthPanel(Panel):
             return
         request = replace(request, node=shown[0])
         session.quick_job(
-            "hide", session.store, spec, request, on_end=lambda view: self._filled(spec, request, view)
+            "depth.hide_job:hide_job",
+            session.store,
+            spec,
+            request,
+            on_end=lambda view: self._filled(spec, request, view),
         )
 
     def _filled(self, spec: Spec, request: HideRequest, view: HiddenView | None) -> None:
@@ -195,7 +199,7 @@ class DepthPanel(Panel):
 
     def _choose_model(self, choice: ModelChoice) -> None:
         """Try it first: a file that is no depth network is to change nothing."""
-        self.session.quick_job("model", choice, on_end=self._tried)
+        self.session.quick_job("depth.model_job:model_job", choice, on_end=self._tried)
 
     def _tried(self, view: ModelView | None) -> None:
         if view is not None:

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import viser
 
+from app.records import Shown
 from app.state import Spec
 from app.tables import command_html
 from app.ui import Panel
@@ -23,10 +24,16 @@ GROUPS = {
     "Whole": {"HTML, 3-D": "scene.html", "Run folder": "run.zip"},
 }
 HINTS = {
-    "Surface": "The surface after fusion, with colours.",
+    "Surface": "The surface that the Surface screen shows, with colours.",
     "Clouds": "Points of all nodes in the world frame, as the ball meets them.",
     "Numbers": "Everything measured; everything set.",
     "Whole": "One self-contained page with the surface to turn; or a ZIP of the whole run.",
+}
+SURFACES: dict[Shown, str] = {
+    "after": "the surface after fusion",
+    "before": "the surface before fusion",
+    "poisson": "the Poisson surface",
+    "alpha": "the alpha shape",
 }
 
 
@@ -40,6 +47,7 @@ class ExportPanel(Panel):
         """Buttons by kind, a picture of the view, the command."""
         gui = self.gui
         gui.add_markdown(TEXT)
+        self._surface = gui.add_markdown("")
         for label, kinds in GROUPS.items():
             group = gui.add_button_group(label, list(kinds), hint=HINTS[label])
             group.on_click(lambda event, kinds=kinds: self._clicked(kinds[event.target.value], event.client))
@@ -47,13 +55,13 @@ class ExportPanel(Panel):
         picture.on_click(lambda event: self._photograph(event.client))
         gui.add_markdown("**The same from the command line**")
         self._command = gui.add_html("")
-        self._show_command(self.session.spec)
+        self.on_spec(self.session.spec)
 
     def on_spec(self, spec: Spec) -> None:
-        """Show the command for these settings."""
-        self._show_command(spec)
-
-    def _show_command(self, spec: Spec) -> None:
+        """Show which surface is exported, and the command for these settings."""
+        self._surface.content = (
+            f"Surface and page hold **{SURFACES[spec.shown]}**, as the Surface screen shows."
+        )
         self._command.content = command_html(spec.command())
 
     def _clicked(self, name: str, client: viser.ClientHandle | None) -> None:
@@ -68,7 +76,8 @@ class ExportPanel(Panel):
             if content is not None:
                 client.send_file_download(name, content, save_immediately=True)
 
-        session.side_job("export", session.store, session.spec, name, on_end=send)
+        spec = session.spec
+        session.side_job("export.job:export_job", session.store, spec, name, spec.shown, on_end=send)
 
     def _photograph(self, client: viser.ClientHandle | None) -> None:
         """Runs on the server's own thread, because it waits for the browser to draw."""

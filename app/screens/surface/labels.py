@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
-from app.screens.surface.view import Coloring
+from app.records import Shown
+from app.screens.surface.view import BaselineName, Coloring
 from pipeline.config import RadiusRule
 
 AFTER, BEFORE, BOTH = "after fusion", "before fusion (sensor only)", "side by side"
 POISSON, ALPHA = "Poisson, a baseline", "alpha shape, a baseline"
-BASELINES: dict[str, Literal["poisson", "alpha"]] = {POISSON: "poisson", ALPHA: "alpha"}
-SHOWN = (AFTER, BEFORE, BOTH, POISSON, ALPHA)
-"""Which surface is drawn."""
+BASELINES: dict[str, BaselineName] = {POISSON: "poisson", ALPHA: "alpha"}
+SHOWN: dict[str, Shown] = {AFTER: "after", BEFORE: "before", BOTH: "after", **BASELINES}
+"""Which surface is drawn, and so exported; of two side by side the one after fusion."""
 COLORINGS: dict[str, Coloring] = {
     "the camera's colours": "color",
     "source: sensor or inferred": "source",

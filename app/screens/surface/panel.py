@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -57,6 +58,7 @@ class SurfacePanel(Panel):
         self._quick_line = ""
         self._by_click = False
         self._thinning: tuple[int, int] | None = None
+        self._key: tuple[Hashable, ...] | None = None
         gui.add_markdown(TEXT)
         self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, SurfaceLook()), self._take_look)
         self._radius = gui.add_slider(
@@ -108,6 +110,9 @@ class SurfacePanel(Panel):
 
     def on_spec(self, spec: Spec) -> None:
         """Show the settings that are wanted; what was made with others goes."""
+        if spec.key("surface") == self._key:
+            return
+        self._key = spec.key("surface")
         self._controls.write(spec.config)
         self._rule.value = NAMES[spec.config.surface.radius_rule]
         thinning = (spec.config.surface.max_points, spec.config.surface.smoothing_passes)
@@ -200,7 +205,9 @@ class SurfacePanel(Panel):
         if coloring != "color" and self.session.results.view("fuse") is not None:
             session = self.session
             request = PaintRequest(("after", "before"), coloring)
-            session.quick_job("paint", session.store, session.spec, request, on_end=self._painted)
+            session.quick_job(
+                "surface.paint_job:paint_job", session.store, session.spec, request, on_end=self._painted
+            )
 
     def _painted(self, view: PaintedView | None) -> None:
         """Draw it, unless something else is wanted by now."""
@@ -230,7 +237,11 @@ class SurfacePanel(Panel):
             self._stage.draw_baseline(None)
             self._quick.content = WAIT
             session.side_job(
-                "baseline", session.store, key, name, on_end=lambda view: self._measured(label, key, view)
+                "surface.baselines_job:baseline_job",
+                session.store,
+                key,
+                name,
+                on_end=lambda view: self._measured(label, key, view),
             )
         self._arrange()
 
@@ -267,6 +278,9 @@ class SurfacePanel(Panel):
             baseline = self._shown.value in BASELINES
             self._coloring.disabled = baseline  # its vertices are no points with a source
             self._legend.visible = bool(self._legend.content) and not baseline
+        shown = SHOWN[self._shown.value]
+        if shown != self.session.spec.shown:
+            self.session.want(replace(self.session.spec, shown=shown))
         self.session.frame_view()
 
     # The folders.
@@ -275,7 +289,9 @@ class SurfacePanel(Panel):
         session = self.session
         if session.results.view("fuse") is not None:
             load = self._advice.load
-            session.side_job("sweep", session.store, session.spec, on_partial=load, on_end=load)
+            session.side_job(
+                "surface.sweep_job:sweep_job", session.store, session.spec, on_partial=load, on_end=load
+            )
 
     def _load_holes(self) -> None:
         if self._view is not None and self._view.holes:
@@ -294,7 +310,14 @@ class SurfacePanel(Panel):
     def _explain(self, which: Which, index: int) -> None:
         session = self.session
         if session.results.fresh("surface", session.spec):
-            session.quick_job("explain", session.store, session.spec, which, index, on_end=self._explained)
+            session.quick_job(
+                "surface.holes_job:explain_job",
+                session.store,
+                session.spec,
+                which,
+                index,
+                on_end=self._explained,
+            )
         else:
             self._explained(None)  # the holes listed are of a surface that is being made anew
 
@@ -309,7 +332,13 @@ class SurfacePanel(Panel):
         if longest_m is None:
             self._filled(None)
         else:
-            session.side_job("fill", session.store, session.spec, 100.0 * longest_m, on_end=self._filled)
+            session.side_job(
+                "surface.holes_job:fill_job",
+                session.store,
+                session.spec,
+                100.0 * longest_m,
+                on_end=self._filled,
+            )
 
     def _filled(self, view: FilledView | None) -> None:
         with self.ui.atomic():
@@ -329,7 +358,11 @@ class SurfacePanel(Panel):
         elif session.results.view("fuse") is not None:
             spec = session.spec
             session.side_job(
-                "walk", session.store, spec, request, on_end=lambda view: self._walked(spec, view)
+                "surface.walk_job:walk_job",
+                session.store,
+                spec,
+                request,
+                on_end=lambda view: self._walked(spec, view),
             )
 
     def _close_walk(self) -> None:
