@@ -56,8 +56,8 @@ def test_a_failed_step_holds_the_chain_until_something_changes():
     results.put("scene", SPEC.key("scene"), "view")
     results.fail("depth", SPEC.key("depth"), "no")
     assert results.first_stale(SPEC) is None
-    assert results.status("depth", SPEC, None) == "failed"
-    assert results.status("fuse", SPEC, None) == "missing"
+    assert results.status("depth", SPEC) == "failed"
+    assert results.status("fuse", SPEC) == "missing"
     assert results.first_stale(edited("depth.crop", True)) == "depth"
     results.retry_failed()
     assert results.first_stale(SPEC) == "depth"
