@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
+from pipeline.findings import Suggestion
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import roll
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud
@@ -21,17 +20,6 @@ _AGREES = 0.5
 _MARGIN = 1e-6
 """A ball of exactly the needed radius would be decided by rounding."""
 _WORTH_SAYING = 0.03
-
-
-@dataclass(frozen=True, slots=True)
-class Suggestion:
-    """A ball radius and what it does to this cloud."""
-
-    name: str
-    radius_m: float
-    share: float
-    """Share of the sampled surface points, borders left out, whose fan of triangles this ball closes."""
-    sentence: str
 
 
 def suggest_radii(cloud: PointCloud) -> tuple[Suggestion, ...]:

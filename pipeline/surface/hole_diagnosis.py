@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
+from pipeline.findings import Explanation, Reason
 from pipeline.geometry import distinct_rows
 from pipeline.rays import first_hits, triangle_scene
 from pipeline.surface.fill import skin_points_m
@@ -17,8 +17,6 @@ from pipeline.surface.holes import Hole, beyond_m, half_edges, is_closed
 from pipeline.surface.pivoting import Rolled, Roller, roll
 from pipeline.surface.ray_parts import Known, View, known_there
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud, PointSource, SurfaceResult
-
-Reason = Literal["gap", "normals", "no points", "outside view"]
 
 MOST = 0.5
 """More than this share of a hole decides."""
@@ -35,23 +33,6 @@ _PLACES = 8
 _WHOLE = 6.0
 """A rim within this many balls' radii of its centre is examined whole."""
 _SAMPLES = 200
-
-
-@dataclass(frozen=True, slots=True)
-class Explanation:
-    """Why a hole is there and what would close it."""
-
-    reason: Reason
-    sentence: str
-    remedy: str
-    closing_radius_m: float | None
-    """The smallest ball tried that closes it when it rolls after the surface's own; None if none did."""
-    sensor_share: float
-    """Share of the hole's pixels, in all cameras that see it, where the sensor measured; NaN without any."""
-    inferred_share: float
-    """Share of those where only the network's depth is known."""
-    unknown_share: float
-    """Share of those where neither is."""
 
 
 @dataclass(frozen=True, slots=True)

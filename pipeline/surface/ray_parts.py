@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from packetmesh.errors import InputError
+from pipeline.findings import RayParts
 from pipeline.geometry import apply, inverse, project, undistorted_rays
 from pipeline.open3d_runtime import o3d
 from pipeline.rays import Camera, camera_hits, first_hits, triangle_scene
@@ -26,22 +27,6 @@ class View:
     """(H, W) True where the sensor measured a depth."""
     inferred_valid: BoolArray | None
     """(H, W) True where the network's depth is known; None if it was not asked."""
-
-
-@dataclass(frozen=True, slots=True)
-class RayParts:
-    """Shares of all pixel rays; they add up to 1, and all are NaN without a view."""
-
-    on_sensor: float
-    """Rays that meet a triangle of the sensor's points."""
-    on_inferred: float
-    """Rays that meet a triangle most of whose corners were inferred."""
-    missed_measured: float
-    """Rays that meet nothing though the sensor measured there."""
-    missed_inferred: float
-    """Rays that meet nothing where only the network knows a depth."""
-    missed_unknown: float
-    """Rays that meet nothing where nobody knows a depth."""
 
 
 @dataclass(frozen=True, slots=True)

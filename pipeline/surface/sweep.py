@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from packetmesh.errors import InputError
+from pipeline.findings import SweepPoint
 from pipeline.rays import Camera
 from pipeline.surface.holes import open_area_m2
 from pipeline.surface.pivoting import compile_all, roll
@@ -19,26 +19,6 @@ from pipeline.types import PointCloud, RigTruth
 STEPS = 12
 NARROWEST, WIDEST = 0.5, 6.0
 """Ends of a sweep, in mean nearest-neighbour distances r_F."""
-
-
-@dataclass(frozen=True, slots=True)
-class SweepPoint:
-    """The surface that one ball leaves."""
-
-    radius_m: float
-    triangles: int
-    unused_share: float
-    """Share of the points that no triangle uses."""
-    hole_area_m2: float
-    """Of the loops shorter than 1 m, without the outer loop of each part (SPEC 5)."""
-    no_hit_ray_share: float
-    """Share of the cameras' pixel rays that miss the surface; NaN without cameras."""
-    accuracy_1cm: float
-    """Share of the surface within 1 cm of the truth; NaN without truth or without a triangle."""
-    f_score_5cm: float
-    """NaN without truth or without a triangle."""
-    elapsed_s: float
-    """Of the ball alone."""
 
 
 def sweep_radii_m(r_F_m: float, others_m: Iterable[float] = ()) -> tuple[float, ...]:

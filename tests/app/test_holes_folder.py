@@ -11,7 +11,8 @@ import viser
 from app.records import MeshView
 from app.screens.surface.draw_holes import picked_hole, tape
 from app.screens.surface.holes import FILL_OFF, NONE, HolesFolder, filled_sentence, hole_name, parts_sentence
-from app.screens.surface.view import ExplainView, FilledView, HoleView, PartsView
+from app.screens.surface.view import ExplainView, FilledView, HoleView
+from pipeline.findings import Explanation, RayParts
 from pipeline.geometry import rotation_exp
 from pipeline.surface import boundary_loops
 from pipeline.types import SurfaceQuality
@@ -131,7 +132,8 @@ def test_the_tape_runs_around_the_loop_in_two_colours():
 
 
 HOLES = (square(side_m=0.3), square((0.6, 0.0, 2.0)), square(side_m=3.0, rim=True, clockwise=False))
-ANSWER = ExplainView("after", 1, "gap", "The ball fell.", "Take a larger one.", 0.03, 0.75, 0.15, 0.1)
+FOUND = Explanation("gap", "The ball fell.", "Take a larger one.", 0.03, 0.75, 0.15, 0.1)
+ANSWER = ExplainView("after", 1, FOUND)
 
 QUALITY = SurfaceQuality(0.031, 2, 1.0, 0.0, 0, 1, 2.0, 0)
 MESH = MeshView(b"", QUALITY, np.empty((0, 2, 3), np.float32), 4, 2, {"f_score_5cm": 0.87})
@@ -180,7 +182,7 @@ def test_the_list_names_holes_then_rims_and_choosing_asks(screen):
     screen.gui.set("Hole", screen.list.options[2])
     assert screen.asked == [("after", 1)]
     screen.folder.tell(ANSWER)
-    assert all(part in screen.why for part in ("Gap", ANSWER.sentence, ANSWER.remedy))
+    assert all(part in screen.why for part in ("Gap", FOUND.sentence, FOUND.remedy))
     assert all(share in screen.why for share in ("75 %", "15 %", "10 %"))
     screen.gui.set("Hole", NONE)
     assert "2 holes and 1 rim after fusion" in screen.why
@@ -199,7 +201,11 @@ def test_an_answer_about_another_hole_is_not_shown(screen):
 def test_without_cameras_that_look_there_is_no_table(screen):
     screen.gui.set("Hole", screen.list.options[2])
     unseen = float("nan")
-    screen.folder.tell(replace(ANSWER, sensor_share=unseen, inferred_share=unseen, unknown_share=unseen))
+    screen.folder.tell(
+        replace(
+            ANSWER, found=replace(FOUND, sensor_share=unseen, inferred_share=unseen, unknown_share=unseen)
+        )
+    )
     assert "share of pixels" not in screen.why
 
 
@@ -280,8 +286,8 @@ def test_an_answer_that_comes_after_filling_was_turned_off_is_not_told(screen):
 
 
 def test_sentences_carry_the_numbers(screen):
-    assert parts_sentence(PartsView(0.5, 0.3, 0.05, 0.1, 0.05)).count("%") == 6
-    assert " 20.0 % miss it: 5.0 % though" in parts_sentence(PartsView(0.5, 0.3, 0.05, 0.1, 0.05))
+    assert parts_sentence(RayParts(0.5, 0.3, 0.05, 0.1, 0.05)).count("%") == 6
+    assert " 20.0 % miss it: 5.0 % though" in parts_sentence(RayParts(0.5, 0.3, 0.05, 0.1, 0.05))
     text = filled_sentence(FILLED)
     assert "**3 holes filled, 123.0 cm².**" in text
     assert "3.1 %" in text

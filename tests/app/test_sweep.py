@@ -11,18 +11,19 @@ from app.screens.surface.advice import NO_ADVICE, STOPPED, WAITING, AdviceFolder
 from app.screens.surface.spacing_plot import ADVISED, OF_THESIS, USED, spacing_figure
 from app.screens.surface.sweep_job import suggestions_of, sweep_job
 from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
-from app.screens.surface.view import SpacingView, SuggestionRow, SweepRow, SweepView
+from app.screens.surface.view import SpacingView, SweepView
 from app.state import Spec
 from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig, SurfaceConfig
+from pipeline.findings import Suggestion, SweepPoint
 from pipeline.sources import Demo
 from tests.app.fakes import ui_of
 
 SPEC = Spec(Demo("box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))
 NAN = float("nan")
 ROWS = (
-    SuggestionRow("finest", 0.0246, 0.49, "Wide enough for 50% of the surface; rolled, it closes 49%."),
-    SuggestionRow("even", 0.0312, 0.88, "Wide enough for 90% of the surface; rolled, it closes 88%."),
+    Suggestion("finest", 0.0246, 0.49, "Wide enough for 50% of the surface; rolled, it closes 49%."),
+    Suggestion("even", 0.0312, 0.88, "Wide enough for 90% of the surface; rolled, it closes 88%."),
 )
 
 
@@ -37,7 +38,7 @@ def run(job):
 
 
 def row(radius_mm, no_hit, accuracy=NAN, triangles=100):
-    return SweepRow(radius_mm / 1000, triangles, 0.1, 0.2, no_hit, accuracy, accuracy, 0.01)
+    return SweepPoint(radius_mm / 1000, triangles, 0.1, 0.2, no_hit, accuracy, accuracy, 0.01)
 
 
 def swept(*rows):

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.screens.surface.sweep_plot import BELOW, sweep_figure, sweep_sentence
-from app.screens.surface.view import SuggestionRow, SweepView
+from app.screens.surface.view import SweepView
 from app.tables import number, table
 from app.ui import Ui
+from pipeline.findings import Suggestion
 
 TEXT = """A ball bridges the triangles around a point if it is as wide as the largest of their circumcircles.
 How wide that is can be read off the points before any ball rolls."""
@@ -62,7 +63,7 @@ class AdviceFolder:
             )
         self.forget()
 
-    def suggest(self, rows: tuple[SuggestionRow, ...]) -> None:
+    def suggest(self, rows: tuple[Suggestion, ...]) -> None:
         """Show what the points suggest."""
         self._radii_m = {row.name: row.radius_m for row in rows}
         if rows:
@@ -103,7 +104,7 @@ class AdviceFolder:
         self._on_sweep()
 
 
-def suggestions_html(rows: tuple[SuggestionRow, ...]) -> str:
+def suggestions_html(rows: tuple[Suggestion, ...]) -> str:
     """A line for each suggested radius: its name, the radius, and what it closes."""
     if not rows:
         return f"<div style='padding: 0 0.8em; font-size: 13px'>{NO_ADVICE}</div>"

@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from app.screens.surface.draw_holes import HoleDrawing, picked_hole
-from app.screens.surface.view import ExplainView, FilledView, HoleView, PartsView, Which
+from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
 from app.tables import number, table
 from app.ui import Ui
+from pipeline.findings import Explanation, RayParts
 from pipeline.types import FloatArray
 
 TEXT = """**Click a red rim in the picture, or choose one here**, and read why it is there. A *hole* has
@@ -93,7 +94,7 @@ class HolesFolder:
             self._offset_m = np.zeros(3)
             self._choose(None)
 
-    def parts(self, parts: PartsView | None) -> None:
+    def parts(self, parts: RayParts | None) -> None:
         """Tell where the rays of all pixels end; None if it is not known."""
         self._parts.content = "" if parts is None else parts_sentence(parts)
 
@@ -131,8 +132,8 @@ class HolesFolder:
         if answer is None:
             self._why.content = SILENT
         elif (answer.which, answer.index) == (self._which, self._index):
-            self._why.content = reason_text(answer)
-            self._shares.content = shares_table(answer)
+            self._why.content = reason_text(answer.found)
+            self._shares.content = shares_table(answer.found)
 
     def filled(self, view: FilledView | None) -> None:
         """Say what filling made of the surface; None if nobody could fill it."""
@@ -228,12 +229,12 @@ def hole_name(index: int, hole: HoleView) -> str:
     return f"{index + 1}: {100.0 * hole.length_m:,.0f} cm around, {1e4 * hole.area_m2:,.1f} cm²"
 
 
-def reason_text(answer: ExplainView) -> str:
+def reason_text(found: Explanation) -> str:
     """Markdown: the reason in a word and in a sentence, and what to do about it."""
-    return f"**{answer.reason.capitalize()}.** {answer.sentence}\n\n**What to try:** {answer.remedy}"
+    return f"**{found.reason.capitalize()}.** {found.sentence}\n\n**What to try:** {found.remedy}"
 
 
-def shares_table(answer: ExplainView) -> str:
+def shares_table(found: Explanation) -> str:
     """HTML: who has a depth for the pixels that look into the hole; empty if no camera does."""
     rows = [
         (name, hint, number(share, 0, "%", 100.0))
@@ -241,24 +242,24 @@ def shares_table(answer: ExplainView) -> str:
             (
                 "Sensor measured",
                 "Pixels with sensor depth: there are points, so the ball or their normals leave the hole.",
-                answer.sensor_share,
+                found.sensor_share,
             ),
             (
                 "Only inferred",
                 "Pixels without sensor depth for which the depth network has one: here fusion can help.",
-                answer.inferred_share,
+                found.inferred_share,
             ),
             (
                 "Neither",
                 "Pixels for which nobody has a depth. Only another camera or invention can close these.",
-                answer.unknown_share,
+                found.unknown_share,
             ),
         )
     ]
-    return table(rows, ("share of pixels",)) if np.isfinite(answer.sensor_share) else ""
+    return table(rows, ("share of pixels",)) if np.isfinite(found.sensor_share) else ""
 
 
-def parts_sentence(parts: PartsView) -> str:
+def parts_sentence(parts: RayParts) -> str:
     """Markdown: where the rays of all pixels end on the surface after fusion."""
 
     def share(value: float) -> str:

@@ -9,11 +9,12 @@ import numpy as np
 
 from app.drawing.colors import HOLE, NEUTRAL
 from app.drawing.meshes import mesh_view, surface_glb
-from app.screens.surface.view import ExplainView, FilledView, HoleView, PartsView, Which
+from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
 from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
+from pipeline.findings import RayParts
 from pipeline.nodes import NodeClouds, Placement
 from pipeline.spec import key
 from pipeline.stages import cameras_of, compared
@@ -47,17 +48,10 @@ def views_of(rig: Rig, nodes: Sequence[NodeClouds], placement: Placement) -> lis
     ]
 
 
-def parts_of(store: Store, spec: Spec, surface: SurfaceResult) -> Generator[Progress, None, PartsView]:
+def parts_of(store: Store, spec: Spec, surface: SurfaceResult) -> Generator[Progress, None, RayParts]:
     """Where the pixel rays of all cameras end on a surface of the spec."""
     views = yield from _views(store, spec)
-    parts = ray_parts(surface, views)
-    return PartsView(
-        on_sensor=parts.on_sensor,
-        on_inferred=parts.on_inferred,
-        missed_measured=parts.missed_measured,
-        missed_inferred=parts.missed_inferred,
-        missed_unknown=parts.missed_unknown,
-    )
+    return ray_parts(surface, views)
 
 
 def explain_job(store: Store, spec: Spec, which: Which, index: int) -> Generator[Progress, None, ExplainView]:
@@ -75,18 +69,7 @@ def explain_job(store: Store, spec: Spec, which: Which, index: int) -> Generator
                 "and rims; choose one from the list"
             )
         cloud = clouds.fused if which == "after" else clouds.sensor
-        why = explain_hole(holes[index], surface, cloud, views)
-        return ExplainView(
-            which=which,
-            index=index,
-            reason=why.reason,
-            sentence=why.sentence,
-            remedy=why.remedy,
-            closing_radius_m=why.closing_radius_m,
-            sensor_share=why.sensor_share,
-            inferred_share=why.inferred_share,
-            unknown_share=why.unknown_share,
-        )
+        return ExplainView(which, index, explain_hole(holes[index], surface, cloud, views))
 
     return (yield from store.remember(("explain", key(spec, which), which, index), explain))
 

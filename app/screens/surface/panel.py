@@ -324,7 +324,8 @@ class SurfacePanel(Panel):
     def _explained(self, answer: ExplainView | None) -> None:
         self._holes.tell(answer)
         if answer is not None and self._by_click:
-            self.session.notify(answer.reason.capitalize(), f"{answer.sentence} {answer.remedy}", "blue")
+            found = answer.found
+            self.session.notify(found.reason.capitalize(), f"{found.sentence} {found.remedy}", "blue")
         self._by_click = False
 
     def _fill(self, longest_m: float | None) -> None:

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import asdict
 
-from app.screens.surface.view import SuggestionRow, SweepRow, SweepView
+from app.screens.surface.view import SweepView
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
+from pipeline.findings import Suggestion
 from pipeline.spec import key
 from pipeline.stages import cameras_of
 from pipeline.surface.advice import suggest_radii
 from pipeline.surface.sweep import iterate_sweep, sweep_radii_m
 
 
-def suggestions_of(store: Store, spec: Spec) -> Generator[Progress, None, tuple[SuggestionRow, ...]]:
+def suggestions_of(store: Store, spec: Spec) -> Generator[Progress, None, tuple[Suggestion, ...]]:
     """The radii that the cloud after fusion suggests; none if it has no inner point."""
     clouds = yield from store.stage(spec, "clouds")
 
-    def suggest() -> Generator[Progress, None, tuple[SuggestionRow, ...]]:
+    def suggest() -> Generator[Progress, None, tuple[Suggestion, ...]]:
         yield Progress("reading the ball radius off the points", 0.4)
-        return tuple(SuggestionRow(**asdict(suggestion)) for suggestion in suggest_radii(clouds.fused))
+        return suggest_radii(clouds.fused)
 
     return (yield from store.remember(("suggest", key(spec, "clouds")), suggest))
 
@@ -39,8 +39,7 @@ def sweep_job(store: Store, spec: Spec) -> Generator[Progress | SweepView, None,
         points = iterate_sweep(clouds.fused, radii_m, cameras_of(rig, placement), rig.truth)
         for done, radius_m in enumerate(radii_m):
             yield Progress(f"a ball of {1000 * radius_m:.1f} mm", done / len(radii_m))
-            row = SweepRow(**asdict(next(points)))
-            view = SweepView((*view.points, row), view.r_F_m, view.sigma_D_m, view.planned)
+            view = SweepView((*view.points, next(points)), view.r_F_m, view.sigma_D_m, view.planned)
             yield view
         return view
 

@@ -10,7 +10,8 @@ import plotly.graph_objects as go
 
 from app.drawing.colors import DELIVERED, INFERRED, LOSS, NEUTRAL, SOURCE, TARGET, css
 from app.drawing.marks import mark
-from app.screens.surface.view import SweepRow, SweepView
+from app.screens.surface.view import SweepView
+from pipeline.findings import SweepPoint
 
 NO_HIT, ACCURATE, LEFT, RIGHT = css(LOSS), css(TARGET), css(NEUTRAL), css(INFERRED)
 WORK, POINTS = "triangles and time", "unused points and hole area"
@@ -91,7 +92,7 @@ def sweep_sentence(view: SweepView) -> str:
     return "; ".join(parts) + "."
 
 
-def _mm(row: SweepRow) -> str:
+def _mm(row: SweepPoint) -> str:
     return f"{1000 * row.radius_m:.0f} mm"
 
 
@@ -124,7 +125,7 @@ def _radius_axis(view: SweepView | None) -> dict[str, object]:
 
 def _curve(
     figure: go.Figure,
-    rows: Sequence[SweepRow],
+    rows: Sequence[SweepPoint],
     values: Sequence[float],
     axis: str,
     color: str,

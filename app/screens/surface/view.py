@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from app.records import MeshView
+from pipeline.findings import Explanation, RayParts, Suggestion, SweepPoint
 from pipeline.types import FloatArray, IntArray
 
 Coloring = Literal["color", "source", "distance", "normal"]
@@ -88,35 +89,12 @@ class HoleView:
 
 @dataclass(frozen=True, slots=True)
 class ExplainView:
-    """Why there is a hole, as ``pipeline.surface.hole_diagnosis.Explanation`` says it."""
+    """Why there is a hole."""
 
     which: Which
     index: int
     """In that surface's holes."""
-    reason: str
-    sentence: str
-    remedy: str
-    closing_radius_m: float | None
-    sensor_share: float
-    """This and the other two: shares of the pixels that look into the hole; NaN if none does."""
-    inferred_share: float
-    unknown_share: float
-
-
-@dataclass(frozen=True, slots=True)
-class PartsView:
-    """Where the pixel rays of all cameras end; shares with sum 1."""
-
-    on_sensor: float
-    """On surface that the sensor measured."""
-    on_inferred: float
-    """On surface that only inference made possible."""
-    missed_measured: float
-    """In no surface, though the sensor measured the pixel."""
-    missed_inferred: float
-    """In no surface; only inference has a depth for the pixel."""
-    missed_unknown: float
-    """In no surface, and nobody has a depth for the pixel."""
+    found: Explanation
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,37 +110,10 @@ class FilledView:
 
 
 @dataclass(frozen=True, slots=True)
-class SuggestionRow:
-    """A ball radius with a meaning, as ``pipeline.surface.advice.Suggestion`` gives it."""
-
-    name: str
-    radius_m: float
-    share: float
-    """Share of the sampled surface points, borders left out, whose fan of triangles this ball closes."""
-    sentence: str
-
-
-@dataclass(frozen=True, slots=True)
-class SweepRow:
-    """The surface that one ball leaves, as ``pipeline.surface.sweep.SweepPoint`` measures it."""
-
-    radius_m: float
-    triangles: int
-    unused_share: float
-    hole_area_m2: float
-    no_hit_ray_share: float
-    accuracy_1cm: float
-    """This and the next: NaN without truth or without a triangle."""
-    f_score_5cm: float
-    elapsed_s: float
-    """Of the ball alone."""
-
-
-@dataclass(frozen=True, slots=True)
 class SweepView:
     """The balls of a sweep; while it runs, those that have rolled."""
 
-    points: tuple[SweepRow, ...]
+    points: tuple[SweepPoint, ...]
     """By radius, ascending."""
     r_F_m: float
     sigma_D_m: float
@@ -202,7 +153,7 @@ class SurfaceView:
     """From the clouds to the surface after fusion."""
     holes: Mapping[Which, tuple[HoleView, ...]] = field(default_factory=dict)
     """Of both surfaces, at the end."""
-    parts: PartsView | None = None
+    parts: RayParts | None = None
     """Of the surface after fusion."""
-    suggestions: tuple[SuggestionRow, ...] = ()
+    suggestions: tuple[Suggestion, ...] = ()
     """Ball radii that the cloud after fusion suggests."""
