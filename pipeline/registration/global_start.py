@@ -1,4 +1,4 @@
-"""A start pose from nothing: local features matched across the clouds, and the motion most of them share."""
+"""A start pose without a guess: matched local features, and the motion that most of them share."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import middle_extent_m
+from pipeline.open3d_runtime import o3d
 from pipeline.registration.loop import register
 from pipeline.types import FloatArray, PointCloud, RegistrationResult
 
@@ -21,7 +22,7 @@ EDGE_RATIO = 0.9
 """Least ratio of the lengths between matched points that a guess of RANSAC survives with."""
 RANSAC_ITERATIONS, RANSAC_CONFIDENCE = 100_000, 0.999
 SMALLEST_SHARE = 0.15
-"""Share of the source points that must find a partner, lest the pose be called a guess."""
+"""Share of the source points that must find a partner; a pose with fewer is refused."""
 
 
 def register_from_anywhere(
@@ -68,8 +69,6 @@ def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: i
     Raises:
         ReconstructionError: neither pose brings enough points together.
     """
-    from pipeline.open3d_runtime import o3d
-
     reach_m = PAIR_REACH * voxel_m
     (moving, moving_features), (fixed, fixed_features) = (
         _with_features(cloud, voxel_m) for cloud in (source, target)
@@ -93,8 +92,6 @@ def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: i
 
 def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
     """The thinned cloud with normals, and its features."""
-    from pipeline.open3d_runtime import o3d
-
     points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
     if cloud.normals is not None:
         points.normals = o3d.utility.Vector3dVector(cloud.normals)
@@ -108,8 +105,6 @@ def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
 
 
 def _by_ransac(source: Any, target: Any, source_features: Any, target_features: Any, reach_m: float) -> Any:
-    from pipeline.open3d_runtime import o3d
-
     o3d_registration = o3d.pipelines.registration
     return o3d_registration.registration_ransac_based_on_feature_matching(
         source,
@@ -129,8 +124,6 @@ def _by_ransac(source: Any, target: Any, source_features: Any, target_features: 
 
 
 def _fast_global(source: Any, target: Any, source_features: Any, target_features: Any, reach_m: float) -> Any:
-    from pipeline.open3d_runtime import o3d
-
     o3d_registration = o3d.pipelines.registration
     option = o3d_registration.FastGlobalRegistrationOption(maximum_correspondence_distance=reach_m)
     result = o3d_registration.registration_fgr_based_on_feature_matching(

@@ -89,7 +89,7 @@ def _rims(lengths_m: FloatArray, part: IntArray) -> BoolArray:
 
 def _run_around(vertices_m: FloatArray, triangles: IntArray, edges: IntArray, first: IntArray) -> BoolArray:
     """(L,) True for loops that run anticlockwise about the mean normal of the triangles along them."""
-    enclosed = loop_areas_m2(*vertices_m[edges].swapaxes(0, 1), first)
+    enclosed = loop_areas_m2(vertices_m[edges[:, 0]], vertices_m[edges[:, 1]], first)
     face = half_edges(triangles, edges) // 3
     a, b, c = vertices_m[triangles[face]].swapaxes(0, 1)
     normals = np.cross(b - a, c - a) * (face >= 0)[:, None]

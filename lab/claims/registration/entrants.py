@@ -52,7 +52,7 @@ class Entrant:
     def config(self, direction: Direction, gate_m: float, max_points: int) -> RegistrationConfig:
         """The settings for one case."""
         plain = RegistrationConfig(
-            method=VARIANTS[self.method][0] if self.method in VARIANTS else self.method,  # type: ignore[arg-type]
+            method=VARIANTS[self.method][0] if self.method in VARIANTS else self.method,
             metric=self.metric,
             direction=direction,
             gate_m=self.scaled_gate_m(gate_m),
