@@ -111,8 +111,7 @@ def affine_depth(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.rando
 def affine_inverse(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
     """1/z' = a/z + b, right for networks that know disparity up to scale and shift.
 
-    Where that says more than three times the sensor's farthest depth, disparity is as good as zero and
-    the depth unknown.
+    Depths beyond three times the sensor's farthest have a disparity near zero and become unknown.
     """
     a, b = fit_line(1.0 / z[overlap], 1.0 / p[overlap], rng)
     if not a > 0.0:
@@ -139,10 +138,10 @@ def corrected(line: FloatArray, p: FloatArray, overlap: BoolArray) -> FloatArray
     usable = overlap & positive(line)
     residual = np.zeros(line.shape, np.float32)
     residual[usable] = np.clip(np.log(p[usable] / line[usable]), -LOCAL_CLIP, LOCAL_CLIP)
-    return line * np.exp(spread(residual, usable))
+    return line * np.exp(masked_blur(residual, usable))
 
 
-def spread(residual: FloatArray, known: BoolArray) -> FloatArray:
+def masked_blur(residual: FloatArray, known: BoolArray) -> FloatArray:
     """sum_s G_s*(m r) / sum_s G_s*m with Gaussians of 4, 12 and 40 px at 320 px width.
 
     Args:

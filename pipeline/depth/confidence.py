@@ -1,4 +1,4 @@
-"""Which inferred depth to believe: fills that meet the rims of their holes, and a verdict on every pixel.
+"""Confidence of inferred depth, and its continuation from the rims of the sensor's holes.
 
 SPEC 3.5, the steps between alignment and fusion.
 """
@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.depth.alignment import INLIER_SHARE_OF_DEPTH, LOCAL_CLIP, AlignmentResult, positive, spread
+from pipeline.depth.alignment import INLIER_SHARE_OF_DEPTH, LOCAL_CLIP, AlignmentResult, masked_blur, positive
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, IntArray
 
 FILL_WIDTH_PX = 320
@@ -23,7 +23,7 @@ SLOPE_SIGMA_PX = 6.0
 COLOR_SIGMA = 7.0
 """Root mean square of the three channels' differences, in grey levels."""
 LEAST_WEIGHT = 1e-6
-SLOPE_TRUST = 0.5
+SLOPE_SHARE = 0.5
 """Share of the slope around a hole that goes on inside it."""
 SLOPE_DECAY = 0.97
 """What is left of it after every pass inwards."""
@@ -32,10 +32,10 @@ LARGEST_SLOPE = 0.03
 RELIEF_APART = 0.02
 """Separation at which the network's relief is compared with the sensor's, in shares of the diagonal."""
 RELIEF_STEP = 0.15
-"""Logarithmic depth steps of the sensor above this are edges, which say nothing about relief."""
+"""Logarithmic depth steps of the sensor above this are edges and are left out."""
 RELIEF_AFTER_LOCAL = 0.3
 """Share of the relief that holds after ``local`` alignment, measured on hidden sensor depth: it has bent
-the depth to the sensor's wherever there is any, so agreement there says nothing about the holes."""
+the depth to the sensor's wherever there is any, so agreement there is no evidence about the holes."""
 FLYING_WINDOW = 0.005
 """Half width of the window that shows both surfaces of a step, in shares of the diagonal."""
 FLYING_STEP = 0.12
@@ -50,18 +50,18 @@ ODDS_OF_DISTANCE = -0.97
 ODDS_OF_RESIDUAL = -13.2
 """Log odds of being within 5 % of the truth: constant, per log of the distance in shares of the diagonal,
 and per local residual; logistic regression on hidden sensor depth and on the sensor's own holes in rendered
-frames together. Those are harder, for they are where things are dark, shiny or out of sight: this says 83 %
+frames together. Those are harder, for they are where things are dark, shiny or out of sight: this gives 83 %
 there where 73 % are within 5 %, and 84 % on hidden depth where 93 % are."""
 
 
 @dataclass(frozen=True, slots=True)
 class JudgedDepth:
-    """Inferred depth that is left after judging, and why the rest is not."""
+    """Inferred depth after the tests of confidence, reach and flying pixels, with their results."""
 
     depth: DepthMap
-    """(H, W) metres, without the pixels that fly, are out of reach or are believed too little."""
+    """(H, W) metres, without flying pixels, pixels out of reach and those below the least confidence."""
     confidence: FloatArray
-    """(H, W) float32, estimated share of such pixels within 5 % of the truth; NaN without inferred depth."""
+    """(H, W) float32, estimated probability of lying within 5 % of the truth; NaN without inferred depth."""
     flying: BoolArray
     """(H, W) pixels that hang between two surfaces."""
     out_of_reach: BoolArray
@@ -71,7 +71,7 @@ class JudgedDepth:
 def judge(
     alignment: AlignmentResult, sensor: DepthMap, rgb: ByteArray, reach: float, least_confidence: float
 ) -> JudgedDepth:
-    """Make aligned depth meet the rims of the sensor's holes and drop what is not to be believed.
+    """Join aligned depth to the rims of the sensor's holes and drop what cannot be relied on.
 
     Args:
         alignment: (H, W) inferred depth in metres.
@@ -95,17 +95,17 @@ def judge(
         raise InputError(f"A least confidence of {least_confidence} is no share; try 0.5.")
     depth = meet_rims(alignment, sensor, rgb)
     usable, measured = positive(depth.z_m), positive(sensor.z_m)
-    distance = distance_to(measured)
-    flying = usable & hanging(depth, sensor)
+    distance = distance_to_measured(measured)
+    flying = usable & flying_pixels(depth, sensor)
     out_of_reach = usable & (distance > reach)
-    confidence = np.where(usable, believed(alignment, sensor, distance), np.nan).astype(np.float32)
+    confidence = np.where(usable, confidence_of(alignment, sensor, distance), np.nan).astype(np.float32)
     with np.errstate(invalid="ignore"):
         keep = usable & ~flying & ~out_of_reach & (confidence >= least_confidence)
     kept_m = np.where(keep, depth.z_m, np.nan).astype(np.float32)
     return JudgedDepth(DepthMap(kept_m, depth.kind), confidence, flying, out_of_reach)
 
 
-def distance_to(measured: BoolArray) -> FloatArray:
+def distance_to_measured(measured: BoolArray) -> FloatArray:
     """(H, W) distance to the nearest measured pixel in shares of the diagonal; infinite if there is none."""
     if not measured.any():
         return np.full(measured.shape, np.inf, np.float32)
@@ -113,7 +113,7 @@ def distance_to(measured: BoolArray) -> FloatArray:
     return distance_px / np.float32(np.hypot(*measured.shape))
 
 
-def believed(alignment: AlignmentResult, sensor: DepthMap, distance: FloatArray) -> FloatArray:
+def confidence_of(alignment: AlignmentResult, sensor: DepthMap, distance: FloatArray) -> FloatArray:
     """(H, W) confidence of aligned depth.
 
     At pixels with sensor depth it is the share of those around that agree with the sensor within 5 %;
@@ -123,15 +123,15 @@ def believed(alignment: AlignmentResult, sensor: DepthMap, distance: FloatArray)
     known = positive(z_m) & positive(p_m)
     residual = np.log(np.where(known, p_m, 1.0) / np.where(known, z_m, 1.0))
     residual = np.clip(residual, -LOCAL_CLIP, LOCAL_CLIP).astype(np.float32)
-    rough = np.abs(residual - spread(residual, known)) * known
+    rough = np.abs(residual - masked_blur(residual, known)) * known
     agrees = known & (np.abs(np.expm1(-residual)) < INLIER_SHARE_OF_DEPTH)
     odds = ODDS_OF_DISTANCE * np.log(np.maximum(distance, 1e-6)) + LOG_ODDS
-    odds += ODDS_OF_RESIDUAL * spread(rough.astype(np.float32), known)
+    odds += ODDS_OF_RESIDUAL * masked_blur(rough.astype(np.float32), known)
     inferred = 1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0)))
-    return np.where(known, np.clip(spread(agrees.astype(np.float32), known), 0.0, 1.0), inferred)
+    return np.where(known, np.clip(masked_blur(agrees.astype(np.float32), known), 0.0, 1.0), inferred)
 
 
-def hanging(depth: DepthMap, sensor: DepthMap) -> BoolArray:
+def flying_pixels(depth: DepthMap, sensor: DepthMap) -> BoolArray:
     """(H, W) flying pixels: on a steep step, off both of its sides, and near no measured depth around."""
     measured = positive(sensor.z_m)
     complete_m = np.where(measured, sensor.z_m, depth.z_m)
@@ -187,7 +187,7 @@ def meet_rims(alignment: AlignmentResult, sensor: DepthMap, rgb: ByteArray) -> D
     log_p = np.log(np.where(known, sensor.z_m, 1.0)).astype(np.float32)
     gain = RELIEF_AFTER_LOCAL if alignment.mode == "local" else confirmed_relief(log_z, log_p, known)
     field = np.where(known, log_p - gain * log_z, 0.0).astype(np.float32)
-    met = np.exp(gain * log_z + extended(field, known, rgb))
+    met = np.exp(gain * log_z + extrapolated(field, known, rgb))
     return DepthMap(np.where(known | ~usable, depth.z_m, met).astype(np.float32))
 
 
@@ -206,21 +206,23 @@ def confirmed_relief(log_z: FloatArray, log_p: FloatArray, known: BoolArray) -> 
     return float(np.clip(product / square, 0.0, 1.0))
 
 
-def extended(field: FloatArray, known: BoolArray, rgb: ByteArray) -> FloatArray:
-    """(H, W) the field where it is known, and elsewhere what ``continued`` says of the image made small."""
+def extrapolated(field: FloatArray, known: BoolArray, rgb: ByteArray) -> FloatArray:
+    """(H, W) the field where it is known; elsewhere inpainted at ``FILL_WIDTH_PX`` and upsampled."""
     step = max(1, round(known.shape[1] / FILL_WIDTH_PX))
     small = (slice(step // 2, None, step),) * 2
     colors = cv2.GaussianBlur(rgb, (0, 0), 1.0).transpose(2, 0, 1) / np.float32(COLOR_SIGMA * np.sqrt(6.0))
     if not known[small].any():
         return np.where(known, field, np.float32(np.median(field[known])))
-    coarse = continued(field[small], known[small], colors[:, *small])
+    coarse = inpainted(field[small], known[small], colors[:, *small])
     filled = field.copy()
     rows, columns = np.nonzero(~known)
-    filled[rows, columns] = between(coarse, colors[:, *small], colors[:, rows, columns], rows, columns, step)
+    filled[rows, columns] = upsampled(
+        coarse, colors[:, *small], colors[:, rows, columns], rows, columns, step
+    )
     return filled
 
 
-def continued(field: FloatArray, known: BoolArray, colors: FloatArray) -> FloatArray:
+def inpainted(field: FloatArray, known: BoolArray, colors: FloatArray) -> FloatArray:
     """The field with its unknown pixels filled from the rims inwards, a pass for every ring of pixels.
 
     Args:
@@ -259,7 +261,7 @@ def predicted(
     down, right = (axis.ravel() for axis in np.meshgrid(reach_px, reach_px, indexing="ij"))
     there = pixels[:, None] + (down * width_px + right)
     space = np.exp(-(down**2 + right**2) / (2.0 * SPACE_SIGMA_PX**2)).astype(np.float32)
-    weights = known.take(there) * space * likeness(colors.take(there, axis=1), colors[:, pixels, None])
+    weights = known.take(there) * space * color_weights(colors.take(there, axis=1), colors[:, pixels, None])
     weights /= weights.sum(axis=1, keepdims=True)
     field, slope_down, slope_right = values.take(there, axis=1)
     field -= down.astype(np.float32) * slope_down + right.astype(np.float32) * slope_right
@@ -268,7 +270,7 @@ def predicted(
     return total
 
 
-def likeness(colors: FloatArray, others: FloatArray) -> FloatArray:
+def color_weights(colors: FloatArray, others: FloatArray) -> FloatArray:
     """(...) weight of the difference of two (3, ...) arrays of colours, never quite zero."""
     return np.exp(-np.square(colors - others).sum(axis=0)) + np.float32(LEAST_WEIGHT)
 
@@ -284,11 +286,11 @@ def slopes(field: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]
             cv2.GaussianBlur(layer.astype(np.float32), (0, 0), SLOPE_SIGMA_PX)
             for layer in (sound, np.where(sound, slope, 0.0))
         )
-        found.append(SLOPE_TRUST * total / (count + 0.01))
+        found.append(SLOPE_SHARE * total / (count + 0.01))
     return found[0], found[1]
 
 
-def between(
+def upsampled(
     coarse: FloatArray,
     coarse_colors: FloatArray,
     colors: FloatArray,
@@ -314,7 +316,7 @@ def between(
     for y, share_down in ((top, 1.0 - v), (np.minimum(top + 1, coarse.shape[0] - 1), v)):
         for x, share_right in ((left, 1.0 - u), (np.minimum(left + 1, coarse.shape[1] - 1), u)):
             there = y * coarse.shape[1] + x
-            weight = share_down * share_right * likeness(flat_colors.take(there, axis=1), colors)
+            weight = share_down * share_right * color_weights(flat_colors.take(there, axis=1), colors)
             total += weight * flat.take(there)
             weights += weight
     return total / weights

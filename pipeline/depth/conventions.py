@@ -1,6 +1,6 @@
-"""How a depth network wants its image and what its numbers mean: said by its file, a preset or flags.
+"""A depth network's input and the meaning of its output, as its file, a preset or flags give them.
 
-An ONNX file says it in its ``metadata_props``. All keys are optional text, plain or JSON:
+An ONNX file holds it in its ``metadata_props``. All keys are optional text, plain or JSON:
 
     preset             the preset that gives what the other keys leave open
     depth_kind         metric: metres; relative: depth up to scale; inverse: disparity up to scale and shift
@@ -82,7 +82,7 @@ class Convention:
 
 @dataclass(frozen=True, slots=True)
 class Overrides:
-    """What a person says of a network; None leaves it to the file or the preset."""
+    """Parts of the convention that flags set; None leaves a part to the file or the preset."""
 
     kind: ModelKind | None = None
     size_px: tuple[int, int] | None = None
@@ -93,7 +93,7 @@ class Overrides:
 
     @staticmethod
     def of(config: DepthConfig) -> Overrides:
-        """What the settings say."""
+        """The overrides that the settings hold."""
         size_px = None
         if config.input_width_px is not None and config.input_height_px is not None:
             size_px = config.input_width_px, config.input_height_px
@@ -129,18 +129,18 @@ def convention_of(
 
     Args:
         session: of onnxruntime.
-        preset: a name of ``PRESETS``; it replaces all that the metadata say.
-        overrides: what flags say.
+        preset: a name of ``PRESETS``; it replaces all metadata.
+        overrides: from flags.
         name: of the network in errors.
 
     Raises:
         InputError: an unknown preset, metadata without sense, a graph that is no depth network, or a
-            network of which nobody says what it is.
+            network whose kind of output is given nowhere.
     """
     signature = signature_of(session, name)
     given = overrides or Overrides()
     if preset is None:
-        values = said_by(session.get_modelmeta().custom_metadata_map, name)
+        values = from_metadata(session.get_modelmeta().custom_metadata_map, name)
         if "kind" not in values and (signature.width_px, signature.height_px) == (WIDTH_PX, PADDED_HEIGHT_PX):
             values = {**_values(PRESETS["packetmesh"]), **values}
     else:
@@ -166,8 +166,8 @@ def preset_named(name: str) -> Convention:
     raise InputError(f"There is no preset '{name}' for depth networks; try one of {', '.join(PRESETS)}")
 
 
-def said_by(metadata: Mapping[str, str], name: str) -> Values:
-    """Fields of ``Convention`` by what a file's metadata say.
+def from_metadata(metadata: Mapping[str, str], name: str) -> Values:
+    """The fields of ``Convention`` that a file's metadata set.
 
     Raises:
         InputError: a key of ours with a value that it does not take.

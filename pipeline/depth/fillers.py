@@ -1,4 +1,7 @@
-"""The obvious ways to fill depth without inferring it: inpainting, the nearest depth, joint bilateral."""
+"""Baselines that fill depth without a network: inpainting, the nearest depth, joint bilateral filtering.
+
+The Hide tool compares the network's fill with them.
+"""
 
 from __future__ import annotations
 
@@ -54,10 +57,10 @@ def nearest(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
 
 
 def joint_bilateral(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
-    """Means of the known depths around, weighted by distance and likeness of colour, from the rims inwards.
+    """Means of the known depths around, weighted by distance and similarity of colour, from the rims inwards.
 
-    Kopf et al. 2007, as an iteration: each pass fills the unknown pixels that have a known one within
-    3 pixels, from all known ones within 7.
+    Joint bilateral upsampling (Kopf et al. 2007) as an iteration: each pass fills the unknown pixels that
+    have a known one within 3 pixels, from all known ones within 7.
     """
     require_depth(sensor)
     pad = ((WINDOW_PX, WINDOW_PX), (WINDOW_PX, WINDOW_PX))

@@ -21,7 +21,7 @@ THREADS = 2
 
 
 class DepthNetwork:
-    """A loaded network of ours or another's; build it once and infer many images, from any thread."""
+    """A loaded depth network, the shipped one or any other; one object serves many images and threads."""
 
     def __init__(
         self,
@@ -33,12 +33,12 @@ class DepthNetwork:
 
         Args:
             model_path: any depth network (``pipeline.depth.conventions``).
-            preset: how it wants its image, a name of ``conventions.PRESETS``; None takes what it says.
-            overrides: what is otherwise than the file or the preset says.
+            preset: a name of ``conventions.PRESETS``; None takes the convention in the file.
+            overrides: parts of the convention that replace the file's or the preset's.
 
         Raises:
-            InputError: the file is missing, is not ONNX, is damaged, is no depth network, or does not
-                say what it expects and neither does the caller.
+            InputError: the file is missing, is not ONNX, is damaged, is no depth network, or neither
+                it nor the caller gives its convention.
         """
         if model_path is None and preset not in (None, "packetmesh"):
             raise InputError(f"The preset {preset} is for a network of that kind: name its ONNX file as well")
@@ -59,7 +59,7 @@ class DepthNetwork:
 
     @property
     def description(self) -> dict[str, str]:
-        """What the file says of itself: how it was trained and its errors, or how it wants its image."""
+        """The file's metadata: its training and errors, or its convention."""
         return dict(self._session.get_modelmeta().custom_metadata_map)
 
     def infer(self, rgb: ByteArray, crop: bool = False) -> DepthMap:

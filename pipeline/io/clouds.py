@@ -22,12 +22,13 @@ _PARSERS: dict[str, Callable[[AnyPath, bytes], np.ndarray]] = {
     ".npz": parse_npz,
     **dict.fromkeys((".xyz", ".txt", ".asc", ".csv"), parse_text),
 }
+"""Formats by suffix. A new one is a file with a parser that gives a table, and a line here."""
 
 
 def read_cloud(path: AnyPath) -> PointCloud:
     """Points with normals, colours and source labels, where the file has them.
 
-    The suffix tells the format: .ply (also without a suffix), .pcd, .npz, or text in .xyz, .txt, .asc and
+    The suffix decides the format: .ply (also without a suffix), .pcd, .npz, or text in .xyz, .txt, .asc and
     .csv. Further elements (faces) and points that are not finite are left out.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Camera intrinsics in the styles that people have them in, told apart by their keys."""
+"""Camera intrinsics in four common styles, recognised by their keys."""
 
 from __future__ import annotations
 

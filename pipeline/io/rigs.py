@@ -16,7 +16,7 @@ from pipeline.types import AnyPath, RgbdFrame, Rig
 
 MAX_NODES = 6
 LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
-"""T_world_camera of a node that says nothing about its pose: at the origin, upright, looking along +y."""
+"""T_world_camera of a node without a pose file: at the origin, upright, looking along +y."""
 
 
 def load_frame(

@@ -1,4 +1,4 @@
-"""What is really there, beside the nodes of a rig: ``RIG/truth.ply`` and ``RIG/node_NN/true_pose.txt``."""
+"""The true surface and poses of a rig: ``RIG/truth.ply`` and ``RIG/node_NN/true_pose.txt``."""
 
 from __future__ import annotations
 

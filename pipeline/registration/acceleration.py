@@ -1,4 +1,4 @@
-"""Going further than one update says, and back when that was too far (Zhang, Yao, Deng 2021)."""
+"""Safeguarded Anderson acceleration: a pose that raises the energy is undone (Zhang, Yao, Deng 2021)."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Acceleration:
         self._sigma_m = float("nan")
         self._plain: FloatArray | None = None
 
-    def way_back(self, kept: PairWeights) -> FloatArray | None:
-        """The plain pose to take instead, if the extrapolated one raised the energy; else None."""
+    def fallback(self, kept: PairWeights) -> FloatArray | None:
+        """The pose of the last plain update, if the extrapolated one raised the energy; else None."""
         if kept.sigma_m != self._sigma_m:
             self._mixer.reset()
         elif self._plain is not None and kept.energy > self._energy:
@@ -31,7 +31,7 @@ class Acceleration:
             return plain
         return None
 
-    def onward(self, T: FloatArray, T_plain: FloatArray, kept: PairWeights) -> FloatArray:
+    def extrapolated(self, T: FloatArray, T_plain: FloatArray, kept: PairWeights) -> FloatArray:
         """The next pose, from the present one and its plain update."""
         self._energy, self._sigma_m, self._plain = kept.energy, kept.sigma_m, T_plain
         return self._mixer.mix(T, T_plain)

@@ -21,7 +21,7 @@ class Anderson:
     """
 
     def __init__(self, memory: int = 5, center_m: ArrayLike = (0.0, 0.0, 0.0), spread_m: float = 1.0) -> None:
-        """Without a past.
+        """Without any pose yet.
 
         Args:
             memory: differences m that are combined.
@@ -52,7 +52,7 @@ class Anderson:
         return self._from_unit @ motion @ self._to_unit @ self._T_first
 
     def reset(self) -> None:
-        """Forget the past: the next call starts anew."""
+        """Forget all poses: the next call returns its proposal."""
         self._proposals.clear()
         self._residuals.clear()
 

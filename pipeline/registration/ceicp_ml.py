@@ -35,7 +35,7 @@ class CeicpMl(PairWeighting):
     outlier_density: float
     """w0 / (1 - w0) |Q| / V, in one over cubic metres."""
     count: int
-    """Source points that every target point asks for."""
+    """Nearest source points of every target point that are paired with it."""
     sigma_m: float | None = None
     """Scale of the responsibilities; None takes it from the first matching."""
     steady: bool = False

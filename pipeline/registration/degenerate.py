@@ -4,4 +4,4 @@ from packetmesh.errors import ReconstructionError
 
 
 class DegenerateError(ReconstructionError):
-    """The pairs leave the motion undetermined; the message says why, in a few words."""
+    """The pairs leave the motion undetermined; the message gives the reason in a few words."""

@@ -1,4 +1,7 @@
-"""Make a cloud worse in the ways that depth really is: noise, outliers, holes, bias, less overlap."""
+"""Degrade a cloud as real depth is degraded: noise, outliers, holes, bias, less overlap.
+
+The Fuse screen degrades the race's source with it, and the capture map and the claims use it as well.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,11 @@ BIAS_SCALE_OF_VIEW = 0.3
 
 @dataclass(frozen=True, slots=True)
 class Degradation:
-    """What to do to a cloud; the plain one does nothing."""
+    """How much of each degradation; the default changes nothing.
+
+    Raises:
+        InputError: a value outside 0 to its limit in ``LIMITS``.
+    """
 
     noise_m: float = 0.0
     """Standard deviation of noise along the view ray, metres."""
@@ -41,17 +48,17 @@ class Degradation:
 
 
 def degrade(cloud: PointCloud, how: Degradation, seed: int) -> PointCloud:
-    """The cloud with points cropped, punched out, bent, shaken and replaced, in this order.
+    """The cloud after crop, holes, depth bias, noise and outliers, applied in this order.
 
-    Every kind draws from a stream of its own, so that changing one leaves the others as they were.
+    Every kind has its own random stream: changing one leaves the draws of the others as they were.
 
     Args:
         cloud: in its camera's frame, z forward.
-        how: what to do; shares are of the points that are left at that moment.
-        seed: same seed, same result.
+        how: the degradations; shares are of the points that the earlier ones have left.
+        seed: of all five streams.
 
     Returns:
-        The points that are left; moved ones keep their other columns, replaced ones do too.
+        The points that are left, with all their columns; only positions change.
 
     Raises:
         InputError: there are no points, or some lie beside or behind the camera.
@@ -109,7 +116,7 @@ def _without_least(values: FloatArray, share: float) -> BoolArray:
 
 
 def _with_outliers(points_m: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
-    """(N, 3) the points with a share of them drawn anew in the bounding box of all."""
+    """(N, 3) the points, a share of them replaced by uniform ones in the bounding box of all."""
     replaced = rng.permutation(len(points_m))[: round(share * len(points_m))]
     points_m = points_m.copy()
     low, high = points_m.min(axis=0), points_m.max(axis=0)

@@ -1,4 +1,4 @@
-"""Fractional ICP: the data say which share of the pairs are inliers (SPEC 4.6)."""
+"""Fractional ICP: the share of inliers among the pairs is found from their distances (SPEC 4.6)."""
 
 from __future__ import annotations
 

@@ -51,8 +51,6 @@ def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: i
     Raises:
         ReconstructionError: neither pose brings enough points together.
     """
-    from pipeline.open3d_runtime import o3d
-
     reach_m = PAIR_REACH * voxel_m
     (moving, moving_features), (fixed, fixed_features) = (
         _with_features(cloud, voxel_m) for cloud in (source, target)
@@ -76,8 +74,6 @@ def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: i
 
 def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
     """The thinned cloud with normals, and its features."""
-    from pipeline.open3d_runtime import o3d
-
     points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
     if cloud.normals is not None:
         points.normals = o3d.utility.Vector3dVector(cloud.normals)
@@ -91,8 +87,6 @@ def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
 
 
 def _by_ransac(source: Any, target: Any, source_features: Any, target_features: Any, reach_m: float) -> Any:
-    from pipeline.open3d_runtime import o3d
-
     o3d_registration = o3d.pipelines.registration
     return o3d_registration.registration_ransac_based_on_feature_matching(
         source,
@@ -112,8 +106,6 @@ def _by_ransac(source: Any, target: Any, source_features: Any, target_features: 
 
 
 def _fast_global(source: Any, target: Any, source_features: Any, target_features: Any, reach_m: float) -> Any:
-    from pipeline.open3d_runtime import o3d
-
     o3d_registration = o3d.pipelines.registration
     option = o3d_registration.FastGlobalRegistrationOption(maximum_correspondence_distance=reach_m)
     result = o3d_registration.registration_fgr_based_on_feature_matching(

@@ -1,4 +1,4 @@
-"""The loop that all iterative closest-point methods share: match, weigh, move, until still."""
+"""The loop of all iterative closest-point methods: match, weigh, move, until the pose stays."""
 
 from __future__ import annotations
 
@@ -146,8 +146,8 @@ def _iterations(
     for index in range(config.max_iterations):
         try:
             method, matching, kept = _weigh(method, matcher, T, first=index == 0)
-            if acceleration is not None and (back := acceleration.way_back(kept)) is not None:
-                T = back
+            if acceleration is not None and (fallback := acceleration.fallback(kept)) is not None:
+                T = fallback
                 method, matching, kept = _weigh(method, matcher, T)
             support = matching.select(kept.rows)
             motion = residual.solve(support, kept.weights)
@@ -155,7 +155,7 @@ def _iterations(
             return f"degenerate: {error}"
         moved_T: FloatArray = motion @ T
         if acceleration is not None:
-            moved_T = acceleration.onward(T, moved_T, kept)
+            moved_T = acceleration.extrapolated(T, moved_T, kept)
             motion = moved_T @ np.linalg.inv(T)
         step = RegistrationStep(
             index=index,

@@ -21,4 +21,4 @@ def _start_of(place: str) -> MethodStart:
 
 
 METHODS: dict[str, MethodStart] = {name: _start_of(place) for name, place in config.METHODS.items()}
-"""Every method that can be asked for."""
+"""Every method by its name in the settings."""

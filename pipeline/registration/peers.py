@@ -20,9 +20,11 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.geometry import apply, rigid
+from pipeline.open3d_runtime import o3d
 from pipeline.registration.sample import draw
 from pipeline.types import FloatArray, PointCloud
 
+o3d_registration: Any = o3d.pipelines.registration
 NEIGHBOURS = 20
 """Neighbours of a point for its normal or covariance, as in our plane metric."""
 CPD_POINTS = 1500
@@ -45,7 +47,7 @@ class PeerResult:
     T_target_source: FloatArray
     """(4, 4)."""
     iterations: int | None
-    """None where the program does not tell."""
+    """None where the program does not report it."""
     elapsed_s: float
     """From points to pose, preparation included, imports not."""
     stop_reason: str
@@ -53,7 +55,7 @@ class PeerResult:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What every peer is asked to do."""
+    """What every peer gets."""
 
     source_m: FloatArray
     """(N, 3)."""
@@ -118,70 +120,24 @@ def run_peer(
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SyntaxWarning)  # pycpd's source compares numbers with "is not"
-        import_module("pipeline.open3d_runtime" if PEERS[name].module == "open3d" else PEERS[name].module)
+        import_module(PEERS[name].module)  # before the clock starts
     started = time.perf_counter()
     T, iterations, reason = PEERS[name].solve(problem)
     return PeerResult(np.array(T), iterations, time.perf_counter() - started, reason)
 
 
-def _open3d_point(problem: Problem) -> Outcome:
-    from pipeline.open3d_runtime import o3d
-
-    estimation = o3d.pipelines.registration.TransformationEstimationPointToPoint()
-    return _open3d_icp(problem, *_open3d_clouds(problem), estimation)
-
-
-def _open3d_plane(problem: Problem) -> Outcome:
-    from pipeline.open3d_runtime import o3d
-
-    source, target = _open3d_clouds(problem)
-    target.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS))
-    estimation = o3d.pipelines.registration.TransformationEstimationPointToPlane()
-    return _open3d_icp(problem, source, target, estimation)
-
-
-def _open3d_icp(problem: Problem, source: Any, target: Any, estimation: Any) -> Outcome:
-    from pipeline.open3d_runtime import o3d
-
-    return _open3d_outcome(
-        o3d.pipelines.registration.registration_icp(
-            source, target, problem.gate_m, problem.T_init, estimation, _open3d_criteria(problem)
-        )
-    )
-
-
-def _open3d_gicp(problem: Problem) -> Outcome:
-    from pipeline.open3d_runtime import o3d
-
-    estimation = o3d.pipelines.registration.TransformationEstimationForGeneralizedICP()
-    source, target = _open3d_clouds(problem)
-    return _open3d_outcome(
-        o3d.pipelines.registration.registration_generalized_icp(
-            source, target, problem.gate_m, problem.T_init, estimation, _open3d_criteria(problem)
-        )
-    )
-
-
-def _open3d_clouds(problem: Problem) -> tuple[Any, Any]:
-    from pipeline.open3d_runtime import o3d
-
+def _open3d(problem: Problem, register: Any, estimation: Any, with_normals: bool = False) -> Outcome:
+    """One of Open3D's loops; it tells neither its iterations nor why it stopped."""
     source, target = (
         o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
         for points_m in (problem.source_m, problem.target_m)
     )
-    return source, target
-
-
-def _open3d_criteria(problem: Problem) -> Any:
-    from pipeline.open3d_runtime import o3d
-
-    return o3d.pipelines.registration.ICPConvergenceCriteria(
+    if with_normals:
+        target.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS))
+    criteria = o3d_registration.ICPConvergenceCriteria(
         RELATIVE_TOLERANCE, RELATIVE_TOLERANCE, problem.max_iterations
     )
-
-
-def _open3d_outcome(result: Any) -> Outcome:
-    """Open3D tells neither its iterations nor why it stopped."""
+    result = register(source, target, problem.gate_m, problem.T_init, estimation, criteria)
     return result.transformation, None, "finished" if result.fitness > 0 else _NO_PAIRS
 
 
@@ -292,11 +248,37 @@ def _rigid_cpd(base: Any) -> Any:
 _STAGED = "max distance T_d, T_d/2, 10 cm, 6 cm in turn"
 
 PEERS: dict[str, Peer] = {
-    "open3d-point": Peer("Open3D ICP, point to point", "hard gate", "open3d", _open3d_point),
-    "open3d-plane": Peer(
-        "Open3D ICP, point to plane", "hard gate; its normals are in the time", "open3d", _open3d_plane
+    "open3d-point": Peer(
+        "Open3D ICP, point to point",
+        "hard gate",
+        "open3d",
+        lambda problem: _open3d(
+            problem,
+            o3d_registration.registration_icp,
+            o3d_registration.TransformationEstimationPointToPoint(),
+        ),
     ),
-    "open3d-gicp": Peer("Open3D GICP", "hard gate; its covariances are in the time", "open3d", _open3d_gicp),
+    "open3d-plane": Peer(
+        "Open3D ICP, point to plane",
+        "hard gate; its normals are in the time",
+        "open3d",
+        lambda problem: _open3d(
+            problem,
+            o3d_registration.registration_icp,
+            o3d_registration.TransformationEstimationPointToPlane(),
+            with_normals=True,
+        ),
+    ),
+    "open3d-gicp": Peer(
+        "Open3D GICP",
+        "hard gate; its covariances are in the time",
+        "open3d",
+        lambda problem: _open3d(
+            problem,
+            o3d_registration.registration_generalized_icp,
+            o3d_registration.TransformationEstimationForGeneralizedICP(),
+        ),
+    ),
     "small-gicp": Peer(
         "small_gicp GICP",
         "hard gate; trees and covariances are in the time",

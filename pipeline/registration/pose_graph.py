@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.geometry import apply, inverse
+from pipeline.open3d_runtime import o3d
 from pipeline.registration.metrics import point_error_m
 from pipeline.registration.neighbourhood import median_spacing_m
 from pipeline.types import FloatArray, PointCloud
@@ -34,8 +35,8 @@ class PoseEdge:
     information: FloatArray
     """(6, 6) sum of J^T J over the close pairs; rotations first, as Open3D orders them."""
     misfit_m: float
-    """Median distance of the source's points from the target where they overlap; tells which of several
-    edges that contradict each other is the worst."""
+    """Median distance of the source's points from the target where they overlap; of edges that
+    contradict each other, the one with the largest is dropped first."""
 
     @property
     def pairs(self) -> float:
@@ -163,8 +164,6 @@ def _ways(start: int, end: int, edges: Sequence[PoseEdge]) -> Iterator[FloatArra
 
 def _optimised(start: Sequence[FloatArray], edges: Sequence[PoseEdge]) -> list[FloatArray]:
     """Open3D's Levenberg-Marquardt over the nodes that have a start, node 0 held."""
-    from pipeline.open3d_runtime import o3d
-
     reached = [node for node, pose in enumerate(start) if np.isfinite(pose).all()]
     if len(edges) < len(reached):
         return list(start)  # a tree: nothing to agree about

@@ -62,7 +62,7 @@ def draw(cloud: PointCloud, max_points: int, seed: int, name: str) -> Sample:
 
 
 def random_keys(points_m: FloatArray, seed: int) -> FloatArray:
-    """(N,) numbers in [0, 1), as good as random, by which to choose among (N, 3) points.
+    """(N,) pseudo-random numbers in [0, 1) by which to choose among (N, 3) points.
 
     A key follows from the point's distance to the cloud's centre over the cloud's size alone: it stays with
     its point when the points come in another order, or when the whole cloud moves or is scaled.

@@ -17,7 +17,7 @@ STILL_STEPS = 2
 
 @dataclass(slots=True)
 class StopRule:
-    """Watches steps go by and says when they have become pointless."""
+    """Decides after every step whether the registration has converged or stalled."""
 
     translation_tolerance_m: float
     _rmse_m: float = float("nan")

@@ -1,4 +1,4 @@
-"""What one node's sensor knows about another node's points."""
+"""Which of a node's points another node's sensor can judge."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ guesses about a surface that the sensor has measured."""
 def hidden_from(
     cloud: PointCloud, T_camera_cloud: FloatArray, intrinsics: CameraIntrinsics, depth: DepthMap
 ) -> BoolArray:
-    """(N,) True for the points about which another camera's sensor says nothing.
+    """(N,) True for the points that another camera's sensor cannot confirm or refute.
 
     Those are outside its image, at pixels without depth, or well behind what it measured. The other
     points lie on a measured surface, or float in front of it where the sensor sees through them.

@@ -85,7 +85,7 @@ class PairWeighting(ABC):
 
     @property
     def neighbours(self) -> int:
-        """Nearest points that every point asks for; a matching's rows come in blocks, nearest first."""
+        """Nearest points that every point is paired with; a matching's rows come in blocks, nearest first."""
         return 1
 
     @property

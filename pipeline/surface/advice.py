@@ -1,4 +1,4 @@
-"""Which ball radius closes the surface, read off the triangles that the points ask for (SPEC 5)."""
+"""Suggested ball radii: those whose balls close given shares of the surface (SPEC 5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surfaces by other methods, to hold the ball's against: screened Poisson and alpha shapes."""
+"""Baselines for ball pivoting: screened Poisson surfaces and alpha shapes."""
 
 from __future__ import annotations
 

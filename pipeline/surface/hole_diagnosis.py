@@ -1,4 +1,4 @@
-"""Why a hole is there, found by experiment: what would have to be different for the ball to close it."""
+"""The cause of a hole, found by rolling again: which change would make the ball close it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST = 0.5
 GROWTH = 1.25
 """Each ball that is tried is larger than the one before by this factor."""
 WIDE = 10.0
-"""Without views, a gap of this many point spacings is one where nobody measured."""
+"""Without views, a gap of this many point spacings counts as unmeasured."""
 _MOST_POINTS = 4000
 """Points that one explanation rolls over, so that it takes a fraction of a second."""
 _BALLS_AROUND = 4.0
@@ -60,12 +60,12 @@ class _Place:
     widest_gap_m: float
     """Diameter of the largest circle around a sample without a point of the cloud."""
     largest_m: float
-    """Largest ball whose emptiness these points can tell."""
+    """Largest ball whose emptiness can be decided from these points."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Findings:
-    """What the experiments showed."""
+    """The results of rolling again and of the cameras' views."""
 
     known: Known
     layered: float
@@ -113,7 +113,7 @@ def explain_hole(
     place = _place(hole, surface, cloud)
     found = _findings(place, surface, views)
     reason = _reason(place, surface, found)
-    sentence, remedy = _words(reason, place, surface, found)
+    sentence, remedy = _sentences(reason, place, surface, found)
     if hole.island:
         sentence = f"This loop runs around a piece that hangs on the rest by single points. {sentence}"
     known = found.known
@@ -138,12 +138,12 @@ def _reason(place: _Place, surface: SurfaceResult, found: _Findings) -> Reason:
         return "normals"
     if np.isfinite(known.sensor_share):
         inferred = known.inferred_share if _has_inferred(surface) else 0.0
-        nobody = known.sensor_share + inferred <= MOST
+        unmeasured = known.sensor_share + inferred <= MOST
     elif place.ends:
-        nobody = found.radius_m is None
+        unmeasured = found.radius_m is None
     else:
-        nobody = place.widest_gap_m >= WIDE * place.spacing_m
-    return "no points" if nobody else "gap"
+        unmeasured = place.widest_gap_m >= WIDE * place.spacing_m
+    return "no points" if unmeasured else "gap"
 
 
 def _has_inferred(surface: SurfaceResult) -> bool:
@@ -258,10 +258,10 @@ def _closed(rolled: Rolled, place: _Place) -> BoolArray:
     return first_hits(scene, above_m, -place.directions) <= 2.0 * place.height_m
 
 
-def _words(reason: Reason, place: _Place, surface: SurfaceResult, found: _Findings) -> tuple[str, str]:
-    """The sentence that says why, and the one or two that say what to do."""
+def _sentences(reason: Reason, place: _Place, surface: SurfaceResult, found: _Findings) -> tuple[str, str]:
+    """The sentence with the cause, and the one or two with the remedy."""
     if reason == "outside view":
-        return _unseen_words(place, found.known)
+        return _unseen_sentences(place, found.known)
     if reason == "normals":
         return (
             "Points are there, but their normals contradict each other: if they agreed, balls of up to "
@@ -270,18 +270,18 @@ def _words(reason: Reason, place: _Place, surface: SurfaceResult, found: _Findin
             "Take more smoothing passes, or estimate the normals from more neighbours.",
         )
     if reason == "no points":
-        return _unmeasured_words(place, surface, found)
-    return _gap_words(place, surface.radii_m[-1], found)
+        return _unmeasured_sentences(place, surface, found)
+    return _gap_sentences(place, surface.radii_m[-1], found)
 
 
 def _length(length_m: float) -> str:
-    """A length as people say it."""
+    """A length in the unit that suits it."""
     if length_m >= 0.1:
         return f"{100 * length_m:.0f} cm"
     return f"{1000 * length_m:.0f} mm" if length_m >= 0.01 else f"{1000 * length_m:.1f} mm"
 
 
-def _unseen_words(place: _Place, known: Known) -> tuple[str, str]:
+def _unseen_sentences(place: _Place, known: Known) -> tuple[str, str]:
     if known.outside_share + known.hidden_share <= MOST:
         return (
             f"Beyond {known.past_share:.0%} of this rim a camera sees something farther away: the surface "
@@ -295,7 +295,7 @@ def _unseen_words(place: _Place, known: Known) -> tuple[str, str]:
     )
 
 
-def _unmeasured_words(place: _Place, surface: SurfaceResult, found: _Findings) -> tuple[str, str]:
+def _unmeasured_sentences(place: _Place, surface: SurfaceResult, found: _Findings) -> tuple[str, str]:
     known = found.known
     if np.isfinite(known.sensor_share):
         sentence = (
@@ -318,16 +318,16 @@ def _unmeasured_words(place: _Place, surface: SurfaceResult, found: _Findings) -
         remedy = "Fuse the sensor's depth with the network's, which knows more here."
     else:
         remedy = "Add a view from another place."
-    return sentence, f"{remedy} {_ball_words(place, found)}"
+    return sentence, f"{remedy} {_ball_sentence(place, found)}"
 
 
-def _gap_words(place: _Place, ball_m: float, found: _Findings) -> tuple[str, str]:
+def _gap_sentences(place: _Place, ball_m: float, found: _Findings) -> tuple[str, str]:
     ball, width = f"the largest ball so far, {_length(ball_m)} in radius,", _length(2.0 * ball_m)
     if place.ends:
         there = "Points go on" if found.radius_m is not None else "A depth is known"
-        return f"{there} beyond this rim, but {ball} does not reach them.", _ball_words(place, found)
+        return f"{there} beyond this rim, but {ball} does not reach them.", _ball_sentence(place, found)
     gap = f"The widest gap in the hole is {_length(place.widest_gap_m)}"
-    remedy = _ball_words(place, found)
+    remedy = _ball_sentence(place, found)
     if place.widest_gap_m > 2.0 * ball_m:
         sentence = f"{gap}, and {ball} falls through all that are wider than {width}."
     elif found.layered > MOST and found.radius_m is None:
@@ -340,7 +340,7 @@ def _gap_words(place: _Place, ball_m: float, found: _Findings) -> tuple[str, str
     return sentence, remedy
 
 
-def _ball_words(place: _Place, found: _Findings) -> str:
+def _ball_sentence(place: _Place, found: _Findings) -> str:
     """What larger balls do."""
     if found.radius_m is not None:
         does = "goes on beyond most of this rim" if place.ends else "closes it"

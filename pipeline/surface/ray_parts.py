@@ -26,7 +26,7 @@ class View:
     sensor_valid: BoolArray
     """(H, W) True where the sensor measured a depth."""
     inferred_valid: BoolArray | None
-    """(H, W) True where the network's depth is known; None if it was not asked."""
+    """(H, W) True where the network's depth is known; None if it did not run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class Sight:
 
 
 def ray_parts(surface: SurfaceResult, views: Sequence[View]) -> RayParts:
-    """Sort the pixel rays of all views by what they meet, and those that meet nothing by who knows more.
+    """Classify the pixel rays of all views by what they meet, or by which depth is known where they miss.
 
     Raises:
         InputError: a mask that does not have its camera's image size.

@@ -1,4 +1,4 @@
-"""Taking the sensor's noise out of a thinned cloud before the ball rolls over it."""
+"""Smoothing of a thinned cloud by moving least squares, before the ball rolls over it."""
 
 from __future__ import annotations
 

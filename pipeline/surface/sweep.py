@@ -1,4 +1,4 @@
-"""What the ball radius does: the same cloud rolled over by one ball after another, each alone."""
+"""A sweep of the ball radius: the same cloud meshed with one ball after another, each alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A surface against what is really there (SPEC 5)."""
+"""Errors of a surface against the true one (SPEC 5)."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def compare_with_truth(
     """
     if not len(triangles):
         raise InputError("There is no triangle to compare with the truth; try a larger ball radius")
-    mesh_m = _where_it_truly_is(vertices_m, truth, cameras)
+    mesh_m = _in_true_frame(vertices_m, truth, cameras)
     true_cameras = [
         Camera(camera.intrinsics, T) for camera, T in zip(cameras, truth.T_world_camera, strict=True)
     ]
@@ -63,10 +63,10 @@ def compare_with_truth(
 def distances_to_truth_m(vertices_m: FloatArray, truth: RigTruth, cameras: Sequence[Camera]) -> FloatArray:
     """(N,) distances of (N, 3) points to the true surface, after ``compare_with_truth``'s move."""
     true_scene = triangle_scene(truth.vertices_m, truth.triangles)
-    return _distances_m(true_scene, _where_it_truly_is(vertices_m, truth, cameras))
+    return _distances_m(true_scene, _in_true_frame(vertices_m, truth, cameras))
 
 
-def _where_it_truly_is(vertices_m: FloatArray, truth: RigTruth, cameras: Sequence[Camera]) -> FloatArray:
+def _in_true_frame(vertices_m: FloatArray, truth: RigTruth, cameras: Sequence[Camera]) -> FloatArray:
     """The points moved so that their first camera stands where it truly does."""
     return apply(truth.T_world_camera[0] @ inverse(cameras[0].T_world_camera), vertices_m)
 

@@ -1,4 +1,4 @@
-"""The walk of the rolling ball, kept whole so that it can be watched from pivot to pivot, and backwards."""
+"""The record of a rolling ball, pivot by pivot, which can be played forwards and backwards."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ def _glued_by(twins: IntArray) -> IntArray:
 def _left_front(
     triangles: IntArray, steps: Sequence[BallPivotStep], balls: ByteArray, radii: int
 ) -> IntArray:
-    """A half-edge is on one ball's front without a break, so the last step in which it is there tells all."""
+    """A half-edge is on one ball's front without a break, so its last step there is enough to know."""
     left = np.zeros((radii, 3 * len(triangles)), np.int32)
     fronts = half_edges(triangles, np.concatenate([step.front_edges for step in steps]))
     ends = np.cumsum([len(step.front_edges) for step in steps])

@@ -11,7 +11,7 @@ from app.screens.depth.view import Disc, HideRequest
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork, align_depth
-from pipeline.depth.confidence import distance_to, judge
+from pipeline.depth.confidence import distance_to_measured, judge
 from pipeline.io.demos import load_demo
 
 
@@ -112,7 +112,7 @@ def test_confidence_and_what_is_left_out_are_as_the_lesson_says(room):
     alignment = align_depth(DepthNetwork().infer(room.rgb), room.depth)
     judged = judge(alignment, room.depth, room.rgb, look_at("Points that fly").reach, 0.0)
     blind = ~room.depth.valid
-    distance = distance_to(room.depth.valid)
+    distance = distance_to_measured(room.depth.valid)
     near, far = (distance < 0.005) & blind, (distance > 0.02) & blind
     assert judged.confidence[near].mean() > judged.confidence[far].mean() + 0.2
     assert judged.flying.sum() > 100

@@ -81,11 +81,14 @@ def test_two_nodes_meet_with_ceicp_and_not_with_icp(rooms):
 def test_holes_hurt_ceicp_less_than_icp(rooms):
     """A complete cloud onto the holed sensor cloud of its own node (C17: ratio of medians at most 0.6).
 
-    ICP is cured by asking the other way round, since each sensor point has its partner (SPEC 4.8).
+    ICP is cured in the other direction, where each sensor point has its partner (SPEC 4.8). Two draws of
+    the points a room, because the ratio of one draw's medians varies by a tenth.
     """
     cases = [(first.complete, first.sensor, np.eye(4)) for first, _ in rooms]
-    icp_m = np.median(_errors_m(cases, replace(ICP, direction="q2p")))
-    icp_asked_back_m = np.median(_errors_m(cases, replace(ICP, direction="p2q")))
-    ceicp_m = np.median(_errors_m(cases, replace(ICP, method="ceicp-n")))
-    assert ceicp_m <= 0.6 * icp_m
-    assert icp_asked_back_m < 0.5 * icp_m
+
+    def median_m(**changes) -> float:
+        return float(np.median([_errors_m(cases, replace(ICP, seed=seed, **changes)) for seed in (0, 1)]))
+
+    icp_m = median_m()
+    assert median_m(method="ceicp-n") <= 0.6 * icp_m
+    assert median_m(direction="p2q") < 0.5 * icp_m
