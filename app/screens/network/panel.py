@@ -89,7 +89,7 @@ class NetworkPanel(Panel):
         return self._setup.command()
 
     def _run(self) -> None:
-        """Simulate what the controls say, unless it is what is shown."""
+        """Simulate the runs of the controls, unless they are shown already."""
         preset = NETWORKS[self._setup.preset]
         self._about.content = preset.sentence + (f" {ORIGIN}" if preset.schemes else "")
         runs = self._setup.runs()

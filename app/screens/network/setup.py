@@ -26,7 +26,7 @@ FREE = """Any setting of `packetmesh simulate --describe`, several separated by 
 
 
 class NetworkSetup:
-    """The controls of one run or two; says when a person changes one."""
+    """The controls of one run or two."""
 
     def __init__(
         self,
@@ -89,7 +89,7 @@ class NetworkSetup:
         self._load()
 
     def runs(self) -> tuple[NetworkRun, ...]:
-        """The runs that the controls say.
+        """The runs that the controls describe.
 
         Raises:
             InputError: settings that do not go together.

@@ -290,10 +290,10 @@ class SurfacePanel(Panel):
         if session.results.fresh("surface", session.spec):
             session.quick_job("explain", session.store, session.spec, which, index, on_end=self._explained)
         else:
-            self._explained(None)  # the holes listed are of a surface that is being made anew
+            self._explained(None)  # the holes listed are of a surface that is being computed again
 
     def _explained(self, answer: ExplainView | None) -> None:
-        self._holes.tell(answer)
+        self._holes.explain(answer)
         if answer is not None and self._by_click:
             self.session.notify(answer.reason.capitalize(), f"{answer.sentence} {answer.remedy}", "blue")
         self._by_click = False
