@@ -103,7 +103,7 @@ def stored(control: Control, display: Any, config: PipelineConfig) -> PipelineCo
 
 
 class Controls:
-    """The controls of some fields, kept equal to a config that somebody else owns."""
+    """The controls of some fields, kept equal to the session's config."""
 
     def __init__(
         self,

@@ -8,6 +8,7 @@ import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.geometry import middle_extent_m
+from pipeline.open3d_runtime import o3d
 from pipeline.types import FloatArray, PointCloud
 
 VOXELS_ACROSS = 50

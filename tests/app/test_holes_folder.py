@@ -181,7 +181,7 @@ def test_the_list_names_holes_then_rims_and_choosing_asks(screen):
     assert screen.asked == []
     screen.gui.set("Hole", screen.list.options[2])
     assert screen.asked == [("after", 1)]
-    screen.folder.tell(ANSWER)
+    screen.folder.explain(ANSWER)
     assert all(part in screen.why for part in ("Gap", FOUND.sentence, FOUND.remedy))
     assert all(share in screen.why for share in ("75 %", "15 %", "10 %"))
     screen.gui.set("Hole", NONE)
@@ -192,16 +192,16 @@ def test_the_list_names_holes_then_rims_and_choosing_asks(screen):
 def test_an_answer_about_another_hole_is_not_shown(screen):
     screen.gui.set("Hole", screen.list.options[1])
     asking = screen.why
-    screen.folder.tell(ANSWER)
+    screen.folder.explain(ANSWER)
     assert screen.why == asking
-    screen.folder.tell(None)
+    screen.folder.explain(None)
     assert screen.why != asking
 
 
 def test_without_cameras_that_look_there_is_no_table(screen):
     screen.gui.set("Hole", screen.list.options[2])
     unseen = float("nan")
-    screen.folder.tell(
+    screen.folder.explain(
         replace(
             ANSWER, found=replace(FOUND, sensor_share=unseen, inferred_share=unseen, unknown_share=unseen)
         )

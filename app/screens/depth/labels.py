@@ -1,4 +1,4 @@
-"""What the Depth screen and its lesson call things."""
+"""Labels of the Depth screen and of its lesson."""
 
 from __future__ import annotations
 

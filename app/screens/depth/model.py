@@ -27,7 +27,7 @@ KEPT = "The network before is kept. Say what this one expects, or choose another
 
 
 class ModelFolder:
-    """A list of networks, an upload button, a preset, and what the network says about itself."""
+    """A list of networks, an upload button, a preset, and the description in the network's file."""
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class ModelFolder:
             self._table = gui.add_html("")
 
     def _add_input(self, ui: Ui) -> None:
-        """What only somebody who knows the network can say, for one that is not ours."""
+        """Add the settings of the input of a network that is not ours."""
         gui = ui.gui
         self._advanced = gui.add_folder("Advanced: its input", expand_by_default=False, visible=False)
         with self._advanced:
@@ -107,7 +107,7 @@ class ModelFolder:
         self._advanced.visible = config.model is not None
 
     def load(self, view: ModelView | None) -> None:
-        """Tell of the network that was tried; None could not be used, and the one before stays in use."""
+        """Show the network that was tried; None could not be used, and the one before stays in use."""
         if view is None:
             self._status.content = KEPT
             return

@@ -105,4 +105,4 @@ class ModelView:
     """One test image, the first, which takes longer than those that follow."""
     size_bytes: int
     description: dict[str, str]
-    """What the file says about itself."""
+    """From the metadata of the file."""

@@ -1,4 +1,4 @@
-"""The words with which the panel and the lessons say what a race is."""
+"""Labels of the choices of a race, in the panel and in the lessons."""
 
 from __future__ import annotations
 

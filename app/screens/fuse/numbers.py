@@ -14,7 +14,7 @@ STOPS = {"max_iterations": "limit"}
 
 
 def verdict(lanes: tuple[RaceLane, ...]) -> str:
-    """What the numbers say, whoever wins."""
+    """A sentence on which method ends nearest to the truth, whichever that is."""
     if lanes[0].steps[-1].point_error_m is None:
         return (
             "The truth of this scene is not known. RMSE alone does not tell which is better: each method "
@@ -124,7 +124,7 @@ def _place_row(row: RegistrationRow) -> Row:
 
 
 def _loop(row: RegistrationRow) -> str:
-    """What the other registrations say about this one."""
+    """How well the other registrations agree with this one."""
     if not row.used:
         return "Not used: it degenerated or contradicts the other registrations."
     if not np.isfinite(row.loop_error_m):

@@ -133,7 +133,7 @@ class FusePanel(Panel):
             self._start()
 
     def on_show(self) -> None:
-        """Race at the latest when somebody looks."""
+        """Start the race if none has run yet."""
         self._lanes = 0
         self._start()
 

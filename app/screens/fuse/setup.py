@@ -143,7 +143,7 @@ class RaceSetup:
         )
 
     def _read(self, race: Race) -> Race:
-        """``race`` with what the controls of the clouds and methods say."""
+        """``race`` with the values of the controls of the clouds and methods."""
         names = list(self._source.options)
         worse = {name: handle.value / DEGRADATIONS[name][3] for name, handle in self._worse.items()}
         return replace(

@@ -160,11 +160,11 @@ class NetworkCharts:
     def _paint(self) -> None:
         """Paint the rows if the window has moved, and the player's place."""
         several = len(self._views) > 1
-        anew, self._painted = self._painted != self._window, self._window
+        moved, self._painted = self._painted != self._window, self._window
         self._zoom.label = f"Span ({short_time(self._window.span_ns / 1e9)})"
         for index, view in enumerate(self._views):
             rows, cursor = self._rows[2 * index : 2 * index + 2]
-            if anew:
+            if moved:
                 rows.content = gantt_html(view, self._window, view.label if several else "")
             cursor.content = cursor_html(view, self._window, self._now_ns)
 

@@ -25,7 +25,7 @@ FREE = """Any setting of `packetmesh simulate --describe`, several separated by 
 
 
 class NetworkSetup:
-    """The controls of one run or two; says when a person changes one."""
+    """The controls of one run or two."""
 
     def __init__(
         self,

@@ -15,7 +15,7 @@ from pipeline.types import FloatArray
 
 
 class What(IntEnum):
-    """What a piece of the timeline says. Those from ``LOSS`` on are instants."""
+    """What happened in a piece of the timeline. Those from ``LOSS`` on are instants."""
 
     WAIT = 0
     """A packet waited in the node's buffer for its first frame."""
@@ -79,7 +79,7 @@ class Series:
     t_s: FloatArray
     """(T,) middles of the intervals, or their ends for what adds up."""
     values: FloatArray
-    """(T,) NaN where there is nothing to say."""
+    """(T,) NaN where there is none."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,8 +125,8 @@ class HolesFolder:
         if self._shown:
             self._choose(0)
 
-    def tell(self, answer: ExplainView | None) -> None:
-        """Show why the chosen hole is there; None if nobody could say."""
+    def explain(self, answer: ExplainView | None) -> None:
+        """Show why the chosen hole is there; None if no answer came."""
         if self._index is None:
             return
         if answer is None:
@@ -136,7 +136,7 @@ class HolesFolder:
             self._shares.content = shares_table(answer.found)
 
     def filled(self, view: FilledView | None) -> None:
-        """Say what filling made of the surface; None if nobody could fill it."""
+        """Show what filling made of the surface; None if no answer came."""
         if not self.filling:
             self._filled.content = FILL_OFF
         else:
@@ -148,7 +148,7 @@ class HolesFolder:
         return self._fill.value > 0.0
 
     def unfill(self) -> None:
-        """The surface is drawn anew, without what was filled."""
+        """Turn filling off, as the surface is drawn again without it."""
         self._fill.value = 0.0
         self.filled(None)
 

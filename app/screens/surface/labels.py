@@ -1,4 +1,4 @@
-"""What the Surface screen and its lesson call things."""
+"""Labels of the Surface screen and of its lesson."""
 
 from __future__ import annotations
 

@@ -319,10 +319,10 @@ class SurfacePanel(Panel):
                 on_end=self._explained,
             )
         else:
-            self._explained(None)  # the holes listed are of a surface that is being made anew
+            self._explained(None)  # the holes listed are of a surface that is being computed again
 
     def _explained(self, answer: ExplainView | None) -> None:
-        self._holes.tell(answer)
+        self._holes.explain(answer)
         if answer is not None and self._by_click:
             found = answer.found
             self.session.notify(found.reason.capitalize(), f"{found.sentence} {found.remedy}", "blue")

@@ -120,7 +120,7 @@ class RollingFolder:
         self.forget()
 
     def _chose(self) -> None:
-        """Another choice takes effect at once while somebody watches, or waits."""
+        """Another choice takes effect at once while a walk is shown or awaited."""
         if self.showing or self._waiting:
             self._request()
 

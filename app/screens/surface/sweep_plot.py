@@ -73,7 +73,7 @@ def _fill(figure: go.Figure, view: SweepView, below: str) -> None:
 
 
 def sweep_sentence(view: SweepView) -> str:
-    """What the sweep says: from where on larger balls close hardly anything, and what they cost."""
+    """The sweep in a sentence: from where on larger balls close hardly anything, and what they cost."""
     rows = [row for row in view.points if row.triangles]
     if not rows:
         return "No ball of the sweep leaves a triangle."
