@@ -100,7 +100,7 @@ def from_trial(site: Site, result: dict[str, Any]) -> SceneErrors:
         for frame in result["frames"]
     ]
     png = np.frombuffer(base64.b64decode(result["strip"]), np.uint8)
-    return SceneErrors(site, tuple(frames), cv2.imdecode(png, cv2.IMREAD_COLOR))
+    return SceneErrors(site, tuple(frames), np.asarray(cv2.imdecode(png, cv2.IMREAD_COLOR), np.uint8))
 
 
 def scene_errors(site: Site, network: DepthNetwork) -> SceneErrors:
