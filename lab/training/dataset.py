@@ -206,5 +206,5 @@ def degrade(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
         rgb = np.clip(rgb + noise, 0, 255).astype(np.uint8)
     if rng.random() < 0.2:
         _, code = cv2.imencode(".jpg", rgb, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(40, 95))])
-        rgb = cv2.imdecode(code, cv2.IMREAD_COLOR)
+        rgb = np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
     return rgb
