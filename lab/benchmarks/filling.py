@@ -1,4 +1,4 @@
-"""Filling honest holes: real sensor depth is hidden, filled by us and by the obvious peers, and compared."""
+"""Filling realistic holes: sensor depth is hidden, filled by us and by the obvious peers, and compared."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Honest holes: real sensor depth hidden in the shapes in which that sensor loses it (SPEC 3.5)."""
+"""Realistic holes: sensor depth hidden in the shapes in which that sensor loses it (SPEC 3.5)."""
 
 from __future__ import annotations
 

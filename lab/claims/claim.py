@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lab.claims.exhibits import Exhibit, exhibit_record
+from lab.claims.exhibits import Curve, Exhibit, exhibit_record
 from packetmesh.progress import Progress
 from pipeline.types import FloatArray
 
@@ -84,9 +84,18 @@ class Claim:
         )
 
 
-def bootstrap_ci95(values: FloatArray, seed: int = 0, resamples: int = 2000) -> tuple[float, float]:
-    """95 % percentile interval of the mean of (N,) ``values``."""
+def bootstrap_ci95(
+    values: FloatArray, seed: int = 0, resamples: int = 2000, statistic: Callable[..., Any] = np.mean
+) -> tuple[float, float]:
+    """95 % percentile interval of the mean, or of another statistic, of (N,) ``values``."""
     values = np.asarray(values, float)
     rows = np.random.default_rng(seed).integers(0, len(values), (resamples, len(values)))
-    low, high = np.percentile(values[rows].mean(axis=1), (2.5, 97.5))
+    low, high = np.percentile(statistic(values[rows], axis=1), (2.5, 97.5))
     return float(low), float(high)
+
+
+def mean_curve(label: str, x: Iterable[float], columns: Iterable[FloatArray], resamples: int = 2000) -> Curve:
+    """The means of (N,) values at each ``x``, with their bootstrap intervals as a band."""
+    points = [(float(column.mean()), *bootstrap_ci95(column, resamples=resamples)) for column in columns]
+    means, low, high = zip(*points, strict=True)
+    return Curve(label, tuple(float(value) for value in x), means, low, high)

@@ -1,4 +1,4 @@
-"""Tables and pictures that belong to a verdict, as data: whoever shows them decides how."""
+"""Tables and pictures that belong to a verdict, as data."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ def _data_of(package: Path) -> tarfile.TarFile:
 
 
 def numbered_records(file: Path, suffix: str) -> Iterator[tuple[dict[str, str], dict[str, str]]]:
-    """The numbered records of the catalogues in a zip file, each with what its catalogue says of itself.
+    """The numbered records of the catalogues in a zip file, each with its catalogue's own properties.
 
     Args:
         file: zip file with Java properties whose names end in ``suffix``, in lines like ``width#3=60``.

@@ -11,7 +11,6 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numba
@@ -21,18 +20,13 @@ from scipy.sparse.csgraph import connected_components
 
 from lab.training import dataset
 from lab.training.furniture import Catalogue
-from lab.training.varied_rooms import varied_room
 from lab.worlds import shading
 from lab.worlds.film import Film, develop
 from lab.worlds.pixels import camera_rays
 from lab.worlds.raycast import world_mesh
-from lab.worlds.render import Renderer
-from lab.worlds.rooms import random_room
 from lab.worlds.scene import Scene
-from lab.worlds.viewpoints import random_views, varied_views
 from packetmesh.errors import InputError
-from pipeline.geometry import scaled
-from pipeline.open3d_runtime import o3d
+from pipeline.rays import tensor, triangle_scene
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray, IntArray
 
 Camera = tuple[CameraIntrinsics, FloatArray]
@@ -80,38 +74,22 @@ def render_traced(
     Raises:
         InputError: that Python cannot render.
     """
-    data.mkdir(parents=True, exist_ok=True)
-    for shard in range(first, last):
-        rgb_file = data / f"{split}_traced_{shard:04d}_rgb.npy"
-        if not rgb_file.exists():
-            start = dataset.FIRST_SEED[split] + FIRST_TRACED + shard * dataset.ROOMS_PER_SHARD
-            seeds = range(start, start + dataset.ROOMS_PER_SHARD)
-            rooms = [traced_views(seed, blender, samples, threads, catalogue) for seed in seeds]
-            colors, depths = (np.concatenate(arrays) for arrays in zip(*rooms, strict=True))
-            dataset.save_array(rgb_file.with_name(rgb_file.name.replace("rgb", "depth")), depths)
-            dataset.save_array(rgb_file, colors)
-        yield rgb_file
+
+    def room(seed: int) -> Iterator[tuple[ByteArray, FloatArray]]:
+        return zip(*traced_views(seed, blender, samples, threads, catalogue), strict=True)
+
+    first_seed = dataset.FIRST_SEED[split] + FIRST_TRACED
+    return dataset.write_shards(data, f"{split}_traced", range(first, last), first_seed, room)
 
 
 def traced_views(
     seed: int, blender: Path, samples: int, threads: int, catalogue: Catalogue | None = None
 ) -> tuple[ByteArray, FloatArray]:
     """Photographs (N, H, W, 3) uint8 of one room and their depth (N, H, W) float16 as in ``room_views``."""
-    scene = varied_room(seed, catalogue) if catalogue is not None else random_room(seed)
-    rng = np.random.default_rng(seed)
-    renderer = Renderer(scene, threads)
-    if catalogue is not None:
-        seen = varied_views(seed, scene, dataset.VIEWS_PER_ROOM, renderer, dataset.WIDTH_PX)
-        cameras = [(intrinsics, pose) for pose, intrinsics in seen]
-        focal_px = dataset.FOCAL_PX
-    else:
-        intrinsics = scaled(scene.intrinsics, dataset.WIDTH_PX / scene.intrinsics.width_px)
-        poses = random_views(scene, rng, dataset.VIEWS_PER_ROOM, renderer)
-        cameras = [(intrinsics, pose) for pose in poses]
-        focal_px = intrinsics.fx_px
-    light = trace(scene, cameras, blender, samples, threads)
-    depths_m = [renderer.depth(*camera) * (focal_px / camera[0].fx_px) for camera in cameras]
-    return np.stack([develop(view, _FILM, rng) for view in light]), np.stack(depths_m).astype(np.float16)
+    room = dataset.viewed_room(seed, catalogue, threads)
+    light = trace(room.scene, room.cameras, blender, samples, threads)
+    depths_m = [room.canonical_m(room.renderer.depth(*camera), camera[0]) for camera in room.cameras]
+    return np.stack([develop(view, _FILM, room.rng) for view in light]), np.stack(depths_m)
 
 
 def trace(
@@ -143,7 +121,7 @@ def trace(
 
 
 def write_exchange(file: Path, scene: Scene, cameras: Sequence[Camera]) -> None:
-    """Write a scene and its cameras as plain arrays; lengths in metres, colours linear unless said.
+    """Write a scene and its cameras as plain arrays; lengths in metres, colours linear unless stated.
 
     ``corners_m`` (F, 3, 3) of the triangles, world, ``corner_normals`` (F, 3, 3) world, ``uv`` (F, 3, 2) from
     the lower left of the image, ``material`` (F,) index into ``gloss`` and ``emission`` (M,);
@@ -199,20 +177,14 @@ def _apart(corners_m: FloatArray) -> FloatArray:
 
 def _nearest_m(vertices: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> FloatArray:
     """(F,) what a pixel covers of each triangle, metres, from the camera that is nearest; inf if unseen."""
-    caster = o3d.t.geometry.RaycastingScene()
-    caster.add_triangles(_tensor(vertices.astype(np.float32)), _tensor(triangles.astype(np.uint32)))
+    caster = triangle_scene(vertices, triangles)
     covered_m = np.full(len(triangles), np.inf)
     for intrinsics, pose in cameras:
-        answer = caster.cast_rays(_tensor(camera_rays(intrinsics, pose)), nthreads=1)
+        answer = caster.cast_rays(tensor(camera_rays(intrinsics, pose), np.float32), nthreads=1)
         z_m, triangle = answer["t_hit"].numpy(), answer["primitive_ids"].numpy()
         seen = np.isfinite(z_m)
         np.minimum.at(covered_m, triangle[seen], z_m[seen] / intrinsics.fx_px)
     return covered_m
-
-
-def _tensor(array: Any) -> Any:
-    constructor: Any = o3d.core.Tensor
-    return constructor(array)
 
 
 def _world_normals(scene: Scene) -> FloatArray:

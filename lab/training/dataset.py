@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,10 +13,12 @@ import cv2
 import numpy as np
 
 from pipeline.geometry import scaled
-from pipeline.types import ByteArray, FloatArray
+from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
 if TYPE_CHECKING:
     from lab.training.furniture import Catalogue
+    from lab.worlds.render import Renderer
+    from lab.worlds.scene import Scene
 
 WIDTH_PX, HEIGHT_PX = 320, 240
 ROOMS_PER_SHARD = 10
@@ -33,54 +37,86 @@ def render_shards(
     A shard is ``<split>_<number>_rgb.npy`` (N, 240, 320, 3) uint8 and ``..._depth.npy`` (N, 240, 320)
     float16 metres, NaN where the ray hits nothing; the RGB file appears last.
     """
+    shards = range(first_shard, last_shard)
+    return write_shards(folder, split, shards, FIRST_SEED[split], partial(room_views, catalogue=catalogue))
+
+
+def write_shards(
+    folder: Path,
+    name: str,
+    shards: range,
+    first_seed: int,
+    room: Callable[[int], Iterable[tuple[ByteArray, FloatArray]]],
+) -> Iterator[Path]:
+    """Write the shards that are missing: the views that ``room`` gives for each of ten seeds."""
     folder.mkdir(parents=True, exist_ok=True)
-    for shard in range(first_shard, last_shard):
-        rgb_file = folder / f"{split}_{shard:04d}_rgb.npy"
+    for shard in shards:
+        rgb_file = folder / f"{name}_{shard:04d}_rgb.npy"
         if not rgb_file.exists():
-            first = FIRST_SEED[split] + shard * ROOMS_PER_SHARD
+            first = first_seed + shard * ROOMS_PER_SHARD
             seeds = range(first, first + ROOMS_PER_SHARD)
-            colors, depths = zip(
-                *(view for seed in seeds for view in room_views(seed, catalogue)), strict=True
-            )
+            colors, depths = zip(*(view for seed in seeds for view in room(seed)), strict=True)
             save_array(rgb_file.with_name(rgb_file.name.replace("rgb", "depth")), np.stack(depths))
             save_array(rgb_file, np.stack(colors))
         yield rgb_file
 
 
-def room_views(seed: int, catalogue: Catalogue | None = None) -> Iterator[tuple[ByteArray, FloatArray]]:
-    """Five views of one furnished room, at the training size.
+@dataclass(frozen=True, slots=True)
+class ViewedRoom:
+    """A furnished room with its cameras, at the training size."""
+
+    scene: Scene
+    renderer: Renderer
+    cameras: list[tuple[CameraIntrinsics, FloatArray]]
+    """Intrinsics and T_world_camera."""
+    rng: np.random.Generator
+    """For what is random in the images."""
+    focal_px: float
+    """That of the camera whose depth is learned."""
+
+    def canonical_m(self, z_m: FloatArray, intrinsics: CameraIntrinsics) -> FloatArray:
+        """(H, W) float16 depth that the learned camera would measure for the same image."""
+        return (z_m * (self.focal_px / intrinsics.fx_px)).astype(np.float16)
+
+
+def viewed_room(
+    seed: int, catalogue: Catalogue | None, threads: int = 1, views: int | None = None
+) -> ViewedRoom:
+    """The room of a seed with five cameras, or as many as asked for.
 
     Args:
         seed: of the room and its views.
         catalogue: furnishes the room; without it, procedural pieces do. Its views differ in focal length;
             as in ``zoom``, their depth is then what the training camera would measure for the same image:
             true depth times 262.5 px / focal length (canonical cameras, Yin et al. 2023).
+        threads: of the renderer; 0 takes all cores.
+        views: number of cameras.
     """
-    from lab.worlds.render import Renderer
-    from lab.worlds.rooms import random_room
-    from lab.worlds.viewpoints import random_views
-
-    if catalogue is not None:
-        yield from _varied_views(seed, catalogue)
-        return
-    scene, rng = random_room(seed), np.random.default_rng(seed)
-    renderer = Renderer(scene, threads=1)
-    intrinsics = scaled(scene.intrinsics, WIDTH_PX / scene.intrinsics.width_px)
-    for T_world_camera in random_views(scene, rng, VIEWS_PER_ROOM, renderer):
-        view = renderer.view(intrinsics, T_world_camera, "fast", rng)
-        yield view.rgb, view.z_m.astype(np.float16)
-
-
-def _varied_views(seed: int, catalogue: Catalogue) -> Iterator[tuple[ByteArray, FloatArray]]:
     from lab.training.varied_rooms import varied_room
     from lab.worlds.render import Renderer
-    from lab.worlds.viewpoints import varied_views
+    from lab.worlds.rooms import random_room
+    from lab.worlds.viewpoints import random_views, varied_views
 
-    scene, rng = varied_room(seed, catalogue), np.random.default_rng(seed)
-    renderer = Renderer(scene, threads=1)
-    for T_world_camera, intrinsics in varied_views(seed, scene, VIEWS_PER_ROOM, renderer, WIDTH_PX):
-        view = renderer.view(intrinsics, T_world_camera, "fast", rng)
-        yield view.rgb, (view.z_m * (FOCAL_PX / intrinsics.fx_px)).astype(np.float16)
+    count, rng = views or VIEWS_PER_ROOM, np.random.default_rng(seed)
+    if catalogue is not None:
+        scene = varied_room(seed, catalogue)
+        renderer = Renderer(scene, threads)
+        seen = varied_views(seed, scene, count, renderer, WIDTH_PX)
+        cameras = [(intrinsics, pose) for pose, intrinsics in seen]
+        return ViewedRoom(scene, renderer, cameras, rng, FOCAL_PX)
+    scene = random_room(seed)
+    renderer = Renderer(scene, threads)
+    intrinsics = scaled(scene.intrinsics, WIDTH_PX / scene.intrinsics.width_px)
+    cameras = [(intrinsics, pose) for pose in random_views(scene, rng, count, renderer)]
+    return ViewedRoom(scene, renderer, cameras, rng, intrinsics.fx_px)
+
+
+def room_views(seed: int, catalogue: Catalogue | None = None) -> Iterator[tuple[ByteArray, FloatArray]]:
+    """Colours and depth, float16 metres, of the views of one room."""
+    room = viewed_room(seed, catalogue)
+    for intrinsics, T_world_camera in room.cameras:
+        view = room.renderer.view(intrinsics, T_world_camera, "fast", room.rng)
+        yield view.rgb, room.canonical_m(view.z_m, intrinsics)
 
 
 def save_array(file: Path, array: np.ndarray) -> None:
@@ -170,5 +206,5 @@ def degrade(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
         rgb = np.clip(rgb + noise, 0, 255).astype(np.uint8)
     if rng.random() < 0.2:
         _, code = cv2.imencode(".jpg", rgb, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(40, 95))])
-        rgb = cv2.imdecode(code, cv2.IMREAD_COLOR)
+        rgb = np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
     return rgb

@@ -8,21 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from lab.worlds.render import Renderer
-from lab.worlds.rooms import random_room
+from lab.training.dataset import FIRST_SEED, viewed_room
 from lab.worlds.sensor import sense_depth
-from lab.worlds.viewpoints import random_views
 from pipeline.config import AlignmentMode
 from pipeline.depth.alignment import align_depth
 from pipeline.depth.inference import DepthNetwork
 from pipeline.depth.metrics import depth_errors
-from pipeline.depth.preprocessing import WIDTH_PX
-from pipeline.geometry import scaled
 from pipeline.io.demos import DEMO_SCENES, load_demo
 from pipeline.io.rigs import load_frame
 from pipeline.types import ByteArray, DepthMap, FloatArray
 
-FIRST_TEST_ROOM = 2_000_000
+FIRST_TEST_ROOM = FIRST_SEED["test"]
 """Seed from which on no room is trained on."""
 MODES: tuple[AlignmentMode, ...] = ("none", "median", "affine_depth", "affine_inverse", "local")
 BLOCK_PX = 32
@@ -92,12 +88,10 @@ def held_out_rooms(seeds: range, views: int) -> Iterator[Example]:
         views: of each room, one after the other.
     """
     for seed in seeds:
-        scene, rng = random_room(seed), np.random.default_rng(seed)
-        renderer = Renderer(scene)
-        intrinsics = scaled(scene.intrinsics, WIDTH_PX / scene.intrinsics.width_px)
-        for T_world_camera in random_views(scene, rng, views, renderer):
-            view = renderer.view(intrinsics, T_world_camera, "fast", rng)
-            yield Example(view.rgb, sense_depth(view, intrinsics, rng), view.z_m)
+        room = viewed_room(seed, None, threads=0, views=views)
+        for intrinsics, T_world_camera in room.cameras:
+            view = room.renderer.view(intrinsics, T_world_camera, "fast", room.rng)
+            yield Example(view.rgb, sense_depth(view, intrinsics, room.rng), view.z_m)
 
 
 def demo(name: str) -> Iterator[Example]:

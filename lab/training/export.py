@@ -202,9 +202,9 @@ def described_data(training: Shards) -> str:
 
 
 def describe(file: Path, facts: dict[str, Any], errors: dict[str, float], data: str) -> None:
-    """Write into the file what it takes and gives, how it was made, and its errors on validation rooms."""
+    """Write into the file its input and output, how it was made, and its errors on validation rooms."""
     model = onnx.load(file)
-    said = {
+    properties = {
         **metadata_of(CONVENTION),
         "kind": CONVENTION.kind,
         "normalised_inside": "true",
@@ -215,6 +215,6 @@ def describe(file: Path, facts: dict[str, Any], errors: dict[str, float], data: 
         "float_abs_rel": str(errors["float_abs_rel"]),
         **{name: str(value) for name, value in facts.items()},
     }
-    onnx.helper.set_model_props(model, said)
+    onnx.helper.set_model_props(model, properties)
     model.producer_name = "PacketMesh"
     onnx.save(model, file)

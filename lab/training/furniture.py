@@ -26,7 +26,7 @@ from pipeline.types import ByteArray, FloatArray
 Role = Literal["opening", "ceiling", "wall", "against", "table", "chair", "free", "small", "unused"]
 """Where a thing belongs: in, under, on or against something, or free on the floor."""
 _FORMAT = 2
-"""Changes when cached models must be made anew."""
+"""Changes when cached models must be made again."""
 _KEPT_MODELS = 400
 _OUTDOORS = re.compile(
     r"\b(sedan|elevator|garage|shutter|blind|screen door|street|lamppost|fences?|railing|hedge|goal|horse|"

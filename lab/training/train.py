@@ -82,7 +82,7 @@ STAGES = {
 
 
 ALONE = Team(0, 1, torch.empty(0), torch.empty(0), None)
-"""A team of one, which has nobody to wait for."""
+"""A team of one process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +245,7 @@ def scheduled_rate(peak: float, spent: float, rise: float = 0.04) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Batches(IterableDataset):
-    """Endless augmented batches of one stage; every worker process draws its own."""
+    """Endless augmented batches of one stage; every worker process has others."""
 
     data: Path
     stage: Stage
@@ -310,7 +310,7 @@ def validate(
 
 
 def log(folder: Path, state: TrainingState, **values: float) -> None:
-    """Append one line to ``log.jsonl`` and say it."""
+    """Append one line to ``log.jsonl`` and print it."""
     line = json.dumps(asdict(state) | values)
     with (folder / "log.jsonl").open("a") as stream:
         stream.write(line + "\n")

@@ -53,7 +53,7 @@ DEMOS: dict[str, tuple[Callable[[], Scene], DemoScene]] = {
         ),
     ),
 }
-"""What builds each place, and what is told of it."""
+"""The builder and the description of each demo."""
 
 
 def build_demo(name: str) -> Scene:
@@ -68,7 +68,7 @@ def build_demo(name: str) -> Scene:
 
 
 def render_demo(name: str) -> Rig:
-    """The rig of a demo as it ships, photographed anew; the same bits every time."""
+    """The rig of a demo as it ships; the same bits every time."""
     scene = build_demo(name)
     renderer = Renderer(scene)
     frames, depth = [], []
@@ -83,7 +83,7 @@ def render_demo(name: str) -> Rig:
 
 
 def disturbed(T_world_camera: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """The (4, 4) pose turned by ``POSE_ERROR_RAD`` and shifted by ``POSE_ERROR_M``, each somewhere."""
+    """The (4, 4) pose turned by ``POSE_ERROR_RAD`` and shifted by ``POSE_ERROR_M``, in random directions."""
     axis, way = (v / np.linalg.norm(v) for v in rng.standard_normal((2, 3)))
     T = T_world_camera.copy()
     T[:3, :3] = T[:3, :3] @ rotation_exp(POSE_ERROR_RAD * axis)

@@ -12,7 +12,7 @@ from pipeline.types import ByteArray, FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """How a cheap colour camera develops a scene; each photograph draws within these ranges."""
+    """How a cheap colour camera develops a scene; each photograph has random values within these ranges."""
 
     exposure_stops: float = 0.15
     """Auto exposure is wrong by up to this many stops either way."""

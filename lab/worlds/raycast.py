@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from lab.worlds import shading
 from lab.worlds.scene import Part, Scene
 from pipeline.open3d_runtime import o3d
+from pipeline.rays import tensor, triangle_scene
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 
@@ -52,14 +52,14 @@ class RayCaster:
         self._all = _embree(self._meshes)
 
     @cached_property
-    def _opaque(self) -> Any:
+    def _opaque(self) -> o3d.t.geometry.RaycastingScene:
         """What casts shadows."""
         pairs = zip(self._meshes, self._parts, strict=True)
         return _embree([mesh for mesh, part in pairs if part.material.emission <= 0.0])
 
     def cast(self, rays: FloatArray) -> Hits:
         """The first thing each ray meets."""
-        answer = self._all.cast_rays(_tensor(rays), nthreads=self._threads)
+        answer = self._all.cast_rays(tensor(rays, np.float32), nthreads=self._threads)
         t, triangle = answer["t_hit"].numpy(), answer["primitive_ids"].numpy()
         positions, normals, view = np.zeros((3, len(t), 3), np.float32)
         barycentric = answer["primitive_uvs"].numpy()
@@ -72,11 +72,13 @@ class RayCaster:
 
     def reach(self, rays: FloatArray) -> FloatArray:
         """(N,) how far each ray goes, in units of its direction; infinite for a miss."""
-        return self._all.cast_rays(_tensor(rays), nthreads=self._threads)["t_hit"].numpy()
+        return self._all.cast_rays(tensor(rays, np.float32), nthreads=self._threads)["t_hit"].numpy()
 
     def occluded(self, rays: FloatArray, t_far: float) -> BoolArray:
         """(N,) True where something opaque is nearer than ``t_far`` times the ray's direction."""
-        return self._opaque.test_occlusions(_tensor(rays), 0.0, t_far, nthreads=self._threads).numpy()
+        return self._opaque.test_occlusions(
+            tensor(rays, np.float32), 0.0, t_far, nthreads=self._threads
+        ).numpy()
 
 
 def world_mesh(scene: Scene) -> tuple[FloatArray, IntArray]:
@@ -100,15 +102,5 @@ def _merged(meshes: list[_ShadedMesh]) -> tuple[FloatArray, IntArray]:
     return np.concatenate([vertices for vertices, _, _ in meshes]), np.concatenate(triangles)
 
 
-def _embree(meshes: list[_ShadedMesh]) -> Any:
-    scene = o3d.t.geometry.RaycastingScene()
-    if meshes:
-        vertices, triangles = _merged(meshes)
-        scene.add_triangles(_tensor(vertices.astype(np.float32)), _tensor(triangles.astype(np.uint32)))
-    return scene
-
-
-def _tensor(array: Any) -> Any:
-    """Open3D's view of a numpy array; its stubs do not know that this constructor exists."""
-    constructor: Any = o3d.core.Tensor
-    return constructor(array)
+def _embree(meshes: list[_ShadedMesh]) -> o3d.t.geometry.RaycastingScene:
+    return triangle_scene(*_merged(meshes)) if meshes else o3d.t.geometry.RaycastingScene()

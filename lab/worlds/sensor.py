@@ -35,7 +35,7 @@ class SensorConfig:
     grazing_deg: tuple[float, float] = (70.0, 86.0)
     """Angles to the normal between which returns get lost."""
     dark: tuple[float, float] = (0.0012, 0.006)
-    """Infrared echo (albedo x cosine / z^2) at which returns are all lost, and all there."""
+    """Infrared return (albedo x cosine / z^2) below which every pixel is lost, and above which none is."""
     mirror_deg: float = 9.0
     """A shiny surface blinds the camera within about this angle of looking straight back."""
     edge_px: tuple[float, float] = (0.0, 1.7)
@@ -153,9 +153,9 @@ def _loss_probability(
     rays = pixel_rays(intrinsics) @ view.T_world_camera[:3, :3].T
     cosine = np.abs(np.einsum("hwk,hwk->hw", rays, view.normals)) / np.linalg.norm(rays, axis=-1)
     angle_deg = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
-    echo = view.infrared * (1.0 - view.gloss) ** 2 * cosine / true_m**2
+    infrared_return = view.infrared * (1.0 - view.gloss) ** 2 * cosine / true_m**2
     steep = _ramp(angle_deg, *config.grazing_deg)
-    dark = 1.0 - _ramp(echo, *config.dark)
+    dark = 1.0 - _ramp(infrared_return, *config.dark)
     blind = view.gloss * np.exp(-((angle_deg / config.mirror_deg) ** 2))
     far = _ramp(true_m, config.far_m - config.fade_m, config.far_m + 0.3) ** 2
     return 1.0 - (1.0 - steep) * (1.0 - dark) * (1.0 - blind) * (1.0 - far) * (1.0 - config.blob_share)

@@ -1,4 +1,4 @@
-"""Compiled per-pixel loops of the renderer; all arrays float32, directions of unit length unless said."""
+"""Compiled per-pixel loops of the renderer; all arrays float32, directions of unit length unless stated."""
 
 from __future__ import annotations
 

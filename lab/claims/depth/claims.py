@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lab.claims.claim import Claim, Outcome, bootstrap_ci95
+from lab.claims.claim import Claim, Outcome, bootstrap_ci95, mean_curve
 from lab.claims.depth.errors import (
     ALIGNMENTS,
     CHAIN,
@@ -120,9 +120,7 @@ def distance_charts(measured: Sequence[SceneErrors]) -> tuple[Chart, ...]:
 
 def _curve(group: str, scenes: Sequence[SceneErrors]) -> Curve:
     middles_m, values = distance_curve([frame for scene in scenes for frame in scene.frames], JUDGED)
-    low, high = zip(*(bootstrap_ci95(column) for column in values), strict=True)
-    means = tuple(float(column.mean()) for column in values)
-    return Curve(group, tuple(middles_m.tolist()), means, low, high)
+    return mean_curve(group, middles_m.tolist(), values)
 
 
 def pictures(measured: Sequence[SceneErrors]) -> tuple[Picture, ...]:

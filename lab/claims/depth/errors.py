@@ -100,9 +100,7 @@ def from_trial(site: Site, result: dict[str, Any]) -> SceneErrors:
         for frame in result["frames"]
     ]
     png = np.frombuffer(base64.b64decode(result["strip"]), np.uint8)
-    strip = cv2.imdecode(png, cv2.IMREAD_COLOR)
-    assert strip is not None  # it was encoded by this code
-    return SceneErrors(site, tuple(frames), np.asarray(strip, np.uint8))
+    return SceneErrors(site, tuple(frames), np.asarray(cv2.imdecode(png, cv2.IMREAD_COLOR), np.uint8))
 
 
 def scene_errors(site: Site, network: DepthNetwork) -> SceneErrors:

@@ -1,4 +1,4 @@
-"""From how far away a registration still finds home (SPEC 4.7, 4.8)."""
+"""Capture range: from how far away a registration still converges to the truth (SPEC 4.7, 4.8)."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from pipeline.types import FloatArray, PointCloud
 
 ROTATIONS_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
 TRANSLATIONS_M = (0.1, 0.2, 0.3, 0.4, 0.6)
-HOME_RAD = float(np.radians(1.5))
-HOME_M = 0.05
+CAPTURED_RAD = float(np.radians(1.5))
+CAPTURED_M = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +48,9 @@ class CaptureCell:
     """Of the source's centre."""
 
     @property
-    def home(self) -> bool:
+    def captured(self) -> bool:
         """Within 1.5 degrees and 5 cm of the truth."""
-        return self.rotation_error_rad < HOME_RAD and self.translation_error_m < HOME_M
+        return self.rotation_error_rad < CAPTURED_RAD and self.translation_error_m < CAPTURED_M
 
 
 def map_capture(task: CaptureTask) -> list[dict[str, Any]]:
@@ -65,7 +65,7 @@ def map_capture(task: CaptureTask) -> list[dict[str, Any]]:
         method=task.entrant.start(),
         gate_by_start=task.gate_by_start,
     )
-    return [asdict(cell) | {"entrant": task.entrant.name, "home": cell.home} for cell in cells]
+    return [asdict(cell) | {"entrant": task.entrant.name, "captured": cell.captured} for cell in cells]
 
 
 def capture_range(

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from lab.claims.claim import bootstrap_ci95
-from lab.claims.exhibits import Chart, Curve, HeatMap
+from lab.claims.claim import mean_curve
+from lab.claims.exhibits import Chart, HeatMap
 from lab.claims.registration.cases import CONDITIONS
 from lab.claims.registration.results import Results
 from lab.claims.registration.setup import CURVED, FIXED_GATE
@@ -46,7 +46,7 @@ def convergence_charts(results: Results, condition: str) -> tuple[Chart, ...]:
             over,
             unit,
             tuple(
-                _mean_curve(entrant, x, [of(trial) for trial in trials])
+                mean_curve(entrant, x, np.array([of(trial) for trial in trials]).T, resamples=400)
                 for entrant in CURVED
                 if (trials := results.trials(entrant, (condition,)))
             ),
@@ -69,13 +69,13 @@ def error_by_time(trial: dict) -> FloatArray:
 
 
 def capture_maps(results: Results) -> tuple[HeatMap, ...]:
-    """For every entrant, the share of the rooms that came home, by rotation and translation."""
+    """For every entrant, the share of captured rooms, by the start's rotation and translation."""
     maps = []
     for entrant in dict.fromkeys(cell["entrant"] for cell in results.cells):
-        home = home_shares(results, entrant)
-        rotations = tuple(sorted({rotation for rotation, _ in home}))
-        translations = tuple(sorted({translation for _, translation in home}))
-        shares = tuple(tuple(home[r, t] for t in translations) for r in rotations)
+        captured = captured_shares(results, entrant)
+        rotations = tuple(sorted({rotation for rotation, _ in captured}))
+        translations = tuple(sorted({translation for _, translation in captured}))
+        shares = tuple(tuple(captured[r, t] for t in translations) for r in rotations)
         maps.append(
             HeatMap(
                 f"capture range, {entrant}",
@@ -91,17 +91,10 @@ def capture_maps(results: Results) -> tuple[HeatMap, ...]:
     return tuple(maps)
 
 
-def home_shares(results: Results, entrant: str) -> dict[tuple[float, float], float]:
-    """Share of the rooms that came home from each (rotation in degrees, translation in metres)."""
+def captured_shares(results: Results, entrant: str) -> dict[tuple[float, float], float]:
+    """Share of the rooms captured from each start: (rotation in degrees, translation in metres)."""
     found: dict[tuple[float, float], list[bool]] = {}
     for cell in results.cells:
         if cell["entrant"] == entrant:
-            found.setdefault((cell["rotation_deg"], cell["translation_m"]), []).append(cell["home"])
-    return {start: float(np.mean(home)) for start, home in found.items()}
-
-
-def _mean_curve(label: str, x: FloatArray, values: Sequence[FloatArray]) -> Curve:
-    columns = np.array(values).T
-    bands = [bootstrap_ci95(column, resamples=400) for column in columns]
-    low, high = zip(*bands, strict=True)
-    return Curve(label, tuple(x.tolist()), tuple(columns.mean(axis=1).tolist()), low, high)
+            found.setdefault((cell["rotation_deg"], cell["translation_m"]), []).append(cell["captured"])
+    return {start: float(np.mean(captured)) for start, captured in found.items()}

@@ -74,4 +74,4 @@ class Entrant:
 
 
 Lineup = tuple[tuple[Direction, Entrant], ...]
-"""Who takes part in a condition, and in which direction."""
+"""The entrants of a condition, each with its direction of matching."""

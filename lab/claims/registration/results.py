@@ -1,4 +1,4 @@
-"""The benchmark's stored results, asked for by entrant and condition."""
+"""The benchmark's results by entrant and condition."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The benchmark behind the claims: its rooms, who takes part in which condition, and the trials."""
+"""The benchmark behind the claims: its rooms, the entrants of each condition, and the trials."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ CAPTURE_ROOMS = 6
 CURVE_CONDITIONS = ("easy", "nodes-sensor")
 """Where convergence curves are recorded (Fig. 4.9)."""
 CURVED = ("icp", "picp", "ricp", "mricp", "ficp", "hicp", "ceicp-n", "ceicp-a", "icp plane", "ceicp-a plane")
-"""Whose: the methods of Table 4.4, and the plane metric."""
+"""The entrants with curves: the methods of Table 4.4, and the plane metric."""
 ABLATED = ("easy", "bias-3", "holes-x3", "outliers-20", "nodes-sensor", "nodes-fused")
 """Where the ablations run."""
 BOTH_DIRECTIONS = ("easy", "bias-3", "holes-x3", "outliers-20")
-"""Conditions in which the sensor cloud asks the complete one as well."""
-ASKED_BACK = ("icp", "icp-gated", "ficp", "hicp", "ceicp-n", "ceicp-a")
-"""Methods that take part in that."""
+"""Conditions in which the sensor cloud is matched to the complete one as well."""
+REVERSED = ("icp", "icp-gated", "ficp", "hicp", "ceicp-n", "ceicp-a")
+"""The methods that do both."""
 OVERLAPPING = ("ficp", "ceicp-a")
 """Methods that run point to point on the overlap series as well; those without a gate are lost there."""
 SLOW = {
@@ -46,7 +46,7 @@ CAPTURED = (
     (Entrant("ceicp-n"), True),
     (Entrant("ceicp-a", "plane"), True),
 )
-"""Whose capture range is mapped, and whether its gate grows with the distance of the start."""
+"""The entrants whose capture range is mapped, and whether the gate grows with the start's distance."""
 
 
 def case_tasks() -> list[CaseTask]:
@@ -69,22 +69,22 @@ def capture_tasks() -> list[CaptureTask]:
 
 
 def standard_lineup(condition: Condition) -> Lineup:
-    """Who takes part in a condition.
+    """The entrants of a condition.
 
     A node's own two clouds: point to point as in Table 4.4, and the plane metric where there is no bias
     for it to follow. Two nodes: both metrics.
     """
     name, single = condition.name, condition.clouds == "inferred"
     everyone = [e for e in methods() if name in SLOW.get(e.method, CONDITIONS)]
-    asked = [e for e in everyone if condition.overlap is None or e.method in OVERLAPPING]
-    asked += methods("plane") if not single or name == "easy" else ()
-    asked += ablations("point" if single else "plane") if name in ABLATED else ()
-    asked += peers()
-    back = [e for e in everyone if e.method in ASKED_BACK] if name in BOTH_DIRECTIONS else []
+    forward = [e for e in everyone if condition.overlap is None or e.method in OVERLAPPING]
+    forward += methods("plane") if not single or name == "easy" else ()
+    forward += ablations("point" if single else "plane") if name in ABLATED else ()
+    forward += peers()
+    back = [e for e in everyone if e.method in REVERSED] if name in BOTH_DIRECTIONS else []
     if name in ABLATED and not single:
         back = [Entrant("ceicp-a", "plane")]
     return (
-        *(("q2p", tuned(entrant)) for entrant in asked),
+        *(("q2p", tuned(entrant)) for entrant in forward),
         *(("p2q", tuned(entrant)) for entrant in back),
     )
 

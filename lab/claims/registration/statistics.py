@@ -11,7 +11,6 @@ from scipy.stats import wilcoxon
 from pipeline.types import FloatArray
 
 SIGNIFICANCE = 0.05
-RESAMPLES = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +56,3 @@ def holm_p(p_values: Sequence[float]) -> list[float]:
         highest = min(1.0, max(highest, (count - rank) * p_values[row]))
         adjusted[row] = float(highest)
     return adjusted
-
-
-def median_ci95(values: FloatArray, seed: int = 0) -> tuple[float, float]:
-    """95 % percentile bootstrap interval of the median of (N,) ``values``."""
-    values = np.asarray(values, float)
-    rows = np.random.default_rng(seed).integers(0, len(values), (RESAMPLES, len(values)))
-    low, high = np.percentile(np.median(values[rows], axis=1), (2.5, 97.5))
-    return float(low), float(high)

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lab.claims.claim import bootstrap_ci95
 from lab.claims.exhibits import Table
 from lab.claims.registration.cases import CONDITIONS
 from lab.claims.registration.results import Results
-from lab.claims.registration.statistics import Comparison, compare, holm, median_ci95
+from lab.claims.registration.statistics import Comparison, compare, holm
 from lab.claims.registration.tuned import TUNED
 from pipeline.config import Direction
 
@@ -62,8 +63,9 @@ def table_4_4(results: Results) -> Table:
         ),
         tuple(rows),
         "Thesis: average Hausdorff distance (AHD), unit not stated, clouds not available. Ours: medians over "
-        "the rooms in centimetres, point to point, source asks target. Only the order can be compared, and "
-        "AHD hardly tells the methods apart where one cloud has holes: the point error decides.",
+        "the rooms in centimetres, point to point, each source point matched to the target. Only the "
+        "order can be compared, and AHD hardly tells the methods apart where one cloud has holes: the point "
+        "error decides.",
     )
 
 
@@ -77,9 +79,9 @@ def conditions_table(results: Results, direction: Direction) -> Table:
             errors_cm = results.values(entrant, (condition,), direction=direction)
             cells.append(_cell(errors_cm) if len(errors_cm) else None)
         rows.append((entrant, *cells))
-    asks = "the source asks the target (q2p)" if direction == "q2p" else "the target asks the source (p2q)"
+    matched = "source to target (q2p)" if direction == "q2p" else "target to source (p2q)"
     return Table(
-        f"Point error by condition, {asks}",
+        f"Point error by condition, matched {matched}",
         ("method", *(CONDITIONS[condition].label for condition in conditions)),
         tuple(rows),
         "Median over the rooms in centimetres, its 95 % bootstrap interval, and the share of rooms below "
@@ -135,7 +137,7 @@ def ablation_table(results: Results) -> Table:
             else None
             for c in conditions
         ]
-        rows.append((f"target asks source (p2q), {method}", *cells))
+        rows.append((f"target matched to source (p2q), {method}", *cells))
     return Table(
         "Ablations: what makes the difference",
         ("change", *(CONDITIONS[condition].label for condition in conditions)),
@@ -168,7 +170,7 @@ def _plain(results: Results, conditions: Sequence[str], direction: Direction) ->
 
 
 def _cell(errors_cm: np.ndarray) -> str:
-    low, high = median_ci95(errors_cm)
+    low, high = bootstrap_ci95(errors_cm, statistic=np.median)
     return f"{np.median(errors_cm):.2f} [{low:.2f}, {high:.2f}] {np.mean(errors_cm < 2.0):.0%}"
 
 

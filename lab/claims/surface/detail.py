@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import isotonic_regression
 from scipy.stats import spearmanr
 
-from lab.claims.claim import Claim, Outcome, bootstrap_ci95
+from lab.claims.claim import Claim, Outcome, bootstrap_ci95, mean_curve
 from lab.claims.exhibits import Chart, Curve, Table
 from lab.claims.surface.stairs import Stairs, feet_samples, stairs, stairs_cloud
 from lab.trials import iterate_trials
@@ -131,18 +131,13 @@ def _chart(
         "ball radius / point spacing",
         "share within 1 cm",
         (
-            _mean_curve("accuracy", x, accuracy),
-            _mean_curve("coverage", x, coverage),
+            mean_curve("accuracy", x, accuracy.T),
+            mean_curve("coverage", x, coverage.T),
             Curve("best falling curve", x, falling, falling, falling),
         ),
         f"Steps of 3 to 8 cm, points 1 cm apart with 2 mm of noise, {len(accuracy)} clouds; mean and its "
         "95 % bootstrap interval.",
     )
-
-
-def _mean_curve(label: str, x: tuple[float, ...], values: FloatArray) -> Curve:
-    low, high = zip(*(bootstrap_ci95(column) for column in values.T), strict=True)
-    return Curve(label, x, tuple(values.mean(axis=0).tolist()), low, high)
 
 
 def _table(

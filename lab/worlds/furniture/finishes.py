@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lab.worlds import textures
+from lab.worlds.room_finishes import draw_seed
 from lab.worlds.scene import Material
 from pipeline.types import FloatArray
 
@@ -52,18 +53,20 @@ def plain(color: Color, gloss: float = 0.0, infrared: float = 1.0) -> Material:
 def fabric(rng: np.random.Generator, color: Color, second: Color | None = None) -> Material:
     """Woven cloth, plain or of two colours."""
     other = None if second is None else linear(second)
-    return Material(textures.fabric(linear(color), other, _seed(rng), rng.uniform(0.004, 0.008)))
+    return Material(textures.fabric(linear(color), other, draw_seed(rng), rng.uniform(0.004, 0.008)))
 
 
 def wood(rng: np.random.Generator, color: Color, along: int = 0, gloss: float = 0.05) -> Material:
     """Oiled wood, its grain along an axis of the part."""
     light = linear(color)
-    return Material(textures.wood(light * 1.08, light * [0.62, 0.56, 0.5], _seed(rng), 0.05, along), gloss)
+    return Material(
+        textures.wood(light * 1.08, light * [0.62, 0.56, 0.5], draw_seed(rng), 0.05, along), gloss
+    )
 
 
 def painted(rng: np.random.Generator, color: Color, gloss: float = 0.08) -> Material:
     """Paint or lacquer, hardly mottled."""
-    return Material(textures.paint(linear(color), _seed(rng)), gloss)
+    return Material(textures.paint(linear(color), draw_seed(rng)), gloss)
 
 
 def ceramic(color: Color) -> Material:
@@ -83,7 +86,7 @@ def chrome() -> Material:
 
 def steel(rng: np.random.Generator, color: Color = "#8b8f93", axis: int = 0) -> Material:
     """Brushed or rolled metal."""
-    return Material(textures.brushed_metal(linear(color), _seed(rng), axis), 0.4, infrared=0.8)
+    return Material(textures.brushed_metal(linear(color), draw_seed(rng), axis), 0.4, infrared=0.8)
 
 
 def glass(color: Color = "#27402f") -> Material:
@@ -93,12 +96,12 @@ def glass(color: Color = "#27402f") -> Material:
 
 def leaf(rng: np.random.Generator, color: Color) -> Material:
     """A plant's leaf, bright in the infrared."""
-    return Material(textures.leaf(linear(color), _seed(rng)), 0.12, infrared=1.6)
+    return Material(textures.leaf(linear(color), draw_seed(rng)), 0.12, infrared=1.6)
 
 
 def cardboard(rng: np.random.Generator, size_m: float, color: Color = "#b08a5b") -> Material:
     """Corrugated board with tape, on a box about its part's origin."""
-    return Material(textures.cardboard(linear(color), _seed(rng), size_m))
+    return Material(textures.cardboard(linear(color), draw_seed(rng), size_m))
 
 
 def book(rng: np.random.Generator, color: Color) -> Material:
@@ -136,8 +139,4 @@ def screen(rng: np.random.Generator, size_m: tuple[float, float], lit: bool) -> 
     """A glossy display: black when off."""
     if not lit:
         return plain((0.012, 0.013, 0.016), 0.85, infrared=0.1)
-    return Material(textures.display(_seed(rng), size_m), 0.5, infrared=0.1, emission=0.9)
-
-
-def _seed(rng: np.random.Generator) -> int:
-    return int(rng.integers(2**31))
+    return Material(textures.display(draw_seed(rng), size_m), 0.5, infrared=0.1, emission=0.9)

@@ -226,7 +226,7 @@ def test_an_exported_network_takes_bytes_says_what_it_is_and_gives_the_checkpoin
     out = config.out / "network.onnx"
     errors = export.export(config.out / "last.pt", rooms, out)
     network = DepthNetwork(out)
-    said = network.description
+    properties = network.description
     expected = {
         "kind": "relative",
         "normalised_inside": "true",
@@ -234,10 +234,10 @@ def test_an_exported_network_takes_bytes_says_what_it_is_and_gives_the_checkpoin
         "seed": "0",
         "initial": "random",
     }
-    assert expected.items() <= said.items()
-    assert json.loads(said["metrics"]) == errors
-    assert said["licence"] == "Apache-2.0"
-    assert said["data"] == "8 images in 1 shards (train)"
+    assert expected.items() <= properties.items()
+    assert json.loads(properties["metrics"]) == errors
+    assert properties["licence"] == "Apache-2.0"
+    assert properties["data"] == "8 images in 1 shards (train)"
     rgb = np.load(rooms / "validation_0000_rgb.npy")[0]
     model = DepthNet("half").eval()
     model.load_state_dict(torch.load(config.out / "last.pt", weights_only=True)["model"])

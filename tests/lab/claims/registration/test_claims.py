@@ -41,7 +41,7 @@ def _trial(condition: str, room: int, direction: str, entrant: str, error_cm: fl
     }
 
 
-def _results(error_cm=None, iterations=None, far_home=None) -> Results:
+def _results(error_cm=None, iterations=None, far_captured=None) -> Results:
     """Made-up trials of the whole benchmark: everyone errs by 1 cm in 20 iterations but those named."""
     error_cm, iterations = error_cm or {}, iterations or {}
     trials = [
@@ -55,7 +55,7 @@ def _results(error_cm=None, iterations=None, far_home=None) -> Results:
             "entrant": entrant.name,
             "rotation_deg": r,
             "translation_m": t,
-            "home": r < 45 or t < 0.6 or bool(far_home),
+            "captured": r < 45 or t < 0.6 or bool(far_captured),
         }
         for _ in range(ROOMS)
         for entrant, _ in CAPTURED
@@ -105,7 +105,7 @@ def test_c19_needs_fewer_iterations_of_both_versions():
 
 def test_c20_needs_a_farthest_start_that_fails():
     assert _verdict("C20") == "reproduced"
-    assert _verdict("C20", far_home=True) == "not reproduced"
+    assert _verdict("C20", far_captured=True) == "not reproduced"
 
 
 def test_equal_errors_are_reported_as_ties():

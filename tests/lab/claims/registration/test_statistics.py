@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import wilcoxon
 
-from lab.claims.registration.statistics import Comparison, compare, holm, holm_p, median_ci95
+from lab.claims.claim import bootstrap_ci95
+from lab.claims.registration.statistics import Comparison, compare, holm, holm_p
 
 
 def test_holm_by_hand():
@@ -59,7 +60,7 @@ def test_the_interval_of_the_median_covers_it_about_95_times_of_100():
     rng = np.random.default_rng(3)
     covered = []
     for seed in range(200):
-        low, high = median_ci95(rng.lognormal(0.0, 1.0, 30), seed)
+        low, high = bootstrap_ci95(rng.lognormal(0.0, 1.0, 30), seed, statistic=np.median)
         covered.append(low <= 1.0 <= high)
     assert 0.90 <= np.mean(covered) <= 0.99
-    assert median_ci95(np.full(9, 2.5)) == (2.5, 2.5)
+    assert bootstrap_ci95(np.full(9, 2.5), statistic=np.median) == (2.5, 2.5)

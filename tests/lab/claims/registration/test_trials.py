@@ -71,7 +71,7 @@ def test_who_refuses_stays_at_the_start_and_says_why(small):
 
 
 @pytest.mark.parametrize("direction", ["q2p", "p2q"])
-def test_a_peer_brings_the_source_home_in_both_directions(case, direction):
+def test_a_peer_registers_the_source_in_both_directions(case, direction):
     start_cm = Ruler(case).point_error_cm(case.T_init)
     T = _pose(Entrant("open3d-gicp"), case.thinned(3000), direction)
     assert Ruler(case).point_error_cm(T) < 0.2 * start_cm
@@ -171,8 +171,8 @@ def test_capture_range_covers_the_grid_and_depends_on_how_far_the_method_looks(c
     )
     assert [(c.rotation_deg, c.translation_m) for c in grown] == [(5, 0.1), (5, 1.5), (30, 0.1), (30, 1.5)]
     assert grown[0] == fixed[0]
-    assert grown[0].home
-    assert not fixed[3].home
+    assert grown[0].captured
+    assert not fixed[3].captured
     assert fixed[3].point_error_m > 0.3
 
 
@@ -182,7 +182,7 @@ def test_a_start_out_of_the_gates_reach_is_a_miss_not_an_error(case):
     cell = next(
         capture_range(small.source, small.target, small.T_true, config, (0.0,), (50.0,), gate_by_start=False)
     )
-    assert not cell.home
+    assert not cell.captured
     assert cell.translation_error_m == pytest.approx(50.0)
 
 
@@ -207,12 +207,12 @@ def test_a_trial_records_what_the_tables_need():
     assert not results.trials("ceicp-a plane", ("nodes-sensor",))[0]["curve_error_cm"]
 
 
-def test_a_map_has_a_cell_for_every_start_and_the_nearest_comes_home():
+def test_a_map_has_a_cell_for_every_start_and_the_nearest_is_captured():
     cells = map_capture(CaptureTask(EASY, 2000, Entrant("ceicp-a", "plane"), True, 500))
     assert len(cells) == 25
     assert {cell["entrant"] for cell in cells} == {"ceicp-a plane"}
     near = next(c for c in cells if (c["rotation_deg"], c["translation_m"]) == (5.0, 0.1))
-    assert near["home"]
+    assert near["captured"]
 
 
 def test_the_standard_benchmark_is_what_the_specification_asks_for():
