@@ -233,7 +233,7 @@ def gantt_html(view: NetworkView, window: Window, title: str = "") -> str:
 
 
 def cursor_html(view: NetworkView, window: Window, now_ns: int) -> str:
-    """A line over the timeline that stands right above this, so that it moves without painting the rows again."""
+    """A line over the timeline right above, which moves without painting the rows again."""
     share = window.share(now_ns)
     if not 0.0 <= share <= 1.0:
         return ""
