@@ -49,4 +49,4 @@ def spacing_of(clouds: MergedClouds) -> SpacingView:
     r_F_m, sigma_D_m = clouds.r_F_m, clouds.sigma_D_m
     distances_m = nearest_distances_m(clouds.fused.points_m)
     counts, edges_m = np.histogram(distances_m, bins=HISTOGRAM_BINS, range=(0.0, r_F_m + 5 * sigma_D_m))
-    return SpacingView(r_F_m, sigma_D_m, edges_m, counts, len(clouds.sensor), len(clouds.fused))
+    return SpacingView(r_F_m, sigma_D_m, edges_m, counts)

@@ -28,8 +28,6 @@ class SpacingView:
     """(B + 1,) bins of the nearest-neighbour distance."""
     counts: IntArray
     """(B,)."""
-    points_before: int
-    points_after: int
 
 
 QUICK_POINTS = 20_000
