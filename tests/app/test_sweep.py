@@ -160,7 +160,7 @@ def test_the_sweep_figure_marks_the_spacing_inside_its_axis():
 
 
 def test_the_histogram_tells_the_radii_of_the_thesis_the_advice_and_those_in_use_apart():
-    view = SpacingView(0.010, 0.004, np.linspace(0.0, 0.03, 31), np.arange(30), 100, 200)
+    view = SpacingView(0.010, 0.004, np.linspace(0.0, 0.03, 31), np.arange(30))
     figure = spacing_figure(view, (0.013,), (0.012, 0.02, 0.03))
     marks = {trace.name: trace for trace in figure.data if trace.type == "scatter"}
     assert set(marks) == {USED, ADVISED, OF_THESIS}
