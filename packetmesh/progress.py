@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeVar
 
 Step = TypeVar("Step")
@@ -52,12 +52,12 @@ def drain(
 
 
 def part(
-    steps: Generator[Progress, None, Result], begin: float, end: float
+    steps: Generator[Progress, None, Result], stage: str, begin: float, end: float
 ) -> Generator[Progress, None, Result]:
-    """The same computation as the part of a longer one that goes from ``begin`` to ``end`` of it."""
+    """The same computation as a stage of a longer one, which goes from ``begin`` to ``end`` of it."""
     while True:
         try:
             step = next(steps)
         except StopIteration as stop:
             return stop.value
-        yield replace(step, fraction=begin + step.fraction * (end - begin))
+        yield Progress(stage, begin + step.fraction * (end - begin))

@@ -43,7 +43,8 @@ def network_job(store: Store, spec: Spec) -> Generator[Progress, None, tuple[Net
     views, share = [], 1.0 / max(1, len(spec.networks))
     for index, config in enumerate(spec.networks):
         work = store.remember(("simulate", config), partial(_simulated, config))
-        views.append((yield from part(work, index * share, (index + 1) * share)))
+        stage = f"simulating run {index + 1} of {len(spec.networks)}"
+        views.append((yield from part(work, stage, index * share, (index + 1) * share)))
     return tuple(views)
 
 
