@@ -20,6 +20,11 @@ def test_fewer_than_three_points(corner):
         iterate_registration(corner, PointCloud(np.empty((0, 3))), CONFIG)
 
 
+def test_a_method_that_does_not_exist_is_refused_with_those_that_do():
+    with pytest.raises(InputError, match=r"registration\.method is cpd; try one of icp, .*fast-robust-icp"):
+        RegistrationConfig("cpd")
+
+
 def test_points_that_are_not_finite(corner):
     points_m = corner.points_m.copy()
     points_m[[3, 8], 1] = np.nan, np.inf
