@@ -139,9 +139,10 @@ class Session:
         on_end: Callable[[Any], None],
         on_partial: Callable[[Any], None] = lambda _: None,
     ) -> None:
-        """Run a job after the chain's, in place of the one before.
+        """Run a job of the store, the spec and these arguments, in place of the one before.
 
-        On this thread, ``on_partial`` gets what it has so far, and ``on_end`` its result or None.
+        It waits for the chain's own. On this thread, ``on_partial`` gets what it has so far, and
+        ``on_end`` its result or None.
         """
         self._run_beside(self._side, job, arguments, on_end, on_partial)
 
@@ -172,6 +173,8 @@ class Session:
         lane.submit(
             jobs.run,
             job,
+            self.store,
+            self.spec,
             *arguments,
             on_progress=lambda value: self.post(progressed, value),
             on_end=lambda outcome: self.post(ended, outcome),

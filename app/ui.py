@@ -14,7 +14,6 @@ import viser
 
 from app.debounce import Debounce
 from app.state import Results, Spec, Step
-from app.store import Store
 from packetmesh.errors import InputError
 from pipeline.config import PipelineConfig
 from pipeline.types import FloatArray
@@ -114,10 +113,6 @@ class Workbench(Protocol):
         """What is there."""
 
     @property
-    def store(self) -> Store:
-        """Where jobs keep results."""
-
-    @property
     def folder(self) -> Path:
         """Where uploaded files go."""
 
@@ -134,7 +129,10 @@ class Workbench(Protocol):
         on_end: Callable[[Any], None],
         on_partial: Callable[[Any], None] = ...,
     ) -> None:
-        """Run a job after the chain's, in place of the one before; ``on_end`` gets its result or None."""
+        """Run a job of the store, the spec and these arguments, in place of the one before.
+
+        It waits for the chain's own; ``on_end`` gets its result, or None.
+        """
 
     def quick_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
         """Run a job of a fraction of a second, even beside one of the chain; of many, the latest."""

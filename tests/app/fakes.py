@@ -231,7 +231,7 @@ class Bench:
         view = None
         try:
             if not self.refuse:
-                view = end(jobs.run(job, *arguments))
+                view = end(jobs.run(job, self.store, self.spec, *arguments))
         except PacketMeshError as error:
             self.notices.append(str(error))
         on_end(view)

@@ -239,7 +239,7 @@ def test_the_words_of_the_screen_are_those_of_the_pipeline():
 
 
 def test_the_network_that_ships_says_what_it_is():
-    view = end(model_job(ModelChoice()))
+    view = end(model_job(None, SPEC, ModelChoice()))
     assert (view.choice, view.kind) == (ModelChoice(), "relative")
     assert view.provider.endswith("ExecutionProvider")
     assert view.size_bytes == SHIPPED_MODEL.stat().st_size
@@ -250,7 +250,7 @@ def test_a_chosen_model_is_fed_as_its_choice_says(tmp_path):
     networks = pytest.importorskip("tests.pipeline.depth.networks")
     file = networks.input_side(tmp_path / "n.onnx", 3)
     request = ModelChoice(str(file), None, "metric", 96, 64, "unit")
-    assert end(model_job(request)).choice == request
+    assert end(model_job(None, SPEC, request)).choice == request
     convention = DepthNetwork.of(request.put_into(DepthConfig())).convention
     assert (convention.width_px, convention.height_px, convention.normalised_inside) == (96, 64, True)
 
@@ -268,7 +268,7 @@ def test_a_bad_input_size_is_one_sentence(tmp_path, width_px, height_px, sentenc
     networks = pytest.importorskip("tests.pipeline.depth.networks")
     file = networks.input_side(tmp_path / "n.onnx", 3)
     with pytest.raises(InputError, match=sentence) as refused:
-        end(model_job(ModelChoice(str(file), "midas-small", None, width_px, height_px)))
+        end(model_job(None, SPEC, ModelChoice(str(file), "midas-small", None, width_px, height_px)))
     assert "\n" not in str(refused.value)
 
 
@@ -276,4 +276,4 @@ def test_a_file_that_is_no_network_is_one_sentence(tmp_path):
     path = tmp_path / "mine.onnx"
     path.write_bytes(b"not a network")
     with pytest.raises(InputError, match=r"mine\.onnx is not a readable ONNX network"):
-        end(model_job(ModelChoice(str(path))))
+        end(model_job(None, SPEC, ModelChoice(str(path))))

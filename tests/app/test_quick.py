@@ -21,7 +21,7 @@ class Browser:
         self.store = self.spec = None
         self.results = SimpleNamespace(fresh=lambda step, spec: True)
 
-    def quick_job(self, job, store, spec, request, on_end):
+    def quick_job(self, job, request, on_end):
         self.jobs.append((request, on_end))
 
     @property

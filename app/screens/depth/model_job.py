@@ -8,6 +8,8 @@ from collections.abc import Generator
 import numpy as np
 
 from app.screens.depth.view import ModelChoice, ModelView
+from app.state import Spec
+from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork
@@ -16,8 +18,8 @@ TEST_IMAGE = np.dstack(np.broadcast_arrays(*np.ogrid[0:240, 0:320], 128)).astype
 """(240, 320, 3) a ramp of colours; any network has something to say to it."""
 
 
-def model_job(choice: ModelChoice) -> Generator[Progress, None, ModelView]:
-    """Load a network and infer one image.
+def model_job(store: Store, spec: Spec, choice: ModelChoice) -> Generator[Progress, None, ModelView]:
+    """Load a network and infer one image; needs nothing of the chain.
 
     Raises:
         InputError: it is no depth network, nobody says what kind, or it does not take the size.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -183,15 +184,13 @@ class DepthPanel(Panel):
         request = replace(request, node=shown[0])
         session.quick_job(
             "depth.hide_job:hide_job",
-            session.store,
-            spec,
             request,
-            on_end=lambda view: self._filled(spec, request, view),
+            on_end=lambda view: self._filled(spec.key("depth"), request, view),
         )
 
-    def _filled(self, spec: Spec, request: HideRequest, view: HiddenView | None) -> None:
+    def _filled(self, key: tuple[Hashable, ...], request: HideRequest, view: HiddenView | None) -> None:
         shown = self._shown()
-        if spec != self.session.spec or request.discs != self._hide.discs:
+        if key != self.session.spec.key("depth") or request.discs != self._hide.discs:
             return
         if shown is not None and shown[0] == request.node:
             with self.ui.atomic():

@@ -77,7 +77,7 @@ class ExportPanel(Panel):
                 client.send_file_download(name, content, save_immediately=True)
 
         spec = session.spec
-        session.side_job("export.job:export_job", session.store, spec, name, spec.shown, on_end=send)
+        session.side_job("export.job:export_job", name, spec.shown, on_end=send)
 
     def _photograph(self, client: viser.ClientHandle | None) -> None:
         """Runs on the server's own thread, because it waits for the browser to draw."""

@@ -188,7 +188,7 @@ class FusePanel(Panel):
                 self._capture.forget()
             self._raced = wanted
             ended = functools.partial(self._finished, wanted)
-            session.side_job("fuse.race_job:race_job", session.store, session.spec, wanted[1], on_end=ended)
+            session.side_job("fuse.race_job:race_job", wanted[1], on_end=ended)
         return wanted != self._arrived
 
     def _wanted(self) -> _Wanted:
@@ -269,7 +269,7 @@ class FusePanel(Panel):
         self._capture.wait()
         self._mapped = wanted = _anywhere(self._wanted())
         ended = functools.partial(self._take_capture, wanted)
-        session.side_job("fuse.capture_job:capture_job", session.store, session.spec, wanted[1], on_end=ended)
+        session.side_job("fuse.capture_job:capture_job", wanted[1], on_end=ended)
 
     def _take_capture(self, wanted: _Wanted, view: CaptureView | None) -> None:
         with self.ui.atomic():

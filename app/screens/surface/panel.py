@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -9,8 +10,9 @@ from typing import Any, ClassVar
 from app.controls import Controls
 from app.drawing.cameras import stage_of, turn
 from app.lesson import LessonFolder, read_lesson
-from app.records import MeshView, SceneView
+from app.records import SceneView
 from app.screens.surface.advice import AdviceFolder
+from app.screens.surface.baselines import Baselines
 from app.screens.surface.holes import HolesFolder
 from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN
 from app.screens.surface.legend import legend_html
@@ -22,6 +24,7 @@ from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
 from app.screens.surface.spacing_plot import spacing_figure
 from app.screens.surface.stage import SurfaceStage
 from app.screens.surface.view import (
+    BaselineName,
     BaselineView,
     ExplainView,
     FilledView,
@@ -53,7 +56,7 @@ class SurfacePanel(Panel):
         """Radius, rule, what to draw; histogram and quality."""
         gui, session = self.gui, self.session
         self._view: SurfaceView | None = None
-        self._baselines: dict[str, BaselineView] = {}
+        self._baselines = Baselines(session, self._made)
         self._look: SurfaceLook | None = None
         self._quick_line = ""
         self._by_click = False
@@ -119,7 +122,7 @@ class SurfacePanel(Panel):
         if thinning != self._thinning:
             self._advice.forget()
         self._thinning = thinning
-        self._baselines = {}
+        self._baselines.forget()
         if self._shown.value in BASELINES:
             self._shown.value = AFTER
         self._close_walk()
@@ -196,8 +199,7 @@ class SurfacePanel(Panel):
 
     def _show_numbers(self) -> None:
         if self._view is not None:
-            others: dict[str, MeshView] = {view.name: view.mesh for view in self._baselines.values()}
-            self._table.content = quality_table(self._view, others, self._has_truth())
+            self._table.content = quality_table(self._view, self._baselines.meshes, self._has_truth())
 
     def _repaint(self) -> None:
         """Have the surfaces of the settings in the colours chosen."""
@@ -205,9 +207,7 @@ class SurfacePanel(Panel):
         if coloring != "color" and self.session.results.view("fuse") is not None:
             session = self.session
             request = PaintRequest(("after", "before"), coloring)
-            session.quick_job(
-                "surface.paint_job:paint_job", session.store, session.spec, request, on_end=self._painted
-            )
+            session.quick_job("surface.paint_job:paint_job", request, on_end=self._painted)
 
     def _painted(self, view: PaintedView | None) -> None:
         """Draw it, unless something else is wanted by now."""
@@ -224,39 +224,27 @@ class SurfacePanel(Panel):
 
     def _picked_shown(self) -> None:
         """Show another surface; that of a baseline is made first."""
-        session, label = self.session, self._shown.value
-        name = BASELINES.get(label)
+        name = BASELINES.get(self._shown.value)
         self._quick.content = ""
         if name is None or self._view is None:
             self._load_holes()
-        elif label in self._baselines:
-            self._quick.content = note_html(self._baselines[label])
-            self._stage.draw_baseline(self._baselines[label].mesh)
         else:
-            key = session.spec
-            self._stage.draw_baseline(None)
-            self._quick.content = WAIT
-            session.side_job(
-                "surface.baselines_job:baseline_job",
-                session.store,
-                key,
-                name,
-                on_end=lambda view: self._measured(label, key, view),
-            )
+            self._show_baseline(self._baselines.want(name))
         self._arrange()
 
-    def _measured(self, label: str, spec: Spec, view: BaselineView | None) -> None:
-        if spec != self.session.spec:
-            return
-        self._quick.content = ""
+    def _show_baseline(self, view: BaselineView | None) -> None:
+        """Draw a baseline, or say that it is being made."""
+        self._quick.content = WAIT if view is None else note_html(view)
+        self._stage.draw_baseline(None if view is None else view.mesh)
+
+    def _made(self, name: BaselineName, view: BaselineView | None) -> None:
+        """A baseline is there, or could not be made."""
         if view is None:
-            self._shown.value = AFTER
+            self._shown.value, self._quick.content = AFTER, ""
         else:
-            self._baselines[label] = view
-            self._quick.content = note_html(view)
             self._show_numbers()
-            if self._shown.value == label:
-                self._stage.draw_baseline(view.mesh)
+            if BASELINES.get(self._shown.value) == name:
+                self._show_baseline(view)
         self._arrange()
 
     def _picked_coloring(self) -> None:
@@ -289,9 +277,7 @@ class SurfacePanel(Panel):
         session = self.session
         if session.results.view("fuse") is not None:
             load = self._advice.load
-            session.side_job(
-                "surface.sweep_job:sweep_job", session.store, session.spec, on_partial=load, on_end=load
-            )
+            session.side_job("surface.sweep_job:sweep_job", on_partial=load, on_end=load)
 
     def _load_holes(self) -> None:
         if self._view is not None and self._view.holes:
@@ -310,14 +296,7 @@ class SurfacePanel(Panel):
     def _explain(self, which: Which, index: int) -> None:
         session = self.session
         if session.results.fresh("surface", session.spec):
-            session.quick_job(
-                "surface.holes_job:explain_job",
-                session.store,
-                session.spec,
-                which,
-                index,
-                on_end=self._explained,
-            )
+            session.quick_job("surface.holes_job:explain_job", which, index, on_end=self._explained)
         else:
             self._explained(None)  # the holes listed are of a surface that is being computed again
 
@@ -333,13 +312,7 @@ class SurfacePanel(Panel):
         if longest_m is None:
             self._filled(None)
         else:
-            session.side_job(
-                "surface.holes_job:fill_job",
-                session.store,
-                session.spec,
-                100.0 * longest_m,
-                on_end=self._filled,
-            )
+            session.side_job("surface.holes_job:fill_job", 100.0 * longest_m, on_end=self._filled)
 
     def _filled(self, view: FilledView | None) -> None:
         with self.ui.atomic():
@@ -357,14 +330,8 @@ class SurfacePanel(Panel):
             self._close_walk()
             self._arrange()
         elif session.results.view("fuse") is not None:
-            spec = session.spec
-            session.side_job(
-                "surface.walk_job:walk_job",
-                session.store,
-                spec,
-                request,
-                on_end=lambda view: self._walked(spec, view),
-            )
+            ended = functools.partial(self._walked, session.spec.key("surface"))
+            session.side_job("surface.walk_job:walk_job", request, on_end=ended)
 
     def _close_walk(self) -> None:
         """Take the walk away, and stand back again after a close-up."""
@@ -373,8 +340,8 @@ class SurfacePanel(Panel):
         if near:
             self.session.frame_view(anew=True)
 
-    def _walked(self, spec: Spec, view: WalkView | None) -> None:
-        if spec != self.session.spec:
+    def _walked(self, key: tuple[Hashable, ...], view: WalkView | None) -> None:
+        if key != self.session.spec.key("surface"):
             return
         self._rolling.load(view)
         self._arrange()
