@@ -7,6 +7,7 @@ import os
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 from lab.claims.depth.scenes import DATA, DATA_VARIABLE, real_folders
@@ -42,27 +43,30 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 RECONSTRUCT = "reconstruct"
 RECORDS = (RECONSTRUCT, *COMMANDS)
 PROGRAMS = {"packetmesh": (sys.executable, "-m", "app.cli"), "python": (sys.executable,)}
-SURFACE_KEYS = ("measured", "surface_before", "surface_after", "truth", "timings_s", "peak_memory_bytes")
+SURFACE_KEYS = ("measured", "surface_before", "surface_after", "truth")
 VERDICT_KEYS = ("claim", "thesis", "tolerance", "verdict", "why", "ours", "ci95")
 
 
-def measure(name: str) -> Record:
+def measure(name: str, runs: Path = Path("runs/results")) -> Record:
     """Run what is behind a record, which takes seconds to half an hour.
 
-    Claims keep their trials below ``runs/results``, so that an interrupted run resumes.
+    Args:
+        name: of ``RECORDS``.
+        runs: folder for what the commands write; claims keep their trials there, so that an interrupted run
+            resumes.
 
     Raises:
         InputError: there is no such record, or the code is not committed.
         PacketMeshError: the command failed.
     """
-    if name not in RECORDS:
+    if name != RECONSTRUCT and name not in COMMANDS:
         raise InputError(f"There is no record '{name}'; known are {', '.join(RECORDS)}")
     commit = committed_code()
     if name == RECONSTRUCT:
-        return new_record(name, f"make results-record ONLY={name}", commit, _reconstructions())
+        return new_record(name, f"make results-record ONLY={name}", commit, _reconstructions(runs))
     words = COMMANDS[name]
     if words[0] == "packetmesh":
-        words = (*words, "--out", f"runs/results/{name}")
+        words = (*words, "--out", f"{runs / name}")
     words = (*words, "--json")
     answer = _run(words)
     if "reproduce" in words:
@@ -70,22 +74,23 @@ def measure(name: str) -> Record:
     return new_record(name, shlex.join(words), commit, answer)
 
 
-def _reconstructions() -> dict[str, Any]:
+def _reconstructions(runs: Path) -> dict[str, Any]:
     """Every demo scene and every real frame there is, by both presets."""
     sources = {scene: ["--scene", scene] for scene in DEMO_SCENES}
     for folder in real_folders():
         files = {"color": "color.png", "depth": "depth.png", "intrinsics": "intrinsics.json"}
         place = f"${DATA_VARIABLE}/{folder.name}"
-        sources[folder.name] = [word for key, file in files.items() for word in (f"--{key}", f"{place}/{file}")]
+        sources[folder.name] = [
+            word for key, file in files.items() for word in (f"--{key}", f"{place}/{file}")
+        ]
     return {
-        title: {preset: _reconstruction(title, source, preset) for preset in PRESETS}
+        title: {preset: _reconstruction(source, preset, runs / f"{title}-{preset}") for preset in PRESETS}
         for title, source in sources.items()
     }
 
 
-def _reconstruction(title: str, source: list[str], preset: str) -> dict[str, Any]:
-    out = f"runs/results/{title}-{preset}"
-    words = ("packetmesh", "reconstruct", *source, "--preset", preset, "--out", out, "--json")
+def _reconstruction(source: list[str], preset: str, out: Path) -> dict[str, Any]:
+    words = ("packetmesh", "reconstruct", *source, "--preset", preset, "--out", str(out), "--json")
     metrics = _run(words)
     return {"command": " ".join(words)} | {key: metrics[key] for key in SURFACE_KEYS}
 
