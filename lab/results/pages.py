@@ -130,6 +130,6 @@ def _depth(ours: dict[str, float]) -> str:
 def _unreproduced(claims: Row) -> str:
     missing = [name for name in sorted(claims) if claims[name]["verdict"] != "reproduced"]
     return (
-        f"**Not all of the thesis holds.** {len(claims) - len(missing)} of {len(claims)} claims are reproduced; "
-        f"not reproduced: {listed(missing)}. [Why](docs/results.md)."
+        f"**Not all of the thesis holds.** {len(claims) - len(missing)} of {len(claims)} claims are "
+        f"reproduced; not reproduced: {listed(missing)}. [Why](docs/results.md)."
     )

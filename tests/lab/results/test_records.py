@@ -34,8 +34,7 @@ def test_a_committed_record_says_what_ran_when_and_where(name):
     assert re.fullmatch(r"\d+ \S+ cores, \d+ GiB of memory, (no|an NVIDIA) GPU", record.machine)
     assert record.numbers
     written = (FOLDER / f"{name}.json").read_text()
-    assert "/work" not in written
-    assert "/tmp" not in written
+    assert not re.search(r'[ "]/\w', written)  # no path of one machine
     assert socket.gethostname() not in written
 
 
@@ -43,8 +42,8 @@ def test_every_claim_and_every_benchmark_belongs_to_one_record():
     words = [command for command in measure.COMMANDS.values() if command[0] == "packetmesh"]
     only = {program: [list(w[3:]) for w in words if w[1] == program] for program in ("reproduce", "bench")}
     claims = Counter(claim for (names,) in only["reproduce"] for claim in names.split(","))
-    assert claims == Counter(CLAIMS)
-    assert Counter(chain(*only["bench"])) == Counter(CASES)
+    assert claims == Counter(list(CLAIMS))
+    assert Counter(chain(*only["bench"])) == Counter(list(CASES))
 
 
 def test_every_record_has_a_section():
