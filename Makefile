@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 SCENE  ?= living-room
 ARGS   ?=
 
-.PHONY: run test check bench reproduce lock scenes clean
+.PHONY: run test check bench reproduce results results-record lock scenes clean
 
 run: $(VENV)/.core  ## the app in the browser, with a scene reconstructed
 	$(BIN)/packetmesh serve --scene $(SCENE) --open $(ARGS)
@@ -24,6 +24,12 @@ bench: $(VENV)/.dev  ## speed and memory, beside peers
 
 reproduce: $(VENV)/.core  ## the thesis's claims beside ours
 	$(BIN)/packetmesh reproduce --out runs/reproduce $(ARGS)
+
+results: $(VENV)/.core  ## docs/results.md and the README's results, from the records in docs/results
+	$(BIN)/python -m lab.results write
+
+results-record: $(VENV)/.dev  ## measure for the records named by ONLY, then as above
+	$(BIN)/python -m lab.results record $(ONLY)
 
 scenes: $(VENV)/.core  ## render the demo scenes again
 	$(BIN)/python -m lab.worlds $(ARGS)

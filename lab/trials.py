@@ -118,7 +118,7 @@ def trial_digest(module: str, data: tuple[Path, ...] = (), root: Path = ROOT) ->
         data: files and folders.
         root: folder of our packages.
     """
-    digest = hashlib.sha256(json.dumps(_versions()).encode())
+    digest = hashlib.sha256(json.dumps(library_versions()).encode())
     for name, tree in sorted(_imported(module, root).items()):
         digest.update(f"{name} {ast.dump(tree)}".encode())
     for path in data:
@@ -155,9 +155,10 @@ def _source(module: str, root: Path) -> Path | None:
     return file if module.partition(".")[0] in PACKAGES and file.is_file() else None
 
 
-def _versions() -> list[str]:
-    versions = [platform.python_version()]
-    for library in LIBRARIES:
+def library_versions(libraries: Iterable[str] = LIBRARIES) -> dict[str, str]:
+    """Versions of Python and of those of the libraries that are installed."""
+    versions = {"python": platform.python_version()}
+    for library in libraries:
         with suppress(metadata.PackageNotFoundError):
-            versions.append(f"{library} {metadata.version(library)}")
+            versions[library] = metadata.version(library)
     return versions

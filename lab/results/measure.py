@@ -1,0 +1,115 @@
+"""The commands behind the records, and what is kept of their answers."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from lab.claims.depth.scenes import DATA, DATA_VARIABLE, real_folders
+from lab.results.record import Record, committed_code, new_record
+from lab.trials import ROOT
+from packetmesh.errors import InputError, PacketMeshError
+from pipeline.config import PRESETS
+from pipeline.io.demos import DEMO_SCENES
+
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "outlier_claims": ("packetmesh", "reproduce", "--only", "C10"),
+    "depth_claims": ("packetmesh", "reproduce", "--only", "C12,C13,C14"),
+    "registration_claims": ("packetmesh", "reproduce", "--only", "C16,C17,C18,C19,C20"),
+    "surface_claims": ("packetmesh", "reproduce", "--only", "C21,C22,C23,C24"),
+    "network_claims": (
+        *("packetmesh", "reproduce", "--only"),
+        "C26,C27,C28,C29,C30,C31,C32,C33,C34,C35,C36",
+    ),
+    "bench_chain": (
+        *("packetmesh", "bench", "--only"),
+        *("reconstruct one 640x480 pair", "reconstruct a rig of three"),
+    ),
+    "bench_surface": ("packetmesh", "bench", "--only", "surface"),
+    "bench_registration": (
+        *("packetmesh", "bench", "--only"),
+        *("registration", "registration, peers thinned like ours"),
+    ),
+    "bench_depth": ("packetmesh", "bench", "--only", "depth"),
+    "bench_network": ("packetmesh", "bench", "--only", "network"),
+    "ns3_saturation": ("python", "tests/benchmarks/ns3_saturation.py"),
+}
+"""What is run for a record; the last one needs ns-3."""
+RECONSTRUCT = "reconstruct"
+RECORDS = (RECONSTRUCT, *COMMANDS)
+PROGRAMS = {"packetmesh": (sys.executable, "-m", "app.cli"), "python": (sys.executable,)}
+SURFACE_KEYS = ("measured", "surface_before", "surface_after", "truth")
+VERDICT_KEYS = ("claim", "thesis", "tolerance", "verdict", "why", "ours", "ci95")
+
+
+def measure(name: str, runs: Path = Path("runs/results")) -> Record:
+    """Run what is behind a record, which takes seconds to half an hour.
+
+    Args:
+        name: of ``RECORDS``.
+        runs: folder for what the commands write; claims keep their trials there, so that an interrupted run
+            resumes.
+
+    Raises:
+        InputError: there is no such record, or the code is not committed.
+        PacketMeshError: the command failed.
+    """
+    if name != RECONSTRUCT and name not in COMMANDS:
+        raise InputError(f"There is no record '{name}'; known are {', '.join(RECORDS)}")
+    commit = committed_code()
+    if name == RECONSTRUCT:
+        return new_record(name, f"make results-record ONLY={name}", commit, _reconstructions(runs))
+    words = COMMANDS[name]
+    if words[0] == "packetmesh":
+        words = (*words, "--out", f"{runs / name}")
+    words = (*words, "--json")
+    answer = _run(words)
+    if "reproduce" in words:
+        answer = {claim: _verdict(verdict) for claim, verdict in answer.items()}
+    return new_record(name, shlex.join(words), commit, answer)
+
+
+def _reconstructions(runs: Path) -> dict[str, Any]:
+    """Every demo scene and every real frame there is, by both presets."""
+    sources = {scene: ["--scene", scene] for scene in DEMO_SCENES}
+    for folder in real_folders():
+        files = {"color": "color.png", "depth": "depth.png", "intrinsics": "intrinsics.json"}
+        place = f"${DATA_VARIABLE}/{folder.name}"
+        sources[folder.name] = [
+            word for key, file in files.items() for word in (f"--{key}", f"{place}/{file}")
+        ]
+    return {
+        title: {preset: _reconstruction(source, preset, runs / f"{title}-{preset}") for preset in PRESETS}
+        for title, source in sources.items()
+    }
+
+
+def _reconstruction(source: list[str], preset: str, out: Path) -> dict[str, Any]:
+    words = ("packetmesh", "reconstruct", *source, "--preset", preset, "--out", str(out), "--json")
+    metrics = _run(words)
+    return {"command": " ".join(words)} | {key: metrics[key] for key in SURFACE_KEYS}
+
+
+def _verdict(verdict: dict[str, Any]) -> dict[str, Any]:
+    """A verdict with its tables, but without its curves and pictures."""
+    tables = [exhibit for exhibit in verdict["exhibits"] if "header" in exhibit]
+    return {key: verdict[key] for key in VERDICT_KEYS} | {"tables": tables}
+
+
+def _run(words: tuple[str, ...]) -> dict[str, Any]:
+    """The JSON that a command prints; its progress is seen on standard error."""
+    data = os.environ.get(DATA_VARIABLE, str(DATA))
+    program, *arguments = (word.replace(f"${DATA_VARIABLE}", data) for word in words)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [*PROGRAMS[program], *arguments], cwd=ROOT, env=environment, stdout=subprocess.PIPE, check=False
+    )
+    if done.returncode:
+        raise PacketMeshError(f"`{shlex.join(words)}` failed with exit code {done.returncode}")
+    answer: dict[str, Any] = json.loads(done.stdout)
+    return answer

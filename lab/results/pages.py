@@ -1,0 +1,135 @@
+"""docs/results.md and the results in README.md, written from the records alone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+from lab.results import tables
+from lab.results.markdown import Row, change, listed
+from lab.results.record import ROOT, Record, Records, read_records
+from packetmesh.files import atomic_path
+
+RESULTS = ROOT / "docs" / "results.md"
+README = ROOT / "README.md"
+BEGIN, END = "<!-- results: written by `make results` -->", "<!-- end of results -->"
+"""Around the lines of the README that state results."""
+
+SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
+    "reconstruct": ("What comes out", tables.reconstructions),
+    "bench_chain": ("Time and memory of the whole chain", tables.chain_speed),
+    "outlier_claims": ("Outlier filter: the thesis's claim", tables.verdicts),
+    "depth_claims": ("Inferred depth: the thesis's claims", tables.depth_claims),
+    "bench_depth": ("Filling holes", tables.filling),
+    "registration_claims": ("Registration: the thesis's claims", tables.registration_claims),
+    "bench_registration": ("Registration: speed", tables.registration_speed),
+    "surface_claims": ("Ball pivoting: the thesis's claims", tables.surface_claims),
+    "bench_surface": ("Ball pivoting: speed", tables.rolling_speed),
+    "network_claims": ("The camera network: the thesis's claims", tables.network_claims),
+    "bench_network": ("The camera network: speed", tables.network_speed),
+    "ns3_saturation": ("The camera network: throughput beside ns-3", tables.ns3_throughput),
+}
+"""Heading and body by record, in the order of the page; a section without its record is left out."""
+
+INTRODUCTION = """# Results
+
+Written by `make results` from the records in [docs/results](results): edit neither this page nor its numbers.
+`make results-record ONLY=NAME` measures again. A record also holds the versions of the libraries. Shares of
+claims run from 0 to 1, intervals are 95 %."""
+
+
+def write_pages() -> None:
+    """Write both pages from the committed records."""
+    records = read_records()
+    pages = {RESULTS: results_page(records), README: readme(README.read_text("utf-8"), records)}
+    for path, content in pages.items():
+        with atomic_path(path) as temporary:
+            temporary.write_text(content, "utf-8")
+
+
+def results_page(records: Records) -> str:
+    """The whole of docs/results.md."""
+    parts = [INTRODUCTION]
+    for name, (heading, body) in SECTIONS.items():
+        if name in records:
+            parts += [f"## {heading}", _origin(records[name]), body(records[name].numbers)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _origin(record: Record) -> str:
+    return (
+        f"[`{record.command}`](results/{record.name}.json), commit {record.commit}, {record.date}, "
+        f"{record.machine}"
+    )
+
+
+def readme(page: str, records: Records) -> str:
+    """The README with the lines between its marks replaced."""
+    lines = "\n".join(f"- {line}" for line in readme_results(records))
+    pattern = f"({re.escape(BEGIN)}\n).*?({re.escape(END)})"
+    return re.sub(pattern, lambda marks: f"{marks[1]}{lines}\n{marks[2]}", page, flags=re.DOTALL)
+
+
+def readme_results(records: Records) -> Iterator[str]:
+    """What the README says of results, a sentence or two for each record it needs."""
+    if "reconstruct" in records:
+        yield _fusion(records["reconstruct"].numbers)
+    if "registration_claims" in records:
+        yield _registration(records["registration_claims"].numbers)
+    if "depth_claims" in records:
+        yield _depth(records["depth_claims"].numbers["C12"]["ours"])
+    claims = {
+        name: claim
+        for key, record in records.items()
+        if key.endswith("_claims")
+        for name, claim in record.numbers.items()
+    }
+    if claims:
+        yield _unreproduced(claims)
+
+
+def _fusion(numbers: Row) -> str:
+    scene, presets = next(iter(numbers.items()))
+    parts = []
+    for preset, run in presets.items():
+        before, after = run["surface_before"], run["surface_after"]
+        rays = change(before["no_hit_ray_share"], after["no_hit_ray_share"])
+        parts.append(f"by `{preset}` {rays} and {change(*tables.f_scores(run))}")
+    return (
+        "**What fills a hole is a guess.** Rays without a surface, and F-score at 5 cm, before → after "
+        f"fusion in {scene}: {'; '.join(parts)}."
+    )
+
+
+def _registration(numbers: Row) -> str:
+    medians = tables.point_errors(numbers)
+    biased = [float(cells["bias 3 %"].split()[0]) for cells in medians.values() if "bias 3 %" in cells]
+    lost = tables.losses(medians, "icp")
+    return (
+        f"**CEICP does not always win.** Plain ICP ends nearer to the truth in {len(lost)} of "
+        f"{len(medians['icp'])} conditions: {listed(lost)}. No rigid method repairs a depth bias: 3 % leaves "
+        f"{min(biased):.1f} to {max(biased):.1f} cm."
+    )
+
+
+def _depth(ours: dict[str, float]) -> str:
+    scaled, raw = (
+        {key.removeprefix(prefix): value for key, value in ours.items() if key.startswith(prefix)}
+        for prefix in ("abs_rel_median-scaled_", "abs_rel_raw_")
+    )
+    held_out = [value for name, value in scaled.items() if name.startswith("Scene ")]
+    real = [name for name in scaled if name.startswith("kinect")]
+    return (
+        "**The depth network saw rendered rooms only.** Scaled by the median, its mean relative error is "
+        f"{min(held_out):.3f} to {max(held_out):.3f} in rooms that it never saw; on real frames "
+        + listed([f"{scaled[name]:.3f} (as it comes {raw[name]:.2f}) on {name}" for name in real])
+        + ". A sensor has to align it."
+    )
+
+
+def _unreproduced(claims: Row) -> str:
+    missing = [name for name in sorted(claims) if claims[name]["verdict"] != "reproduced"]
+    return (
+        f"**Not all of the thesis holds.** {len(claims) - len(missing)} of {len(claims)} claims are "
+        f"reproduced; not reproduced: {listed(missing)}. [Why](docs/results.md)."
+    )

@@ -1,0 +1,89 @@
+"""docs/results.md and the README's results are what the committed records say."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from lab.results.markdown import change, listed, pivot, table, text
+from lab.results.pages import README, RESULTS, readme, readme_results, results_page
+from lab.results.record import read_records
+
+RECORDS = read_records()
+DECIMAL = re.compile(r"\d+\.\d+")
+
+
+def changed(value, factor=1.37):
+    """The same numbers, all of them others."""
+    if isinstance(value, dict):
+        return {key: changed(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [changed(item) for item in value]
+    if isinstance(value, str):
+        return DECIMAL.sub(lambda found: f"{factor * float(found[0]):.{len(found[0].split('.')[1])}f}", value)
+    return factor * value if isinstance(value, float) else value
+
+
+def other(record):
+    return replace(record, numbers=changed(record.numbers))
+
+
+def test_the_page_of_results_is_what_the_records_say():
+    assert RESULTS.read_text("utf-8") == results_page(RECORDS), "run `make results`"
+
+
+def test_the_results_in_the_readme_are_what_the_records_say():
+    page = README.read_text("utf-8")
+    assert readme(page, RECORDS) == page, "run `make results`"
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_another_record_makes_another_page(name):
+    assert results_page({**RECORDS, name: other(RECORDS[name])}) != results_page(RECORDS)
+
+
+def test_no_result_is_typed_into_the_readme_s_lines():
+    ours = "\n".join(readme_results(RECORDS))
+    theirs = "\n".join(readme_results({name: other(record) for name, record in RECORDS.items()}))
+    typed = set(DECIMAL.findall(ours)) & set(DECIMAL.findall(theirs))
+    assert DECIMAL.findall(ours)
+    assert typed == set()
+
+
+def test_a_table_has_a_cell_for_every_column():
+    lines = table(("a", "b"), [("x|y", 1.0), (None, 1234567)]).splitlines()
+    assert lines == ["| a | b |", "| --- | --- |", "| x\\|y | 1 |", "| – | 1,234,567 |"]
+
+
+@pytest.mark.parametrize(
+    ("value", "written"),
+    [(0.012345, "0.0123"), (12345.6, "12,346"), (7, "7"), (-1.0, "-1"), (None, "–"), (1e-6, "1e-06")],
+)
+def test_numbers_keep_three_digits(value, written):
+    assert text(value) == written
+
+
+def test_a_change_needs_both_ends():
+    assert change(0.1384, 0.0376) == "13.8 → 3.8 %"
+    assert change(None, 0.5) == "–"
+
+
+def test_words_are_listed_as_in_a_sentence():
+    assert listed([]) == "none"
+    assert listed(["a"]) == "a"
+    assert listed(["a", "b", "c"]) == "a, b and c"
+
+
+def test_a_pivot_leaves_what_was_not_run_empty():
+    runs = [
+        {"program": "ours", "cloud": "room", "s": 1.0},
+        {"program": "theirs", "cloud": "room", "s": 2.0},
+        {"program": "ours", "cloud": "terrain", "s": 3.0},
+    ]
+    lines = pivot(runs, "program", ("cloud",), lambda run: text(run["s"])).splitlines()
+    assert lines == [
+        "| program | room | terrain |",
+        "| --- | --- | --- |",
+        "| ours | 1 | 3 |",
+        "| theirs | 2 | – |",
+    ]
