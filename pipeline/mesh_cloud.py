@@ -15,9 +15,9 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.config import SurfaceConfig
-from pipeline.geometry import distinct_rows
 from pipeline.io.clouds import read_cloud
 from pipeline.io.meshes import mesh_suffix, write_mesh
+from pipeline.points import distinct_rows
 from pipeline.surface import radii, reconstruct_surface, smooth, spacing, voxel_average, voxel_for_count
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.normals import oriented_normals, turned_to_viewpoint
@@ -141,7 +141,8 @@ def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
     euler = len(surface.vertices_m) - len(edges_and_faces(surface.triangles)[0]) + len(surface.triangles)
     closed = quality.boundary_loops == 0 and quality.non_manifold_edges == 0 and quality.components == 1
     measures = asdict(quality)
-    del measures["no_hit_ray_share"]  # a cloud from a file has no cameras
+    for of_cameras in ("no_hit_ray_share", "kept_measurement_share"):
+        del measures[of_cameras]  # a cloud from a file has none
     return {
         "points": meshed.points,
         "normals": meshed.normals,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.geometry import neighbour_distances_m
+from pipeline.points import neighbour_distances_m
 from pipeline.types import FloatArray
 
 NORMAL_NEIGHBOURS, SPACING_NEIGHBOURS = 20, 4

@@ -17,11 +17,10 @@ from packetmesh.progress import Progress
 from pipeline.findings import RayParts
 from pipeline.nodes import NodeClouds, Placement
 from pipeline.spec import key
-from pipeline.stages import cameras_of, compared
+from pipeline.stages import cameras_of, compared, with_rays
 from pipeline.surface.fill import Filled, fill_holes
 from pipeline.surface.hole_diagnosis import explain_hole
 from pipeline.surface.holes import find_holes
-from pipeline.surface.quality import no_hit_ray_share
 from pipeline.surface.ray_parts import View, ray_parts
 from pipeline.types import Rig, SurfaceResult
 
@@ -82,9 +81,7 @@ def fill_job(store: Store, spec: Spec, longest_cm: float) -> Generator[Progress,
     yield Progress("filling small holes", 0.6)
     filled = fill_holes(after, longest_cm / 100.0)
     yield Progress("measuring the filled surface", 0.8)
-    surface, cameras = filled.surface, cameras_of(rig, placement)
-    missed = no_hit_ray_share(surface.vertices_m, surface.triangles, cameras)
-    surface = replace(surface, quality=replace(surface.quality, no_hit_ray_share=missed))
+    surface = with_rays(filled.surface, rig, placement)
     view = mesh_view(surface, compared(rig, placement, surface))
     return FilledView(replace(view, glb=_marked_glb(filled)), filled.holes, filled.area_m2)
 
