@@ -164,9 +164,9 @@ def unused(surface, cloud):
     return surface.quality.unused_points / len(cloud)
 
 
-def test_too_small_a_ball_uses_fewer_than_one_point_in_ten(room):
+def test_too_small_a_ball_uses_only_one_point_in_ten(room):
     look, _ = stop_named("Too small a ball")
-    assert unused(room.roll(look, room.fused), room.fused) > 0.9
+    assert 0.87 < unused(room.roll(look, room.fused), room.fused) < 0.93
     assert look.radius_in_r_F > 1.0 / np.sqrt(3.0)  # wide enough for three points that are r_F apart
 
 
@@ -188,13 +188,13 @@ def test_r_F_uses_half_of_the_points_and_covers_a_tenth_and_the_thesis_closes_th
 def test_too_large_a_ball_loses_rays_points_and_truth(room, four_balls):
     look, text = stop_named("Too large a ball")
     large = room.roll(look, room.fused)
-    assert missed(large) > 1.3 * missed(four_balls)
+    assert missed(large) > 1.15 * missed(four_balls)
     assert about(
         text,
         r"leave (\d+) % of the rays without surface, this one (\d+) %",
         (missed(four_balls), missed(large)),
     )
-    assert 0.35 < unused(large, room.fused) < 0.45
+    assert 0.25 < unused(large, room.fused) < 0.35
     score, best = (room.truth(surface)["f_score_5cm"] for surface in (large, four_balls))
     assert score < best - 0.05
     assert about(text, r"\*F-score\* is (\d+) % instead of (\d+) %", (score, best))
@@ -219,8 +219,8 @@ def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, fo
     look, text = stop_named("Why holes stay: noise")
     noisy = clouds(room.rig, room.nodes, room.poses, look.smoothing_passes)
     torn = noisy.roll(look, noisy.fused)
-    assert 1.3 < missed(torn) / missed(four_balls) < 1.7
-    assert 1.7 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 2.7
+    assert 1.6 < missed(torn) / missed(four_balls) < 2.0
+    assert 2.5 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 3.5
     old_normals = room.roll(look, replace(room.fused, normals=noisy.fused.normals))
     new_normals = noisy.roll(look, replace(noisy.fused, normals=room.fused.normals))
     assert missed(old_normals) <= missed(four_balls) < missed(torn) <= missed(new_normals)
@@ -239,36 +239,36 @@ def test_no_ball_closes_before_fusion_what_the_sensor_did_not_see(room, four_bal
         for camera, frame, node in zip(room.cameras, room.rig.frames, room.nodes, strict=True)
     ]
     parts = ray_parts(before, views)
-    assert 0.75 < (parts.missed_inferred + parts.missed_unknown) / missed(before) < 0.85
+    assert 0.7 < (parts.missed_inferred + parts.missed_unknown) / missed(before) < 0.8
     singles = (SurfaceLook(rule="manual", radius_in_r_F=factor) for factor in (2.0, 4.0, 6.0, 8.0))
     best = min(missed(room.roll(single, room.sensor)) for single in singles)
     assert best > 2.0 * missed(four_balls)
     assert about(text, r"even the best radius leaves (\d+) %", (best,))
 
 
-def test_what_is_guessed_is_a_quarter_and_three_tenths_of_it_is_off(room, four_balls):
+def test_what_is_guessed_is_a_fifth_and_two_tenths_of_it_is_off(room, four_balls):
     text = stop_named("Measured or guessed?")[1]
     guessed = four_balls.source == PointSource.INFERRED
     a, b, c = four_balls.vertices_m[four_balls.triangles].swapaxes(0, 1)
     area_m2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     share = area_m2[guessed[four_balls.triangles].any(axis=1)].sum() / area_m2.sum()
-    assert 0.2 < guessed.mean() < 0.3
-    assert 0.33 < share < 0.43
+    assert 0.15 < guessed.mean() < 0.2
+    assert 0.25 < share < 0.33
     near = distances_to_truth_m(four_balls.vertices_m, room.rig.truth, room.cameras) <= 0.05
     assert near[~guessed].mean() > 0.999
-    assert 0.65 < near[guessed].mean() < 0.75
+    assert 0.75 < near[guessed].mean() < 0.85
     before, after = (
         room.truth(surface)["f_score_5cm"] for surface in (room.roll(SurfaceLook(), room.sensor), four_balls)
     )
-    assert after < before
-    assert about(text, r"F-score falls from (\d+) % to (\d+) %", (before, after))
+    assert after < before + 0.005
+    assert about(text, r"gains nothing: ([\d.]+) % before, ([\d.]+) % after", (before, after), 0.5)
 
 
 def test_poisson_closes_nearly_everything_and_is_no_better(room, four_balls):
     look, text = stop_named("Is no hole at all better?")
     assert look.shown == POISSON
     poisson = poisson_surface(room.fused, room.r_F_m)
-    assert no_hit_ray_share(poisson.vertices_m, poisson.triangles, room.cameras) < 0.002
+    assert no_hit_ray_share(poisson.vertices_m, poisson.triangles, room.cameras) < 0.004
     theirs, ours = room.truth(poisson), room.truth(four_balls)
     assert theirs["f_score_5cm"] < ours["f_score_5cm"]
     scores = (theirs["f_score_5cm"], ours["f_score_5cm"])
