@@ -1,4 +1,4 @@
-"""Open3D, importable on a bare Linux: its shared library wants libusb, which pip brings (see README)."""
+"""Open3D, importable on a bare Linux: its shared library wants libusb, which pip brings."""
 
 import ctypes
 import sys

@@ -94,7 +94,8 @@ def _fusion(numbers: Row) -> str:
     for preset, run in presets.items():
         before, after = run["surface_before"], run["surface_after"]
         rays = change(before["no_hit_ray_share"], after["no_hit_ray_share"])
-        parts.append(f"by `{preset}` {rays} and {change(*tables.f_scores(run))}")
+        scores = change(*tables.f_scores(run) or (None, None))
+        parts.append(f"by `{preset}` {rays} and {scores}")
     return (
         "**What fills a hole is a guess.** Rays without a surface, and F-score at 5 cm, before → after "
         f"fusion in {scene}: {'; '.join(parts)}."
@@ -107,8 +108,8 @@ def _registration(numbers: Row) -> str:
     lost = tables.losses(medians, "icp")
     return (
         f"**CEICP does not always win.** Plain ICP ends nearer to the truth in {len(lost)} of "
-        f"{len(medians['icp'])} conditions: {listed(lost)}. No rigid method repairs a depth bias: 3 % leaves "
-        f"{min(biased):.1f} to {max(biased):.1f} cm."
+        f"{len(medians['icp'])} conditions: {'; '.join(lost)}. No rigid method repairs a depth bias: 3 % "
+        f"leaves {min(biased):.1f} to {max(biased):.1f} cm."
     )
 
 

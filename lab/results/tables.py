@@ -20,11 +20,12 @@ def reconstructions(numbers: Row) -> str:
     for scene, presets in numbers.items():
         for preset, run in presets.items():
             before, after, measured = run["surface_before"], run["surface_after"], run["measured"]
+            scores = f_scores(run)
             areas = f"{before['hole_area_m2']:.2f} → {after['hole_area_m2']:.2f} m²"
             rows.append(
                 (
                     *(scene, preset, change(before["no_hit_ray_share"], after["no_hit_ray_share"])),
-                    change(*f_scores(run)),
+                    change(*scores) if scores else None,
                     change(measured["within_2pct_before"], measured["within_2pct_after"]),
                     areas,
                 )
@@ -44,19 +45,17 @@ What fills a hole is a guess, and fewer missing rays do not say that it is right
 falls in {_falls(numbers)}."""
 
 
-def f_scores(run: Row) -> tuple[float | None, float | None]:
+def f_scores(run: Row) -> tuple[float, float] | None:
     """F-score at 5 cm before and after fusion; None without a truth."""
     truth = run["truth"]
-    if truth is None:
-        return None, None
-    return truth["surface_before"]["f_score_5cm"], truth["surface_after"]["f_score_5cm"]
+    return truth and (truth["surface_before"]["f_score_5cm"], truth["surface_after"]["f_score_5cm"])
 
 
 def _falls(numbers: Row) -> str:
     """In how many scenes the F-score falls, by preset."""
     parts = []
     for preset in next(iter(numbers.values())):
-        judged = [pair for scene in numbers.values() if (pair := f_scores(scene[preset]))[0] is not None]
+        judged = [pair for scene in numbers.values() if (pair := f_scores(scene[preset]))]
         lower = sum(after < before for before, after in judged)
         parts.append(f"{lower} of {len(judged)} scenes by the preset `{preset}`")
     return listed(parts)
@@ -134,7 +133,7 @@ def registration_claims(numbers: Row) -> str:
             "Median point error in centimetres and, in brackets, the share of rooms that end within 2 cm; "
             "all methods tuned with equal effort on other rooms. A dash: the method did not take part.",
             table(("condition", *methods), rows),
-            f"Plain ICP ends nearer to the truth than CEICP-A in: {listed(losses(medians, 'icp'))}.",
+            f"Plain ICP ends nearer to the truth than CEICP-A in: {'; '.join(losses(medians, 'icp'))}.",
             exhibit(numbers["C16"], "One node, all six conditions: ceicp-a"),
             exhibit(numbers["C16"], "Two nodes"),
             exhibit(numbers["C17"], "Ablations"),
@@ -223,7 +222,7 @@ def network_speed(numbers: Row) -> str:
     result = numbers["network"]
     total, *runs = result["runs"]
     street, saturated = ([run for run in runs if key in run] for key in ("scheme", "mac"))
-    hours = street[0]["simulated_s"] / 3600.0
+    vehicles, hours = street[0]["vehicles"], street[0]["simulated_s"] / 3600.0
     schemes = len({run["scheme"] for run in street})
     rows = [
         (
@@ -237,9 +236,9 @@ def network_speed(numbers: Row) -> str:
         *("medium access", "nodes", "simulated s a second", "ns-3"),
         *("wall time, ours over ns-3's", "throughput, ours over ns-3's", "verdict"),
     )
-    return f"""The street with 60 vehicles, {len(street)} runs of {hours:g} hours by {schemes} schemes, takes
-{result["ours_s"]:.0f} s: {total["simulated_s_per_s"]:,.0f} simulated seconds in a second, with at most
-{result["peak_memory_bytes"] / 1e9:.2f} GB in a process. Saturated nodes around one sink:
+    return f"""The street with {vehicles} vehicles, {len(street)} runs of {hours:.3g} hours by {schemes}
+schemes, takes {result["ours_s"]:.0f} s: {total["simulated_s_per_s"]:,.0f} simulated seconds in a second, with
+at most {result["peak_memory_bytes"] / 1e9:.2f} GB in a process. Saturated nodes around one sink:
 
 {table(header, rows)}"""
 

@@ -16,7 +16,7 @@ DECIMAL = re.compile(r"\d+\.\d+")
 def changed(value, factor=1.37):
     """The same numbers, all of them others."""
     if isinstance(value, dict):
-        return {key: changed(item) for key, item in value.items()}
+        return {key: item if key in {"title", "header"} else changed(item) for key, item in value.items()}
     if isinstance(value, list):
         return [changed(item) for item in value]
     if isinstance(value, str):
@@ -43,11 +43,10 @@ def test_another_record_makes_another_page(name):
 
 
 def test_no_result_is_typed_into_the_readme_s_lines():
-    ours = "\n".join(readme_results(RECORDS))
-    theirs = "\n".join(readme_results({name: other(record) for name, record in RECORDS.items()}))
-    typed = set(DECIMAL.findall(ours)) & set(DECIMAL.findall(theirs))
-    assert DECIMAL.findall(ours)
-    assert typed == set()
+    others = {name: other(record) for name, record in RECORDS.items()}
+    ours, theirs = (DECIMAL.findall("\n".join(readme_results(records))) for records in (RECORDS, others))
+    assert ours
+    assert [one for one, other_one in zip(ours, theirs, strict=True) if one == other_one] == []
 
 
 def test_a_table_has_a_cell_for_every_column():
