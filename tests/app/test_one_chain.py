@@ -46,17 +46,13 @@ def blind(folder):
     return RigFolder(str(folder / "blind"))
 
 
-SPECS = {
-    "rig with truth": lambda folder: spec(Demo("box-on-table")),
-    "thesis": lambda folder: spec(PAIR, "thesis"),
-    "pair": lambda folder: spec(PAIR),
-    "other units": lambda folder: spec(replace(PAIR, depth_scale=2000.0)),
-    "one radius": lambda folder: spec(
-        PAIR, "packetmesh", "surface.radii_m=0.03", "surface.radius_rule=manual"
-    ),
-    "ball falls through": lambda folder: spec(
-        Demo("box-on-table"), "packetmesh", "surface.radii_m=0.0001", "surface.radius_rule=manual"
-    ),
+GOOD = {
+    "rig with truth": lambda: spec(Demo("box-on-table")),
+    "thesis": lambda: spec(PAIR, "thesis"),
+    "one radius": lambda: spec(PAIR, "packetmesh", *one_ball(0.03)),
+    "ball falls through": lambda: spec(Demo("box-on-table"), "packetmesh", *one_ball(0.0001)),
+}
+BAD = {
     "nothing measured": lambda folder: spec(blind(folder)),
     "no such scene": lambda folder: spec(Demo("moon")),
     "no such file": lambda folder: spec(replace(PAIR, color="/no/such/color.png")),
@@ -101,34 +97,28 @@ def without_the_clock(files):
     return rest | {"metrics.json": metrics, "report.html": report, "stages": stages}
 
 
-@pytest.mark.parametrize("name", SPECS)
+def both_ways(asked, folder, capsys):
+    """What the app gives, and what its command gives."""
+    (folder / "store").mkdir()
+    return by_the_app(asked, folder / "store"), by_the_command(asked, folder / "out", capsys)
+
+
+@pytest.mark.parametrize("name", GOOD)
 def test_the_app_and_the_command_line_give_the_same_bytes(name, tmp_path, capsys):
-    asked = SPECS[name](tmp_path)
-    (tmp_path / "store").mkdir()
-    shown = by_the_app(asked, tmp_path / "store")
-    given = by_the_command(asked, tmp_path / "out", capsys)
-    if isinstance(shown, str):
-        assert given == shown
-        assert "\n" not in shown
-        assert not (tmp_path / "out" / "metrics.json").exists()
-        return
+    shown, given = both_ways(GOOD[name](), tmp_path, capsys)
     assert sorted(given) == sorted(shown)
     for file, content in without_the_clock(shown).items():
         assert without_the_clock(given)[file] == content, file
+    falls = json.loads(shown["metrics.json"])["surface_after"]["no_hit_ray_share"] == 1.0
+    assert falls == (name == "ball falls through") == ("surface.glb" not in shown)
 
 
-def test_good_and_bad_specs_are_in_the_table(tmp_path):
-    """The table would prove nothing if all of it failed."""
-    ends = {}
-    for name in ("pair", "ball falls through", "nothing measured", "wrong units"):
-        folder = tmp_path / name
-        folder.mkdir()
-        ends[name] = by_the_app(SPECS[name](tmp_path), folder)
-    assert "surface.glb" in ends["pair"]
-    assert "surface.glb" not in ends["ball falls through"]
-    assert json.loads(ends["ball falls through"]["metrics.json"])["surface_after"]["no_hit_ray_share"] == 1.0
-    assert isinstance(ends["nothing measured"], str)
-    assert isinstance(ends["wrong units"], str)
+@pytest.mark.parametrize("name", BAD)
+def test_the_app_and_the_command_line_refuse_in_the_same_words(name, tmp_path, capsys):
+    shown, given = both_ways(BAD[name](tmp_path), tmp_path, capsys)
+    assert given == shown
+    assert "\n" not in shown
+    assert not (tmp_path / "out" / "metrics.json").exists()
 
 
 @pytest.mark.parametrize("shown", ["after", "before", "poisson"])
