@@ -61,7 +61,7 @@ class SurfacePanel(Panel):
         self._quick_line = ""
         self._by_click = False
         self._thinning: tuple[int, int] | None = None
-        self._key: tuple[Hashable, ...] | None = None
+        self._key = session.spec.key("surface")
         gui.add_markdown(TEXT)
         self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, SurfaceLook()), self._take_look)
         self._radius = gui.add_slider(
