@@ -42,7 +42,7 @@ def test_a_dragged_radius_is_shown_at_once_and_measured_when_it_rests(surface):
     handle = slider(surface, "Radius (mm)")
     handle.focus()
     quick = surface.get_by_text(re.compile(r"triangles over [\d,]+ points"))
-    for _ in range(25):
+    for _ in range(40):
         handle.press("ArrowLeft")
     quick.wait_for()
     assert numbers(surface, "Triangles") == triangles

@@ -75,6 +75,11 @@ def test_stopping_early_drops_what_has_not_begun(tmp_path):
     assert 1 <= len(list(tmp_path.iterdir())) <= 5
 
 
+def heed_interrupts():
+    """A shell starts what runs in its background with interrupts ignored, and that is inherited."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="process groups are POSIX")
 def test_an_interrupt_from_the_terminal_ends_tasks_that_run(tmp_path):
     script = tmp_path / "interrupted.py"
@@ -85,6 +90,7 @@ def test_an_interrupt_from_the_terminal_ends_tasks_that_run(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=heed_interrupts,
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
     )
     try:
