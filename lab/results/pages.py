@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
+from lab.claims.registry import CLAIMS
 from lab.results import tables
 from lab.results.markdown import Row, change, listed
 from lab.results.record import ROOT, Record, Records, read_records
@@ -130,7 +131,9 @@ def _depth(ours: dict[str, float]) -> str:
 
 def _unreproduced(claims: Row) -> str:
     missing = [name for name in sorted(claims) if claims[name]["verdict"] != "reproduced"]
-    return (
-        f"**Not all of the thesis holds.** {len(claims) - len(missing)} of {len(claims)} claims are "
-        f"reproduced; not reproduced: {listed(missing)}. [Why](docs/results.md)."
+    waiting = sorted(set(CLAIMS) - set(claims))
+    sentence = (
+        f"**The thesis's claims.** Of {len(CLAIMS)}, {len(claims)} are on record: "
+        f"{len(claims) - len(missing)} reproduced; not reproduced: {listed(missing)}. [Why](docs/results.md)."
     )
+    return sentence + (f" Not measured since the last change: {listed(waiting)}." if waiting else "")
