@@ -25,7 +25,8 @@ from app.ui import Panel
 
 TEXT = """**What you see.** Blue: points the sensor measured. Violet: points a neural network inferred
 from the colour image alone, made metric by comparing it with the sensor where both know a depth. Red:
-points the outlier filter rejects. Fusion takes the violet points where blue ones are missing.
+points the outlier filter rejects. Fusion takes violet points only where the
+sensor measured nothing.
 Go on with **Fuse**."""
 CONFIDENCE_TEXT = (
     "Inferred depth that flies, lies too far from anything measured or is hardly believed is left out."
