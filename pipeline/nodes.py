@@ -13,10 +13,13 @@ from pipeline import geometry
 from pipeline.acquisition import FilterResult, back_project, filter_outliers
 from pipeline.config import AcquisitionConfig, DepthConfig, FusionMode, NodePoints, RegistrationConfig
 from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, judge
+from pipeline.pixels import near
 from pipeline.registration import fuse, register
 from pipeline.registration.pose_graph import graph_points, pose_edge, solve_pose_graph
 from pipeline.types import DepthMap, FloatArray, PointCloud, PointSource, RegistrationResult, RgbdFrame
 
+COLOR_REACH_PX = 8
+"""How far from a pixel that has arrived a filled-in colour still shows what is there."""
 SHARED_VIEW = 0.25
 """Share of a node's points in another's image from which on the two are worth registering."""
 
@@ -82,6 +85,12 @@ def infer_depth(network: DepthNetwork, frame: RgbdFrame, crop: bool = False) -> 
     return InferredDepth(depth, network.convention.kind == "inverse", network.provider, elapsed_s)
 
 
+def nothing_inferred(frame: RgbdFrame) -> InferredDepth:
+    """Instead of the network's answer where no colour has arrived to infer from."""
+    unknown = np.full(frame.depth.z_m.shape, np.nan, np.float32)
+    return InferredDepth(DepthMap(unknown, kind="relative"), disparity=False, provider="none", elapsed_s=0.0)
+
+
 def prepare_node(
     frame: RgbdFrame,
     inferred: InferredDepth,
@@ -103,9 +112,9 @@ def prepare_node(
     """
     filtered = filter_outliers(back_project(frame), acquisition, frame.intrinsics.fx_px)
     sensor = filtered.kept
-    alignment = align_depth(inferred.depth, frame.depth, depth.alignment, inferred.disparity)
+    alignment = _aligned(frame, inferred, depth)
     judged = judge(alignment, frame.depth, frame.rgb, depth.reach, depth.least_confidence)
-    believed = judged.depth if mode == "fill" else alignment.depth
+    believed = _guesses(frame, judged.depth if mode == "fill" else alignment.depth)
     cloud = back_project(frame, believed, PointSource.INFERRED)
     result = None
     if registration is not None:
@@ -122,6 +131,32 @@ def prepare_node(
         inferred_registration=result,
         fused=fuse(sensor, cloud, mode, frame.depth.valid),
     )
+
+
+def _aligned(frame: RgbdFrame, inferred: InferredDepth, config: DepthConfig) -> AlignmentResult:
+    """Inferred depth made metric; none where nothing could be inferred.
+
+    Coarse depth guides the alignment as measured depth does.
+    """
+    if inferred.provider == "none":
+        return AlignmentResult(inferred.depth, config.alignment, {}, float("nan"), 0.0)
+    guide = frame.depth
+    if frame.coarse is not None:
+        guide = DepthMap(np.where(guide.valid, guide.z_m, frame.coarse.z_m))
+    return align_depth(inferred.depth, guide, config.alignment, inferred.disparity)
+
+
+def _guesses(frame: RgbdFrame, inferred: DepthMap) -> DepthMap:
+    """Depth where nothing was measured: the coarse depth that arrived, else the inferred one.
+
+    Depth inferred from a filled-in colour counts only near pixels whose colour has arrived.
+    """
+    z_m = inferred.z_m
+    if frame.rgb_known is not None:
+        z_m = np.where(near(frame.rgb_known, COLOR_REACH_PX), z_m, np.float32(np.nan))
+    if frame.coarse is not None:
+        z_m = np.where(frame.coarse.valid, frame.coarse.z_m, z_m)
+    return inferred if z_m is inferred.z_m else DepthMap(z_m, inferred.kind)
 
 
 def place_nodes(

@@ -23,7 +23,15 @@ from pipeline.config import (
 )
 from pipeline.depth import DepthNetwork
 from pipeline.merging import MergedClouds, merge_clouds
-from pipeline.nodes import InferredDepth, NodeClouds, Placement, infer_depth, place_nodes, prepare_node
+from pipeline.nodes import (
+    InferredDepth,
+    NodeClouds,
+    Placement,
+    infer_depth,
+    nothing_inferred,
+    place_nodes,
+    prepare_node,
+)
 from pipeline.sources import Source
 from pipeline.spec import CHAIN, NEEDS, Spec, StageName, key
 from pipeline.surface import Camera, compare_with_truth, measured, radii, roll_or_nothing
@@ -111,7 +119,8 @@ def infer_depths(depth: DepthConfig, rig: Rig) -> Steps[tuple[InferredDepth, ...
     inferred = []
     for index, frame in enumerate(rig.frames):
         yield Progress(f"inferring the depth of {frame.name}", 0.1 + 0.1 * index / len(rig.frames))
-        inferred.append(infer_depth(network, frame, depth.crop))
+        seen = frame.rgb_known is None or frame.rgb_known.any()
+        inferred.append(infer_depth(network, frame, depth.crop) if seen else nothing_inferred(frame))
     return tuple(inferred)
 
 

@@ -97,6 +97,10 @@ class RgbdFrame:
     intrinsics: CameraIntrinsics
     T_world_camera: FloatArray
     """(4, 4) pose as the node believes it to be; registration corrects it."""
+    rgb_known: BoolArray | None = None
+    """(H, W) where ``rgb`` has arrived, if the images came over a network; None is everywhere."""
+    coarse: DepthMap | None = None
+    """(H, W) depth known only coarsely, where ``depth`` is unknown: a guess, as inferred depth is."""
 
 
 @dataclass(frozen=True, slots=True)

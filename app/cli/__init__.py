@@ -14,6 +14,7 @@ from typing import Any
 import tyro
 
 from app.cli.bench import bench
+from app.cli.deliver import deliver
 from app.cli.doctor import doctor
 from app.cli.infer_depth import infer_depth
 from app.cli.mesh import mesh
@@ -33,6 +34,7 @@ COMMANDS: dict[str, Any] = {
     "mesh": mesh,
     "infer-depth": infer_depth,
     "simulate": simulate,
+    "deliver": deliver,
     "reproduce": reproduce,
     "bench": bench,
     "scenes": scenes,

@@ -41,7 +41,7 @@ def reconstruct(
         set: Settings to change, for example `--set depth.alignment=median surface.max_points=20000`.
         json: Print the metrics as one JSON object.
     """
-    source = _source(scene, rig, color, depth, intrinsics, depth_scale)
+    source = source_named(scene, rig, color, depth, intrinsics, depth_scale)
     config = with_settings(load_config(preset), set)
 
     from app.reports.reconstruction import write_reconstruction_report
@@ -69,7 +69,7 @@ def reconstruct(
         print_json(metrics)
 
 
-def _source(
+def source_named(
     scene: str | None,
     rig: Path | None,
     color: Path | None,

@@ -1,0 +1,99 @@
+"""``packetmesh deliver``: a rig's images through a network, and the surface of what has arrived."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.cli.options import PresetName, Settings
+from app.cli.reconstruct import source_named
+from app.cli.text import print_json, say
+from packetmesh.progress import drain
+
+if TYPE_CHECKING:
+    from network_sim.config import NetworkConfig
+    from pipeline.config import PipelineConfig
+    from pipeline.deliver import Moment
+
+
+def deliver(
+    out: Path,
+    scene: str | None = None,
+    rig: Path | None = None,
+    color: Path | None = None,
+    depth: Path | None = None,
+    intrinsics: Path | None = None,
+    depth_scale: float = 1000.0,
+    preset: str = "office",
+    coding: str = "raw",
+    moments: int = 40,
+    link_trace: Path | None = None,
+    chain: PresetName = "packetmesh",
+    set: Settings = (),
+    json: bool = False,
+) -> None:
+    """Send a rig's images through a network and rebuild the scene from what has arrived by each moment.
+
+    Args:
+        out: Folder for what arrived in the end (as `reconstruct` writes it), moments.csv and delivery.html.
+        scene: A demo scene (see `packetmesh scenes`).
+        rig: A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/...
+        color: Colour image of a single RGB-D pair.
+        depth: Its registered 16-bit depth image.
+        intrinsics: Its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info.
+        depth_scale: Depth units per metre in the depth image.
+        preset: The network: thesis-link, greenhouse, office, or the config.json of a finished simulation.
+        coding: How images become bytes: raw, raw-rows, raw-tiles, png, jpeg, rvl, tiles, layered, ...
+        moments: How many times, after equal shares of the bytes, the scene is rebuilt.
+        link_trace: A recorded link (time s, rate Mbit/s, round trip ms, share lost) that every node sends over.
+        chain: Settings of the reconstruction to start from.
+        set: Settings of the network or the reconstruction, for example
+            `--set nodes.retransmit=false loss.share=0.1 loss.burst_packets=8`.
+        json: Print the moments as one JSON object.
+    """
+    source = source_named(scene, rig, color, depth, intrinsics, depth_scale)
+
+    from app.reports.delivery import write_hand_out
+    from packetmesh.files import writable_folder
+    from pipeline.deliver import DeliverySpec, iterate_delivery
+    from pipeline.delivery.folder import delivery_metrics, summary, write_delivery_folder
+    from pipeline.spec import Spec
+
+    network, config = _settings(preset, chain, set)
+    if link_trace is not None:
+        network = replace(network, mac=replace(network.mac, kind="replay", trace=str(link_trace)))
+    asked = DeliverySpec(Spec(source, chain, config), network, coding, moments)
+    steps = iterate_delivery(asked)
+    first = next(steps)  # what cannot be sent leaves no folder
+    writable_folder(out)
+    _say_moment(first)
+    delivery = drain(steps, _say_moment)
+    metrics = delivery_metrics(delivery)
+    write_delivery_folder(delivery, metrics, preset, out)
+    write_hand_out(delivery, out / "delivery.html")
+    say(f"100%  {summary(delivery)}; see {out / 'delivery.html'}")
+    if json:
+        print_json(metrics)
+
+
+def _settings(preset: str, chain: str, changes: tuple[str, ...]) -> tuple[NetworkConfig, PipelineConfig]:
+    """The network's and the chain's settings; every change goes to the one that has its key."""
+    from network_sim.config import PRESETS
+    from packetmesh.settings import config_named, settings, with_settings
+    from pipeline.config import load_config
+
+    network, config = config_named(preset, PRESETS), load_config(chain)
+    parts = {key.partition(".")[0] for key in settings(config)}
+    of_chain = [change for change in changes if change.partition(".")[0] in parts]
+    of_network = [change for change in changes if change not in of_chain]
+    return with_settings(network, of_network), with_settings(config, of_chain)
+
+
+def _say_moment(moment: Moment) -> None:
+    line = f"{moment.t_s:8.3f} s, {moment.delivered_bytes:,} B"
+    if moment.surface is None:
+        say(f"{line}; no surface yet")
+        return
+    score = "" if moment.truth is None else f", F-score {moment.truth['f_score_5cm']:.3f}"
+    say(f"{line}; {moment.surface.quality.no_hit_ray_share:.1%} of the rays without surface{score}")

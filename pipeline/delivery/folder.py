@@ -1,0 +1,122 @@
+"""What a delivery leaves on disk: the run folder of what arrived in the end, and a table of moments."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from packetmesh.files import atomic_path, write_json
+from packetmesh.settings import settings
+from pipeline.deliver import Delivery, Moment, NodeArrival
+from pipeline.run_folder import config_of, metrics_of, surface_metrics, write_run_folder
+
+
+def delivery_metrics(delivery: Delivery) -> dict[str, Any]:
+    """The numbers of a delivery: every length in metres, every share from 0 to 1."""
+    lossless = delivery.lossless
+    return {
+        "moments": [_moment(moment) for moment in delivery.moments],
+        "lossless": surface_metrics(lossless.after)
+        | {"f_score_5cm": _f_score(lossless.truth_after), "bytes": raw_bytes(delivery)},
+        "bytes": sum(len(stream) for stream in delivery.sending.streams),
+        "packet_bytes": delivery.sending.packet_bytes,
+    }
+
+
+def raw_bytes(delivery: Delivery) -> int:
+    """Bytes of all colour images at 8 bits a channel and all depth images at 16 bits."""
+    return sum(5 * frame.rgb.shape[0] * frame.rgb.shape[1] for frame in delivery.sending.rig.frames)
+
+
+def write_delivery_folder(delivery: Delivery, metrics: dict[str, Any], preset: str, folder: Path) -> None:
+    """Write everything but the hand-out into ``folder``, each file whole or not at all.
+
+    Of what had arrived in the end there is what ``packetmesh reconstruct`` writes; where that was too
+    little for a surface, only config.json, metrics.json and moments.csv.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    spec = delivery.sending.spec
+    record = metrics
+    if delivery.last is not None:
+        record = metrics_of(delivery.last) | {"delivery": metrics}
+        write_run_folder(delivery.last, record, folder)
+    write_json(folder / "metrics.json", record)
+    write_json(
+        folder / "config.json",
+        config_of(spec.spec)
+        | {"coding": spec.coding, "moments": spec.moments, "network": preset}
+        | {"network_settings": settings(delivery.sending.trace.config)},
+    )
+    _write_table(delivery.moments, folder / "moments.csv")
+
+
+def summary(delivery: Delivery) -> str:
+    """What arrived and what it is good for, in a sentence."""
+    last, sent = delivery.moments[-1], sum(len(stream) for stream in delivery.sending.streams)
+    if not last.delivered_bytes:
+        return f"of {sent:,} bytes none arrived within {last.t_s:.3g} s"
+    share = f"{last.delivered_bytes / sent:.1%} of {sent:,} bytes arrived in {last.t_s:.3g} s"
+    if last.surface is None:
+        return f"{share}, too little for a surface"
+    holes = f"{last.surface.quality.no_hit_ray_share:.1%} of the rays without surface"
+    return f"{share}: {holes}, {delivery.lossless.after.quality.no_hit_ray_share:.1%} without losses"
+
+
+def _moment(moment: Moment) -> dict[str, Any]:
+    return {
+        "t_s": moment.t_s,
+        "sent_bytes": moment.sent_bytes,
+        "delivered_bytes": moment.delivered_bytes,
+        "packets_lost": moment.packets_lost,
+        "radio_j": moment.radio_j,
+        "energy_j": moment.energy_j,
+        "nodes": [_node(node, node.name in moment.T_world_camera) for node in moment.nodes],
+        "surface": None if moment.surface is None else surface_metrics(moment.surface),
+        "f_score_5cm": _f_score(moment.truth),
+    }
+
+
+def _node(node: NodeArrival, used: bool) -> dict[str, Any]:
+    return {
+        "name": node.name,
+        "total_bytes": node.total_bytes,
+        "delivered_bytes": node.delivered_bytes,
+        "color_share": node.color_share,
+        "depth_share": node.depth_share,
+        "coarse_share": node.coarse_share,
+        "used": used,
+    }
+
+
+def _f_score(truth: dict[str, float] | None) -> float | None:
+    return None if truth is None else truth["f_score_5cm"]
+
+
+def _write_table(moments: tuple[Moment, ...], path: Path) -> None:
+    """One row a moment; shares from 0 to 1, empty where there is no surface or no truth."""
+    with atomic_path(path) as sibling, sibling.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(
+            ("t_s", "sent_bytes", "delivered_bytes", "packets_lost", "radio_j", "energy_j", "nodes")
+            + ("triangles", "no_hit_ray_share", "hole_area_m2", "f_score_5cm")
+        )
+        writer.writerows(_rows(moments))
+
+
+def _rows(moments: tuple[Moment, ...]) -> Iterator[tuple[Any, ...]]:
+    for moment in moments:
+        surface = moment.surface
+        holes = ("", "", "")
+        if surface is not None:
+            quality = surface.quality
+            holes = (len(surface.triangles), quality.no_hit_ray_share, quality.hole_area_m2)
+        score = _f_score(moment.truth)
+        yield (
+            *(moment.t_s, moment.sent_bytes, moment.delivered_bytes, moment.packets_lost),
+            *(moment.radio_j, moment.energy_j, len(moment.T_world_camera), *holes),
+            "" if score is None else score,
+        )

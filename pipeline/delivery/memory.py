@@ -1,0 +1,58 @@
+"""What the moments of a delivery share: a stage runs again only when images that it depends on have grown."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Generator, Hashable, Sequence
+from typing import TypeVar
+
+from packetmesh.progress import Progress
+from pipeline.types import RgbdFrame
+
+Result = TypeVar("Result")
+COLOR_ONLY, DEPTH_ONLY = ("inferred",), ("placement",)
+"""Stages that read one of the two images only; the nodes are placed by their sensor clouds."""
+
+
+class Memory:
+    """The newest result of each stage of one delivery, whose settings never change: a cache of the chain."""
+
+    def __init__(self, places_by_sensor: bool) -> None:
+        """``places_by_sensor``: registration reads measured depth only, no inferred depth."""
+        self._places_by_sensor = places_by_sensor
+        self._color: Hashable = None
+        self._depth: Hashable = None
+        self._kept: dict[Hashable, tuple[Hashable, object]] = {}
+
+    def look_at(self, frames: Sequence[RgbdFrame]) -> bool:
+        """Take the frames of the next moment; returns whether any image has changed."""
+        before = self._color, self._depth
+        self._color = tuple((frame.name, _digest(frame.rgb), _digest(frame.rgb_known)) for frame in frames)
+        self._depth = tuple(
+            (frame.name, _digest(frame.depth.z_m), _digest(frame.coarse and frame.coarse.z_m))
+            for frame in frames
+        )
+        return before != (self._color, self._depth)
+
+    def remember(
+        self, key: tuple[Hashable, ...], compute: Callable[[], Generator[Progress, None, Result]]
+    ) -> Generator[Progress, None, Result]:
+        """As ``pipeline.stages.Cache.remember``, by what the stage reads of the frames."""
+        stage, images = key[0], self._images(key[0])
+        kept = self._kept.get(stage)
+        if kept is not None and kept[0] == images:
+            return kept[1]  # type: ignore[return-value]
+        result = yield from compute()
+        self._kept[stage] = images, result
+        return result
+
+    def _images(self, stage: Hashable) -> Hashable:
+        if stage in COLOR_ONLY:
+            return self._color
+        if stage in DEPTH_ONLY and self._places_by_sensor:
+            return self._depth
+        return self._color, self._depth
+
+
+def _digest(array: object) -> bytes | None:
+    return None if array is None else hashlib.blake2b(array.tobytes(), digest_size=16).digest()  # type: ignore[attr-defined]

@@ -1,0 +1,60 @@
+"""Where a rig's nodes stand in a network, and how large what they send is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from network_sim.config import NetworkConfig
+from packetmesh.errors import InputError
+from pipeline.types import FloatArray, Rig
+
+SAME_PLACE_M = 1e-6
+
+
+def poses_known(rig: Rig) -> bool:
+    """Whether the nodes stand apart; a rig without pose files has all of them at one place."""
+    places_m = np.array([frame.T_world_camera[:3, 3] for frame in rig.frames])
+    return len(places_m) == 1 or bool(np.ptp(places_m, axis=0).max() > SAME_PLACE_M)
+
+
+def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> NetworkConfig:
+    """The network with the rig's cameras as its nodes, each with one image of its own to send.
+
+    Seen from above, nodes stand where their cameras do, and the sink behind them, ``nodes.spacing_m`` from
+    their middle. Where the poses are unknown, they stand as ``nodes.layout`` has it.
+
+    Args:
+        rig: one to six nodes; the world's third axis points up.
+        sizes_bytes: of each node's encoded images.
+        network: a preset, or anything else that collects images from nodes that stand still.
+
+    Raises:
+        InputError: the network's nodes drive.
+    """
+    if network.scenario != "collection":
+        raise InputError(
+            f"A network of the scenario {network.scenario} has no cameras that stand still; try a preset such "
+            "as office, thesis-link or greenhouse"
+        )
+    nodes = replace(
+        network.nodes,
+        count=len(rig.frames),
+        images=1,
+        interval_s=0.0,
+        bytes_by_node=tuple(sizes_bytes),
+        places_m=places_of(rig, network.nodes.spacing_m) if poses_known(rig) else (),
+    )
+    return replace(network, nodes=nodes, run=replace(network.run, keep="all", warmup_s=0.0))
+
+
+def places_of(rig: Rig, spacing_m: float) -> tuple[float, ...]:
+    """x and y in metres of every camera and, last, of the sink."""
+    cameras_m: FloatArray = np.array([frame.T_world_camera[:2, 3] for frame in rig.frames])
+    ahead = np.mean([frame.T_world_camera[:2, 2] for frame in rig.frames], axis=0)
+    length = float(np.hypot(*ahead))
+    behind = -ahead / length if length > 0.0 else np.array([0.0, -1.0])
+    sink_m = cameras_m.mean(axis=0) + spacing_m * behind
+    return tuple(np.vstack([cameras_m, sink_m]).ravel().tolist())

@@ -1,0 +1,75 @@
+"""A node's frame as the sink knows it, from the bytes that have arrived (SPEC 6.4, 6.5)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.delivery.coding import DepthArray, Images, Received
+from pipeline.pixels import nearest_colors
+from pipeline.types import DepthMap, RgbdFrame
+
+UNITS_PER_M = (1000.0, 5000.0, 10_000.0, 256.0, 100.0)
+"""What a depth camera counts in: the first that holds an image's depths exactly is what is sent."""
+MOST_UNITS = np.iinfo(np.uint16).max
+LEAST_DEPTH_SHARE = 0.01
+"""Share of pixels with depth from which on a node counts as heard."""
+
+
+def units_per_m(depth: DepthMap) -> float:
+    """In what units a depth image is whole numbers; millimetres if in none."""
+    z_m = depth.z_m[depth.valid].astype(np.float64)
+    for units in UNITS_PER_M:
+        counts = np.rint(z_m * units)
+        if counts.max(initial=0.0) <= MOST_UNITS and np.array_equal(
+            (counts / units).astype(np.float32), depth.z_m[depth.valid]
+        ):
+            return units
+    return UNITS_PER_M[0]
+
+
+def images_of(frame: RgbdFrame) -> Images:
+    """What a node sends of a frame: colour as it is, depth in whole units.
+
+    Raises:
+        InputError: a depth that 16 bits cannot hold.
+    """
+    units = units_per_m(frame.depth)
+    counts = np.rint(np.where(frame.depth.valid, frame.depth.z_m, 0.0).astype(np.float64) * units)
+    if counts.max(initial=0.0) > MOST_UNITS:
+        raise InputError(
+            f"{frame.name} measures up to {counts.max() / units:.1f} m, but 16 bits in millimetres end at "
+            f"{MOST_UNITS / units:.1f} m; try another depth scale"
+        )
+    return Images(np.ascontiguousarray(frame.rgb), counts.astype(np.uint16))
+
+
+def frame_at_sink(frame: RgbdFrame, received: Received) -> RgbdFrame:
+    """The frame as far as it has arrived: unknown depth is invalid, unknown colour filled in for the network.
+
+    Args:
+        frame: the node's own, of which the name, the intrinsics and the believed pose are known at the sink.
+        received: what its bytes say.
+    """
+    known, units = received.rgb_known, units_per_m(frame.depth)
+    return replace(
+        frame,
+        rgb=received.rgb if known.all() else nearest_colors(received.rgb, known),
+        depth=_depth_map(received.depth, units),
+        rgb_known=None if known.all() else known,
+        coarse=_depth_map(received.coarse, units) if received.coarse.any() else None,
+    )
+
+
+def heard(frame: RgbdFrame) -> bool:
+    """Whether enough of a frame's depth has arrived to place its points."""
+    return frame.depth.coverage >= LEAST_DEPTH_SHARE
+
+
+def _depth_map(counts: DepthArray, units: float) -> DepthMap:
+    """As ``pipeline.io.images.read_depth`` has it, to the bit."""
+    z_m = (counts / units).astype(np.float32)
+    z_m[counts == 0] = np.nan
+    return DepthMap(z_m)
