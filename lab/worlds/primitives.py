@@ -74,11 +74,7 @@ def lathe(profile_m: FloatArray | Sequence, segments: int = 32, bevel_m: float =
     turn = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     rings = profile if ring else profile[1:-1]
     vertices = np.concatenate(
-        [
-            (rings[:, None, :1] * turn[None]).reshape(-1, 2),
-            np.repeat(rings[:, 1], segments)[:, None],
-        ],
-        axis=1,
+        [(rings[:, None, :1] * turn[None]).reshape(-1, 2), np.repeat(rings[:, 1], segments)[:, None]], axis=1
     )
     rows = np.arange(len(rings) if ring else len(rings) - 1)[:, None] * segments
     here, there = np.arange(segments)[None], (np.arange(segments) + 1)[None] % segments

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from lab.worlds import textures
-from lab.worlds.scene import Material, Part
+from lab.worlds.scene import Material, Part, Rng
 from pipeline.types import FloatArray
 
 
-def random_floor(rng: np.random.Generator) -> Material:
+def random_floor(rng: Rng) -> Material:
     """Boards, parquet, tiles, carpet, concrete or stone."""
     light, dark = random_timber(rng)
     color, second = muted(rng, 2, 0.05, 0.5)
@@ -37,7 +37,7 @@ def random_floor(rng: np.random.Generator) -> Material:
     return Material(textures.marble(color, second, seed, rng.uniform(0.2, 0.8)), rng.uniform(0.1, 0.45))
 
 
-def random_wall(rng: np.random.Generator) -> Material:
+def random_wall(rng: Rng) -> Material:
     """Mostly light paint or plaster; some wallpaper, panelling, brick and tiles."""
     color = muted(rng, 1, 0.3, 0.85, 0.12)[0] if rng.random() < 0.75 else muted(rng, 1, 0.05, 0.5)[0]
     second = np.clip(color * rng.uniform(0.5, 1.5, 3), 0.02, 0.9)
@@ -65,7 +65,7 @@ def random_wall(rng: np.random.Generator) -> Material:
     return Material(textures.planks(light, dark, seed, rng.uniform(0.08, 0.3), 3.0), 0.1)
 
 
-def random_material(rng: np.random.Generator) -> Material:
+def random_material(rng: Rng) -> Material:
     """Anything a thing may be made of."""
     color, second, third = textures.random_palette(rng, 3)
     light, dark = random_timber(rng)
@@ -89,7 +89,7 @@ def random_material(rng: np.random.Generator) -> Material:
     return Material(makers[rng.integers(len(makers))](), gloss, infrared=float(rng.uniform(0.5, 1.5)))
 
 
-def recolored(parts: list[Part], rng: np.random.Generator) -> list[Part]:
+def recolored(parts: list[Part], rng: Rng) -> list[Part]:
     """A piece in other colours: its own ones times a random tint, so that textures and contrasts stay."""
     gain = np.clip(rng.uniform(0.45, 1.7) * rng.uniform(0.6, 1.4, 3), 0.2, 2.0).astype(np.float32)
     return [
@@ -98,7 +98,7 @@ def recolored(parts: list[Part], rng: np.random.Generator) -> list[Part]:
     ]
 
 
-def random_timber(rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def random_timber(rng: Rng) -> tuple[FloatArray, FloatArray]:
     """Light and dark colour of a wood: from maple over oak and cherry to wenge, or limed grey."""
     light = (
         np.array([0.55, 0.36, 0.19])
@@ -109,7 +109,7 @@ def random_timber(rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     return np.clip(light, 0.02, 0.85), np.clip(light * rng.uniform(0.35, 0.75), 0.01, 0.6)
 
 
-def muted(rng: np.random.Generator, count: int, low: float, high: float, chroma: float = 0.4) -> FloatArray:
+def muted(rng: Rng, count: int, low: float, high: float, chroma: float = 0.4) -> FloatArray:
     """(count, 3) colours of low to middling saturation with a luminance near low to high."""
     value = rng.uniform(low, high, (count, 1))
     return np.clip(
@@ -117,7 +117,7 @@ def muted(rng: np.random.Generator, count: int, low: float, high: float, chroma:
     )
 
 
-def draw_seed(rng: np.random.Generator) -> int:
+def draw_seed(rng: Rng) -> int:
     """A seed for a texture."""
     return int(rng.integers(2**31))
 
@@ -134,6 +134,6 @@ def covered(parts: list[Part], material: Material) -> list[Part]:
     return [part if part.material.emission > 0.0 else replace(part, material=material) for part in parts]
 
 
-def lamp_white(rng: np.random.Generator) -> FloatArray:
+def lamp_white(rng: Rng) -> FloatArray:
     """(3,) white of a colour temperature from about 2700 to 8000 K."""
     return np.array([1.0, 0.78, 0.52]) + rng.random() ** 0.7 * np.array([-0.12, 0.14, 0.55])

@@ -9,16 +9,16 @@ import numpy as np
 from lab.worlds.furniture import placing
 from lab.worlds.primitives import box
 from lab.worlds.room_finishes import muted, random_floor, random_wall
-from lab.worlds.scene import Material, Part
+from lab.worlds.scene import Material, Part, Rng
 from lab.worlds.textures import paint
 from pipeline.geometry import rigid
 from pipeline.types import FloatArray
 
-Finish = Callable[[np.random.Generator], Material]
+Finish = Callable[[Rng], Material]
 
 
 def shell(
-    rng: np.random.Generator,
+    rng: Rng,
     size_m: FloatArray,
     darkest_ceiling: float,
     wall: Finish = random_wall,

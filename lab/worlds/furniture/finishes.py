@@ -8,7 +8,7 @@ import numpy as np
 
 from lab.worlds import textures
 from lab.worlds.room_finishes import draw_seed
-from lab.worlds.scene import Material
+from lab.worlds.scene import Material, Rng
 from pipeline.types import FloatArray
 
 Color = str | FloatArray | Sequence[float]
@@ -38,7 +38,7 @@ def linear(color: Color) -> FloatArray:
     return textures.from_srgb(*(int(color[i : i + 2], 16) for i in (1, 3, 5)))
 
 
-def pick(rng: np.random.Generator, palette: Sequence[str], color: str | None = None) -> FloatArray:
+def pick(rng: Rng, palette: Sequence[str], color: str | None = None) -> FloatArray:
     """The colour asked for, or one of a palette, slightly off."""
     if color is not None:
         return linear(color)
@@ -50,13 +50,13 @@ def plain(color: Color, gloss: float = 0.0, infrared: float = 1.0) -> Material:
     return Material(textures.solid(linear(color)), gloss, infrared)
 
 
-def fabric(rng: np.random.Generator, color: Color, second: Color | None = None) -> Material:
+def fabric(rng: Rng, color: Color, second: Color | None = None) -> Material:
     """Woven cloth, plain or of two colours."""
     other = None if second is None else linear(second)
     return Material(textures.fabric(linear(color), other, draw_seed(rng), rng.uniform(0.004, 0.008)))
 
 
-def wood(rng: np.random.Generator, color: Color, along: int = 0, gloss: float = 0.05) -> Material:
+def wood(rng: Rng, color: Color, along: int = 0, gloss: float = 0.05) -> Material:
     """Oiled wood, its grain along an axis of the part."""
     light = linear(color)
     return Material(
@@ -64,7 +64,7 @@ def wood(rng: np.random.Generator, color: Color, along: int = 0, gloss: float = 
     )
 
 
-def painted(rng: np.random.Generator, color: Color, gloss: float = 0.08) -> Material:
+def painted(rng: Rng, color: Color, gloss: float = 0.08) -> Material:
     """Paint or lacquer, hardly mottled."""
     return Material(textures.paint(linear(color), draw_seed(rng)), gloss)
 
@@ -84,7 +84,7 @@ def chrome() -> Material:
     return plain((0.55, 0.56, 0.58), 0.95, infrared=0.3)
 
 
-def steel(rng: np.random.Generator, color: Color = "#8b8f93", axis: int = 0) -> Material:
+def steel(rng: Rng, color: Color = "#8b8f93", axis: int = 0) -> Material:
     """Brushed or rolled metal."""
     return Material(textures.brushed_metal(linear(color), draw_seed(rng), axis), 0.4, infrared=0.8)
 
@@ -94,17 +94,17 @@ def glass(color: Color = "#27402f") -> Material:
     return plain(color, 0.9, infrared=0.1)
 
 
-def leaf(rng: np.random.Generator, color: Color) -> Material:
+def leaf(rng: Rng, color: Color) -> Material:
     """A plant's leaf, bright in the infrared."""
     return Material(textures.leaf(linear(color), draw_seed(rng)), 0.12, infrared=1.6)
 
 
-def cardboard(rng: np.random.Generator, size_m: float, color: Color = "#b08a5b") -> Material:
+def cardboard(rng: Rng, size_m: float, color: Color = "#b08a5b") -> Material:
     """Corrugated board with tape, on a box about its part's origin."""
     return Material(textures.cardboard(linear(color), draw_seed(rng), size_m))
 
 
-def book(rng: np.random.Generator, color: Color) -> Material:
+def book(rng: Rng, color: Color) -> Material:
     """Cloth-bound books that stand on z = 0 with their spines towards -y: lettering there, paper on top."""
     cover, title, pages = linear(color), linear("#d8c48e"), linear("#e8e0cc")
     bands = rng.uniform(0.03, 0.2, (3, 1)) + np.array([0.0, 0.004])
@@ -135,7 +135,7 @@ def glow(color: Color, strength: float) -> Material:
     return Material(textures.solid(linear(color)), emission=strength)
 
 
-def screen(rng: np.random.Generator, size_m: tuple[float, float], lit: bool) -> Material:
+def screen(rng: Rng, size_m: tuple[float, float], lit: bool) -> Material:
     """A glossy display: black when off."""
     if not lit:
         return plain((0.012, 0.013, 0.016), 0.85, infrared=0.1)

@@ -7,7 +7,7 @@ import numpy as np
 from lab.worlds.furniture.finishes import leaf, linear, pick, plain
 from lab.worlds.furniture.placing import ORIGIN, solid
 from lab.worlds.primitives import Mesh, lathe, merged, transformed, tube
-from lab.worlds.scene import Part
+from lab.worlds.scene import Part, Rng
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
@@ -15,11 +15,7 @@ POTS = ("#a65a3a", "#e6e1d6", "#4a5357", "#c9b28a", "#8fa79b")
 
 
 def potted_plant(
-    rng: np.random.Generator,
-    T_world: FloatArray = ORIGIN,
-    height_m: float = 1.1,
-    color: str | None = None,
-    leaves: int = 26,
+    rng: Rng, T_world: FloatArray = ORIGIN, height_m: float = 1.1, color: str | None = None, leaves: int = 26
 ) -> list[Part]:
     """A leafy plant (rubber tree or fig): stems from a pot, a broad leaf at every turn."""
     pot_m = float(np.clip(0.16 * height_m, 0.06, 0.17))
@@ -41,11 +37,7 @@ def potted_plant(
 
 
 def grass_plant(
-    rng: np.random.Generator,
-    T_world: FloatArray = ORIGIN,
-    height_m: float = 0.5,
-    color: str | None = None,
-    leaves: int = 24,
+    rng: Rng, T_world: FloatArray = ORIGIN, height_m: float = 0.5, color: str | None = None, leaves: int = 24
 ) -> list[Part]:
     """A tuft of long arching blades (spider plant, snake plant) for shelves and tables."""
     pot_m = float(np.clip(0.2 * height_m, 0.05, 0.13))
@@ -57,7 +49,7 @@ def grass_plant(
     return [*_pot(rng, T_world, pot_m, color), *_foliage(rng, T_world, [], blades, "#6f8f4e")]
 
 
-def _pot(rng: np.random.Generator, T_world: FloatArray, radius_m: float, color: str | None) -> list[Part]:
+def _pot(rng: Rng, T_world: FloatArray, radius_m: float, color: str | None) -> list[Part]:
     """A tapered pot with a rim, filled with earth."""
     clay = plain(pick(rng, POTS, color), 0.1)
     profile = np.array(
@@ -68,9 +60,7 @@ def _pot(rng: np.random.Generator, T_world: FloatArray, radius_m: float, color: 
     return [pot, solid(soil, plain("#2c211a"), T_world)]
 
 
-def _foliage(
-    rng: np.random.Generator, T_world: FloatArray, stems: list[Mesh], blades: list[Mesh], color: str
-) -> list[Part]:
+def _foliage(rng: Rng, T_world: FloatArray, stems: list[Mesh], blades: list[Mesh], color: str) -> list[Part]:
     """Stems and leaves in three greens."""
     parts = [solid(merged(stems), plain("#6b5a3a"), T_world)] if stems else []
     for k in range(3):

@@ -8,10 +8,10 @@ from lab.worlds.furniture import electronics, lights, seating, storage, tables
 from lab.worlds.furniture.placing import ORIGIN, place, solid
 from lab.worlds.pieces.small import laden, things_on
 from lab.worlds.pieces.solids import raised
-from lab.worlds.pieces.stock import Rng, bounds, moved
+from lab.worlds.pieces.stock import bounds, moved
 from lab.worlds.primitives import box, rounded_box
 from lab.worlds.room_finishes import random_material
-from lab.worlds.scene import Part
+from lab.worlds.scene import Part, Rng
 from pipeline.geometry import rigid, rotation_exp
 
 

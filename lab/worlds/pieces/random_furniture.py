@@ -8,8 +8,8 @@ from lab.worlds.furniture import fixtures, lights, plants, seating, storage, tab
 from lab.worlds.pieces.groups import bed, dining, filled_crate, office, sofa, television
 from lab.worlds.pieces.small import laden, small_thing
 from lab.worlds.pieces.solids import basket, random_solid, stack
-from lab.worlds.pieces.stock import Rng, draw
-from lab.worlds.scene import Part
+from lab.worlds.pieces.stock import draw
+from lab.worlds.scene import Part, Rng
 
 
 def random_wall_furniture(rng: Rng) -> list[Part]:

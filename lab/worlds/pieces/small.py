@@ -9,8 +9,8 @@ import numpy as np
 from lab.worlds.furniture import electronics, lights, plants, seating, storage, things
 from lab.worlds.furniture.placing import place
 from lab.worlds.pieces.solids import random_solid
-from lab.worlds.pieces.stock import Rng, bounds, draw, moved
-from lab.worlds.scene import Part
+from lab.worlds.pieces.stock import bounds, draw, moved
+from lab.worlds.scene import Part, Rng
 from pipeline.types import FloatArray
 
 

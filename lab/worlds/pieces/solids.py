@@ -9,10 +9,10 @@ import numpy as np
 
 from lab.worlds.furniture import storage
 from lab.worlds.furniture.placing import ORIGIN, place, solid
-from lab.worlds.pieces.stock import Rng, bounds, draw, moved
+from lab.worlds.pieces.stock import bounds, draw, moved
 from lab.worlds.primitives import Mesh, box, cylinder, frustum, lathe, rounded_box, sphere, tube
 from lab.worlds.room_finishes import random_material
-from lab.worlds.scene import Part
+from lab.worlds.scene import Part, Rng
 from pipeline.geometry import rigid, rotation_exp
 
 

@@ -9,10 +9,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from lab.worlds.scene import Part
+from lab.worlds.scene import Part, Rng
 from pipeline.types import FloatArray
 
-Rng = np.random.Generator
 _Made = TypeVar("_Made")
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lab.worlds.scene import Rng
 from lab.worlds.textures.noise import fbm
 from pipeline.types import FloatArray
 
@@ -18,7 +19,7 @@ def from_srgb(red: float, green: float, blue: float) -> FloatArray:
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
-def random_palette(rng: np.random.Generator, count: int, saturation: float = 0.75) -> FloatArray:
+def random_palette(rng: Rng, count: int, saturation: float = 0.75) -> FloatArray:
     """(count, 3) float32 linear colours of things people own: from muted to vivid, dark to light."""
     hue = rng.random(count)[:, None] + np.array([0.0, 1.0, 2.0]) / 3.0
     vivid = np.clip(np.abs((hue % 1.0) * 6.0 - 3.0) - 1.0, 0.0, 1.0)
