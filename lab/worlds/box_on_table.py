@@ -6,7 +6,7 @@ import numpy as np
 
 from lab.worlds import textures
 from lab.worlds.furniture import electronics, fixtures, lights, plants, seating, tables, things
-from lab.worlds.furniture.finishes import cardboard, linear, painted
+from lab.worlds.furniture.finishes import cardboard, painted
 from lab.worlds.furniture.placing import board, place
 from lab.worlds.scene import Light, Material, Part, Rng, Scene
 from lab.worlds.staging import NORTH, SOUTH, VGA, WALL_M, WEST, arc, shell, sun
@@ -42,9 +42,9 @@ def box_on_table() -> Scene:
 
 
 def _room(rng: Rng) -> list[Part]:
-    wall = Material(textures.plaster(linear("#e2dccf"), 16, 0.01, 0.04))
-    paper = Material(textures.motif(linear("#b7c0b0"), linear("#8fa08f"), 17, 0.13))
-    floor = Material(textures.parquet(linear("#b8864f"), linear("#8a5e34"), 18), 0.05)
+    wall = Material(textures.plaster("#e2dccf", 16, 0.01, 0.04))
+    paper = Material(textures.motif("#b7c0b0", "#8fa08f", 17, 0.13))
+    floor = Material(textures.parquet("#b8864f", "#8a5e34", 18), 0.05)
     return [
         *shell(rng, SIZE_M, floor, (wall, wall, wall, paper), painted(rng, "#f4f2ec", 0.0), {WEST: WINDOW}),
         *fixtures.window(rng, place(0.0, 1.9, WEST, 0.9), (1.2, 1.3), recess_m=WALL_M - 0.04),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from lab.worlds.primitives import Mesh, box, sphere
+from lab.worlds.furniture.placing import ORIGIN, board, place, solid
+from lab.worlds.primitives import sphere
 from lab.worlds.room_finishes import draw_seed, muted, random_floor, random_wall
 from lab.worlds.scene import Light, Material, Part, Rng, Scene
 from lab.worlds.textures import plaster, random_palette
 from packetmesh.errors import InputError
-from pipeline.geometry import look_at, rigid, rotation_exp
+from pipeline.geometry import look_at
 from pipeline.types import CameraIntrinsics, FloatArray
 
 
@@ -70,7 +71,7 @@ def _shell(rng: Rng, low: FloatArray, high: FloatArray) -> list[Part]:
             material = wall if axis != 2 else (random_floor(rng) if side < 0 else ceiling)
             slab, at = size + 0.2, middle.copy()
             slab[axis], at[axis] = 0.1, middle[axis] + side * (0.5 * size[axis] + 0.05)
-            parts.append(_part(box(tuple(slab)), material, rigid(np.eye(3), at)))
+            parts.append(board(slab, material, ORIGIN, at))
     return parts
 
 
@@ -81,13 +82,11 @@ def _things(rng: Rng, eyes: FloatArray) -> list[Part]:
     for k, spot in enumerate(_spots(rng, eyes[:, :2], boxes + balls)):
         if k < boxes:
             size = rng.uniform([0.25, 0.25, 0.25], [0.7, 0.7, 1.2])
-            turn = rotation_exp(np.array([0.0, 0.0, rng.uniform(0.0, np.pi)]))
-            parts.append(_part(box(tuple(size)), _paint(rng), rigid(turn, np.array([*spot, 0.5 * size[2]]))))
+            standing = place(*spot, rng.uniform(0.0, np.pi), 0.5 * size[2])
+            parts.append(board(size, _paint(rng), standing))
         else:
             radius = rng.uniform(0.15, 0.35)
-            parts.append(
-                _part(sphere(radius), _paint(rng), rigid(np.eye(3), np.array([*spot, radius])), True)
-            )
+            parts.append(solid(sphere(radius), _paint(rng), ORIGIN, (*spot, radius)))
     return parts
 
 
@@ -102,10 +101,6 @@ def _spots(rng: Rng, eyes_m: FloatArray, count: int) -> list[FloatArray]:
         others = np.array(spots) if spots else np.full((1, 2), 9.0)
         spots.append(tries[np.argmax(np.min(np.linalg.norm(tries[:, None] - others, axis=2), axis=1))])
     return spots
-
-
-def _part(mesh: Mesh, material: Material, T_world_part: FloatArray, smooth: bool = False) -> Part:
-    return Part(*mesh, material, T_world_part, smooth)
 
 
 def _paint(rng: Rng) -> Material:

@@ -6,7 +6,7 @@ import numpy as np
 
 from lab.worlds import textures
 from lab.worlds.furniture import electronics, fixtures, lights, plants, seating, storage, tables, things
-from lab.worlds.furniture.finishes import linear, painted
+from lab.worlds.furniture.finishes import painted
 from lab.worlds.furniture.placing import place
 from lab.worlds.scene import Light, Material, Part, Rng, Scene
 from lab.worlds.staging import EAST, NORTH, SOUTH, VGA, WALL_M, WEST, arc, shell, sun
@@ -33,9 +33,9 @@ def living_room() -> Scene:
 
 
 def _room(rng: Rng) -> list[Part]:
-    wall = Material(textures.plaster(linear("#dfd8ca"), 3, 0.01, 0.05))
-    accent = Material(textures.plaster(linear("#7f8f88"), 4, 0.01, 0.05))
-    floor = Material(textures.planks(linear("#b58a5c"), linear("#85603a"), 5, 0.13, 1.6), 0.12)
+    wall = Material(textures.plaster("#dfd8ca", 3, 0.01, 0.05))
+    accent = Material(textures.plaster("#7f8f88", 4, 0.01, 0.05))
+    floor = Material(textures.planks("#b58a5c", "#85603a", 5, 0.13, 1.6), 0.12)
     return [
         *shell(rng, SIZE_M, floor, (wall, wall, wall, accent), painted(rng, "#f4f2ec", 0.0), {WEST: WINDOW}),
         *fixtures.window(rng, place(0.0, 2.3, WEST, 0.85), (1.8, 1.45), recess_m=WALL_M - 0.04),

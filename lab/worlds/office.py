@@ -6,7 +6,7 @@ import numpy as np
 
 from lab.worlds import textures
 from lab.worlds.furniture import electronics, fixtures, lights, plants, seating, storage, tables, things
-from lab.worlds.furniture.finishes import glow, linear, painted, plain
+from lab.worlds.furniture.finishes import glow, painted, plain
 from lab.worlds.furniture.placing import board, place
 from lab.worlds.scene import Light, Material, Part, Rng, Scene
 from lab.worlds.staging import EAST, NORTH, SOUTH, VGA, WALL_M, WEST, arc, shell
@@ -34,10 +34,10 @@ def office() -> Scene:
 
 
 def _room(rng: Rng) -> list[Part]:
-    wall = Material(textures.plaster(linear("#e6e4dc"), 6, 0.01, 0.04))
-    blue = Material(textures.plaster(linear("#b9c4c8"), 7, 0.01, 0.04))
-    floor = Material(textures.carpet(linear("#575c66"), 8, 0.012, 0.35))
-    ceiling = Material(textures.tiles(linear("#efefeb"), linear("#b5b5b0"), 9, 0.6, 0.03))
+    wall = Material(textures.plaster("#e6e4dc", 6, 0.01, 0.04))
+    blue = Material(textures.plaster("#b9c4c8", 7, 0.01, 0.04))
+    floor = Material(textures.carpet("#575c66", 8, 0.012, 0.35))
+    ceiling = Material(textures.tiles("#efefeb", "#b5b5b0", 9, 0.6, 0.03))
     panel = board((1.2, 0.3, 0.03), glow("#fff6e6", 3.0), place(2.4, 1.9, 0.0, SIZE_M[2]))
     return [
         *shell(rng, SIZE_M, floor, (wall, wall, wall, blue), ceiling, {WEST: WINDOW}, "#8d9092"),
@@ -69,7 +69,7 @@ def _desk(rng: Rng) -> list[Part]:
 
 
 def _pinboard(rng: Rng, x_m: float) -> list[Part]:
-    cork = Material(textures.patches([linear(c) for c in ("#a87b4f", "#96683d", "#b98d5e")], 10, 0.012))
+    cork = Material(textures.patches(["#a87b4f", "#96683d", "#b98d5e"], 10, 0.012))
     T = place(x_m, SIZE_M[1] - 0.02, NORTH, 1.62)
     parts = [board((1.25, 0.02, 0.62), cork, T, (0.0, 0.01, 0.0))]
     frame = painted(rng, "#d9d4c8", 0.2)

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from lab.worlds.pieces import bounds
 from lab.worlds.render import Renderer
 from lab.worlds.scene import Rng, Scene
 from packetmesh.errors import InputError
@@ -124,11 +125,8 @@ def _things(scene: Scene, low: FloatArray, high: FloatArray) -> FloatArray:
 
 def _boxes(scene: Scene) -> tuple[FloatArray, FloatArray]:
     """(K, 3) low and high corners of the boxes around everything but the shell."""
-    corners = [
-        part.vertices_m @ part.T_world_part[:3, :3].T + part.T_world_part[:3, 3] for part in scene.parts[6:]
-    ]
-    lows = [places.min(axis=0) for places in corners]
-    return np.array(lows).reshape(-1, 3), np.array([places.max(axis=0) for places in corners]).reshape(-1, 3)
+    corners = np.array([bounds([part]) for part in scene.parts[6:]]).reshape(-1, 2, 3)
+    return corners[:, 0], corners[:, 1]
 
 
 def _room_view(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -143,11 +141,8 @@ def _room_view(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
 def _close_up(rng: Rng, things: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray | None:
     """A camera 0.6 to 1.6 m from a thing, looking down at it by 20 to 65 degrees."""
     target = things[rng.integers(len(things))] + rng.normal(0.0, 0.1, 3)
-    distance, yaw, pitch = (
-        rng.uniform(0.6, 1.6),
-        rng.uniform(0.0, 2.0 * np.pi),
-        np.radians(rng.uniform(20.0, 65.0)),
-    )
+    distance, yaw = rng.uniform(0.6, 1.6), rng.uniform(0.0, 2.0 * np.pi)
+    pitch = np.radians(rng.uniform(20.0, 65.0))
     eye = target + distance * _direction(yaw, pitch)
     if np.any(eye < low + 0.15) or np.any(eye > high - 0.15):
         return None

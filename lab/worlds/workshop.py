@@ -6,7 +6,7 @@ import numpy as np
 
 from lab.worlds import textures
 from lab.worlds.furniture import fixtures, lights, seating, stock, storage, tables, things, tools
-from lab.worlds.furniture.finishes import linear, wood
+from lab.worlds.furniture.finishes import wood
 from lab.worlds.furniture.placing import board, place
 from lab.worlds.scene import Light, Material, Part, Rng, Scene
 from lab.worlds.staging import EAST, NORTH, SOUTH, VGA, WALL_M, WEST, arc, shell, sun
@@ -34,10 +34,10 @@ def workshop() -> Scene:
 
 
 def _room(rng: Rng) -> list[Part]:
-    brick = Material(textures.brick(linear("#8f4a34"), linear("#a39a8c"), 12))
-    white = Material(textures.brick(linear("#ddd6c4"), linear("#bdb5a2"), 13))
-    floor = Material(textures.concrete(linear("#8c8983"), 14), 0.03)
-    ceiling = Material(textures.planks(linear("#b99a70"), linear("#927549"), 15, 0.14, 2.0))
+    brick = Material(textures.brick("#8f4a34", "#a39a8c", 12))
+    white = Material(textures.brick("#ddd6c4", "#bdb5a2", 13))
+    floor = Material(textures.concrete("#8c8983", 14), 0.03)
+    ceiling = Material(textures.planks("#b99a70", "#927549", 15, 0.14, 2.0))
     return [
         *shell(rng, SIZE_M, floor, (white, white, white, brick), ceiling, {WEST: WINDOW}, "#6f6c66"),
         *fixtures.window(rng, place(0.0, 1.6, WEST, 1.15), (1.5, 1.1), panes=3, recess_m=WALL_M - 0.04),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from lab.worlds.furniture.finishes import leaf, linear, pick, plain
+from lab.worlds.furniture.finishes import leaf, pick, plain
 from lab.worlds.furniture.placing import ORIGIN, solid
-from lab.worlds.primitives import Mesh, lathe, merged, transformed, tube
+from lab.worlds.primitives import Mesh, lathe, merged, quads_of, thickened, transformed, tube
 from lab.worlds.scene import Part, Rng
+from lab.worlds.textures.mixing import linear
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
@@ -82,13 +83,8 @@ def _leaf_at(
     z = 0.25 * np.abs(y) - bend[:, None]
     top = np.stack([x, y, z], axis=-1).reshape(-1, 3)
     index = np.arange(40).reshape(8, 5)
-    quads = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)
-    face = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     rim = np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
-    ahead = np.roll(rim, -1)
-    walls = np.concatenate([np.stack([rim + 40, ahead + 40, ahead], 1), np.stack([rim + 40, ahead, rim], 1)])
-    vertices = np.concatenate([top, top - [0.0, 0.0, 0.002]])
-    triangles = np.concatenate([face, face[:, ::-1] + 40, walls])
+    blade = thickened(top, quads_of(index)[:, [0, 3, 2, 1]], rim, 0.002)
     pitch = rotation_exp(np.array([0.0, droop_rad, 0.0]))
     turn = rotation_exp(np.array([0.0, 0.0, heading_rad]))
-    return transformed((vertices, triangles), rigid(turn, root_m) @ rigid(pitch, np.zeros(3)))
+    return transformed(blade, rigid(turn, root_m) @ rigid(pitch, np.zeros(3)))

@@ -11,7 +11,6 @@ from lab.worlds.furniture.finishes import (
     WOODS,
     book,
     ceramic,
-    linear,
     painted,
     pick,
     plain,
@@ -83,7 +82,7 @@ def fruit_bowl(
         radius = rng.uniform(0.035, 0.042)
         spread, lift = (0.065, 0.052) if k < fruits - 2 else (0.028, 0.11)
         angle = 2.4 * k + rng.uniform(-0.2, 0.2)
-        skin = painted(rng, linear(FRUITS[rng.integers(len(FRUITS))]), 0.2)
+        skin = painted(rng, FRUITS[rng.integers(len(FRUITS))], 0.2)
         turn = (rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6), 0.0)
         at = (spread * np.cos(angle), spread * np.sin(angle), lift)
         parts.append(solid(lathe(radius * apple, 24), skin, T_world, at, turn))

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from lab.worlds.scene import Part, Rng
+from pipeline.geometry import apply
 from pipeline.types import FloatArray
 
 _Made = TypeVar("_Made")
@@ -23,7 +24,7 @@ def stocked(maker: Callable[[Rng], _Made], variant: int) -> _Made:
 
 def bounds(parts: list[Part]) -> tuple[FloatArray, FloatArray]:
     """(3,) lowest and (3,) highest corner."""
-    places = [part.vertices_m @ part.T_world_part[:3, :3].T + part.T_world_part[:3, 3] for part in parts]
+    places = [apply(part.T_world_part, part.vertices_m) for part in parts]
     return np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
 
 

@@ -14,7 +14,7 @@ from lab.worlds.furniture.placing import place
 from pipeline import geometry
 
 MODULES = [
-    import_module(f"{furniture.__name__}.{module.name}") for module in iter_modules(furniture.__path__)
+    import_module(f"lab.worlds.furniture.{module.name}") for module in iter_modules(furniture.__path__)
 ]
 PIECES = {
     name: piece
