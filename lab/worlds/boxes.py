@@ -82,7 +82,7 @@ def _things(rng: Rng, eyes: FloatArray) -> list[Part]:
     for k, spot in enumerate(_spots(rng, eyes[:, :2], boxes + balls)):
         if k < boxes:
             size = rng.uniform([0.25, 0.25, 0.25], [0.7, 0.7, 1.2])
-            standing = place(*spot, rng.uniform(0.0, np.pi), 0.5 * size[2])
+            standing = place(spot[0], spot[1], rng.uniform(0.0, np.pi), 0.5 * size[2])
             parts.append(board(size, _paint(rng), standing))
         else:
             radius = rng.uniform(0.15, 0.35)

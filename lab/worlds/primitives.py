@@ -73,9 +73,8 @@ def lathe(profile_m: FloatArray | Sequence, segments: int = 32, bevel_m: float =
     angle = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)
     turn = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     rings = profile if ring else profile[1:-1]
-    vertices = np.concatenate(
-        [(rings[:, None, :1] * turn[None]).reshape(-1, 2), np.repeat(rings[:, 1], segments)[:, None]], axis=1
-    )
+    around = (rings[:, None, :1] * turn).reshape(-1, 2)
+    vertices = np.column_stack([around, np.repeat(rings[:, 1], segments)])
     rows = np.arange(len(rings) if ring else len(rings) - 1)[:, None] * segments
     here, there = np.arange(segments)[None], (np.arange(segments) + 1)[None] % segments
     above = (rows + segments) % len(vertices)
@@ -167,9 +166,8 @@ def tube(path_m: FloatArray | Sequence, radius_m: float | Vector, segments: int 
         side = side - axis * (side @ axis)
         sides.append(side)
     across = np.array(sides) / np.linalg.norm(sides, axis=1, keepdims=True)
-    circle = (
-        np.cos(angle)[:, None] * across[:, None] + np.sin(angle)[:, None] * np.cross(forward, across)[:, None]
-    )
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    circle = c * across[:, None] + s * np.cross(forward, across)[:, None]
     vertices = np.concatenate([(path[:, None] + radius * circle).reshape(-1, 3), path[[0, -1]]])
     index = np.arange(len(path) * segments).reshape(len(path), segments)
     walls = _split(quads_of(np.concatenate([index, index[:, :1]], axis=1)))

@@ -21,10 +21,8 @@ def random_floor(rng: Rng) -> Material:
         width_m, length_m = rng.uniform(0.06, 0.22), rng.uniform(0.6, 2.0)
         return Material(textures.planks(light, dark, seed, width_m, length_m), rng.uniform(0.0, 0.35))
     if kind == 1:
-        strips = int(rng.integers(3, 8))
-        return Material(
-            textures.parquet(light, dark, seed, rng.uniform(0.04, 0.09), strips), rng.uniform(0.0, 0.35)
-        )
+        strips, strip_m = int(rng.integers(3, 8)), rng.uniform(0.04, 0.09)
+        return Material(textures.parquet(light, dark, seed, strip_m, strips), rng.uniform(0.0, 0.35))
     if kind == 2:
         tiles = textures.tiles(color, second, seed, rng.uniform(0.15, 0.6), rng.uniform(0.02, 0.25))
         return Material(tiles, rng.uniform(0.0, 0.4))
@@ -45,10 +43,8 @@ def random_wall(rng: Rng) -> Material:
     seed = draw_seed(rng)
     kind = rng.choice(7, p=[0.32, 0.28, 0.09, 0.09, 0.08, 0.07, 0.07])
     if kind == 0:
-        return Material(
-            textures.paint(color, seed, rng.uniform(0.02, 0.15), rng.uniform(0.2, 1.2)),
-            rng.uniform(0.0, 0.08),
-        )
+        paint = textures.paint(color, seed, rng.uniform(0.02, 0.15), rng.uniform(0.2, 1.2))
+        return Material(paint, rng.uniform(0.0, 0.08))
     if kind == 1:
         return Material(textures.plaster(color, seed, rng.uniform(0.008, 0.05), rng.uniform(0.02, 0.15)))
     if kind == 2:
@@ -59,9 +55,8 @@ def random_wall(rng: Rng) -> Material:
         brick = color if rng.random() < 0.4 else np.array([0.36, 0.15, 0.09]) * rng.uniform(0.6, 1.4)
         return Material(textures.brick(brick, muted(rng, 1, 0.3, 0.7)[0], seed))
     if kind == 5:
-        return Material(
-            textures.tiles(color, second, seed, rng.uniform(0.08, 0.4), 0.08), rng.uniform(0.1, 0.3)
-        )
+        tiles = textures.tiles(color, second, seed, rng.uniform(0.08, 0.4), 0.08)
+        return Material(tiles, rng.uniform(0.1, 0.3))
     return Material(textures.planks(light, dark, seed, rng.uniform(0.08, 0.3), 3.0), 0.1)
 
 
@@ -100,11 +95,8 @@ def recolored(parts: list[Part], rng: Rng) -> list[Part]:
 
 def random_timber(rng: Rng) -> tuple[FloatArray, FloatArray]:
     """Light and dark colour of a wood: from maple over oak and cherry to wenge, or limed grey."""
-    light = (
-        np.array([0.55, 0.36, 0.19])
-        * rng.uniform([0.9, 0.75, 0.6], [1.1, 1.15, 1.5])
-        * rng.uniform(0.15, 1.3)
-    )
+    light = np.array([0.55, 0.36, 0.19]) * rng.uniform([0.9, 0.75, 0.6], [1.1, 1.15, 1.5])
+    light *= rng.uniform(0.15, 1.3)
     light = light + rng.uniform(0.0, 0.5) ** 2 * (light.mean() - light)
     return np.clip(light, 0.02, 0.85), np.clip(light * rng.uniform(0.35, 0.75), 0.01, 0.6)
 
@@ -112,9 +104,8 @@ def random_timber(rng: Rng) -> tuple[FloatArray, FloatArray]:
 def muted(rng: Rng, count: int, low: float, high: float, chroma: float = 0.4) -> FloatArray:
     """(count, 3) colours of low to middling saturation with a luminance near low to high."""
     value = rng.uniform(low, high, (count, 1))
-    return np.clip(
-        value * (1.0 + rng.uniform(0.0, chroma, (count, 1)) * rng.uniform(-1.0, 1.0, (count, 3))), 0.01, 0.9
-    )
+    tint = rng.uniform(0.0, chroma, (count, 1)) * rng.uniform(-1.0, 1.0, (count, 3))
+    return np.clip(value * (1.0 + tint), 0.01, 0.9)
 
 
 def draw_seed(rng: Rng) -> int:
@@ -123,10 +114,8 @@ def draw_seed(rng: Rng) -> int:
 
 
 def _tinted(material: Material, gain: FloatArray) -> Material:
-    texture = material.texture
-    return replace(
-        material, texture=lambda points_m, normals: np.clip(texture(points_m, normals) * gain, 0.0, 0.95)
-    )
+    own = material.texture
+    return replace(material, texture=lambda places, normals: np.clip(own(places, normals) * gain, 0.0, 0.95))
 
 
 def covered(parts: list[Part], material: Material) -> list[Part]:

@@ -89,8 +89,7 @@ def arc(
     """T_world_camera of nodes around a place, at a horizontal distance and a height above the floor."""
     poses = []
     for azimuth in np.radians(azimuths_deg):
-        out = distance_m * np.array([np.cos(azimuth), np.sin(azimuth)])
-        poses.append(
-            look_at(np.array([target_m[0] + out[0], target_m[1] + out[1], height_m]), np.asarray(target_m))
-        )
+        x = target_m[0] + distance_m * np.cos(azimuth)
+        y = target_m[1] + distance_m * np.sin(azimuth)
+        poses.append(look_at((x, y, height_m), target_m))
     return tuple(poses)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lab.worlds import textures
+from lab.worlds.primitives import Vector
 from lab.worlds.room_finishes import draw_seed
 from lab.worlds.scene import Material, Rng
 from lab.worlds.textures.mixing import Color, linear
@@ -119,7 +120,7 @@ def glow(color: Color, strength: float) -> Material:
     return Material(textures.solid(color), emission=strength)
 
 
-def screen(rng: Rng, size_m: tuple[float, float], lit: bool) -> Material:
+def screen(rng: Rng, size_m: Vector, lit: bool) -> Material:
     """A glossy display: black when off."""
     if not lit:
         return plain((0.012, 0.013, 0.016), 0.85, infrared=0.1)

@@ -7,7 +7,7 @@ import numpy as np
 from lab.worlds import textures
 from lab.worlds.furniture.finishes import FABRICS, PAINTS, WOODS, fabric, painted, pick, steel, wood
 from lab.worlds.furniture.placing import ORIGIN, board, place, solid
-from lab.worlds.primitives import box, cylinder, lathe, merged, moved, rounded_box, sheet, tube
+from lab.worlds.primitives import Vector, box, cylinder, lathe, merged, moved, rounded_box, sheet, tube
 from lab.worlds.room_finishes import draw_seed
 from lab.worlds.scene import Material, Part, Rng
 from pipeline.types import FloatArray
@@ -16,7 +16,7 @@ from pipeline.types import FloatArray
 def window(
     rng: Rng,
     T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float] = (1.4, 1.3),
+    size_m: Vector = (1.4, 1.3),
     brightness: float = 2.5,
     panes: int = 2,
     recess_m: float = 0.0,
@@ -93,10 +93,7 @@ def radiator(
 
 
 def picture(
-    rng: Rng,
-    T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float] = (0.6, 0.45),
-    color: str | None = None,
+    rng: Rng, T_world: FloatArray = ORIGIN, size_m: Vector = (0.6, 0.45), color: str | None = None
 ) -> list[Part]:
     """A framed painting with a mount; the origin is its middle, on the wall."""
     frame = wood(rng, pick(rng, (*WOODS, "#22201e", "#e9e6df"), color))
@@ -114,10 +111,7 @@ def picture(
 
 
 def rug(
-    rng: Rng,
-    T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float] = (2.0, 1.4),
-    colors: tuple[str, ...] | None = None,
+    rng: Rng, T_world: FloatArray = ORIGIN, size_m: Vector = (2.0, 1.4), colors: tuple[str, ...] | None = None
 ) -> list[Part]:
     """A woven rug with hardly visible ripples."""
     palette = [pick(rng, FABRICS, c) for c in (colors or (None,) * 4)]
@@ -161,7 +155,7 @@ def wall_clock(rng: Rng, T_world: FloatArray = ORIGIN, radius_m: float = 0.15) -
     ]
 
 
-def note(rng: Rng, T_world: FloatArray = ORIGIN, size_m: tuple[float, float] = (0.21, 0.297)) -> list[Part]:
+def note(rng: Rng, T_world: FloatArray = ORIGIN, size_m: Vector = (0.21, 0.297)) -> list[Part]:
     """A printed sheet on a wall; the origin is its middle."""
     page = Material(textures.paper(draw_seed(rng)))
     return [board((size_m[0], 0.0015, size_m[1]), page, T_world @ place(0.0, -0.001))]

@@ -20,7 +20,18 @@ from lab.worlds.furniture.finishes import (
     wood,
 )
 from lab.worlds.furniture.placing import ORIGIN, board, corners, place, solid
-from lab.worlds.primitives import Mesh, box, cylinder, frustum, lathe, merged, moved, transformed, tube
+from lab.worlds.primitives import (
+    Mesh,
+    Vector,
+    box,
+    cylinder,
+    frustum,
+    lathe,
+    merged,
+    moved,
+    transformed,
+    tube,
+)
 from lab.worlds.scene import Part, Rng
 from pipeline.types import FloatArray
 
@@ -28,7 +39,7 @@ from pipeline.types import FloatArray
 def bookshelf(
     rng: Rng,
     T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float, float] = (0.9, 0.3, 1.9),
+    size_m: Vector = (0.9, 0.3, 1.9),
     color: str | None = None,
     fill: float = 0.75,
 ) -> list[Part]:
@@ -78,7 +89,7 @@ def books(
 def cabinet(
     rng: Rng,
     T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float, float] = (1.2, 0.45, 0.8),
+    size_m: Vector = (1.2, 0.45, 0.8),
     color: str | None = None,
     doors: int = 3,
 ) -> list[Part]:
@@ -108,10 +119,7 @@ def cabinet(
 
 
 def crate(
-    rng: Rng,
-    T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float, float] = (0.5, 0.35, 0.28),
-    color: str | None = None,
+    rng: Rng, T_world: FloatArray = ORIGIN, size_m: Vector = (0.5, 0.35, 0.28), color: str | None = None
 ) -> list[Part]:
     """An open crate of rough slats."""
     timber = wood(rng, pick(rng, WOODS[2:6:3], color), gloss=0.03)
@@ -129,9 +137,7 @@ def crate(
     return parts + [board(post, timber, T_world, (x, y, height / 2)) for x, y in inner]
 
 
-def cardboard_box(
-    rng: Rng, T_world: FloatArray = ORIGIN, size_m: tuple[float, float, float] = (0.4, 0.3, 0.3)
-) -> list[Part]:
+def cardboard_box(rng: Rng, T_world: FloatArray = ORIGIN, size_m: Vector = (0.4, 0.3, 0.3)) -> list[Part]:
     """A closed carton with a strip of packing tape."""
     return [board(size_m, cardboard(rng, max(size_m)), T_world, (0.0, 0.0, size_m[2] / 2))]
 
@@ -155,7 +161,8 @@ def waste_bin(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) 
     for _ in range(4):
         ball, triangles = lathe(rng.uniform(0.045, 0.06) * half_circle, 11)
         ball = ball * rng.uniform(0.75, 1.1, (len(ball), 1))
-        paper.append(moved((ball, triangles), *rng.uniform(-0.06, 0.06, 2), rng.uniform(0.17, 0.24)))
+        x, y = rng.uniform(-0.06, 0.06, 2)
+        paper.append(moved((ball, triangles), x, y, rng.uniform(0.17, 0.24)))
     return [
         solid(lathe(wall, 32, 0.002), shell, T_world),
         solid(merged(paper), plain("#e9e6dd"), T_world, smooth=False),

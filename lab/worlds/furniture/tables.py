@@ -6,16 +6,13 @@ import numpy as np
 
 from lab.worlds.furniture.finishes import PAINTS, WOODS, painted, pick, steel, wood
 from lab.worlds.furniture.placing import ORIGIN, board, corners, solid
-from lab.worlds.primitives import frustum, lathe, merged, moved, rounded_box, tube
+from lab.worlds.primitives import Vector, frustum, lathe, merged, moved, rounded_box, tube
 from lab.worlds.scene import Part, Rng
 from pipeline.types import FloatArray
 
 
 def table(
-    rng: Rng,
-    T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float, float] = (1.5, 0.85, 0.74),
-    color: str | None = None,
+    rng: Rng, T_world: FloatArray = ORIGIN, size_m: Vector = (1.5, 0.85, 0.74), color: str | None = None
 ) -> list[Part]:
     """A dining or work table: a wooden top on an apron and four tapered legs."""
     grain = pick(rng, WOODS, color)

@@ -14,6 +14,8 @@ from pipeline.geometry import apply
 from pipeline.types import FloatArray
 
 _Made = TypeVar("_Made")
+Makers = Sequence[tuple[float, Callable[[], _Made]]]
+"""Weights, and what makes a piece (or another thing) where its turn comes."""
 
 
 @lru_cache(maxsize=2048)
@@ -33,7 +35,7 @@ def moved(parts: list[Part], T: FloatArray) -> list[Part]:
     return [replace(part, T_world_part=T @ part.T_world_part) for part in parts]
 
 
-def draw(rng: Rng, makers: Sequence[tuple[float, Callable[[], _Made]]]) -> _Made:
+def draw(rng: Rng, makers: Makers[_Made]) -> _Made:
     """Calls one of the (weight, maker) pairs, chosen by weight."""
     weight = np.array([w for w, _ in makers])
     return makers[int(rng.choice(len(makers), p=weight / weight.sum()))][1]()

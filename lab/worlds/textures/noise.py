@@ -50,11 +50,7 @@ def _fbm(lattice, points, frequency, offset, octaves, gain, out):  # type: ignor
 
 
 def fbm(
-    points_m: FloatArray,
-    scale_m: float | FloatArray,
-    seed: int,
-    octaves: int = 3,
-    gain: float = 0.5,
+    points_m: FloatArray, scale_m: float | FloatArray, seed: int, octaves: int = 3, gain: float = 0.5
 ) -> FloatArray:
     """(N,) float32 fractal value noise, 0 to 1, mean one half, of (N, 3) places.
 

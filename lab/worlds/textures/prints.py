@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from lab.worlds.primitives import Vector
 from lab.worlds.scene import Texture
 from lab.worlds.textures.mixing import mix, random_palette, shade, soft_step
 from lab.worlds.textures.noise import cell_random, face_uv, fbm
@@ -50,7 +49,7 @@ def paper(seed: int = 0, line_m: float = 0.008) -> Texture:
     return texture
 
 
-def display(seed: int, size_m: Sequence[float]) -> Texture:
+def display(seed: int, size_m: Vector) -> Texture:
     """What a computer screen shows: a desktop with windows full of lines, about the part's origin."""
     rng = np.random.default_rng(seed)
     palette = random_palette(rng, 4)
