@@ -147,8 +147,6 @@ class RaceLane:
 class RaceView:
     """Up to four methods from the same start."""
 
-    source_name: str
-    target_name: str
     source: Sample
     """Source camera frame."""
     target: Sample
