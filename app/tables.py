@@ -12,7 +12,6 @@ from app.records import ColorBar
 _CELL = "padding: 2px 8px 2px 0; vertical-align: top;"
 _NAME = "border-bottom: 1px dotted #999; cursor: help;"
 
-
 Row: TypeAlias = tuple[str, ...]
 """One quantity: its name, what it means in a sentence, and its value with the unit for each column."""
 
