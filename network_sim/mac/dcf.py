@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import simpy
 
-from network_sim.mac.context import MacContext
-from network_sim.mac.random_blocks import random_below
+from network_sim.mac.context import MacContext, random_below
 from network_sim.types import Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:
