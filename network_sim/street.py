@@ -20,15 +20,7 @@ from network_sim.config import NetworkConfig
 from network_sim.mac import make_mac
 from network_sim.mac.context import MacContext
 from network_sim.mac.medium import Medium
-from network_sim.mobility import (
-    Contact,
-    Routes,
-    StreetPlaces,
-    access_points_m,
-    cell_numbers,
-    contacts,
-    drive,
-)
+from network_sim.mobility import Contact, Routes, StreetPlaces, access_points_m, cell_numbers, contacts, drive
 from network_sim.radio import Radio
 from network_sim.schemes import make_scheme
 from network_sim.snapshots import Snapshots
@@ -43,10 +35,7 @@ _IMAGE = PacketKind.IMAGE
 
 
 def start_street(
-    env: simpy.Environment,
-    config: NetworkConfig,
-    recorder: Recorder,
-    rng: np.random.Generator,
+    env: simpy.Environment, config: NetworkConfig, recorder: Recorder, rng: np.random.Generator
 ) -> Street:
     """Start all vehicles; the caller runs ``env`` to the horizon, then calls ``Street.record_images``."""
     street_rng, radio_rng, medium_rng, mac_rng = rng.spawn(_STREAMS)

@@ -102,10 +102,7 @@ class DepthConfig:
         """Only the settings of the network itself, which is all that its inference depends on."""
         plain = DepthConfig()
         return replace(
-            self,
-            alignment=plain.alignment,
-            reach=plain.reach,
-            least_confidence=plain.least_confidence,
+            self, alignment=plain.alignment, reach=plain.reach, least_confidence=plain.least_confidence
         )
 
     def __post_init__(self) -> None:

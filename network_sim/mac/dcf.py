@@ -84,11 +84,7 @@ class _Station:
     )
 
     def __init__(
-        self,
-        node: int,
-        counting: dict[int, _Station],
-        unsubscribe: Callable[[_Station], None],
-        eifs_ns: int,
+        self, node: int, counting: dict[int, _Station], unsubscribe: Callable[[_Station], None], eifs_ns: int
     ) -> None:
         """``counting`` holds the stations with a packet that are not frozen; ``unsubscribe`` ends one."""
         self.node = node

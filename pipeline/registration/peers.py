@@ -174,9 +174,7 @@ def _small_vgicp(problem: Problem, gates_m: tuple[float, ...]) -> Outcome:
 
 
 def _in_stages(
-    problem: Problem,
-    gates_m: tuple[float, ...],
-    align: Callable[[FloatArray, float, dict[str, Any]], Any],
+    problem: Problem, gates_m: tuple[float, ...], align: Callable[[FloatArray, float, dict[str, Any]], Any]
 ) -> Outcome:
     """small_gicp once for every gate, each from the pose of the one before."""
     T, iterations, reason = problem.T_init, 0, "max_iterations"
