@@ -17,7 +17,7 @@ NetworkPreset = Literal[
 Normalisation = Literal["imagenet", "unit", "bytes"]
 METHODS = {
     "icp": "icp.Icp",
-    "trimmed-icp": "trimmed.TrimmedIcp",
+    "trimmed-icp": "icp.TrimmedIcp",
     "picp": "picp.Picp",
     "ricp": "ricp.Ricp",
     "mricp": "mricp.Mricp",
@@ -26,7 +26,7 @@ METHODS = {
     "ceicp-literal": "ceicp_literal.CeicpLiteral",
     "ceicp-n": "ceicp.CeicpN",
     "ceicp-a": "ceicp.CeicpA",
-    "ceicp-r": "ceicp_r.CeicpR",
+    "ceicp-r": "ceicp.CeicpR",
     "ceicp-ml": "ceicp_ml.CeicpMl",
     "kernel-correlation": "kernel_correlation.KernelCorrelation",
     "fast-robust-icp": "fast_robust.FastRobustIcp",

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from pipeline.geometry import apply, rigid, rotation_exp
-from pipeline.registration.degenerate import DegenerateError
-from pipeline.registration.plane import solve_plane
+from pipeline.registration.residual import DegenerateError, solve_plane
 
 
 def _patches(rng, count=300):

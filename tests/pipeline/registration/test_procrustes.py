@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.geometry import apply, rigid, rotation_exp
-from pipeline.registration.degenerate import DegenerateError
-from pipeline.registration.procrustes import weighted_procrustes
+from pipeline.registration.residual import DegenerateError, weighted_procrustes
 
 seeds = st.integers(0, 2**32 - 1)
 
