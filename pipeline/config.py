@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from packetmesh.errors import InputError
-from packetmesh.settings import config_named
 
 OutlierMode = Literal["thesis", "depth_normalised", "robust"]
 AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]
@@ -234,12 +233,3 @@ PRESETS: dict[str, PipelineConfig] = {
     ),
 }
 """The two ways through the chain: ours (the default) and the thesis's own."""
-
-
-def load_config(preset: str) -> PipelineConfig:
-    """The preset of that name, or the config saved in that JSON file.
-
-    Raises:
-        InputError: neither a preset nor a readable config.
-    """
-    return config_named(preset, PRESETS)

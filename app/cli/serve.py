@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from app.cli.options import PresetName
 from app.cli.text import say
-from pipeline.config import load_config
+from packetmesh.settings import config_named
+from pipeline.config import PRESETS
 
 
 def serve(
@@ -32,7 +33,7 @@ def serve(
 
     serve_app(
         scene=scene,
-        config=load_config(preset),
+        config=config_named(preset, PRESETS),
         host=host,
         port=port,
         open_browser=open,
