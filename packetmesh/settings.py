@@ -68,9 +68,7 @@ def with_settings(config: Config, changes: Iterable[str]) -> Config:
 def settings(config: Any, prefix: str = "") -> dict[str, str]:
     """Dotted key and value of every field of ``config``, as text that ``with_settings`` parses.
 
-    Args:
-        config: a frozen dataclass.
-        prefix: what the keys begin with, for a config within another.
+    ``prefix`` is what the keys begin with, for a config within another.
     """
     text: dict[str, str] = {}
     for field in dataclasses.fields(config):
