@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import simpy
@@ -48,12 +48,12 @@ class Transmission:
     size_bytes: int
     modulation: Modulation
     """For ``Radio.error_rate``."""
-    overlaps: list[Transmission] = field(default_factory=list)
+    overlaps: list[Transmission]
     """Frames that were on the air at the same time, in the order in which they began."""
-    earlier: int = 0
-    """How many of them began before it."""
-    heard: list[Listener] = field(default_factory=list)
+    heard: list[Listener]
     """Listeners that sense it."""
+    earlier: int = 0
+    """How many of the overlapping frames began before it."""
 
     def peak_interference_w(self, powers_w: list[float]) -> float:
         """The largest sum of overlapping powers at any instant of this frame.
@@ -164,7 +164,7 @@ class Medium:
             self._rows_end_ns = start_ns + REFRESH_NS
         power_w = self.radio.faded_w(self.power_w(sender, receiver))
         frame = Transmission(
-            sender, receiver, start_ns, end_ns, end_ns + reserve_ns, power_w, size_bytes, modulation
+            sender, receiver, start_ns, end_ns, end_ns + reserve_ns, power_w, size_bytes, modulation, [], []
         )
         for other in self._active:
             if other.end_ns > start_ns:
