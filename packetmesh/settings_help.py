@@ -51,7 +51,8 @@ def describe(config: Any, prefix: str = "") -> list[Setting]:
     ``prefix`` is what the keys begin with, for a config within another.
     """
     rows: list[Setting] = []
-    text, docs = settings(config), field_docs(type(config))
+    kind: type = type(config)
+    text, docs = settings(config), field_docs(kind)
     for field in dataclasses.fields(config):
         key, value = prefix + field.name, getattr(config, field.name)
         if dataclasses.is_dataclass(value):
