@@ -8,7 +8,8 @@ import webbrowser
 
 from app.cli.options import PresetName
 from app.cli.text import say
-from pipeline.config import load_config
+from packetmesh.settings import config_named
+from pipeline.config import PRESETS
 
 
 def serve(
@@ -34,7 +35,7 @@ def serve(
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
-    app = build_server(scene, load_config(preset), host, port, lecture)
+    app = build_server(scene, config_named(preset, PRESETS), host, port, lecture)
     try:
         say(f"PacketMesh is at {app.url} (stop with Ctrl-C)")
         if open:

@@ -89,9 +89,9 @@ def _run(
 
 
 def _say_who_is_alone(config: NetworkConfig) -> None:
-    from network_sim.collection import reachability
+    from network_sim.collection import disconnected
 
-    alone = reachability(config).disconnected if config.scenario == "collection" else ()
+    alone = disconnected(config) if config.scenario == "collection" else ()
     if alone:
         say(f"no path of links leads to the sink from {', '.join(alone)}; try a larger radio.range_m")
 
