@@ -16,6 +16,7 @@ import threading
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, Literal
@@ -54,7 +55,6 @@ class Ticket:
     arguments: tuple[Any, ...]
     on_progress: Callable[[Any], None]
     on_end: Callable[[Outcome], None]
-    state: Literal["waiting", "running", "ended"] = "waiting"
     stopping: bool = False
 
 
@@ -141,7 +141,7 @@ class ComputePool:
                 if slot.process is not None:
                     slot.process.terminate()
         for ticket in waiting:
-            _end(ticket, Outcome("stopped"))
+            _tell(ticket.on_end, Outcome("stopped"))
         for thread in self._threads:
             thread.join(timeout=5.0)
 
@@ -151,7 +151,7 @@ class ComputePool:
             if ticket not in self._waiting:
                 return False
             self._waiting.remove(ticket)
-        _end(ticket, Outcome("stopped"))
+        _tell(ticket.on_end, Outcome("stopped"))
         return True
 
     def _slot_of(self, ticket: Ticket) -> _Slot | None:
@@ -167,7 +167,7 @@ class ComputePool:
             if ticket is None:
                 return
             self._waiting.remove(ticket)
-            ticket.state, slot.ticket = "running", ticket
+            slot.ticket = ticket
             _send(slot, ("job", (ticket.function, ticket.arguments)))
 
     def _attend(self, slot: _Slot) -> None:
@@ -203,7 +203,7 @@ class ComputePool:
     def _hear(self, slot: _Slot, kind: str, value: Any) -> None:
         ticket = slot.ticket
         if kind == "progress" and ticket is not None:
-            _report(ticket, value)
+            _tell(ticket.on_progress, value)
             return
         with self._lock:
             slot.ready, slot.ticket = True, None
@@ -213,7 +213,7 @@ class ComputePool:
                 slot.process.terminate()
             self._dispatch()
         if ticket is not None:
-            _end(ticket, Outcome(kind, value))  # type: ignore[arg-type]
+            _tell(ticket.on_end, Outcome(kind, value))  # type: ignore[arg-type]
 
     def _bury(self, slot: _Slot) -> None:
         with self._lock:
@@ -223,7 +223,7 @@ class ComputePool:
                 slot.connection.close()
         if ticket is not None:
             stopped = ticket.stopping or self._closed
-            _end(ticket, Outcome("stopped") if stopped else Outcome("error", DIED))
+            _tell(ticket.on_end, Outcome("stopped") if stopped else Outcome("error", DIED))
 
 
 def _send(slot: _Slot, message: tuple[str, Any]) -> None:
@@ -235,19 +235,12 @@ def _send(slot: _Slot, message: tuple[str, Any]) -> None:
         logger.debug("the computing process is gone")
 
 
-def _report(ticket: Ticket, value: Any) -> None:
+def _tell(callback: Callable[[Any], None], what: Any) -> None:
+    """Hand on what a process says; a callback that fails must not end the thread that attends to it."""
     try:
-        ticket.on_progress(value)
+        callback(what)
     except Exception:
-        logger.exception("a progress callback failed")
-
-
-def _end(ticket: Ticket, outcome: Outcome) -> None:
-    ticket.state = "ended"
-    try:
-        ticket.on_end(outcome)
-    except Exception:
-        logger.exception("an end callback failed")
+        logger.exception("a callback of a job failed")
 
 
 def _memory_bytes(process: BaseProcess | None) -> int:
@@ -264,7 +257,10 @@ def _child(connection: Connection, warm_up: Callable[[], None] | None, threads: 
         os.environ.setdefault(name, str(threads))
     try:
         if warm_up is not None:
-            _try(warm_up)
+            try:
+                warm_up()
+            except Exception:  # it goes wrong again, and is reported, in the first job
+                traceback.print_exc()
         connection.send(("ready", None))
         while True:
             kind, job = connection.recv()
@@ -272,14 +268,6 @@ def _child(connection: Connection, warm_up: Callable[[], None] | None, threads: 
                 connection.send(_answer(connection, *job))
     except (EOFError, OSError):
         return
-
-
-def _try(warm_up: Callable[[], None]) -> None:
-    """Warm up; what goes wrong here goes wrong again, and is reported, in the first job."""
-    try:
-        warm_up()
-    except Exception:
-        traceback.print_exc()
 
 
 def _answer(
@@ -313,14 +301,6 @@ def _answer(
 
 
 @dataclass(slots=True)
-class _Request:
-    function: Callable[..., Any]
-    arguments: tuple[Any, ...]
-    on_progress: Callable[[Any], None]
-    on_end: Callable[[Outcome], None]
-
-
-@dataclass(slots=True)
 class LatestWins:
     """A lane of one running and one waiting job; a newer job replaces the waiting one.
 
@@ -331,7 +311,7 @@ class LatestWins:
     pool: ComputePool
     owner: object
     _running: Ticket | None = None
-    _waiting: _Request | None = None
+    _start_waiting: Callable[[], Ticket] | None = None
     _lock: threading.RLock = field(default_factory=threading.RLock)
 
     @property
@@ -346,36 +326,26 @@ class LatestWins:
         on_end: Callable[[Outcome], None],
     ) -> None:
         """Run this job as soon as the one before it is out of the way."""
-        request = _Request(function, arguments, on_progress, on_end)
+        ended = partial(self._ended, on_end)
+        start = partial(
+            self.pool.submit, self.owner, function, *arguments, on_progress=on_progress, on_end=ended
+        )
         with self._lock:
             if self._running is None:
-                self._start(request)
+                self._running = start()
                 return
-            self._waiting = request
-            running = self._running
+            self._start_waiting, running = start, self._running
         self.pool.stop(running)
 
     def cancel(self) -> None:
         """Forget the waiting job and end the running one now."""
         with self._lock:
-            self._waiting = None
-            running = self._running
+            self._start_waiting, running = None, self._running
         if running is not None:
             self.pool.cancel(running)
 
-    def _start(self, request: _Request) -> None:
-        self._running = self.pool.submit(
-            self.owner,
-            request.function,
-            *request.arguments,
-            on_progress=request.on_progress,
-            on_end=lambda outcome: self._ended(request, outcome),
-        )
-
-    def _ended(self, request: _Request, outcome: Outcome) -> None:
+    def _ended(self, on_end: Callable[[Outcome], None], outcome: Outcome) -> None:
         with self._lock:
-            self._running = None
-            following, self._waiting = self._waiting, None
-            if following is not None:
-                self._start(following)
-        request.on_end(outcome)
+            start, self._start_waiting = self._start_waiting, None
+            self._running = None if start is None else start()
+        on_end(outcome)

@@ -7,12 +7,8 @@ import io
 import logging
 import os
 import shutil
-import signal
 import socket
 import tempfile
-import threading
-import webbrowser
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -34,8 +30,6 @@ from app.store import Store
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Demo, RigFolder
-
-logger = logging.getLogger(__name__)
 
 PANEL_WIDTH_PX = 440
 PANELS = (ScenePanel, DepthPanel, FusePanel, SurfacePanel, NetworkPanel, ExportPanel)
@@ -115,33 +109,6 @@ def build_server(
                 session.close()
 
     return app
-
-
-def serve(
-    scene: str = "living-room",
-    config: PipelineConfig | None = None,
-    host: str = "127.0.0.1",
-    port: int = 8080,
-    open_browser: bool = False,
-    lecture: bool = False,
-    announce: Callable[[str], None] = logger.info,
-) -> None:
-    """Serve until SIGINT or SIGTERM.
-
-    Raises:
-        InputError: as ``build_server``.
-    """
-    stopped = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stopped.set())
-    app = build_server(scene, config, host, port, lecture)
-    try:
-        announce(app.url)
-        if open_browser:
-            webbrowser.open(app.url)
-        stopped.wait()
-    finally:
-        app.stop()
 
 
 def start_spec(scene: str, config: PipelineConfig) -> Spec:

@@ -20,7 +20,6 @@ STEPS: tuple[Step, ...] = (*CHAIN, "network")
 """All steps that compute; the network needs nothing of the chain."""
 StepStatus = Literal["fresh", "stale", "running", "failed", "missing"]
 
-
 STAGE_OF: Mapping[Step, StageName] = {
     "scene": "rig",
     "depth": "nodes",

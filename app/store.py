@@ -6,12 +6,13 @@ import contextlib
 import hashlib
 import os
 import pickle
-import tempfile
 from collections.abc import Callable, Generator, Hashable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from packetmesh.errors import InputError
+from packetmesh.files import atomic_path
 from pipeline.spec import Spec, StageName
 
 Step = TypeVar("Step")
@@ -52,20 +53,21 @@ class Store:
 
     def stage(self, spec: Spec, stage: StageName) -> Generator[Any, None, Any]:
         """The result of a stage of the chain, with whatever has to be computed before it."""
-        from pipeline.stages import compute  # computing needs large libraries, serving does not
+        (value,) = yield from self.stages(spec, stage)
+        return value
 
-        return (yield from compute(spec, stage, self)).value
+    def stages(self, spec: Spec, *stages: StageName) -> Generator[Any, None, tuple[Any, ...]]:
+        """The results of several stages."""
+        from pipeline.stages import run  # computing needs large libraries, serving does not
+
+        done = yield from run(spec, self, stages)
+        return tuple(one.value for one in done.values())
 
     def _write(self, path: Path, value: Any) -> None:
         """Keep a result; a full disk costs only the time to compute it again."""
-        with contextlib.suppress(OSError):
-            descriptor, temporary = tempfile.mkstemp(dir=self.folder, prefix=".")
-            try:
-                with os.fdopen(descriptor, "wb") as file:
-                    pickle.dump(value, file, protocol=pickle.HIGHEST_PROTOCOL)
-                os.replace(temporary, path)
-            finally:
-                Path(temporary).unlink(missing_ok=True)
+        with contextlib.suppress(InputError, OSError):
+            with atomic_path(path) as temporary, temporary.open("wb") as file:
+                pickle.dump(value, file, protocol=pickle.HIGHEST_PROTOCOL)
             self._prune(path)
 
     def _prune(self, newest: Path) -> None:

@@ -6,9 +6,11 @@ import html
 from collections.abc import Sequence
 from typing import TypeAlias
 
+from app.drawing.colors import css
+from app.records import ColorBar
+
 _CELL = "padding: 2px 8px 2px 0; vertical-align: top;"
 _NAME = "border-bottom: 1px dotted #999; cursor: help;"
-
 
 Row: TypeAlias = tuple[str, ...]
 """One quantity: its name, what it means in a sentence, and its value with the unit for each column."""
@@ -30,6 +32,16 @@ def table(rows: Sequence[Row], columns: Sequence[str] = ()) -> str:
     return (
         '<div style="padding: 0 0.8em 0.8em 0.8em; font-size: 13px; overflow-x: auto">'
         f'<table style="border-collapse: collapse; width: 100%">{"".join(lines)}</table></div>'
+    )
+
+
+def bar_html(bar: ColorBar) -> str:
+    """The colours from left to right over their labels."""
+    gradient = ", ".join(css(stop) for stop in bar.stops)
+    ends = "".join(f"<span>{html.escape(label)}</span>" for label in bar.labels)
+    return (
+        f'<div style="height: 0.7em; background: linear-gradient(to right, {gradient}); border-radius: 2px; '
+        f'margin-top: 0.3em"></div><div style="display: flex; justify-content: space-between">{ends}</div>'
     )
 
 

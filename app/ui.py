@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 import viser
 
 from app.debounce import Debounce
-from app.state import Results, Spec, Step
+from app.state import Spec, Step
 from packetmesh.errors import InputError
-from pipeline.config import PipelineConfig
 from pipeline.types import FloatArray
+
+if TYPE_CHECKING:
+    from app.session import Session
 
 Input = TypeVar("Input", bound="viser.GuiInputHandle[Any]")
 
@@ -97,59 +99,6 @@ def keep_upload(file: viser.UploadedFile, folder: Path, kind: str, limit_bytes: 
     return path
 
 
-class Workbench(Protocol):
-    """What a panel needs of its session; all but ``notify`` on the session's thread."""
-
-    @property
-    def ui(self) -> Ui:
-        """Where to put controls and drawings."""
-
-    @property
-    def spec(self) -> Spec:
-        """What is wanted now."""
-
-    @property
-    def results(self) -> Results:
-        """What is there."""
-
-    @property
-    def folder(self) -> Path:
-        """Where uploaded files go."""
-
-    def want(self, spec: Spec) -> None:
-        """Want something else; whatever is still right is kept."""
-
-    def edit(self, change: Callable[[PipelineConfig], PipelineConfig]) -> None:
-        """Change the settings and recompute what depends on them."""
-
-    def side_job(
-        self,
-        job: str,
-        *arguments: Any,
-        on_end: Callable[[Any], None],
-        on_partial: Callable[[Any], None] = ...,
-    ) -> None:
-        """Run a job of the store, the spec and these arguments, in place of the one before.
-
-        It waits for the chain's own; ``on_end`` gets its result, or None.
-        """
-
-    def quick_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
-        """Run a job of a fraction of a second, even beside one of the chain; of many, the latest."""
-
-    def cancel_side_job(self) -> None:
-        """End the side job now."""
-
-    def notify(self, title: str, sentence: str, color: Any = ...) -> None:
-        """Show a notice to the people who watch."""
-
-    def clients(self) -> Iterable[viser.ClientHandle]:
-        """The browsers that show this session."""
-
-    def frame_view(self, anew: bool = ...) -> None:
-        """Turn the view to the scene if it does not show it yet; with ``anew`` in any case."""
-
-
 class Panel(ABC):
     """A step: its controls in the control panel and its nodes in the 3-D scene.
 
@@ -162,7 +111,7 @@ class Panel(ABC):
     drawn_below: ClassVar[str]
     """Scene node under which it draws; only the current step's is visible."""
 
-    def __init__(self, session: Workbench) -> None:
+    def __init__(self, session: Session) -> None:
         self.session, self.ui = session, session.ui
         self.gui, self.scene = session.ui.gui, session.ui.scene
 

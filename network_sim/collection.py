@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from network_sim.mac.medium import Medium
 from network_sim.nodes import Camera, Shared, Station
 from network_sim.places import FixedPlaces, place_nodes
 from network_sim.radio import Radio
-from network_sim.routing import Routes, link_success, shortest_paths
+from network_sim.routing import link_success, shortest_paths
 from network_sim.sink import Sink
 from network_sim.types import BEGIN_WITHIN_NS, Cause, EventKind, Packet, to_ns
 
@@ -26,24 +25,12 @@ if TYPE_CHECKING:
     from network_sim.trace import Recorder
 
 
-@dataclass(frozen=True, slots=True)
-class Reachability:
-    """Which nodes have a route to the sink, before any fails."""
-
-    names: tuple[str, ...]
-    routes: Routes
-
-    @property
-    def disconnected(self) -> tuple[str, ...]:
-        """Names of the nodes without a route to the sink."""
-        return tuple(self.names[node] for node in self.routes.unreachable)
-
-
-def reachability(config: NetworkConfig) -> Reachability:
-    """Which nodes have a route to the sink in the run of this config, without running it."""
+def disconnected(config: NetworkConfig) -> tuple[str, ...]:
+    """Names of the nodes without a route to the sink in the run of this config, without running it."""
     ground = np.random.default_rng(config.run.seed).spawn(1)[0]
     places, _, success = _topology(config, ground)
-    return Reachability(collection_names(config), shortest_paths(success, places.count - 1))
+    names = collection_names(config)
+    return tuple(names[node] for node in shortest_paths(success, places.count - 1).unreachable)
 
 
 def _topology(
@@ -77,7 +64,11 @@ class Collection:
         self._down: list[Cause | None] = [None] * self.places.count
         """Why each node is down: ``NODE_DOWN`` if it failed, ``NONE`` if it sleeps; None if it is up."""
         self._asleep = False
-        self._cameras = [self._camera(station) for station in self.stations[:-1]]
+        interval_ns = to_ns(config.nodes.interval_s)
+        self._cameras = [  # they take images independently of each other
+            Camera(self.shared, station, int(self._rng.integers(interval_ns or BEGIN_WITHIN_NS)))
+            for station in self.stations[:-1]
+        ]
         self._sink = Sink(self.shared, self.stations[-1], config.uplink, recorder, uplink_rng)
         medium = Medium(env, radio, self.places, medium_rng)
         up = self.shared.up.__getitem__
@@ -106,12 +97,6 @@ class Collection:
             failed=[False] * count,
             up=[True] * count,
         )
-
-    def _camera(self, station: Station) -> Camera:
-        """Cameras take images independently of each other."""
-        interval_ns = to_ns(self._config.nodes.interval_s)
-        phase_ns = int(self._rng.integers(interval_ns or BEGIN_WITHIN_NS))
-        return Camera(self.shared, station, phase_ns)
 
     @property
     def ended(self) -> simpy.Event:

@@ -113,7 +113,9 @@ class Tally:
         ends_ns = edges_ns[1:] - (self._start_ns + MINUTE_NS * np.arange(minutes))
         count, size_bytes, duration_ns, offset_ns = np.moveaxis(sums[:minutes], 1, 0)
         states_ns = self._states.sums(horizon_ns, minutes)
-        late = self._states.late
+        faults = [*self._packets.faults(), *self._images.faults()]
+        if self._states.late:
+            faults.append(f"{self._states.late} frames or failures were recorded more than a second late")
         return Counters(
             count=count,
             size_bytes=size_bytes,
@@ -126,9 +128,5 @@ class Tally:
             images=self._images.outcomes(self._warmup_ns),
             created=self._packets.count(),
             captured=self._images.count(),
-            faults=(*self._packets.faults(), *self._images.faults(), *_late(late)),
+            faults=tuple(faults),
         )
-
-
-def _late(rows: int) -> list[str]:
-    return [f"{rows} frames or failures were recorded more than a second late"] if rows else []

@@ -174,14 +174,7 @@ class Book:
         self._under_way += 1
         self._packets += 1
         return Packet(
-            self._packets - 1,
-            kind,
-            source,
-            destination,
-            self._header_bytes + count,
-            image,
-            first_byte,
-            count,
+            self._packets - 1, kind, source, destination, self._header_bytes + count, image, first_byte, count
         )
 
     def entered(self, packet: Packet, node: int) -> None:

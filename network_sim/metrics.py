@@ -83,11 +83,8 @@ def elapsed_s(trace: NetworkTrace) -> float:
 
 def _outcomes(trace: NetworkTrace) -> Rows:
     """Delivery and delay of images and of their packets."""
-    for noun, outcomes, began in (
-        ("image", trace.counters.images, "taken"),
-        ("packet", trace.counters.packets, "first queued"),
-    ):
-        yield from _outcome(noun, outcomes, began)
+    yield from _outcome("image", trace.counters.images, "taken")
+    yield from _outcome("packet", trace.counters.packets, "first queued")
 
 
 def _outcome(noun: str, outcomes: Outcomes, began: str) -> Rows:
@@ -182,12 +179,7 @@ def _overheads(trace: NetworkTrace) -> Rows:
     for kind in (PacketKind.SUMMARY, PacketKind.REQUEST, PacketKind.STATUS):
         words = kind.name.lower()
         per_minute = 60 * _bytes(trace, EventKind.ENQUEUE, kind) / elapsed_s(trace)
-        yield (
-            f"{words}_bytes",
-            per_minute,
-            "B/min",
-            f"Bytes of {words} packets queued, at every hop",
-        )
+        yield f"{words}_bytes", per_minute, "B/min", f"Bytes of {words} packets queued, at every hop"
 
 
 def _coverage(trace: NetworkTrace) -> Rows:
@@ -201,12 +193,7 @@ def _coverage(trace: NetworkTrace) -> Rows:
     arrived = np.isin(taken.image, trace.events.of(EventKind.ARRIVE).image)
     covered = np.unique(np.stack((taken.peer, window))[:, arrived], axis=1).shape[1]
     windows = f"Pairs of a road cell and a span of {trace.config.scheme.validity_s:g} s"
-    yield (
-        "coverage",
-        covered / seen,
-        "1",
-        f"{windows} of which an image arrived, of all that cameras saw",
-    )
+    yield "coverage", covered / seen, "1", f"{windows} of which an image arrived, of all that cameras saw"
     if arrived.any():
         share = 1.0 - covered / arrived.sum()
         yield "redundancy", share, "1", f"Arrived images beyond the first of its kind. {windows} are a kind"

@@ -8,14 +8,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal, overload
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from network_sim.config import RadioConfig
 
-FloatArray = NDArray[np.float64]
 Modulation = Literal["cck", "oqpsk"]
 """How bytes are sent: IEEE 802.11b at 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
 
@@ -49,16 +47,8 @@ class PathLoss:
     least_m: float
     """Below this distance the power no longer grows: the law would exceed the transmitted power."""
 
-    @overload
-    def power_w(self, distance_m: float) -> float: ...
-    @overload
-    def power_w(self, distance_m: FloatArray) -> FloatArray: ...
-    def power_w(self, distance_m: float | FloatArray) -> float | FloatArray:
-        """Mean received power at a distance, or at each of an array of any shape."""
-        if isinstance(distance_m, np.ndarray):
-            distance = np.maximum(distance_m, self.least_m)
-            near = self.near_w * distance**-self.near_exponent
-            return np.where(distance < self.break_m, near, self.far_w * distance**-self.far_exponent)
+    def power_w(self, distance_m: float) -> float:
+        """Mean received power at a distance."""
         held_m = distance_m if distance_m > self.least_m else self.least_m
         if held_m < self.break_m:
             return self.near_w * held_m**-self.near_exponent
@@ -173,7 +163,7 @@ class Radio:
         self.config = config
         """Its config."""
         self.mean_power_w = law.power_w
-        """Mean received power at a distance, or at each of an array."""
+        """Mean received power at a distance."""
         self.rx_threshold_w = law.power_w(config.range_m) * (1.0 - _ROUNDING)
         """Least power that is received; without shadowing, what arrives at the nominal range."""
         self.cs_threshold_w = law.power_w(config.sense_range_m) * (1.0 - _ROUNDING)

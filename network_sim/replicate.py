@@ -61,20 +61,13 @@ def iterate_runs(
     return [answers[index] for index in range(len(configs))]
 
 
-def iterate_study(
-    cases: Sequence[NetworkConfig], count: int, scheduler: str | None = None
-) -> Generator[Progress, None, list[Estimates]]:
-    """Estimates for each case from ``count`` replications; all cases share their seeds."""
-    runs = yield from iterate_runs([run for case in cases for run in replications(case, count)], scheduler)
-    return [estimates_of(runs[first : first + count]) for first in range(0, len(runs), count)]
-
-
 def iterate_sweep(
     config: NetworkConfig, key: str, values: Sequence[str], count: int, scheduler: str | None = None
 ) -> Generator[Progress, None, dict[str, Estimates]]:
-    """Estimates for each value of a setting, such as ``"scheme.k"``."""
+    """Estimates for each value of a setting, such as ``"scheme.k"``, from ``count`` runs with equal seeds."""
     cases = [with_settings(config, [f"{key}={value}"]) for value in values]
-    return dict(zip(values, (yield from iterate_study(cases, count, scheduler)), strict=True))
+    runs = yield from iterate_runs([run for case in cases for run in replications(case, count)], scheduler)
+    return {value: estimates_of(runs[i * count : (i + 1) * count]) for i, value in enumerate(values)}
 
 
 def estimates_of(runs: Sequence[Mapping[str, Metric]]) -> dict[str, Estimate]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 
 import numpy as np
 import simpy
@@ -11,21 +11,13 @@ from simpy.core import StopSimulation
 from network_sim.collection import Collection, collection_names
 from network_sim.config import NetworkConfig
 from network_sim.conservation import check
-from network_sim.mac import Mac, make_mac
-from network_sim.mac.context import MacContext
-from network_sim.mac.medium import Medium
-from network_sim.mobility import StreetPlaces
-from network_sim.places import Places
-from network_sim.radio import Radio
-from network_sim.street import start_street, street_places
+from network_sim.street import start_street
 from network_sim.trace import NetworkTrace, Recorder
-from network_sim.types import Packet, to_ns
+from network_sim.types import to_ns
 from packetmesh.progress import Progress, drain
 
 REPORTS = 100
 """Reports of progress in a run."""
-STREET_STREAMS = 4
-"""Random streams of a street grid; the first is that of the street itself."""
 
 
 def simulate(config: NetworkConfig) -> NetworkTrace:
@@ -92,23 +84,12 @@ def _collect(
 def _drive(
     env: simpy.Environment, config: NetworkConfig, rng: np.random.Generator
 ) -> Generator[Progress, None, NetworkTrace]:
-    street_rng, radio_rng, medium_rng, mac_rng = rng.spawn(STREET_STREAMS)
     recorder = _recorder(config, config.street.vehicles + config.street.access_points)
-
-    def mac(places: Places, up: Callable[[int], bool], receive: Callable[[Packet, int], None]) -> Mac:
-        medium = Medium(env, Radio(config.radio, radio_rng), places, medium_rng)
-        return make_mac(MacContext(env, medium, config, recorder, mac_rng, up, receive))
-
-    street = start_street(env, config, recorder, mac, street_rng)
+    street = start_street(env, config, recorder, rng)
     for share in _run(env, config):
         yield Progress("street grid", share)
     street.record_images()
     return recorder.trace(config, street.names, None, int(env.now), street.roles)
-
-
-def street_of(config: NetworkConfig) -> StreetPlaces:
-    """Positions of all nodes at any time in the street-grid run of this config, without running it."""
-    return street_places(config, np.random.default_rng(config.run.seed).spawn(STREET_STREAMS)[0])
 
 
 def _recorder(config: NetworkConfig, nodes: int) -> Recorder:

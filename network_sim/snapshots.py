@@ -25,7 +25,7 @@ class Snapshots:
 
     def __init__(self, config: NetworkConfig, routes: Routes, rng: np.random.Generator) -> None:
         """``rng`` draws when each vehicle takes its first image, within the first interval."""
-        self.routes = routes
+        self._routes = routes
         self._cell_m = config.scheme.cell_m
         self._directed = config.scheme.directed_cells
         self._capacity = config.scheme.buffer_images
@@ -58,7 +58,7 @@ class Snapshots:
     def tags(self, vehicle: int, images: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Cells (T,) and times in ns (T,) of images of a vehicle."""
         captured_ns = self._first_ns[vehicle] + (images - vehicle * self._per_vehicle) * self._sample_ns
-        return self.routes.cells(vehicle, captured_ns, self._cell_m, self._directed), captured_ns
+        return self._routes.cells(vehicle, captured_ns, self._cell_m, self._directed), captured_ns
 
     def record(self, recorder: Recorder, now_ns: int, image_bytes: int) -> None:
         """Record all images taken so far, and those that a full buffer dropped before they had arrived."""

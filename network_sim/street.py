@@ -9,7 +9,7 @@ was requested but did not arrive is offered again, as long as it is in the vehic
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from itertools import count
 from typing import Any
 
@@ -17,51 +17,47 @@ import numpy as np
 import simpy
 
 from network_sim.config import NetworkConfig
-from network_sim.mac import Mac
-from network_sim.mobility import (
-    Contact,
-    Routes,
-    StreetPlaces,
-    access_points_m,
-    cell_numbers,
-    contacts,
-    drive,
-)
-from network_sim.places import Places
+from network_sim.mac import make_mac
+from network_sim.mac.context import MacContext
+from network_sim.mac.medium import Medium
+from network_sim.mobility import Contact, Routes, StreetPlaces, access_points_m, cell_numbers, contacts, drive
+from network_sim.radio import Radio
 from network_sim.schemes import make_scheme
 from network_sim.snapshots import Snapshots
 from network_sim.trace import Recorder
 from network_sim.types import EventKind, Packet, PacketKind, to_ns
 
-MacFactory = Callable[[Places, Callable[[int], bool], Callable[[Packet, int], None]], Mac]
-"""Makes the medium access of nodes at these places, given whether a node is up and a receive callback."""
+_STREAMS = 4
+"""Random streams of a run; the first is that of the vehicles."""
 _ENQUEUE, _RECEIVE, _ARRIVE = EventKind.ENQUEUE, EventKind.RECEIVE, EventKind.ARRIVE
 _IMAGE = PacketKind.IMAGE
 """An enumeration is slow to look up, and these are for every packet."""
 
 
 def start_street(
-    env: simpy.Environment,
-    config: NetworkConfig,
-    recorder: Recorder,
-    mac_factory: MacFactory,
-    rng: np.random.Generator,
+    env: simpy.Environment, config: NetworkConfig, recorder: Recorder, rng: np.random.Generator
 ) -> Street:
     """Start all vehicles; the caller runs ``env`` to the horizon, then calls ``Street.record_images``."""
-    driving, cameras, requests = rng.spawn(3)
+    street_rng, radio_rng, medium_rng, mac_rng = rng.spawn(_STREAMS)
+    driving, cameras, requests = street_rng.spawn(3)
     routes = drive(config.street, config.run.horizon_s, driving)
+    medium = Medium(env, Radio(config.radio, radio_rng), _places(routes), medium_rng)
     snapshots = Snapshots(config, routes, cameras)
-    street = Street(env, config, recorder, mac_factory, snapshots, requests)
+    street = Street(medium, config, recorder, snapshots, requests, mac_rng)
     points_m = access_points_m(config.street)
     for vehicle, meetings in enumerate(contacts(routes, points_m, config.radio.range_m)):
         env.process(street.follow(vehicle, meetings))
     return street
 
 
-def street_places(config: NetworkConfig, rng: np.random.Generator) -> StreetPlaces:
-    """Positions of all nodes at any time of a run whose ``start_street`` gets an equal ``rng``."""
-    routes = drive(config.street, config.run.horizon_s, rng.spawn(3)[0])
-    return StreetPlaces(routes, access_points_m(config.street))
+def street_of(config: NetworkConfig) -> StreetPlaces:
+    """Positions of all nodes at any time in the street-grid run of this config, without running it."""
+    street_rng = np.random.default_rng(config.run.seed).spawn(_STREAMS)[0]
+    return _places(drive(config.street, config.run.horizon_s, street_rng.spawn(3)[0]))
+
+
+def _places(routes: Routes) -> StreetPlaces:
+    return StreetPlaces(routes, access_points_m(routes.config))
 
 
 class Street:
@@ -69,21 +65,20 @@ class Street:
 
     def __init__(
         self,
-        env: simpy.Environment,
+        medium: Medium,
         config: NetworkConfig,
         recorder: Recorder,
-        mac_factory: MacFactory,
         snapshots: Snapshots,
         rng: np.random.Generator,
+        mac_rng: np.random.Generator,
     ) -> None:
+        """``rng`` draws the requests of the scheme, ``mac_rng`` backoffs."""
         vehicles, points = config.street.vehicles, config.street.access_points
-        self.routes: Routes = snapshots.routes
-        self.places = StreetPlaces(self.routes, access_points_m(config.street))
         self.names = tuple(
             [f"vehicle {i + 1}" for i in range(vehicles)] + [f"access point {i + 1}" for i in range(points)]
         )
         self.roles = ("vehicle",) * vehicles + ("access-point",) * points
-        self._env = env
+        self._env = env = medium.env
         self._config = config.scheme
         self._recorder = recorder
         self._snapshots = snapshots
@@ -95,7 +90,7 @@ class Street:
         self._parts = [(first, min(most, size - first)) for first in range(0, size, most)]
         self._interval_ns = to_ns(config.scheme.summary_interval_s)
         always_up = ([True] * len(self.names)).__getitem__
-        self._mac = mac_factory(self.places, always_up, self._receive)
+        self._mac = make_mac(MacContext(env, medium, config, recorder, mac_rng, always_up, self._receive))
 
     def follow(self, vehicle: int, meetings: list[Contact]) -> Generator[simpy.Event, Any, None]:
         """Process of one vehicle: its contacts, each kept until the vehicle is out of range."""

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from network_sim.counters import Counters
 from network_sim.ledger import Outcomes
@@ -63,15 +62,11 @@ def _blocks(events: Events) -> Iterator[list[tuple[Any, ...]]]:
     """The events as tuples, not all at once: text needs many times their memory."""
     for start in range(0, len(events), _BLOCK):
         part = events.rows(start, start + _BLOCK)
-        columns = [
-            _member_names(name, part[name]) if name in _ENUMS else part[name].tolist() for name in _NAMES
-        ]
-        yield list(zip(*columns, strict=True))
-
-
-def _member_names(name: str, column: NDArray[np.int8]) -> list[str]:
-    names = [member.name for member in _ENUMS[name]]
-    return [names[number] for number in column.tolist()]
+        columns = {name: part[name].tolist() for name in _NAMES}
+        for name, enum in _ENUMS.items():
+            names = [member.name for member in enum]
+            columns[name] = [names[number] for number in columns[name]]
+        yield list(zip(*columns.values(), strict=True))
 
 
 def _record(trace: NetworkTrace) -> dict[str, Any]:

@@ -6,14 +6,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    CancelledError,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    wait,
-)
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import Any, TypeVar
@@ -72,10 +65,7 @@ def run_batch(
 
 
 def _completed(
-    pool: Executor,
-    function: Callable[[Task], Answer],
-    tasks: Sequence[Task],
-    most: Callable[[], int],
+    pool: Executor, function: Callable[[Task], Answer], tasks: Sequence[Task], most: Callable[[], int]
 ) -> Iterator[tuple[int, Answer]]:
     """Indices and answers as they come, while at most ``most()`` tasks are in the pool."""
     remaining = iter(enumerate(tasks))

@@ -7,7 +7,7 @@ import math
 import os
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -43,14 +43,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
             f"{path} cannot be written ({error.strerror or error}); try another folder for the output"
         ) from None
     finally:
-        _remove(sibling)
-
-
-def _remove(sibling: Path) -> None:
-    try:
-        sibling.unlink(missing_ok=True)
-    except OSError:
-        return  # its folder does not exist, so neither does it
+        with suppress(OSError):  # its folder does not exist, so neither does it
+            sibling.unlink(missing_ok=True)
 
 
 def writable_folder(path: str | os.PathLike[str]) -> Path:

@@ -43,7 +43,7 @@ def config_named(preset: str, presets: Mapping[str, Config]) -> Config:
     return with_settings(defaults, [f"{key}={value}" for key, value in text.items()])
 
 
-def with_settings(config: Config, settings: Iterable[str]) -> Config:
+def with_settings(config: Config, changes: Iterable[str]) -> Config:
     """``config`` with settings such as ``"depth.alignment=median"`` applied.
 
     Raises:
@@ -56,32 +56,25 @@ def with_settings(config: Config, settings: Iterable[str]) -> Config:
     5000
     """
     values = {}
-    for setting in settings:
+    for setting in changes:
         key, equals, value = setting.partition("=")
         if not equals:
-            example = next(f"{key}={value}" for key, value in _as_text(config).items() if "." in key)
+            example = next(f"{key}={value}" for key, value in settings(config).items() if "." in key)
             raise InputError(f"'{setting}' is not a setting; try key=value, for example {example}")
         values[key.strip()] = value.strip()
-    return _replaced(config, values, list(_as_text(config)))
+    return _replaced(config, values, list(settings(config)))
 
 
-def settings(config: object) -> dict[str, str]:
-    """Dotted key and value of every field of ``config``, as text that ``with_settings`` parses."""
-    return _as_text(config)
+def settings(config: Any, prefix: str = "") -> dict[str, str]:
+    """Dotted key and value of every field of ``config``, as text that ``with_settings`` parses.
 
-
-def differences(config: Config, base: Config) -> list[str]:
-    """The settings of ``config`` that differ from ``base``, as ``key=value``."""
-    before = settings(base)
-    return [f"{key}={value}" for key, value in settings(config).items() if before[key] != value]
-
-
-def _as_text(config: Any, prefix: str = "") -> dict[str, str]:
+    ``prefix`` is what the keys begin with, for a config within another.
+    """
     text: dict[str, str] = {}
     for field in dataclasses.fields(config):
         key, value = prefix + field.name, getattr(config, field.name)
         if dataclasses.is_dataclass(value):
-            text |= _as_text(value, f"{key}.")
+            text |= settings(value, f"{key}.")
         elif isinstance(value, list | tuple):
             text[key] = ",".join(str(item) for item in value)
         elif isinstance(value, bool) or value is None:
@@ -89,6 +82,12 @@ def _as_text(config: Any, prefix: str = "") -> dict[str, str]:
         else:
             text[key] = str(value)
     return text
+
+
+def differences(config: Config, base: Config) -> list[str]:
+    """The settings of ``config`` that differ from ``base``, as ``key=value``."""
+    before = settings(base)
+    return [f"{key}={value}" for key, value in settings(config).items() if before[key] != value]
 
 
 def _replaced(config: Any, values: dict[str, str], known: list[str], prefix: str = "") -> Any:

@@ -45,10 +45,21 @@ class Setting(NamedTuple):
     doc: str
 
 
-def describe(config: Any) -> list[Setting]:
-    """Every setting of ``config`` with its value, unit and meaning, in the order of its fields."""
-    docs = _docs(config)
-    return [Setting(key, value, unit_of(key), docs[key]) for key, value in settings(config).items()]
+def describe(config: Any, prefix: str = "") -> list[Setting]:
+    """Every setting of ``config`` with its value, unit and meaning, in the order of its fields.
+
+    ``prefix`` is what the keys begin with, for a config within another.
+    """
+    rows: list[Setting] = []
+    kind: type = type(config)
+    text, docs = settings(config), field_docs(kind)
+    for field in dataclasses.fields(config):
+        key, value = prefix + field.name, getattr(config, field.name)
+        if dataclasses.is_dataclass(value):
+            rows += describe(value, f"{key}.")
+        else:
+            rows.append(Setting(key, text[field.name], unit_of(key), docs.get(field.name, "")))
+    return rows
 
 
 def unit_of(key: str) -> str:
@@ -57,19 +68,6 @@ def unit_of(key: str) -> str:
     if name in UNITLESS or "_" not in name:
         return ""
     return next((unit for end, unit in UNITS.items() if name.endswith(f"_{end}")), "")
-
-
-def _docs(config: Any, prefix: str = "") -> dict[str, str]:
-    docs: dict[str, str] = {}
-    kind: type = type(config)
-    own = field_docs(kind)
-    for field in dataclasses.fields(config):
-        value = getattr(config, field.name)
-        if dataclasses.is_dataclass(value):
-            docs |= _docs(value, f"{prefix}{field.name}.")
-        else:
-            docs[prefix + field.name] = own.get(field.name, "")
-    return docs
 
 
 @functools.cache

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from packetmesh.errors import InputError
-from packetmesh.settings import config_named
 
 OutlierMode = Literal["thesis", "depth_normalised", "robust"]
 AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]
@@ -17,7 +16,7 @@ NetworkPreset = Literal[
 Normalisation = Literal["imagenet", "unit", "bytes"]
 METHODS = {
     "icp": "icp.Icp",
-    "trimmed-icp": "trimmed.TrimmedIcp",
+    "trimmed-icp": "icp.TrimmedIcp",
     "picp": "picp.Picp",
     "ricp": "ricp.Ricp",
     "mricp": "mricp.Mricp",
@@ -26,7 +25,7 @@ METHODS = {
     "ceicp-literal": "ceicp_literal.CeicpLiteral",
     "ceicp-n": "ceicp.CeicpN",
     "ceicp-a": "ceicp.CeicpA",
-    "ceicp-r": "ceicp_r.CeicpR",
+    "ceicp-r": "ceicp.CeicpR",
     "ceicp-ml": "ceicp_ml.CeicpMl",
     "kernel-correlation": "kernel_correlation.KernelCorrelation",
     "fast-robust-icp": "fast_robust.FastRobustIcp",
@@ -102,10 +101,7 @@ class DepthConfig:
         """Only the settings of the network itself, which is all that its inference depends on."""
         plain = DepthConfig()
         return replace(
-            self,
-            alignment=plain.alignment,
-            reach=plain.reach,
-            least_confidence=plain.least_confidence,
+            self, alignment=plain.alignment, reach=plain.reach, least_confidence=plain.least_confidence
         )
 
     def __post_init__(self) -> None:
@@ -237,12 +233,3 @@ PRESETS: dict[str, PipelineConfig] = {
     ),
 }
 """The two ways through the chain: ours (the default) and the thesis's own."""
-
-
-def load_config(preset: str) -> PipelineConfig:
-    """The preset of that name, or the config saved in that JSON file.
-
-    Raises:
-        InputError: neither a preset nor a readable config.
-    """
-    return config_named(preset, PRESETS)

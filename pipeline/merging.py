@@ -45,7 +45,9 @@ def merge_clouds(
         max_points: both clouds are averaged over the voxels that leave the fused one about so many points.
         smoothing_passes: how often every point is moved onto the plane of its neighbours.
     """
-    joint = without_guesses_in_view(frames, nodes, T_world_camera) if mode == "fill" else _fused(nodes)
+    joint = [node.fused for node in nodes]
+    if mode == "fill":
+        joint = without_guesses_in_view(frames, nodes, T_world_camera)
     everything = PointCloud.concatenate(_placed(joint, T_world_camera))
     voxel_m = voxel_for_count(everything.points_m, max_points)
 
@@ -81,10 +83,6 @@ def without_guesses_in_view(
                 keep[inferred] &= hidden_from(cloud, T_other_node, frame.intrinsics, frame.depth)
         clouds.append(node.fused.select(keep))
     return clouds
-
-
-def _fused(nodes: Sequence[NodeClouds]) -> list[PointCloud]:
-    return [node.fused for node in nodes]
 
 
 def _placed(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray]) -> list[PointCloud]:

@@ -183,7 +183,11 @@ def place_nodes(
     pairs = [*partners, *others]
     results = [_register_pair(frames, clouds, config, *pair) for pair in pairs]
     points_m = [graph_points(cloud) for cloud in clouds]
-    good = [place for place, result in enumerate(results) if _succeeded(result)]
+    good = [
+        place
+        for place, result in enumerate(results)
+        if result.steps and not result.stop_reason.startswith("degenerate")
+    ]
     edges = [pose_edge(*pairs[place], points_m, results[place].T_target_source) for place in good]
     graph = solve_pose_graph(points_m, edges)
     found = {place: (graph.loop_error_m[k], graph.used[k]) for k, place in enumerate(good)}
@@ -230,10 +234,6 @@ def _register_pair(
         return register(clouds[index], clouds[partner], config, T_init)
     except ReconstructionError as error:
         return RegistrationResult(T_init, (), False, str(error))
-
-
-def _succeeded(result: RegistrationResult) -> bool:
-    return bool(result.steps) and not result.stop_reason.startswith("degenerate")
 
 
 def _shared_view(frame: RgbdFrame, cloud: PointCloud, other: RgbdFrame) -> float:

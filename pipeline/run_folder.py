@@ -6,6 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from packetmesh.files import write_json
 from packetmesh.memory import peak_memory_bytes
 from packetmesh.settings import settings
@@ -80,7 +82,7 @@ def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
                     "residual_rms_m": node.alignment.residual_rms_m,
                     "coefficients": node.alignment.coefficients,
                 },
-                "filled_points": inferred_points(node.fused),
+                "filled_points": int(np.sum(node.fused.source == PointSource.INFERRED)),
             }
             for node, frame in zip(reconstruction.nodes, reconstruction.rig.frames, strict=True)
         ],
@@ -102,11 +104,6 @@ def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
         "timings_s": reconstruction.timings_s,
         "peak_memory_bytes": peak_memory_bytes(),
     }
-
-
-def inferred_points(cloud: PointCloud) -> int:
-    """How many points of ``cloud`` the network contributed."""
-    return 0 if cloud.source is None else int((cloud.source == PointSource.INFERRED).sum())
 
 
 def _registration(item: NodeRegistration, reconstruction: Reconstruction) -> dict[str, Any]:

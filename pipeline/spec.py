@@ -64,8 +64,7 @@ NEEDS: dict[StageName, Needs] = {
         ("rig", "inferred"),
     ),
     "placement": Needs(
-        lambda spec: (spec.config.node_registration, spec.config.fusion.align_nodes_with),
-        ("rig", "nodes"),
+        lambda spec: (spec.config.node_registration, spec.config.fusion.align_nodes_with), ("rig", "nodes")
     ),
     "clouds": Needs(
         lambda spec: (
@@ -82,16 +81,7 @@ NEEDS: dict[StageName, Needs] = {
     "alpha": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "clouds")),
 }
 """All stages; ``pipeline.stages`` has what they do."""
-CHAIN: tuple[StageName, ...] = (
-    "rig",
-    "inferred",
-    "nodes",
-    "placement",
-    "clouds",
-    "after",
-    "before",
-    "truth",
-)
+CHAIN: tuple[StageName, ...] = ("rig", "inferred", "nodes", "placement", "clouds", "after", "before", "truth")
 """The stages of a reconstruction, in their order; the others are baselines beside it."""
 
 

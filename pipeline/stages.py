@@ -10,7 +10,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Hashable, Iterable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from functools import partial
+from typing import Any, Literal, Protocol, TypeVar
 
 from packetmesh.progress import Progress
 from pipeline.config import (
@@ -161,25 +162,17 @@ def merge(
     return merge_clouds(rig.frames, nodes, placement.T_world_camera, mode, max_points, smoothing_passes)
 
 
-def roll_after(
-    config: SurfaceConfig, rig: Rig, placement: Placement, clouds: MergedClouds
+def roll_over(
+    name: Literal["fused", "sensor"],
+    fraction: float,
+    config: SurfaceConfig,
+    rig: Rig,
+    placement: Placement,
+    clouds: MergedClouds,
 ) -> Steps[SurfaceResult]:
-    """The surface of the fused cloud; without a triangle where the ball falls through everywhere."""
-    yield Progress("rolling the ball over the fused cloud", 0.7)
-    return _rolled(config, rig, placement, clouds, clouds.fused)
-
-
-def roll_before(
-    config: SurfaceConfig, rig: Rig, placement: Placement, clouds: MergedClouds
-) -> Steps[SurfaceResult]:
-    """The surface of the sensor cloud, by the same balls."""
-    yield Progress("rolling the ball over the sensor cloud", 0.8)
-    return _rolled(config, rig, placement, clouds, clouds.sensor)
-
-
-def _rolled(
-    config: SurfaceConfig, rig: Rig, placement: Placement, clouds: MergedClouds, cloud: PointCloud
-) -> SurfaceResult:
+    """The surface of one of the clouds; without a triangle where the ball falls through everywhere."""
+    yield Progress(f"rolling the ball over the {name} cloud", fraction)
+    cloud: PointCloud = getattr(clouds, name)
     surface = roll_or_nothing(cloud, radii(config, clouds.r_F_m, clouds.sigma_D_m))
     return measured(surface, cameras_of(rig, placement), len(cloud), [frame.depth for frame in rig.frames])
 
@@ -240,8 +233,8 @@ STAGES: dict[StageName, Callable[..., Steps[Any]]] = {
     "nodes": prepare_nodes,
     "placement": register_nodes,
     "clouds": merge,
-    "after": roll_after,
-    "before": roll_before,
+    "after": partial(roll_over, "fused", 0.7),
+    "before": partial(roll_over, "sensor", 0.8),
     "truth": compare,
     "poisson": poisson,
     "alpha": alpha,

@@ -79,11 +79,11 @@ def deliver(
 
 def _settings(preset: str, chain: str, changes: tuple[str, ...]) -> tuple[NetworkConfig, PipelineConfig]:
     """The network's and the chain's settings; every change goes to the one that has its key."""
-    from network_sim.config import PRESETS
+    from network_sim.config import PRESETS as NETWORKS
     from packetmesh.settings import config_named, settings, with_settings
-    from pipeline.config import load_config
+    from pipeline.config import PRESETS
 
-    network, config = config_named(preset, PRESETS), load_config(chain)
+    network, config = config_named(preset, NETWORKS), config_named(chain, PRESETS)
     parts = {key.partition(".")[0] for key in settings(config)}
     of_chain = [change for change in changes if change.partition(".")[0] in parts]
     of_network = [change for change in changes if change not in of_chain]

@@ -136,16 +136,15 @@ def _written(depth: DepthMap, kind: ModelKind, out: Path, stem: str) -> dict[str
 
 def _colored(depth: DepthMap) -> Any:
     """(H, W, 3) the nearness 1/z, light where near; magenta where unknown."""
-    import cv2
     import numpy as np
 
     from app.drawing.colors import HOLE
+    from app.drawing.pictures import cividis
 
     nearness = 1.0 / depth.z_m
     low, high = np.nanpercentile(nearness, PREVIEW_PERCENTILES)
     level = np.clip((nearness - low) / max(high - low, 1e-12), 0.0, 1.0)
-    gray = np.rint(255.0 * np.nan_to_num(level)).astype(np.uint8)
-    colors = cv2.applyColorMap(gray, cv2.COLORMAP_CIVIDIS)[..., ::-1].copy()
+    colors = cividis(np.rint(255.0 * np.nan_to_num(level)).astype(np.uint8))
     colors[~depth.valid] = HOLE
     return colors
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from app.cli.options import PresetName, Settings
 from app.cli.text import print_json, say, say_progress, wrong_use
 from packetmesh.progress import drain
-from packetmesh.settings import with_settings
-from pipeline.config import load_config
+from packetmesh.settings import config_named, with_settings
+from pipeline.config import PRESETS
 
 if TYPE_CHECKING:
     from pipeline.sources import FileSource
@@ -42,7 +42,7 @@ def reconstruct(
         json: Print the metrics as one JSON object.
     """
     source = source_named(scene, rig, color, depth, intrinsics, depth_scale)
-    config = with_settings(load_config(preset), set)
+    config = with_settings(config_named(preset, PRESETS), set)
 
     from app.reports.reconstruction import write_reconstruction_report
     from packetmesh.files import writable_folder

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import signal
+import threading
+import webbrowser
+
 from app.cli.options import PresetName
 from app.cli.text import say
-from pipeline.config import load_config
+from packetmesh.settings import config_named
+from pipeline.config import PRESETS
 
 
 def serve(
@@ -25,17 +30,16 @@ def serve(
         open: Open a browser window.
         lecture: Share one session among all browsers instead of one each.
     """
-    from app.server import serve as serve_app
+    from app.server import build_server
 
-    def announce(url: str) -> None:
-        say(f"PacketMesh is at {url} (stop with Ctrl-C)")
-
-    serve_app(
-        scene=scene,
-        config=load_config(preset),
-        host=host,
-        port=port,
-        open_browser=open,
-        lecture=lecture,
-        announce=announce,
-    )
+    stopped = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stopped.set())
+    app = build_server(scene, config_named(preset, PRESETS), host, port, lecture)
+    try:
+        say(f"PacketMesh is at {app.url} (stop with Ctrl-C)")
+        if open:
+            webbrowser.open(app.url)
+        stopped.wait()
+    finally:
+        app.stop()

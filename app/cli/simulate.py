@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Generator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import tyro
-
-from app.cli.text import print_json, say, wrong_use
+from app.cli.options import Settings
+from app.cli.text import print_json, say, say_progress, wrong_use
 
 if TYPE_CHECKING:
     from network_sim.config import NetworkConfig
     from network_sim.replicate import Estimate, Estimates
     from packetmesh.progress import Progress
 
-Settings = Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="KEY=VALUE")]
 Result = TypeVar("Result")
 
 
@@ -62,7 +59,7 @@ def _describe(config: NetworkConfig, json: bool) -> None:
         print_json({row.key: {"value": row.value, "unit": row.unit, "meaning": row.doc} for row in rows})
         return
     for row in rows:
-        _line(f"{row.key}={row.value}{f' {row.unit}' if row.unit else ''}\n    {row.doc}")
+        print(f"{row.key}={row.value}{f' {row.unit}' if row.unit else ''}\n    {row.doc}")
 
 
 def _run(
@@ -92,9 +89,9 @@ def _run(
 
 
 def _say_who_is_alone(config: NetworkConfig) -> None:
-    from network_sim.collection import reachability
+    from network_sim.collection import disconnected
 
-    alone = reachability(config).disconnected if config.scenario == "collection" else ()
+    alone = disconnected(config) if config.scenario == "collection" else ()
     if alone:
         say(f"no path of links leads to the sink from {', '.join(alone)}; try a larger radio.range_m")
 
@@ -126,7 +123,7 @@ def _sweep(
         print_json(record)
         return
     for value, estimates in cases.items():
-        _line(f"{key}={value}")
+        print(f"{key}={value}")
         _show(estimates, json=False)
 
 
@@ -140,7 +137,7 @@ def _told(steps: Generator[Progress, None, Result]) -> Result:
             return stop.value
         if (tenths := int(10.0 * progress.fraction + 1e-9)) > said:
             said = tenths
-            say(f"{progress.fraction:4.0%}  {progress.stage}")
+            say_progress(progress)
 
 
 def _record(estimates: Estimates) -> dict[str, Any]:
@@ -156,8 +153,4 @@ def _show(estimates: Mapping[str, Estimate], json: bool) -> None:
         return
     for name, one in estimates.items():
         interval = "" if one.ci95 is None else f" ± {one.ci95:.3g}"
-        _line(f"{name:<34} {one.mean:.5g}{interval} {one.unit}")
-
-
-def _line(text: str) -> None:
-    sys.stdout.write(f"{text}\n")
+        print(f"{name:<34} {one.mean:.5g}{interval} {one.unit}")

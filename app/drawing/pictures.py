@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
@@ -29,9 +31,9 @@ def depth_picture(depth: DepthMap, range_m: tuple[float, float], what: str = "")
     """Near is dark, far is bright, unknown is magenta; the caption begins with ``what``."""
     nearest_m, farthest_m = range_m
     level = np.clip((depth.z_m - nearest_m) / (farthest_m - nearest_m), 0.0, 1.0)
-    rgb = _cividis((np.nan_to_num(level) * 255).astype(np.uint8))
+    rgb = cividis((np.nan_to_num(level) * 255).astype(np.uint8))
     rgb[~depth.valid] = HOLE
-    stops = _cividis(np.linspace(0, 255, BAR_STOPS).astype(np.uint8)[None])[0]
+    stops = cividis(np.linspace(0, 255, BAR_STOPS).astype(np.uint8)[None])[0]
     labels = tuple(f"{value_m:.2f} m" for value_m in np.linspace(nearest_m, farthest_m, 3))
     meaning = f"dark {nearest_m:.1f} m to bright {farthest_m:.1f} m, magenta where there is none"
     return Picture(
@@ -76,13 +78,17 @@ def confidence_picture(confidence: FloatArray, flying: BoolArray, out_of_reach: 
 
 def confidence_colors(confidence: FloatArray) -> ByteArray:
     """RGB of confidences from 0 to 1, with a last axis of 3; the darkest colour for NaN."""
-    at = np.linspace(0.0, 1.0, len(CONFIDENCE_STOPS))
-    level = np.nan_to_num(confidence)
-    channels = [np.interp(level, at, channel) for channel in zip(*CONFIDENCE_STOPS, strict=True)]
+    return ramp(np.nan_to_num(confidence), 1.0, CONFIDENCE_STOPS)
+
+
+def ramp(values: FloatArray, most: float, stops: Sequence[tuple[int, int, int]]) -> ByteArray:
+    """RGB, with a last axis of 3, of values from 0 to ``most`` and beyond, between evenly placed colours."""
+    at = np.linspace(0.0, most, len(stops))
+    channels = [np.interp(values, at, channel) for channel in zip(*stops, strict=True)]
     return np.rint(np.stack(channels, axis=-1)).astype(np.uint8)
 
 
-def _cividis(level: ByteArray) -> ByteArray:
+def cividis(level: ByteArray) -> ByteArray:
     """(H, W, 3) RGB of (H, W) levels from 0 to 255."""
     return cv2.cvtColor(cv2.applyColorMap(level, cv2.COLORMAP_CIVIDIS), cv2.COLOR_BGR2RGB)
 

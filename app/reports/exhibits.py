@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-import cv2
 import numpy as np
 
-from app.reports.html import pictures, table
+from app.reports.html import picture, pictures, table
 from lab.claims.exhibits import Chart, Curve, Exhibit, HeatMap, Picture, Table
-from pipeline.types import ByteArray
 
 COLORS = (
     "#5b6570",
@@ -35,7 +32,7 @@ PICTURES_IN_A_ROW = 3
 def exhibit_html(exhibit: Exhibit) -> str:
     """One table or picture with its title and its note."""
     if isinstance(exhibit, Table):
-        kind, body = "wide", _table(exhibit)
+        kind, body = "wide", table(exhibit.header, exhibit.rows)
     elif isinstance(exhibit, Chart):
         kind, body = "picture", chart_svg(exhibit)
     elif isinstance(exhibit, Picture):
@@ -46,24 +43,10 @@ def exhibit_html(exhibit: Exhibit) -> str:
     return f'<div class="{kind}"><h3>{escape(exhibit.title)}</h3>{body}{note}</div>'
 
 
-def _table(exhibit: Table) -> str:
-    rows = [["–" if value is None else value for value in row] for row in exhibit.rows]
-    return table(exhibit.header, rows)
-
-
 def _images(exhibit: Picture) -> str:
-    columns = min(PICTURES_IN_A_ROW, len(exhibit.images))
-    return pictures([_image(caption, rgb) for caption, rgb in exhibit.images], columns)
-
-
-def _image(caption: str, rgb: ByteArray) -> str:
-    """A figure whose image loses nothing, so that rays without a surface keep their one colour."""
-    _, png = cv2.imencode(".png", rgb[..., ::-1])
-    data = base64.b64encode(png.tobytes()).decode()
-    return (
-        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
+    """As PNG, which loses nothing, so that rays without a surface keep their one colour."""
+    figures = [picture(rgb, caption, "png") for caption, rgb in exhibit.images]
+    return pictures(figures, min(PICTURES_IN_A_ROW, len(figures)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ import base64
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
+from typing import Literal
 
 import cv2
 
@@ -21,7 +22,7 @@ table { border-collapse: collapse; width: 100%; } th { font-weight: 600; }
 th:not(:first-child) { text-align: right; }
 th, td { text-align: left; padding: .35rem .7rem .35rem 0; border-bottom: 1px solid var(--line);
   vertical-align: top; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+td:not(:first-child) { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .pictures { display: grid; gap: .9rem; margin-bottom: 1.1rem; }
 figure { margin: 0; } figure img { width: 100%; border-radius: 6px; display: block; background: var(--soft); }
 figcaption { font-size: .88em; opacity: .8; margin-top: .3rem; }
@@ -48,12 +49,13 @@ def write_page(path: Path, title: str, body: str) -> None:
         Path(temporary).write_text(page(title, body), encoding="utf-8")
 
 
-def picture(rgb: ByteArray, caption: str) -> str:
+def picture(rgb: ByteArray, caption: str, kind: Literal["jpeg", "png"] = "jpeg") -> str:
     """An (H, W, 3) RGB image with what it shows, as an HTML figure holding the image itself."""
-    _, jpeg = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88])
-    data = base64.b64encode(jpeg.tobytes()).decode()
+    options = [cv2.IMWRITE_JPEG_QUALITY, 88] if kind == "jpeg" else []
+    _, encoded = cv2.imencode(f".{kind}", rgb[..., ::-1], options)
+    data = base64.b64encode(encoded.tobytes()).decode()
     return (
-        f'<figure><img alt="{escape(caption)}" src="data:image/jpeg;base64,{data}">'
+        f'<figure><img alt="{escape(caption)}" src="data:image/{kind};base64,{data}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
 
@@ -64,13 +66,16 @@ def pictures(figures: Iterable[str], columns: int) -> str:
     return f'<div class="pictures" style="{style}">{"".join(figures)}</div>'
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[str | float | int]]) -> str:
-    """A table with a name first in each row; what follows is aligned to the right."""
-
-    def cell(value: str | float | int, first: bool) -> str:
-        text = value if isinstance(value, str) else f"{value:,}" if isinstance(value, int) else f"{value:.4g}"
-        return f"<td>{escape(text)}</td>" if first else f'<td class="number">{escape(text)}</td>'
-
+def table(header: Sequence[str], rows: Iterable[Sequence[str | float | int | None]]) -> str:
+    """A table with a name first in each row; what follows is aligned to the right, a dash for None."""
     head = "".join(f"<th>{escape(name)}</th>" for name in header)
-    body = "".join(f"<tr>{''.join(cell(v, i == 0) for i, v in enumerate(row))}</tr>" for row in rows)
+    body = "".join(f"<tr>{''.join(f'<td>{escape(_text(value))}</td>' for value in row)}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _text(value: str | float | int | None) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, str):
+        return value
+    return f"{value:,}" if isinstance(value, int) else f"{value:.4g}"

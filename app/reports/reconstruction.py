@@ -89,10 +89,8 @@ def _truth(metrics: dict[str, Any]) -> Iterator[str]:
         '<p class="note">Of what the cameras can see. Coverage: share of the true surface with a mesh point '
         "so near; accuracy: share of the mesh with a true surface so near; F-score: their harmonic mean.</p>"
     )
-    yield table(
-        ("", "before", "after"),
-        ((_truth_label(key), *_in_units(key, before, after)) for key in before or after),
-    )
+    rows = ((_truth_label(key), *_in_units(key, before, after)) for key in before or after)
+    yield table(("", "before", "after"), rows)
 
 
 def _truth_label(key: str) -> str:
@@ -105,10 +103,10 @@ def _truth_label(key: str) -> str:
     return known.get(key, f"{name.replace('f_score', 'F-score')} at {distance.replace('cm', ' cm')} (%)")
 
 
-def _in_units(key: str, *records: dict[str, float] | None) -> tuple[float | str, ...]:
-    """A measure of each surface; a dash for a surface without a triangle."""
+def _in_units(key: str, *records: dict[str, float] | None) -> tuple[float | None, ...]:
+    """A measure of each surface; None for a surface without a triangle."""
     unit = 1000.0 if key.endswith("_m") else 100.0
-    return tuple("–" if record is None else record[key] * unit for record in records)
+    return tuple(None if record is None else record[key] * unit for record in records)
 
 
 def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
@@ -127,47 +125,29 @@ def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
             picture(inferred.rgb, inferred.caption),
         )
         yield pictures(figures, columns=3)
-    yield table(
-        ("node", "sensor points", "outliers removed", "inferred points kept", "alignment residual (mm)"),
+    rows = (
         (
-            (
-                node["name"],
-                node["sensor_points"],
-                node["outliers"],
-                node["filled_points"],
-                1000 * node["alignment"]["residual_rms_m"],
-            )
-            for node in metrics["nodes"]
-        ),
+            *(node[key] for key in ("name", "sensor_points", "outliers", "filled_points")),
+            1000 * node["alignment"]["residual_rms_m"],
+        )
+        for node in metrics["nodes"]
     )
+    head = ("node", "sensor points", "outliers removed", "inferred points kept", "alignment residual (mm)")
+    yield table(head, rows)
 
 
 def _registrations(metrics: dict[str, Any]) -> Iterator[str]:
     if not metrics["registration"]:
         return
     yield "<h2>How the nodes found each other</h2>"
-    yield table(
+    head = ("node", "onto", "method", "iterations", "stopped because")
+    rows = (
         (
-            "node",
-            "onto",
-            "method",
-            "iterations",
-            "stopped because",
-            "weighted RMSE (mm)",
-            "loop error (mm)",
-            "used",
-        ),
-        (
-            (
-                item["source"],
-                item["target"],
-                item["method"],
-                item["iterations"],
-                item["stop_reason"],
-                "–" if item["rmse_m"] is None else 1000 * item["rmse_m"],
-                "–" if not math.isfinite(item["loop_error_m"]) else 1000 * item["loop_error_m"],
-                "yes" if item["used"] else "no",
-            )
-            for item in metrics["registration"]
-        ),
+            *(item[key] for key in ("source", "target", "method", "iterations", "stop_reason")),
+            None if item["rmse_m"] is None else 1000 * item["rmse_m"],
+            1000 * item["loop_error_m"] if math.isfinite(item["loop_error_m"]) else None,
+            "yes" if item["used"] else "no",
+        )
+        for item in metrics["registration"]
     )
+    yield table((*head, "weighted RMSE (mm)", "loop error (mm)", "used"), rows)

@@ -88,9 +88,9 @@ def hidden_case(name: str, group: str, rgb: ByteArray, depth: DepthMap, seed: in
     return HoleCase(name, group, rgb, left, hole, depth.z_m)
 
 
-def our_filling(network: DepthNetwork, config: DepthConfig | None = None) -> Filler:
+def our_filling(network: DepthNetwork) -> Filler:
     """Inferred, aligned and trusted depth, as the chain makes it."""
-    config = config or DepthConfig()
+    config = DepthConfig()
 
     def fill(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
         aligned = align_depth(network.infer(rgb), sensor, config.alignment)

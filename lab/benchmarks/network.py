@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from lab.benchmarks.benchmark import Benchmark
-from lab.benchmarks.ns3 import Counts, Row, Run, compare, find_python, run_ns3
+from lab.benchmarks.ns3 import Counts, Row, Run, Theirs, compare, find_python, run_ns3
 from lab.claims.network.study import RUNS, SCHEMES, STREET, Case
 from lab.claims.network.tasks import TimedRun, timed_run
 from network_sim.config import SchemeName
@@ -22,7 +22,7 @@ SATURATED: Counts = {"ieee802154": (1, 5), "ieee80211b": (1, 5, 20)}
 SATURATED_S = 10.0
 
 
-def network(
+def benchmark(
     objects: int = OBJECTS,
     horizon_s: float = STREET.run.horizon_s,
     runs: int = RUNS,
@@ -46,7 +46,13 @@ def network(
         "events_per_s": sum(run.events for run in timed) / elapsed_s,
     }
     timed.sort(key=lambda run: (SCHEMES.index(run.scheme), run.seed))
-    rows, missing = _saturated(saturated_s)
+    theirs: Theirs = {}
+    missing = []
+    try:
+        theirs, _ = run_ns3(find_python(), SATURATED, saturated_s)
+    except PacketMeshError as error:
+        missing.append(str(error))
+    rows = compare(SATURATED, theirs, saturated_s)
     return Benchmark(
         elapsed_s,
         {},
@@ -59,15 +65,6 @@ def network(
             *missing,
         ),
     )
-
-
-def _saturated(seconds: float) -> tuple[list[Row], list[str]]:
-    """Saturated nodes in both programs, and why not in ns-3."""
-    try:
-        theirs, _ = run_ns3(find_python(), SATURATED, seconds)
-    except PacketMeshError as error:
-        return compare(SATURATED, {}, seconds), [str(error)]
-    return compare(SATURATED, theirs, seconds), []
 
 
 def _record(row: Row) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lab.benchmarks.benchmark import run_alone
+from lab.benchmarks.benchmark import Benchmark, run_alone
 from lab.worlds.demos import build_demo, sense_depth
 from lab.worlds.render import Renderer
 from packetmesh.memory import peak_memory_bytes
@@ -41,16 +41,6 @@ class SpeedPair:
     """(4, 4) T_target_source."""
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedResult:
-    """Medians over the rounds, by method, ours first."""
-
-    elapsed_s: dict[str, float]
-    point_error_m: dict[str, float]
-    peak_memory_bytes: dict[str, int]
-    """Of a process that does nothing but this, libraries and clouds included."""
-
-
 def speed_pair(points: int = POINTS, seed: int = 0) -> SpeedPair:
     """The living room from its first camera and from ``MOTION`` beside it, ``points`` each."""
     scene = build_demo("living-room")
@@ -78,8 +68,10 @@ def thinned(pair: SpeedPair) -> SpeedPair:
     return SpeedPair(clouds[0], clouds[1], pair.T_true)
 
 
-def measure_speed(peers_thinned: bool = False, rounds: int = ROUNDS) -> SpeedResult:
+def benchmark(peers_thinned: bool) -> Benchmark:
     """Ours and every rival in turn, round by round, after one round to warm up.
+
+    Each program's memory is that of a process that does nothing else, libraries and clouds included.
 
     Args:
         peers_thinned: give the rivals only the points that ours takes, instead of all.
@@ -87,12 +79,12 @@ def measure_speed(peers_thinned: bool = False, rounds: int = ROUNDS) -> SpeedRes
     pair = speed_pair()
     names = (OURS, *(name for name in RIVALS if name in available_peers()))
     pairs = {name: thinned(pair) if peers_thinned and name != OURS else pair for name in names}
-    runs = [{name: _run(name, pairs[name]) for name in names} for _ in range(rounds + 1)][1:]
-    return SpeedResult(
-        {name: statistics.median(run[name][0] for run in runs) for name in names},
-        {name: statistics.median(run[name][1] for run in runs) for name in names},
-        {name: run_alone(_memory, name, pairs[name]) for name in names},
+    runs = [{name: _run(name, pairs[name]) for name in names} for _ in range(ROUNDS + 1)][1:]
+    seconds, errors_m = (
+        {name: statistics.median(run[name][value] for run in runs) for name in names} for value in (0, 1)
     )
+    memory = {name: run_alone(_memory, name, pairs[name]) for name in names}
+    return Benchmark(seconds.pop(OURS), seconds, memory.pop(OURS), memory, errors_m)
 
 
 def _run(name: str, pair: SpeedPair) -> tuple[float, float]:

@@ -87,7 +87,7 @@ class Claim:
 def bootstrap_ci95(
     values: FloatArray, seed: int = 0, resamples: int = 2000, statistic: Callable[..., Any] = np.mean
 ) -> tuple[float, float]:
-    """95 % percentile interval of the mean, or of another statistic, of (N,) ``values``."""
+    """95 % percentile interval of the mean, or of another statistic, of (N, ...) ``values``, N cases."""
     values = np.asarray(values, float)
     rows = np.random.default_rng(seed).integers(0, len(values), (resamples, len(values)))
     low, high = np.percentile(statistic(values[rows], axis=1), (2.5, 97.5))

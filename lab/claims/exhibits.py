@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -28,6 +29,12 @@ class Curve:
     low: tuple[float, ...]
     """Lower edge of its band."""
     high: tuple[float, ...]
+
+
+def plain_curve(label: str, x: Iterable[float], y: Iterable[float]) -> Curve:
+    """A line without a band."""
+    values = tuple(float(value) for value in y)
+    return Curve(label, tuple(float(value) for value in x), values, values, values)
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,8 +31,10 @@ def with_gross_outliers(cloud: PointCloud, rng: np.random.Generator) -> tuple[Fl
 def _experiment() -> Outcome:
     config = AcquisitionConfig(outlier_mode="thesis", outlier_neighbours=4, outlier_t=1.0)
     formula_agrees = True
-    lost: dict[str, list[float]] = {"lost_share": [], "lost_share_below_3_m": [], "lost_share_beyond_3_m": []}
-    caught: dict[str, list[float]] = {f"outliers_caught_share_{mode}": [] for mode in MODES}
+    names = ("lost_share", "lost_share_below_3_m", "lost_share_beyond_3_m")
+    found: dict[str, list[float]] = {
+        name: [] for name in (*names, *(f"outliers_caught_share_{mode}" for mode in MODES))
+    }
     for name in DEMO_SCENES:
         for index, frame in enumerate(load_demo(name).frames):
             cloud = back_project(frame)
@@ -41,18 +43,16 @@ def _experiment() -> Outcome:
             keep = filter_outliers(sample, config, focal_px).keep
             formula_agrees &= bool(np.array_equal(keep, brute_force_keep(sample.points_m, 4, 1.0)))
             removed, z_m = ~filter_outliers(cloud, config, focal_px).keep, cloud.points_m[:, 2]
-            lost["lost_share"].append(removed.mean())
-            if np.any(z_m < 3):
-                lost["lost_share_below_3_m"].append(removed[z_m < 3].mean())
-            if np.any(z_m >= 3):
-                lost["lost_share_beyond_3_m"].append(removed[z_m >= 3].mean())
+            for share, part in zip(names, (z_m > 0, z_m < 3, z_m >= 3), strict=True):
+                if part.any():
+                    found[share].append(removed[part].mean())
             points_m, moved = with_gross_outliers(cloud, np.random.default_rng(index))
             for mode in MODES:
                 planted = filter_outliers(
                     PointCloud(points_m), AcquisitionConfig(outlier_mode=mode), focal_px
                 )
-                caught[f"outliers_caught_share_{mode}"].append((~planted.keep)[moved].mean())
-    series = {key: np.array(values) for key, values in (lost | caught).items() if values}
+                found[f"outliers_caught_share_{mode}"].append((~planted.keep)[moved].mean())
+    series = {key: np.array(values) for key, values in found.items() if values}
     ours = {key: float(values.mean()) for key, values in series.items()}
     agreement = "exactly the points" if formula_agrees else "other points than those"
     return Outcome(

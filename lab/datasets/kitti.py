@@ -8,25 +8,23 @@ from __future__ import annotations
 import logging
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from lab.datasets.pair import Frame, Pair, Part, window
+from lab.datasets.pair import Load, Pair, load_pair, window
 from lab.datasets.projection import nearest_per_pixel
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_BYTES, read_bytes, read_text
-from pipeline.io.images import read_color, read_depth
-from pipeline.types import BoolArray, CameraIntrinsics, FloatArray
+from pipeline.io.images import read_color
+from pipeline.types import BoolArray, FloatArray
 
 log = logging.getLogger(__name__)
 
-LISTS: dict[Part, str] = {"train": "train_files.txt", "test": "test_files.txt"}
-"""Files of Eigen's split, as monodepth2 and its successors carry them, in the set's folder."""
-MAX_LIST_BYTES = 16_000_000
-"""Zhou's list of training frames has two million bytes."""
+LIST = "test_files.txt"
+"""Eigen's test split, as monodepth2 and its successors carry it, in the set's folder."""
 UNITS_PER_METRE = 256.0
 GARG = (0.40810811, 0.99189189, 0.03594771, 0.96405229)
 """Top, bottom, left and right of the crop of Garg et al., ECCV 2016, as shares of height and width."""
@@ -46,11 +44,6 @@ class _Place:
     camera: int
     """2 is the left colour camera, 3 the right one."""
     number: int
-
-    @property
-    def name(self) -> str:
-        side = "l" if self.camera == 2 else "r"
-        return f"{Path(self.drive).name}/{self.number:010d}{side}"
 
     @property
     def picture(self) -> Path | None:
@@ -74,66 +67,57 @@ class _Place:
         return _first([self.root / self.drive / "velodyne_points/data" / f"{self.number:010d}.bin"])
 
 
-def find(root: Path) -> list[Frame]:
-    """The frames of the lists of Eigen's split in ``root``, else of every drive below it.
+def find(root: Path) -> list[Load]:
+    """The frames of the list of Eigen's test split in ``root``, else of every drive below it.
 
-    Where one frame of a list has the improved ground truth, only those that have it count, as in
-    published tables (652 of the 697 test frames); else the truth is what the laser saw.
+    Where one frame has the improved ground truth, only those that have it count, as in published tables
+    (652 of the 697 test frames); else the truth is what the laser saw.
 
     Raises:
-        InputError: a list with a line that names no frame.
+        InputError: the list has a line that names no frame.
     """
-    places = _listed(root) or _found(root)
-    there = [(place, part) for place, part in places if place.picture]
+    places = _listed(root / LIST) if (root / LIST).is_file() else _found(root)
+    there = [place for place in places if place.picture]
     if len(there) < len(places):
         log.warning("%d of %d listed pictures are not below %s", len(places) - len(there), len(places), root)
-    improved = {part for place, part in there if place.improved}
-    return [
-        Frame(place.name, partial(_load, place), part)
-        for place, part in there
-        if (place.improved if part in improved else place.laser)
-    ]
+    improved = [place for place in there if place.improved]
+    return [partial(_load, place) for place in improved or [place for place in there if place.laser]]
 
 
 def _first(paths: Iterable[Path]) -> Path | None:
     return next((path for path in paths if path.is_file()), None)
 
 
-def _listed(root: Path) -> list[tuple[_Place, Part | None]]:
-    places: list[tuple[_Place, Part | None]] = []
-    for part, file in LISTS.items():
-        if not (root / file).is_file():
-            continue
-        text = read_bytes(root / file, MAX_LIST_BYTES, "list of KITTI frames").decode(errors="replace")
-        for line in filter(str.strip, text.splitlines()):
-            match = _LINE.match(line)
-            if match is None:
-                raise InputError(
-                    f"The list {root / file} has the line '{line[:80]}', which names no frame; "
-                    "try lines such as '2011_09_26/2011_09_26_drive_0002_sync 0000000069 l'"
-                )
-            camera = int(match["camera"] or (3 if match["side"] == "r" else 2))
-            places.append((_Place(root, match["drive"], camera, int(match["frame"])), part))
+def _listed(file: Path) -> list[_Place]:
+    places = []
+    for line in filter(str.strip, read_text(file, "list of KITTI frames").splitlines()):
+        match = _LINE.match(line)
+        if match is None:
+            raise InputError(
+                f"The list {file} has the line '{line[:80]}', which names no frame; "
+                "try lines such as '2011_09_26/2011_09_26_drive_0002_sync 0000000069 l'"
+            )
+        camera = int(match["camera"] or (3 if match["side"] == "r" else 2))
+        places.append(_Place(file.parent, match["drive"], camera, int(match["frame"])))
     return places
 
 
-def _found(root: Path) -> list[tuple[_Place, Part | None]]:
+def _found(root: Path) -> list[_Place]:
     pictures = [path for path in root.glob("*/*_sync/image_02/data/*") if path.stem.isdecimal()]
     return [
-        (_Place(root, path.parents[2].relative_to(root).as_posix(), 2, int(path.stem)), None)
+        _Place(root, path.parents[2].relative_to(root).as_posix(), 2, int(path.stem))
         for path in sorted(pictures)
     ]
 
 
 def _load(place: _Place) -> Pair:
     assert place.picture is not None
-    rgb = read_color(place.picture)
     if place.improved:
-        z_m = read_depth(place.improved, UNITS_PER_METRE).z_m
-        intrinsics = _intrinsics(place, rgb.shape) if place.cameras.is_file() else None
+        pair = load_pair(place.picture, place.improved, UNITS_PER_METRE)
     else:
-        z_m, intrinsics = _laser_depth(place, rgb.shape[:2]), _intrinsics(place, rgb.shape)
-    return Pair(place.name, rgb, z_m, intrinsics, judged(rgb.shape))
+        rgb = read_color(place.picture)
+        pair = Pair(place.picture, rgb, _laser_depth(place, rgb.shape[:2]))
+    return replace(pair, judged=judged(pair.rgb.shape))
 
 
 def judged(shape: tuple[int, ...]) -> BoolArray:
@@ -156,23 +140,13 @@ def _laser_depth(place: _Place, shape: tuple[int, int]) -> FloatArray:
     points_m = np.frombuffer(data, "<f4").reshape(-1, 4)[:, :3].astype(np.float64)
     file = place.cameras.with_name("calib_velo_to_cam.txt")
     R, T_m = _matrix(file, "R", (3, 3)), _matrix(file, "T", (3,))
-    R_rect, P = _matrix(place.cameras, "R_rect_00", (3, 3)), _projection(place)
+    R_rect = _matrix(place.cameras, "R_rect_00", (3, 3))
+    P = _matrix(place.cameras, f"P_rect_0{place.camera}", (3, 4))
     rectified_m = (points_m[points_m[:, 0] >= 0] @ R.T + T_m) @ R_rect.T
     image = rectified_m @ P[:, :3].T + P[:, 3]
     image = image[image[:, 2] > 0]
-    pixels = np.rint(image[:, :2] / image[:, 2:]).astype(int) - 1
+    pixels = np.rint(image[:, :2] / image[:, 2:]).astype(int) - 1  # KITTI counts from one, as Matlab does
     return nearest_per_pixel(pixels, image[:, 2], shape)
-
-
-def _projection(place: _Place) -> FloatArray:
-    """(3, 4) from the rectified frame of camera 0 to this camera's pixels, counted from one."""
-    return _matrix(place.cameras, f"P_rect_0{place.camera}", (3, 4))
-
-
-def _intrinsics(place: _Place, shape: tuple[int, ...]) -> CameraIntrinsics:
-    """KITTI's tools count pixels from one, as Matlab does; here they count from zero."""
-    P, (height, width) = _projection(place), shape[:2]
-    return CameraIntrinsics.pinhole(P[0, 0], P[1, 1], P[0, 2] - 1.0, P[1, 2] - 1.0, width, height)
 
 
 def _matrix(file: Path, key: str, shape: tuple[int, ...]) -> FloatArray:

@@ -7,11 +7,10 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from lab.datasets import folder, kitti, middlebury, nyu, sr300, sunrgbd, tum
-from lab.datasets.pair import Frame, Pair, Part
-from lab.datasets.splits import split_by_scene
+from lab.datasets.pair import Load, Pair
 from packetmesh.errors import InputError
 
-SETS: dict[str, Callable[[Path], list[Frame]]] = {
+SETS: dict[str, Callable[[Path], list[Load]]] = {
     "nyu": nyu.find,
     "kitti": kitti.find,
     "sunrgbd": sunrgbd.find,
@@ -20,27 +19,24 @@ SETS: dict[str, Callable[[Path], list[Frame]]] = {
     "middlebury": middlebury.find,
     "sr300": sr300.find,
 }
-"""What finds the frames of each kind of set in a folder."""
+"""What finds the pairs of each kind of set in a folder."""
 EXPECTED = {
     "nyu": "nyu_depth_v2_labeled.mat, or pictures *.jpg beside 16-bit depth *.png",
     "kitti": "DATE/DATE_drive_NUMBER_sync/image_02/data with ground-truth PNG or velodyne files",
-    "sunrgbd": "folders with image/, depth_bfx/ or depth/, and intrinsics.txt",
+    "sunrgbd": "folders with image/ and depth_bfx/ or depth/",
     "tum": "sequences with rgb.txt and depth.txt, less than 20 ms apart",
     "folder": "color/NAME and depth/NAME.png, NAME_rgb and NAME_depth.png, or color.png and depth.png",
     "middlebury": "im0.png, disp0.pfm and calib.txt, or motorcycle_left.png and motorcycle_disp.npz",
     "sr300": "depth_M_color.txt beside chateau.xml, and castel/image_0000.pgm with its depth_image_0000.bin",
 }
 """What a folder of each kind holds, for the message when it does not."""
-HELD_OUT_SHARE, SPLIT_SEED = 0.2, 0
 
 
-def open_set(spec: str, part: Part | None = None) -> Iterator[Pair]:
-    """The pairs of a set, read one by one.
+def open_set(spec: str) -> Iterator[Pair]:
+    """The pairs of a set, read one by one; of a set with a split of its own, the test pairs.
 
     Args:
         spec: ``kind=path`` with a kind of ``SETS`` and the set's folder (or NYU's .mat file).
-        part: ``train`` or ``test`` by the set's own split, else by scene, a fifth held out. Without a
-            part: the test frames of a set with a split of its own, all frames of any other.
 
     Raises:
         InputError: no such kind or folder, no pair there, or while reading, a file that cannot be used.
@@ -56,23 +52,9 @@ def open_set(spec: str, part: Part | None = None) -> Iterator[Pair]:
     root = Path(path.strip()).expanduser()
     if not root.exists():
         raise InputError(f"The folder {root} of the set {kind} does not exist; check the path")
-    frames = SETS[kind](root)
-    if not frames:
+    pairs = SETS[kind](root)
+    if not pairs:
         raise InputError(
             f"There is no pair of picture and depth in {root}; a {kind} set has {EXPECTED[kind]}"
         )
-    return (frame.load() for frame in _chosen(frames, part, spec))
-
-
-def _chosen(frames: list[Frame], part: Part | None, spec: str) -> list[Frame]:
-    if any(frame.part for frame in frames):
-        wanted = part or "test"
-        chosen = [frame for frame in frames if frame.part == wanted]
-        if not chosen:
-            raise InputError(f"The split that lies beside {spec} has no {wanted} frames; add its other list")
-        return chosen
-    if part is None:
-        return frames
-    train, test = split_by_scene((frame.name for frame in frames), HELD_OUT_SHARE, SPLIT_SEED)
-    names = set(train if part == "train" else test)
-    return [frame for frame in frames if frame.name in names]
+    return (load() for load in pairs)

@@ -4,27 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
 
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.types import BoolArray, ByteArray, CameraIntrinsics, FloatArray
-
-Part = Literal["train", "test"]
+from pipeline.io.images import read_color, read_depth
+from pipeline.types import BoolArray, ByteArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
     """One picture and its true depth, on the same pixel grid."""
 
-    name: str
-    """``scene/frame``; frames of one scene show the same place."""
+    picture: Path
+    """The file, and for one of many in a file its number below that."""
     rgb: ByteArray
     """(H, W, 3) RGB; grey pictures have three equal channels."""
     truth_m: FloatArray
     """(H, W) float32, metres along the optical axis, NaN where unknown."""
-    intrinsics: CameraIntrinsics | None = None
     judged: BoolArray | None = None
     """(H, W) the pixels that this set's evaluations compare; None when all of them."""
 
@@ -33,20 +31,22 @@ class Pair:
         if self.truth_m.shape != self.rgb.shape[:2]:
             picture, depth = (f"{w} x {h}" for h, w in (self.rgb.shape[:2], self.truth_m.shape))
             raise InputError(
-                f"{self.name} has a picture of {picture} and depth of {depth} pixels; "
+                f"{self.picture} has a picture of {picture} and depth of {depth} pixels; "
                 "try the set's depth that is registered to its pictures"
             )
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
-    """A pair that lies on disk."""
+Load = Callable[[], Pair]
+"""Reads the files of a pair that lies on disk."""
 
-    name: str
-    load: Callable[[], Pair]
-    """Reads the files."""
-    part: Part | None = None
-    """Where the set's own split puts it; None when the set has none."""
+
+def load_pair(picture: Path, depth: Path, units_per_metre: float = 1000.0) -> Pair:
+    """A picture with its 16-bit depth image, whose value 0 means unknown.
+
+    Raises:
+        InputError: one cannot be read, or they differ in size.
+    """
+    return Pair(picture, read_color(picture), read_depth(depth, units_per_metre).z_m)
 
 
 def window(shape: tuple[int, ...], rows: slice, columns: slice) -> BoolArray:

@@ -11,12 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from lab.datasets.pair import Frame, Pair
+from lab.datasets.netpbm import read_netpbm
+from lab.datasets.pair import Load, Pair
 from lab.datasets.projection import nearest_per_pixel
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes, read_text
 from pipeline.geometry import project
-from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
+from pipeline.types import CameraIntrinsics, FloatArray
 
 METRES_PER_UNIT = 0.000124986647
 NEAREST_M = 0.1
@@ -24,27 +25,25 @@ NEAREST_M = 0.1
 INVERSE_DISTORTION = (0.165056542, -0.0508309528, 0.00435937941, 0.00541406544, 0.250085592)
 """k1, k2, p1, p2, k3 of the depth camera, which lead from its pixels to rays, not back (librealsense's
 inverse Brown-Conrady); the tutorial has them, the set's own files do not."""
-_PGM = re.compile(rb"P5\s+(\d+)\s+(\d+)\s+255\s")
 
 
-def find(root: Path) -> list[Frame]:
+def find(root: Path) -> list[Load]:
     """The frames beside every ``depth_M_color.txt`` at or below ``root``."""
-    frames = []
+    pairs: list[Load] = []
     for extrinsics in sorted(root.rglob("depth_M_color.txt")):
         for picture in sorted(extrinsics.parent.glob("*/image_*.pgm")):
             depth = picture.with_name(f"depth_{picture.stem}.bin")
             if depth.is_file():
-                name = f"{extrinsics.parent.name}/{picture.stem}"
-                frames.append(Frame(name, partial(_load, name, extrinsics, picture, depth)))
-    return frames
+                pairs.append(partial(_load, extrinsics, picture, depth))
+    return pairs
 
 
-def _load(name: str, extrinsics: Path, picture: Path, depth: Path) -> Pair:
-    grey, z_m = read_pgm(picture), read_depth_bin(depth)
+def _load(extrinsics: Path, picture: Path, depth: Path) -> Pair:
+    grey, z_m = read_netpbm(picture), read_depth_bin(depth)
     color_camera = _camera(extrinsics.with_name("chateau.xml"), grey.shape)
     depth_camera = _camera(extrinsics.with_name("chateau_depth.xml"), z_m.shape)
     truth_m = registered(z_m, depth_camera, color_camera, np.linalg.inv(_pose(extrinsics)))
-    return Pair(name, np.repeat(grey[..., None], 3, axis=2), truth_m, color_camera)
+    return Pair(picture, np.repeat(grey[..., None], 3, axis=2), truth_m)
 
 
 def registered(
@@ -90,24 +89,6 @@ def rays(camera: CameraIntrinsics, pixels: FloatArray) -> FloatArray:
         ],
         axis=1,
     )
-
-
-def read_pgm(file: Path) -> ByteArray:
-    """(H, W) uint8 of a binary PGM file.
-
-    Raises:
-        InputError: missing, truncated, or no 8-bit PGM.
-    """
-    data = read_bytes(file, MAX_IMAGE_BYTES, "grey image")
-    header = _PGM.match(data)
-    if header is None:
-        raise InputError(
-            f"The grey image {file} is no 8-bit PGM file; try the castel folder of ViSP's images"
-        )
-    width, height = int(header[1]), int(header[2])
-    if len(data) < header.end() + width * height:
-        raise InputError(f"The grey image {file} is truncated; try to unpack ViSP's images again")
-    return np.frombuffer(data, np.uint8, width * height, header.end()).reshape(height, width)
 
 
 def read_depth_bin(file: Path) -> FloatArray:

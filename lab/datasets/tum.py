@@ -5,48 +5,35 @@ Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012.
 
 from __future__ import annotations
 
-import re
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from lab.datasets.pair import Frame, Pair
+from lab.datasets.pair import Load, load_pair
 from packetmesh.errors import InputError
 from packetmesh.files import read_text
-from pipeline.io.images import read_color, read_depth
-from pipeline.io.intrinsics import read_intrinsics
-from pipeline.types import CameraIntrinsics, FloatArray
+from pipeline.types import FloatArray
 
 UNITS_PER_METRE = 5000.0
 LARGEST_GAP_S = 0.02
-WIDTH_PX, HEIGHT_PX = 640, 480
-_DEFAULT = ((525.0, 525.0, 319.5, 239.5), (0.0, 0.0, 0.0, 0.0, 0.0))
-_CALIBRATED = {
-    "1": ((517.3, 516.5, 318.6, 255.3), (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)),
-    "2": ((520.9, 521.0, 325.1, 249.7), (0.2312, -0.7849, -0.0033, -0.0001, 0.9172)),
-    "3": ((535.4, 539.2, 320.1, 247.6), (0.0, 0.0, 0.0, 0.0, 0.0)),
-}
-"""The benchmark's calibration of its three cameras: fx fy cx cy in pixels, and the distortion."""
 
 
-def find(root: Path) -> list[Frame]:
+def find(root: Path) -> list[Load]:
     """The frames of the sequence ``root``, or of all sequences below it.
 
     Raises:
         InputError: a list with a line that is no time and file.
     """
-    frames = []
+    pairs: list[Load] = []
     for listing in sorted(root.rglob("rgb.txt")):
         folder = listing.parent
-        if not (folder / "depth.txt").is_file():
-            continue
-        (rgb_s, pictures), (depth_s, depths) = _listed(listing), _listed(folder / "depth.txt")
-        for i, j in associate(rgb_s, depth_s):
-            name = f"{folder.resolve().name}/{rgb_s[i]:.6f}"
-            frames.append(Frame(name, partial(_load, name, folder, pictures[i], depths[j])))
-    return frames
+        if (folder / "depth.txt").is_file():
+            (rgb_s, pictures), (depth_s, depths) = _listed(listing), _listed(folder / "depth.txt")
+            for i, j in associate(rgb_s, depth_s):
+                files = folder / pictures[i], folder / depths[j]
+                pairs.append(partial(load_pair, *files, UNITS_PER_METRE))
+    return pairs
 
 
 def associate(first_s: FloatArray, second_s: FloatArray) -> list[tuple[int, int]]:
@@ -85,20 +72,3 @@ def _listed(file: Path) -> tuple[FloatArray, list[str]]:
             ) from None
     rows.sort()
     return np.array([time_s for time_s, _ in rows]), [path for _, path in rows]
-
-
-def _load(name: str, folder: Path, picture: str, depth: str) -> Pair:
-    rgb, z_m = read_color(folder / picture), read_depth(folder / depth, UNITS_PER_METRE).z_m
-    return Pair(name, rgb, z_m, _intrinsics(folder, rgb.shape))
-
-
-def _intrinsics(folder: Path, shape: tuple[int, ...]) -> CameraIntrinsics | None:
-    """Those of ``intrinsics.json`` in the sequence, else of the camera in its name; None at another size."""
-    if (folder / "intrinsics.json").is_file():
-        return read_intrinsics(folder / "intrinsics.json")
-    if shape[:2] != (HEIGHT_PX, WIDTH_PX):
-        return None
-    camera = re.search(r"(?:freiburg|fr)([123])", folder.resolve().name)
-    numbers, distortion = _CALIBRATED[camera[1]] if camera else _DEFAULT
-    pinhole = CameraIntrinsics.pinhole(*numbers, WIDTH_PX, HEIGHT_PX)
-    return replace(pinhole, distortion=np.array(distortion))

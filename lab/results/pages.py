@@ -19,14 +19,14 @@ BEGIN, END = "<!-- results: written by `make results` -->", "<!-- end of results
 SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "reconstruct": ("What comes out", tables.reconstructions),
     "bench_chain": ("Time and memory of the whole chain", tables.chain_speed),
-    "outlier_claims": ("Outlier filter: the thesis's claim", tables.verdicts),
-    "depth_claims": ("Inferred depth: the thesis's claims", tables.depth_claims),
+    "outlier_claims": ("Outlier filter: the thesis's claim", tables.claims),
+    "depth_claims": ("Inferred depth: the thesis's claims", tables.claims),
     "bench_depth": ("Filling holes", tables.filling),
     "registration_claims": ("Registration: the thesis's claims", tables.registration_claims),
     "bench_registration": ("Registration: speed", tables.registration_speed),
-    "surface_claims": ("Ball pivoting: the thesis's claims", tables.surface_claims),
+    "surface_claims": ("Ball pivoting: the thesis's claims", tables.claims),
     "bench_surface": ("Ball pivoting: speed", tables.rolling_speed),
-    "network_claims": ("The camera network: the thesis's claims", tables.network_claims),
+    "network_claims": ("The camera network: the thesis's claims", tables.claims),
     "bench_network": ("The camera network: speed", tables.network_speed),
     "ns3_saturation": ("The camera network: throughput beside ns-3", tables.ns3_throughput),
 }

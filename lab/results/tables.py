@@ -12,6 +12,23 @@ METHODS = (
 )
 """The thesis's rivals, CEICP-A and those that come nearest to it; the report of `reproduce` has all."""
 OURS = "ceicp-a"
+SHOWN = (
+    ("C12", "Errors of inferred depth, median-scaled"),
+    ("C14", ""),
+    ("C16", "One node, all six conditions: ceicp-a"),
+    ("C16", "Two nodes"),
+    ("C17", "Ablations"),
+    ("C21", "The printed radii"),
+    ("C22", "Rays that find nothing"),
+    ("C23", "Stairs"),
+    ("C24", "Time and storage"),
+    ("C28", "Table 4.6"),
+    ("C32", "Saturated throughput, with an EIFS"),
+    ("C34", "Figure 4.10 in numbers"),
+    ("C35", "GREEDY"),
+    ("C36", "F(S)"),
+)
+"""Claims, and how the titles begin of those of their tables that the page shows."""
 
 
 def reconstructions(numbers: Row) -> str:
@@ -61,32 +78,15 @@ def _falls(numbers: Row) -> str:
     return listed(parts)
 
 
-def verdicts(numbers: Row) -> str:
-    """Every claim with its verdict."""
+def claims(numbers: Row, *between: str) -> str:
+    """Every claim with its verdict, what comes ``between``, and the claims' tables in ``SHOWN``."""
     rows = [
         (name, claim["claim"], claim["thesis"], claim["verdict"], claim["why"])
         for name, claim in numbers.items()
     ]
-    return table(("", "claim", "the thesis", "verdict", "ours"), rows)
-
-
-def surface_claims(numbers: Row) -> str:
-    """C21 to C24."""
-    return "\n\n".join(
-        (
-            verdicts(numbers),
-            exhibit(numbers["C21"], "The printed radii"),
-            exhibit(numbers["C22"], "Rays that find nothing"),
-            exhibit(numbers["C23"], "Stairs"),
-            exhibit(numbers["C24"], "Time and storage"),
-        )
-    )
-
-
-def depth_claims(numbers: Row) -> str:
-    """C12 to C14."""
-    tables = (exhibit(numbers["C12"], "Errors of inferred depth, median-scaled"), exhibit(numbers["C14"], ""))
-    return "\n\n".join((verdicts(numbers), *tables))
+    verdicts = table(("", "claim", "the thesis", "verdict", "ours"), rows)
+    exhibits = [exhibit(numbers[name], title) for name, title in SHOWN if name in numbers]
+    return "\n\n".join((verdicts, *between, *exhibits))
 
 
 def filling(numbers: Row) -> str:
@@ -127,17 +127,12 @@ def registration_claims(numbers: Row) -> str:
     methods = [method for method in METHODS if method in medians]
     conditions = list(medians[OURS])
     rows = [(label, *(medians[method].get(label) for method in methods)) for label in conditions]
-    return "\n\n".join(
-        (
-            verdicts(numbers),
-            "Median point error in centimetres and, in brackets, the share of rooms that end within 2 cm; "
-            "all methods tuned with equal effort on other rooms. A dash: the method did not take part.",
-            table(("condition", *methods), rows),
-            f"Plain ICP ends nearer to the truth than CEICP-A in: {'; '.join(losses(medians, 'icp'))}.",
-            exhibit(numbers["C16"], "One node, all six conditions: ceicp-a"),
-            exhibit(numbers["C16"], "Two nodes"),
-            exhibit(numbers["C17"], "Ablations"),
-        )
+    return claims(
+        numbers,
+        "Median point error in centimetres and, in brackets, the share of rooms that end within 2 cm; "
+        "all methods tuned with equal effort on other rooms. A dash: the method did not take part.",
+        table(("condition", *methods), rows),
+        f"Plain ICP ends nearer to the truth than CEICP-A in: {'; '.join(losses(medians, 'icp'))}.",
     )
 
 
@@ -201,20 +196,6 @@ Share of the points with the mesh within half a point spacing:
 Memory on top of the cloud, MB:
 
 {pivot(runs, "program", columns, lambda run: text(run["added_memory_bytes"] / 1e6))}"""
-
-
-def network_claims(numbers: Row) -> str:
-    """C26 to C36."""
-    return "\n\n".join(
-        (
-            verdicts(numbers),
-            exhibit(numbers["C28"], "Table 4.6"),
-            exhibit(numbers["C32"], "Saturated throughput, with an EIFS"),
-            exhibit(numbers["C34"], "Figure 4.10 in numbers"),
-            exhibit(numbers["C35"], "GREEDY"),
-            exhibit(numbers["C36"], "F(S)"),
-        )
-    )
 
 
 def network_speed(numbers: Row) -> str:

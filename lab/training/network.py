@@ -8,10 +8,8 @@ from typing import Any, Literal
 import torch
 from torch import Tensor, nn
 
+from lab.training.config import Width
 from lab.training.efficientnet import EfficientNetLite0
-
-Width = Literal["full", "half", "lite0"]
-"""Of the encoder: the ResNet-50 at full or half width, or EfficientNet-Lite0, which has one."""
 
 DEPTH_MIN_M = 0.1
 DEPTH_MAX_M = 10.0

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -20,47 +19,23 @@ import torch
 from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
+from lab.training.config import Precision, TrainingConfig
 from lab.training.dataset import Shards, augment
-from lab.training.initial import Initial, initial_network
-from lab.training.losses import Loss, supervised_loss
-from lab.training.network import DEPTH_MAX_M, DEPTH_MIN_M, DepthNet, Width
+from lab.training.initial import initial_network
+from lab.training.losses import supervised_loss
+from lab.training.network import DEPTH_MAX_M, DEPTH_MIN_M, DepthNet
 from lab.training.parallel import Team, run_team
 from packetmesh.errors import InputError
+from packetmesh.files import atomic_path
 from pipeline.depth.metrics import depth_errors
 from pipeline.depth.preprocessing import normalised_input
 
-Precision = Literal["bf16", "fp32"]
-
 CHECKPOINT_EVERY_S = 180.0
+GRADIENT_CLIP = 1.0
+RISE = 0.04
+"""Share of the budget in which the learning rate rises."""
 VALIDATION_IMAGES = 48
 MEASURED_BATCHES = 8
-
-
-@dataclass(frozen=True, slots=True)
-class TrainingConfig:
-    """How a network is trained; recorded in every checkpoint."""
-
-    data: Path
-    """Folder of rendered shards."""
-    out: Path
-    """Folder of checkpoints and the log."""
-    minutes: float = 75.0
-    """Wall-clock budget of this and all resumed runs together."""
-    pause_minutes: float = math.inf
-    """This run saves and stops after so long even if the budget is not spent; the next one continues it."""
-    learning_rate: float = 4e-4
-    """Peak of the one-cycle schedule; it rises for 4 % of the budget and falls by a cosine to zero."""
-    gradient_clip: float = 1.0
-    seed: int = 0
-    width: Width = "full"
-    initial: Initial = "random"
-    loss: Loss = "scale-invariant"
-    precision: Precision = "bf16"
-    """Of the network's arithmetic; the loss is always fp32."""
-    device: Literal["auto", "cpu", "cuda"] = "auto"
-    """``auto`` takes a GPU when there is one."""
-    processes: int = 2
-    """They share each batch, one core each; on a GPU one process trains."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +132,7 @@ def start(config: TrainingConfig) -> None:
     samples = endless_samples(config.data, np.random.default_rng(config.seed))
     images = (collate(list(islice(samples, stage.batch)), stage)[0] for _ in range(MEASURED_BATCHES))
     model = initial_network(config.initial, config.width, images)
-    save_checkpoint(config, model, optimizer_of(model, config), TrainingState())
+    write(config, "last", model, TrainingState(), optimizer=optimizer_of(model, config).state_dict())
 
 
 def train_member(team: Team, config: TrainingConfig, stop: Tensor) -> None:
@@ -188,7 +163,7 @@ def train_member(team: Team, config: TrainingConfig, stop: Tensor) -> None:
         if team.size > 1:
             now_s = team.average_gradients(model.parameters(), state.step, now_s)
         stopping, now_s = now_s < 0.0, abs(now_s)
-        update(model, optimizer, scheduled_rate(config.learning_rate, spent), config.gradient_clip)
+        update(model, optimizer, scheduled_rate(config.learning_rate, spent))
         state = TrainingState(state.step + 1, state.images_seen + stage.batch, now_s)
         if state.step % 20 == 0:
             if team.leads:
@@ -197,7 +172,7 @@ def train_member(team: Team, config: TrainingConfig, stop: Tensor) -> None:
         if team.leads and (stopping or now_s >= end_s or now_s - saved_at_s > CHECKPOINT_EVERY_S):
             if not stopping:
                 judge(config, model, validation, stage, state)
-            save_checkpoint(config, model, optimizer, state)
+            write(config, "last", model, state, optimizer=optimizer.state_dict())
             saved_at_s = now_s
 
 
@@ -227,20 +202,20 @@ def backward(model: DepthNet, image: Tensor, target_m: Tensor, config: TrainingC
     return loss.detach()
 
 
-def update(model: DepthNet, optimizer: torch.optim.Optimizer, rate: float, gradient_clip: float) -> None:
+def update(model: DepthNet, optimizer: torch.optim.Optimizer, rate: float) -> None:
     """One step along the clipped gradients; none if they are not finite."""
     for group in optimizer.param_groups:
         group["lr"] = rate
-    norm = torch.nn.utils.clip_grad_norm_(model.parameters(), gradient_clip)
+    norm = torch.nn.utils.clip_grad_norm_(model.parameters(), GRADIENT_CLIP)
     if torch.isfinite(norm):
         optimizer.step()
 
 
-def scheduled_rate(peak: float, spent: float, rise: float = 0.04) -> float:
+def scheduled_rate(peak: float, spent: float) -> float:
     """One-cycle learning rate when the share ``spent`` (0 to 1) of the budget is gone."""
-    if spent < rise:
-        return peak * (0.05 + 0.95 * spent / rise)
-    return peak * 0.5 * (1.0 + math.cos(math.pi * min(1.0, (spent - rise) / (1.0 - rise))))
+    if spent < RISE:
+        return peak * (0.05 + 0.95 * spent / RISE)
+    return peak * 0.5 * (1.0 + math.cos(math.pi * min(1.0, (spent - RISE) / (1.0 - RISE))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,8 +273,8 @@ def validate(
     model.eval()
     device = next(model.parameters()).device
     errors = []
-    for row in np.linspace(0, len(shards) - 1, VALIDATION_IMAGES).astype(int):
-        image, truth_m = collate([shards[row]], stage)
+    for sample in shards.evenly(VALIDATION_IMAGES):
+        image, truth_m = collate([sample], stage)
         with torch.autocast(device.type, torch.bfloat16, enabled=precision == "bf16"):
             depth_m = model(image.to(device))[0]
         errors.append(depth_errors(depth_m.cpu().numpy(), truth_m.numpy()))
@@ -317,13 +292,6 @@ def log(folder: Path, state: TrainingState, **values: float) -> None:
     print(line, flush=True)
 
 
-def save_checkpoint(
-    config: TrainingConfig, model: DepthNet, optimizer: torch.optim.Optimizer, state: TrainingState
-) -> None:
-    """Replace ``out/last.pt``."""
-    write(config, "last", model, state, optimizer=optimizer.state_dict())
-
-
 def keep_best(
     config: TrainingConfig, model: DepthNet, state: TrainingState, errors: dict[str, float]
 ) -> None:
@@ -337,10 +305,9 @@ def keep_best(
 
 def write(config: TrainingConfig, name: str, model: DepthNet, state: TrainingState, **more: object) -> None:
     """Replace a checkpoint in ``out`` in one move."""
-    temporary = config.out / f"{name}.tmp"
     plain = asdict(replace(config, data=str(config.data), out=str(config.out)))  # type: ignore[arg-type]
-    torch.save({"model": model.state_dict(), "state": asdict(state), "config": plain, **more}, temporary)
-    temporary.rename(config.out / f"{name}.pt")
+    with atomic_path(config.out / f"{name}.pt") as temporary:
+        torch.save({"model": model.state_dict(), "state": asdict(state), "config": plain, **more}, temporary)
 
 
 def resume(config: TrainingConfig, model: DepthNet, optimizer: torch.optim.Optimizer) -> TrainingState:

@@ -72,10 +72,8 @@ class RoomPlan:
         others = [thing for thing in self.placed if thing is not support]
         if not others:
             return True
-        lows, highs = (
-            np.array([thing.low_m for thing in others]),
-            np.array([thing.high_m for thing in others]),
-        )
+        lows = np.array([thing.low_m for thing in others])
+        highs = np.array([thing.high_m for thing in others])
         return not np.any(np.all((low_m < highs - 1e-6) & (high_m > lows + 1e-6), axis=1))
 
     def add(self, entry: Entry, T: FloatArray, support: Placed | None = None) -> Placed | None:
@@ -175,11 +173,8 @@ def _hang_entry(plan: RoomPlan, wall: int, along_m: float) -> float:
     if entry is None:
         return 0.5
     size = placed_size_m(entry)
-    z = (
-        entry.elevation_m
-        if entry.elevation_m > 0.0 or entry.role == "opening"
-        else plan.rng.uniform(0.9, 1.6)
-    )
+    fixed = entry.elevation_m > 0.0 or entry.role == "opening"
+    z = entry.elevation_m if fixed else plan.rng.uniform(0.9, 1.6)
     z = min(z, plan.size_m[2] - size[2] - 0.02)
     if z < 0.0:
         return 0.1

@@ -103,13 +103,11 @@ def _fan(words: list[str], vertices: int, places: int) -> Iterator[tuple[int, in
 
 def _read_library(archive: zipfile.ZipFile, path: str) -> dict[str, Finish]:
     """The materials of an MTL file by name; none if the file is missing."""
-    try:
-        lines = archive.read(path).decode("latin-1").splitlines()
-    except KeyError:
+    if path not in archive.namelist():
         return {}
     library: dict[str, Finish] = {}
     finish = Finish()
-    for line in lines:
+    for line in archive.read(path).decode("latin-1").splitlines():
         word, _, rest = line.strip().partition(" ")
         values = rest.split()
         if word == "newmtl":
@@ -123,17 +121,9 @@ def _read_library(archive: zipfile.ZipFile, path: str) -> dict[str, Finish]:
         elif word == "d" and values:
             finish.opacity = float(values[-1])
         elif word == "map_Kd" and values:
-            finish.image = _read_image(archive, join_path(dirname(path), rest.strip().replace("\\", "/")))
+            image = normpath(join_path(dirname(path), rest.strip().replace("\\", "/")))
+            finish.image = decode_image(archive.read(image)) if image in archive.namelist() else None
     return library
-
-
-def _read_image(archive: zipfile.ZipFile, path: str) -> ByteArray | None:
-    """(H, W, 4) RGBA, at most 512 pixels wide and high; None if it is missing or unreadable."""
-    try:
-        content = archive.read(normpath(path))
-    except KeyError:
-        return None
-    return decode_image(content)
 
 
 def decode_image(content: bytes) -> ByteArray | None:

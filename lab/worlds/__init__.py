@@ -6,11 +6,4 @@ from lab.worlds.rooms import random_room
 from lab.worlds.scene import Scene
 from lab.worlds.sensor import sense_depth
 
-__all__ = [
-    "Scene",
-    "View",
-    "box_room",
-    "random_room",
-    "render",
-    "sense_depth",
-]
+__all__ = ["Scene", "View", "box_room", "random_room", "render", "sense_depth"]

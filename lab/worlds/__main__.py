@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 
 from lab.worlds.demos import DEMOS, render_demo
-from packetmesh.files import write_json
 from pipeline.io.demos import SCENES
 from pipeline.io.rigs import save_rig
 
 
 def main(names: list[str]) -> None:
-    """Write the rigs of the demos named, or of all, with their truth and their descriptions."""
+    """Write the rigs of the demos named, or of all, with their truth."""
     for name in names or DEMOS:
         rig = render_demo(name)
         save_rig(SCENES / name, rig)
-        write_json(SCENES / name / "scene.json", dataclasses.asdict(DEMOS[name][1]))
         shares = ", ".join(f"{frame.depth.coverage:.0%}" for frame in rig.frames)
         print(f"{name}: sensor depth covers {shares}")
 

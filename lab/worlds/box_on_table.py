@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from lab.worlds import furniture, textures
-from lab.worlds.furniture import place
-from lab.worlds.furniture.finishes import cardboard, linear, painted
-from lab.worlds.scene import Light, Material, Part, Scene
+from lab.worlds import textures
+from lab.worlds.furniture import electronics, fixtures, lights, plants, seating, tables, things
+from lab.worlds.furniture.finishes import cardboard, painted
+from lab.worlds.furniture.placing import board, place
+from lab.worlds.scene import Light, Material, Part, Rng, Scene
 from lab.worlds.staging import NORTH, SOUTH, VGA, WALL_M, WEST, arc, shell, sun
 
 SIZE_M = (3.4, 3.2, 2.5)
@@ -22,7 +23,7 @@ def box_on_table() -> Scene:
     """The scene; the box is its first part."""
     rng = np.random.default_rng(41)
     x, y, top = TABLE_M
-    box = furniture.board(
+    box = board(
         BOX_M, cardboard(rng, 0.3), place(x - 0.02, y - 0.02, BOX_YAW_RAD, top), (0.0, 0.0, BOX_M[2] / 2)
     )
     return Scene(
@@ -40,36 +41,36 @@ def box_on_table() -> Scene:
     )
 
 
-def _room(rng: np.random.Generator) -> list[Part]:
-    wall = Material(textures.plaster(linear("#e2dccf"), 16, 0.01, 0.04))
-    paper = Material(textures.motif(linear("#b7c0b0"), linear("#8fa08f"), 17, 0.13))
-    floor = Material(textures.parquet(linear("#b8864f"), linear("#8a5e34"), 18), 0.05)
+def _room(rng: Rng) -> list[Part]:
+    wall = Material(textures.plaster("#e2dccf", 16, 0.01, 0.04))
+    paper = Material(textures.motif("#b7c0b0", "#8fa08f", 17, 0.13))
+    floor = Material(textures.parquet("#b8864f", "#8a5e34", 18), 0.05)
     return [
         *shell(rng, SIZE_M, floor, (wall, wall, wall, paper), painted(rng, "#f4f2ec", 0.0), {WEST: WINDOW}),
-        *furniture.window(rng, place(0.0, 1.9, WEST, 0.9), (1.2, 1.3), recess_m=WALL_M - 0.04),
-        *furniture.door(rng, place(1.2, 0.0, SOUTH)),
-        *furniture.picture(rng, place(2.3, SIZE_M[1], NORTH, 1.5), (0.55, 0.42), "#8a5a33"),
+        *fixtures.window(rng, place(0.0, 1.9, WEST, 0.9), (1.2, 1.3), recess_m=WALL_M - 0.04),
+        *fixtures.door(rng, place(1.2, 0.0, SOUTH)),
+        *fixtures.picture(rng, place(2.3, SIZE_M[1], NORTH, 1.5), (0.55, 0.42), "#8a5a33"),
     ]
 
 
-def _table(rng: np.random.Generator) -> list[Part]:
+def _table(rng: Rng) -> list[Part]:
     x, y, height = TABLE_M
     return [
-        *furniture.table(rng, place(x, y), (1.5, 0.9, height), "#a8754a"),
-        *furniture.dining_chair(rng, place(x - 0.95, y + 0.1, -np.pi / 2 - 0.3), "#8a5a33"),
-        *furniture.dining_chair(rng, place(x + 0.35, y - 0.72, np.pi + 0.25), "#8a5a33"),
+        *tables.table(rng, place(x, y), (1.5, 0.9, height), "#a8754a"),
+        *seating.dining_chair(rng, place(x - 0.95, y + 0.1, -np.pi / 2 - 0.3), "#8a5a33"),
+        *seating.dining_chair(rng, place(x + 0.35, y - 0.72, np.pi + 0.25), "#8a5a33"),
     ]
 
 
-def _around(rng: np.random.Generator) -> list[Part]:
+def _around(rng: Rng) -> list[Part]:
     x, y, top = TABLE_M
     return [
-        *furniture.table_lamp(rng, place(x + 0.55, y + 0.28, 0.0, top), "#2f5d73"),
-        *furniture.bottle(rng, place(x + 0.3, y + 0.2, 0.0, top)),
-        *furniture.fruit_bowl(rng, place(x - 0.42, y + 0.2, 0.0, top), "#dfe5e3", 6),
-        *furniture.cup(rng, place(x + 0.28, y - 0.16, 0.6, top), "#f2efe8"),
-        *furniture.book_pile(rng, place(x - 0.45, y - 0.18, 0.5, top), 3),
-        *furniture.grass_plant(rng, place(x + 0.05, y + 0.32, 0.0, top), 0.3, "#e6e1d6"),
-        *furniture.tablet(rng, place(x + 0.02, y - 0.28, -0.5, top)),
-        *furniture.teapot(rng, place(x + 0.45, y - 0.02, 2.4, top), "#9fb3b0"),
+        *lights.table_lamp(rng, place(x + 0.55, y + 0.28, 0.0, top), "#2f5d73"),
+        *things.bottle(rng, place(x + 0.3, y + 0.2, 0.0, top)),
+        *things.fruit_bowl(rng, place(x - 0.42, y + 0.2, 0.0, top), "#dfe5e3", 6),
+        *things.cup(rng, place(x + 0.28, y - 0.16, 0.6, top), "#f2efe8"),
+        *things.book_pile(rng, place(x - 0.45, y - 0.18, 0.5, top), 3),
+        *plants.grass_plant(rng, place(x + 0.05, y + 0.32, 0.0, top), 0.3, "#e6e1d6"),
+        *electronics.tablet(rng, place(x + 0.02, y - 0.28, -0.5, top)),
+        *things.teapot(rng, place(x + 0.45, y - 0.02, 2.4, top), "#9fb3b0"),
     ]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from lab.worlds.primitives import Mesh, box, sphere
+from lab.worlds.furniture.placing import ORIGIN, board, place, solid
+from lab.worlds.primitives import sphere
 from lab.worlds.room_finishes import draw_seed, muted, random_floor, random_wall
-from lab.worlds.scene import Light, Material, Part, Scene
+from lab.worlds.scene import Light, Material, Part, Rng, Scene
 from lab.worlds.textures import plaster, random_palette
 from packetmesh.errors import InputError
-from pipeline.geometry import look_at, rigid, rotation_exp
+from pipeline.geometry import look_at
 from pipeline.types import CameraIntrinsics, FloatArray
 
 
@@ -49,9 +50,7 @@ def _check(nodes: int, angle_deg: float, baseline_m: float) -> None:
             raise InputError(f"A box room's {name} is {value:g}; take {low:g} to {high:g}.")
 
 
-def _cameras(
-    rng: np.random.Generator, nodes: int, angle_rad: float, reach_m: float
-) -> tuple[FloatArray, ...]:
+def _cameras(rng: Rng, nodes: int, angle_rad: float, reach_m: float) -> tuple[FloatArray, ...]:
     """Cameras on an arc about the room's middle: neighbours are a chord of baseline length apart."""
     tilt = rng.uniform(0.12, 0.3)
     target = np.array([0.0, 0.0, rng.uniform(0.6, 0.9)])
@@ -62,7 +61,7 @@ def _cameras(
     return tuple(look_at(place + lift, target) for place in places)
 
 
-def _shell(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> list[Part]:
+def _shell(rng: Rng, low: FloatArray, high: FloatArray) -> list[Part]:
     """Floor, ceiling and walls as slabs; parts[0] is the floor."""
     size, middle = high - low, 0.5 * (low + high)
     wall, ceiling = random_wall(rng), Material(plaster(muted(rng, 1, 0.6, 0.8)[0]))
@@ -72,28 +71,26 @@ def _shell(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> list[
             material = wall if axis != 2 else (random_floor(rng) if side < 0 else ceiling)
             slab, at = size + 0.2, middle.copy()
             slab[axis], at[axis] = 0.1, middle[axis] + side * (0.5 * size[axis] + 0.05)
-            parts.append(_part(box(tuple(slab)), material, rigid(np.eye(3), at)))
+            parts.append(board(slab, material, ORIGIN, at))
     return parts
 
 
-def _things(rng: np.random.Generator, eyes: FloatArray) -> list[Part]:
+def _things(rng: Rng, eyes: FloatArray) -> list[Part]:
     """Boxes and balls on the floor about the middle, a metre or more from every camera."""
     boxes, balls = int(rng.integers(4, 8)), int(rng.integers(1, 4))
     parts = []
     for k, spot in enumerate(_spots(rng, eyes[:, :2], boxes + balls)):
         if k < boxes:
             size = rng.uniform([0.25, 0.25, 0.25], [0.7, 0.7, 1.2])
-            turn = rotation_exp(np.array([0.0, 0.0, rng.uniform(0.0, np.pi)]))
-            parts.append(_part(box(tuple(size)), _paint(rng), rigid(turn, np.array([*spot, 0.5 * size[2]]))))
+            standing = place(spot[0], spot[1], rng.uniform(0.0, np.pi), 0.5 * size[2])
+            parts.append(board(size, _paint(rng), standing))
         else:
             radius = rng.uniform(0.15, 0.35)
-            parts.append(
-                _part(sphere(radius), _paint(rng), rigid(np.eye(3), np.array([*spot, radius])), True)
-            )
+            parts.append(solid(sphere(radius), _paint(rng), ORIGIN, (*spot, radius)))
     return parts
 
 
-def _spots(rng: np.random.Generator, eyes_m: FloatArray, count: int) -> list[FloatArray]:
+def _spots(rng: Rng, eyes_m: FloatArray, count: int) -> list[FloatArray]:
     """Places on the floor: the least crowded of a few random ones, one after the other."""
     spots: list[FloatArray] = []
     while len(spots) < count:
@@ -106,10 +103,6 @@ def _spots(rng: np.random.Generator, eyes_m: FloatArray, count: int) -> list[Flo
     return spots
 
 
-def _part(mesh: Mesh, material: Material, T_world_part: FloatArray, smooth: bool = False) -> Part:
-    return Part(*mesh, material, T_world_part, smooth)
-
-
-def _paint(rng: np.random.Generator) -> Material:
+def _paint(rng: Rng) -> Material:
     color = 0.08 + 0.8 * random_palette(rng, 1)[0]
     return Material(plaster(color, draw_seed(rng), 0.03, 0.15))

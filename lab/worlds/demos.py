@@ -17,43 +17,20 @@ from lab.worlds.sensor import sense_depth
 from lab.worlds.workshop import workshop
 from packetmesh.errors import InputError
 from pipeline.geometry import rotation_exp
-from pipeline.io.demos import DemoScene
+from pipeline.io.demos import DEMO_SCENES
 from pipeline.types import DepthMap, FloatArray, RgbdFrame, Rig, RigTruth
 
-SEED = 2021
 POSE_ERROR_RAD = np.radians(3.0)
 POSE_ERROR_M = 0.06
 """How wrong every node but the first is about its pose."""
 
-DEMOS: dict[str, tuple[Callable[[], Scene], DemoScene]] = {
-    "living-room": (
-        living_room,
-        DemoScene(
-            "Living room",
-            "a seating group by a sunny window, with a black television and a chrome lamp",
-            SEED,
-        ),
-    ),
-    "office": (
-        office,
-        DemoScene(
-            "Office", "a desk with two screens in a corner, a swivel chair, a pinboard and book shelves", SEED
-        ),
-    ),
-    "workshop": (
-        workshop,
-        DemoScene(
-            "Workshop", "a bench with a vice under a board of tools, a brick wall, timber and tins", SEED
-        ),
-    ),
-    "box-on-table": (
-        box_on_table,
-        DemoScene(
-            "Box on a table", "a carton of exactly 30 x 20 x 15 cm among a few things on a table", SEED
-        ),
-    ),
+DEMOS: dict[str, Callable[[], Scene]] = {
+    "living-room": living_room,
+    "office": office,
+    "workshop": workshop,
+    "box-on-table": box_on_table,
 }
-"""The builder and the description of each demo."""
+"""The builder of each demo; its ``scene.json`` describes it and holds its seed."""
 
 
 def build_demo(name: str) -> Scene:
@@ -64,7 +41,7 @@ def build_demo(name: str) -> Scene:
     """
     if name not in DEMOS:
         raise InputError(f"There is no demo scene {name!r}; try one of {', '.join(DEMOS)}")
-    return DEMOS[name][0]()
+    return DEMOS[name]()
 
 
 def render_demo(name: str) -> Rig:
@@ -73,7 +50,7 @@ def render_demo(name: str) -> Rig:
     renderer = Renderer(scene)
     frames, depth = [], []
     for node, T in enumerate(scene.cameras):
-        rng = np.random.default_rng([SEED, zlib.crc32(name.encode()), node])
+        rng = np.random.default_rng([DEMO_SCENES[name].seed, zlib.crc32(name.encode()), node])
         view = renderer.view(scene.intrinsics, T, "photo", rng)
         sensed = sense_depth(view, scene.intrinsics, rng)
         believed = T if node == 0 else disturbed(T, rng)

@@ -73,13 +73,8 @@ def lathe(profile_m: FloatArray | Sequence, segments: int = 32, bevel_m: float =
     angle = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)
     turn = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     rings = profile if ring else profile[1:-1]
-    vertices = np.concatenate(
-        [
-            (rings[:, None, :1] * turn[None]).reshape(-1, 2),
-            np.repeat(rings[:, 1], segments)[:, None],
-        ],
-        axis=1,
-    )
+    around = (rings[:, None, :1] * turn).reshape(-1, 2)
+    vertices = np.column_stack([around, np.repeat(rings[:, 1], segments)])
     rows = np.arange(len(rings) if ring else len(rings) - 1)[:, None] * segments
     here, there = np.arange(segments)[None], (np.arange(segments) + 1)[None] % segments
     above = (rows + segments) % len(vertices)
@@ -143,11 +138,18 @@ def sheet(
     z = np.broadcast_to(height(grid[:, 0], grid[:, 1]), len(grid))
     top = np.column_stack([grid, z])
     index = np.arange(rows * columns).reshape(rows, columns)
-    face = _split(_quads(index))
     rim = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
-    ahead, under = np.roll(rim, -1), len(top)
+    return thickened(top, quads_of(index), rim, thickness_m)
+
+
+def thickened(upper_m: FloatArray, quads: IntArray, rim: IntArray, thickness_m: float) -> Mesh:
+    """A surface of (N, 3) points and (Q, 4) cells with its copy ``thickness_m`` below, joined at the rim.
+
+    The cells, and the (R,) points of the rim, run counter-clockwise seen from above.
+    """
+    face, ahead, under = _split(quads), np.roll(rim, -1), len(upper_m)
     walls = _split(np.stack([rim + under, ahead + under, ahead, rim], axis=1))
-    vertices = np.concatenate([top, top - [0.0, 0.0, thickness_m]])
+    vertices = np.concatenate([upper_m, upper_m - [0.0, 0.0, thickness_m]])
     return vertices, np.concatenate([face, face[:, ::-1] + under, walls])
 
 
@@ -164,12 +166,11 @@ def tube(path_m: FloatArray | Sequence, radius_m: float | Vector, segments: int 
         side = side - axis * (side @ axis)
         sides.append(side)
     across = np.array(sides) / np.linalg.norm(sides, axis=1, keepdims=True)
-    circle = (
-        np.cos(angle)[:, None] * across[:, None] + np.sin(angle)[:, None] * np.cross(forward, across)[:, None]
-    )
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    circle = c * across[:, None] + s * np.cross(forward, across)[:, None]
     vertices = np.concatenate([(path[:, None] + radius * circle).reshape(-1, 3), path[[0, -1]]])
     index = np.arange(len(path) * segments).reshape(len(path), segments)
-    walls = _split(_quads(np.concatenate([index, index[:, :1]], axis=1)))
+    walls = _split(quads_of(np.concatenate([index, index[:, :1]], axis=1)))
     first, last, ends = index[0], index[-1], len(path) * segments
     cap = np.stack([np.full(segments, ends), np.roll(first, -1), first], axis=1)
     lid = np.stack([np.full(segments, ends + 1), last, np.roll(last, -1)], axis=1)
@@ -193,7 +194,7 @@ def merged(meshes: Sequence[Mesh]) -> Mesh:
     return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(triangles)
 
 
-def _quads(index: IntArray) -> IntArray:
+def quads_of(index: IntArray) -> IntArray:
     """(Q, 4) cells of a (rows, columns) grid of vertex numbers, counter-clockwise when rows go up."""
     corners = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     return np.stack(corners, axis=-1).reshape(-1, 4)
@@ -218,7 +219,7 @@ def _cube_triangles(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
     quads = []
     for axis, other in ((0, (1, 2)), (1, (2, 0)), (2, (0, 1))):
         sides = np.moveaxis(number, (axis, other[1], other[0]), (0, 1, 2))
-        quads += [_quads(sides[-1]), _quads(sides[0])[:, ::-1]]
+        quads += [quads_of(sides[-1]), quads_of(sides[0])[:, ::-1]]
     used, triangles = np.unique(_split(np.concatenate(quads)), return_inverse=True)
     return used, triangles.reshape(-1, 3)
 

@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from lab.worlds import shading
+from lab.worlds.primitives import merged
 from lab.worlds.scene import Part, Scene
+from pipeline.geometry import apply
 from pipeline.open3d_runtime import o3d
 from pipeline.rays import tensor, triangle_scene
 from pipeline.types import BoolArray, FloatArray, IntArray
@@ -70,20 +72,15 @@ class RayCaster:
         part = np.where(seen, self._triangle_part[np.where(seen, triangle, 0)], -1)
         return Hits(t, positions, normals, view, part)
 
-    def reach(self, rays: FloatArray) -> FloatArray:
-        """(N,) how far each ray goes, in units of its direction; infinite for a miss."""
-        return self._all.cast_rays(tensor(rays, np.float32), nthreads=self._threads)["t_hit"].numpy()
-
     def occluded(self, rays: FloatArray, t_far: float) -> BoolArray:
         """(N,) True where something opaque is nearer than ``t_far`` times the ray's direction."""
-        return self._opaque.test_occlusions(
-            tensor(rays, np.float32), 0.0, t_far, nthreads=self._threads
-        ).numpy()
+        cast = tensor(rays, np.float32)
+        return self._opaque.test_occlusions(cast, 0.0, t_far, nthreads=self._threads).numpy()
 
 
 def world_mesh(scene: Scene) -> tuple[FloatArray, IntArray]:
     """(V, 3) vertices in the world frame and (F, 3) triangles of all parts."""
-    return _merged([_world_mesh(part) for part in scene.parts])
+    return merged([(apply(part.T_world_part, part.vertices_m), part.triangles) for part in scene.parts])
 
 
 _ShadedMesh = tuple[FloatArray, IntArray, FloatArray]
@@ -91,16 +88,11 @@ _ShadedMesh = tuple[FloatArray, IntArray, FloatArray]
 
 def _world_mesh(part: Part) -> _ShadedMesh:
     """World vertices, triangles, and (F, 3, 3) shading normals of each triangle's corners."""
-    vertices = part.vertices_m @ part.T_world_part[:3, :3].T + part.T_world_part[:3, 3]
+    vertices = apply(part.T_world_part, part.vertices_m)
     triangles = np.ascontiguousarray(part.triangles)
     return vertices, triangles, shading.corner_normals(vertices, triangles, part.smooth)
 
 
-def _merged(meshes: list[_ShadedMesh]) -> tuple[FloatArray, IntArray]:
-    first = np.cumsum([0] + [len(vertices) for vertices, _, _ in meshes])
-    triangles = [triangles + start for (_, triangles, _), start in zip(meshes, first, strict=False)]
-    return np.concatenate([vertices for vertices, _, _ in meshes]), np.concatenate(triangles)
-
-
 def _embree(meshes: list[_ShadedMesh]) -> o3d.t.geometry.RaycastingScene:
-    return triangle_scene(*_merged(meshes)) if meshes else o3d.t.geometry.RaycastingScene()
+    solids = [(vertices, triangles) for vertices, triangles, _ in meshes]
+    return triangle_scene(*merged(solids)) if solids else o3d.t.geometry.RaycastingScene()

@@ -40,32 +40,22 @@ class View:
 class _Sampling:
     """How many rays a quality spends."""
 
-    passes: int
-    """Camera rays a pixel."""
-    shadow_rays: int
-    """A light, pass and pixel."""
-    sky_rays: int
-    """Over the hemisphere, a pass and pixel."""
-    bounce: bool
-    """Gather the light of what sky rays hit, instead of only counting it as occluded."""
-    every_pixel: bool
-    """Trace light at all pixels, instead of at the white fields of a chess board."""
+    offsets_px: tuple[tuple[float, float], ...]
+    """Where in a pixel the passes look."""
+    rays: int
+    """Shadow rays a light, pass and pixel, and sky rays over the hemisphere a pass and pixel."""
+    thorough: bool
+    """Trace light at all pixels, not at the white fields of a chess board, and gather the light of what sky
+    rays hit, instead of only counting it as occluded."""
     film: Film
 
 
+_ROTATED_GRID_PX = ((0.125, 0.375), (-0.375, 0.125), (0.375, -0.125), (-0.125, -0.375))
+_HASTY_FILM = Film(0.5, 0.08, noise=(0.0, 0.03), blur_px=(0.25, 0.75), vignette=(0.0, 0.25))
 _SAMPLING = {
-    "fast": _Sampling(
-        1,
-        shadow_rays=1,
-        sky_rays=1,
-        bounce=False,
-        every_pixel=False,
-        film=Film(0.5, 0.08, noise=(0.0, 0.03), blur_px=(0.25, 0.75), vignette=(0.0, 0.25)),
-    ),
-    "photo": _Sampling(4, shadow_rays=4, sky_rays=4, bounce=True, every_pixel=True, film=Film()),
+    "fast": _Sampling(((0.0, 0.0),), rays=1, thorough=False, film=_HASTY_FILM),
+    "photo": _Sampling(_ROTATED_GRID_PX, rays=4, thorough=True, film=Film()),
 }
-_OFFSETS_PX = {1: ((0.0, 0.0),), 4: ((0.125, 0.375), (-0.375, 0.125), (0.375, -0.125), (-0.125, -0.375))}
-"""A rotated grid: where in a pixel the passes look."""
 _DULL = 0.05
 """Parts with less gloss reflect nothing."""
 _REACH_M = 1.2
@@ -108,7 +98,7 @@ class Renderer:
         center = self._caster.cast(camera_rays(intrinsics, T_world_camera))
         albedo = self._albedo(center)
         radiance = np.zeros((*shape, 3), np.float32)
-        for offset_px in _OFFSETS_PX[sampling.passes]:
+        for offset_px in sampling.offsets_px:
             if any(offset_px):
                 hits = self._caster.cast(camera_rays(intrinsics, T_world_camera, offset_px))
                 radiance += self._radiance(hits, self._albedo(hits), shape, sampling, rng)
@@ -116,7 +106,7 @@ class Renderer:
                 radiance += self._radiance(center, albedo, shape, sampling, rng)
         seen = center.part >= 0
         return View(
-            rgb=develop(radiance / sampling.passes, sampling.film, rng),
+            rgb=develop(radiance / len(sampling.offsets_px), sampling.film, rng),
             z_m=np.where(seen, center.t, np.float32(np.nan)).reshape(shape),
             normals=center.normals.reshape(*shape, 3),
             infrared=np.clip(_luminance(albedo) * self._infrared[center.part], 0.0, 1.0).reshape(shape),
@@ -126,9 +116,7 @@ class Renderer:
 
     def depth(self, intrinsics: CameraIntrinsics, T_world_camera: FloatArray) -> FloatArray:
         """(H, W) float32 true depth at the pixel centres; NaN where nothing is."""
-        t = self._caster.reach(camera_rays(intrinsics, T_world_camera))
-        t = np.where(np.isfinite(t), t, np.float32(np.nan))
-        return t.reshape(intrinsics.height_px, intrinsics.width_px)
+        return self.parts_seen(intrinsics, T_world_camera)[0]
 
     def parts_seen(
         self, intrinsics: CameraIntrinsics, T_world_camera: FloatArray
@@ -159,18 +147,18 @@ class Renderer:
         rng: np.random.Generator,
     ) -> FloatArray:
         """(H, W, 3) light towards the camera: traced at some pixels, spread within surfaces to all."""
-        lit = lit_pixels(shape, sampling.every_pixel)
+        lit = lit_pixels(shape, sampling.thorough)
         some = hits.select(lit)
         direct, shine, sky = (np.zeros((len(lit), 3), np.float32) for _ in range(3))
-        for _ in range(sampling.shadow_rays):
+        for _ in range(sampling.rays):
             self._add_lights(some, self._mirror[some.part], dither(shape, rng)[lit], direct, shine)
-        for _ in range(sampling.sky_rays):
-            sky += self._sky(some, dither(shape, rng)[lit], sampling.bounce)
-        shine /= sampling.shadow_rays
-        self._add_mirrored(some, albedo[lit], dither(shape, rng)[lit], sampling.bounce, shine)
+        for _ in range(sampling.rays):
+            sky += self._sky(some, dither(shape, rng)[lit], sampling.thorough)
+        shine /= sampling.rays
+        self._add_mirrored(some, albedo[lit], dither(shape, rng)[lit], sampling.thorough, shine)
 
         light, glint = np.full((2, len(hits.t), 3), np.nan, np.float32)
-        light[lit] = direct / sampling.shadow_rays + sky / sampling.sky_rays
+        light[lit] = direct / sampling.rays + sky / sampling.rays
         glint[lit] = shine
         radiance = albedo * (_smoothed(light, hits, shape) + self._emission[hits.part][:, None])
         if shine.any():

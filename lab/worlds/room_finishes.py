@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from lab.worlds import textures
-from lab.worlds.scene import Material, Part
+from lab.worlds.scene import Material, Part, Rng
 from pipeline.types import FloatArray
 
 
-def random_floor(rng: np.random.Generator) -> Material:
+def random_floor(rng: Rng) -> Material:
     """Boards, parquet, tiles, carpet, concrete or stone."""
     light, dark = random_timber(rng)
     color, second = muted(rng, 2, 0.05, 0.5)
@@ -21,10 +21,8 @@ def random_floor(rng: np.random.Generator) -> Material:
         width_m, length_m = rng.uniform(0.06, 0.22), rng.uniform(0.6, 2.0)
         return Material(textures.planks(light, dark, seed, width_m, length_m), rng.uniform(0.0, 0.35))
     if kind == 1:
-        strips = int(rng.integers(3, 8))
-        return Material(
-            textures.parquet(light, dark, seed, rng.uniform(0.04, 0.09), strips), rng.uniform(0.0, 0.35)
-        )
+        strips, strip_m = int(rng.integers(3, 8)), rng.uniform(0.04, 0.09)
+        return Material(textures.parquet(light, dark, seed, strip_m, strips), rng.uniform(0.0, 0.35))
     if kind == 2:
         tiles = textures.tiles(color, second, seed, rng.uniform(0.15, 0.6), rng.uniform(0.02, 0.25))
         return Material(tiles, rng.uniform(0.0, 0.4))
@@ -37,7 +35,7 @@ def random_floor(rng: np.random.Generator) -> Material:
     return Material(textures.marble(color, second, seed, rng.uniform(0.2, 0.8)), rng.uniform(0.1, 0.45))
 
 
-def random_wall(rng: np.random.Generator) -> Material:
+def random_wall(rng: Rng) -> Material:
     """Mostly light paint or plaster; some wallpaper, panelling, brick and tiles."""
     color = muted(rng, 1, 0.3, 0.85, 0.12)[0] if rng.random() < 0.75 else muted(rng, 1, 0.05, 0.5)[0]
     second = np.clip(color * rng.uniform(0.5, 1.5, 3), 0.02, 0.9)
@@ -45,10 +43,8 @@ def random_wall(rng: np.random.Generator) -> Material:
     seed = draw_seed(rng)
     kind = rng.choice(7, p=[0.32, 0.28, 0.09, 0.09, 0.08, 0.07, 0.07])
     if kind == 0:
-        return Material(
-            textures.paint(color, seed, rng.uniform(0.02, 0.15), rng.uniform(0.2, 1.2)),
-            rng.uniform(0.0, 0.08),
-        )
+        paint = textures.paint(color, seed, rng.uniform(0.02, 0.15), rng.uniform(0.2, 1.2))
+        return Material(paint, rng.uniform(0.0, 0.08))
     if kind == 1:
         return Material(textures.plaster(color, seed, rng.uniform(0.008, 0.05), rng.uniform(0.02, 0.15)))
     if kind == 2:
@@ -59,13 +55,12 @@ def random_wall(rng: np.random.Generator) -> Material:
         brick = color if rng.random() < 0.4 else np.array([0.36, 0.15, 0.09]) * rng.uniform(0.6, 1.4)
         return Material(textures.brick(brick, muted(rng, 1, 0.3, 0.7)[0], seed))
     if kind == 5:
-        return Material(
-            textures.tiles(color, second, seed, rng.uniform(0.08, 0.4), 0.08), rng.uniform(0.1, 0.3)
-        )
+        tiles = textures.tiles(color, second, seed, rng.uniform(0.08, 0.4), 0.08)
+        return Material(tiles, rng.uniform(0.1, 0.3))
     return Material(textures.planks(light, dark, seed, rng.uniform(0.08, 0.3), 3.0), 0.1)
 
 
-def random_material(rng: np.random.Generator) -> Material:
+def random_material(rng: Rng) -> Material:
     """Anything a thing may be made of."""
     color, second, third = textures.random_palette(rng, 3)
     light, dark = random_timber(rng)
@@ -89,7 +84,7 @@ def random_material(rng: np.random.Generator) -> Material:
     return Material(makers[rng.integers(len(makers))](), gloss, infrared=float(rng.uniform(0.5, 1.5)))
 
 
-def recolored(parts: list[Part], rng: np.random.Generator) -> list[Part]:
+def recolored(parts: list[Part], rng: Rng) -> list[Part]:
     """A piece in other colours: its own ones times a random tint, so that textures and contrasts stay."""
     gain = np.clip(rng.uniform(0.45, 1.7) * rng.uniform(0.6, 1.4, 3), 0.2, 2.0).astype(np.float32)
     return [
@@ -98,35 +93,29 @@ def recolored(parts: list[Part], rng: np.random.Generator) -> list[Part]:
     ]
 
 
-def random_timber(rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def random_timber(rng: Rng) -> tuple[FloatArray, FloatArray]:
     """Light and dark colour of a wood: from maple over oak and cherry to wenge, or limed grey."""
-    light = (
-        np.array([0.55, 0.36, 0.19])
-        * rng.uniform([0.9, 0.75, 0.6], [1.1, 1.15, 1.5])
-        * rng.uniform(0.15, 1.3)
-    )
+    light = np.array([0.55, 0.36, 0.19]) * rng.uniform([0.9, 0.75, 0.6], [1.1, 1.15, 1.5])
+    light *= rng.uniform(0.15, 1.3)
     light = light + rng.uniform(0.0, 0.5) ** 2 * (light.mean() - light)
     return np.clip(light, 0.02, 0.85), np.clip(light * rng.uniform(0.35, 0.75), 0.01, 0.6)
 
 
-def muted(rng: np.random.Generator, count: int, low: float, high: float, chroma: float = 0.4) -> FloatArray:
+def muted(rng: Rng, count: int, low: float, high: float, chroma: float = 0.4) -> FloatArray:
     """(count, 3) colours of low to middling saturation with a luminance near low to high."""
     value = rng.uniform(low, high, (count, 1))
-    return np.clip(
-        value * (1.0 + rng.uniform(0.0, chroma, (count, 1)) * rng.uniform(-1.0, 1.0, (count, 3))), 0.01, 0.9
-    )
+    tint = rng.uniform(0.0, chroma, (count, 1)) * rng.uniform(-1.0, 1.0, (count, 3))
+    return np.clip(value * (1.0 + tint), 0.01, 0.9)
 
 
-def draw_seed(rng: np.random.Generator) -> int:
+def draw_seed(rng: Rng) -> int:
     """A seed for a texture."""
     return int(rng.integers(2**31))
 
 
 def _tinted(material: Material, gain: FloatArray) -> Material:
-    texture = material.texture
-    return replace(
-        material, texture=lambda points_m, normals: np.clip(texture(points_m, normals) * gain, 0.0, 0.95)
-    )
+    own = material.texture
+    return replace(material, texture=lambda places, normals: np.clip(own(places, normals) * gain, 0.0, 0.95))
 
 
 def covered(parts: list[Part], material: Material) -> list[Part]:
@@ -134,6 +123,6 @@ def covered(parts: list[Part], material: Material) -> list[Part]:
     return [part if part.material.emission > 0.0 else replace(part, material=material) for part in parts]
 
 
-def lamp_white(rng: np.random.Generator) -> FloatArray:
+def lamp_white(rng: Rng) -> FloatArray:
     """(3,) white of a colour temperature from about 2700 to 8000 K."""
     return np.array([1.0, 0.78, 0.52]) + rng.random() ** 0.7 * np.array([-0.12, 0.14, 0.55])

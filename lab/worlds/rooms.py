@@ -13,7 +13,7 @@ from lab.worlds.furniture import placing
 from lab.worlds.primitives import box
 from lab.worlds.render import Renderer
 from lab.worlds.room_finishes import covered, lamp_white, muted, random_material, recolored
-from lab.worlds.scene import Light, Material, Part, Scene
+from lab.worlds.scene import Light, Material, Part, Rng, Scene
 from lab.worlds.shell import shell, wall_length, wall_pose
 from lab.worlds.textures import paint
 from lab.worlds.viewpoints import random_views
@@ -63,7 +63,7 @@ def random_room(seed: int) -> Scene:
     return replace(scene, cameras=tuple(random_views(scene, rng, 1, Renderer(scene))))
 
 
-def _dress_walls(plan: _Plan, rng: np.random.Generator) -> list[FloatArray]:
+def _dress_walls(plan: _Plan, rng: Rng) -> list[FloatArray]:
     """Skirting, windows, doors, pictures and shelves; returns where daylight comes in."""
     windows = []
     skirting = Material(paint(muted(rng, 1, 0.1, 0.8)[0], 2)) if rng.random() < 0.6 else None
@@ -86,7 +86,7 @@ def _dress_walls(plan: _Plan, rng: np.random.Generator) -> list[FloatArray]:
     return windows
 
 
-def _furnish_walls(plan: _Plan, rng: np.random.Generator) -> None:
+def _furnish_walls(plan: _Plan, rng: Rng) -> None:
     """Sofas, shelves, cabinets, desks and clutter with their backs to the walls."""
     for _ in range(int(rng.integers(4, 10))):
         piece = _varied(_stocked(pieces.random_wall_furniture, rng), rng)
@@ -101,7 +101,7 @@ def _furnish_walls(plan: _Plan, rng: np.random.Generator) -> None:
                 break
 
 
-def _furnish_middle(plan: _Plan, rng: np.random.Generator) -> None:
+def _furnish_middle(plan: _Plan, rng: Rng) -> None:
     """Tables with chairs, rugs, boxes and things that stand about."""
     if rng.random() < 0.35:
         rug = pieces.random_rug(rng)
@@ -118,12 +118,12 @@ def _furnish_middle(plan: _Plan, rng: np.random.Generator) -> None:
                 break
 
 
-def _stocked(maker: Callable[[np.random.Generator], _Piece], rng: np.random.Generator) -> _Piece:
+def _stocked(maker: Callable[[Rng], _Piece], rng: Rng) -> _Piece:
     """One of the pieces that a maker has in stock."""
     return pieces.stocked(maker, int(rng.integers(_VARIANTS)))
 
 
-def _varied(piece: list[Part], rng: np.random.Generator) -> list[Part]:
+def _varied(piece: list[Part], rng: Rng) -> list[Part]:
     """A piece as made, in other colours, or all of a random material."""
     kind = rng.random()
     if kind < 0.3:
@@ -133,9 +133,7 @@ def _varied(piece: list[Part], rng: np.random.Generator) -> list[Part]:
     return covered(piece, random_material(rng))
 
 
-def _lights(
-    rng: np.random.Generator, size_m: FloatArray, windows: list[FloatArray]
-) -> tuple[tuple[Light, ...], FloatArray]:
+def _lights(rng: Rng, size_m: FloatArray, windows: list[FloatArray]) -> tuple[tuple[Light, ...], FloatArray]:
     """One to three area lights and the ambient light, from a warm evening to a grey day."""
     lights = []
     for place in windows[:2]:
@@ -151,7 +149,7 @@ def _lights(
     return tuple(lights), ambient
 
 
-def _intrinsics(rng: np.random.Generator) -> CameraIntrinsics:
+def _intrinsics(rng: Rng) -> CameraIntrinsics:
     """A Kinect v1's colour camera, from sample to sample: 525 px +- 5 % at 640 x 480."""
     focal_px = 525.0 * rng.uniform(0.95, 1.05)
     cx_px, cy_px = 319.5 + rng.normal(0.0, 4.0), 239.5 + rng.normal(0.0, 4.0)

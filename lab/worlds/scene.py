@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from pipeline.types import CameraIntrinsics, FloatArray, IntArray
 
+Rng = np.random.Generator
 Texture = Callable[[FloatArray, FloatArray], FloatArray]
 """(N, 3) positions and (N, 3) normals in the part's own frame, metres -> (N, 3) linear albedo, 0 to 1."""
 

@@ -6,19 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from lab.worlds.furniture import placing
-from lab.worlds.primitives import box
+from lab.worlds.furniture.placing import ORIGIN, board, place
 from lab.worlds.room_finishes import muted, random_floor, random_wall
-from lab.worlds.scene import Material, Part
+from lab.worlds.scene import Material, Part, Rng
 from lab.worlds.textures import paint
-from pipeline.geometry import rigid
 from pipeline.types import FloatArray
 
-Finish = Callable[[np.random.Generator], Material]
+Finish = Callable[[Rng], Material]
 
 
 def shell(
-    rng: np.random.Generator,
+    rng: Rng,
     size_m: FloatArray,
     darkest_ceiling: float,
     wall: Finish = random_wall,
@@ -30,8 +28,8 @@ def shell(
     ceiling = Material(paint(white, 1, 0.04)) if rng.random() < 0.85 else random_wall(rng)
     walls = wall(rng)
     parts = [
-        _slab((x, y, 0.1), (0.0, 0.0, -0.05), floor(rng)),
-        _slab((x, y, 0.1), (0.0, 0.0, z + 0.05), ceiling),
+        board((x, y, 0.1), floor(rng), ORIGIN, (0.0, 0.0, -0.05)),
+        board((x, y, 0.1), ceiling, ORIGIN, (0.0, 0.0, z + 0.05)),
     ]
     for axis in (0, 1):
         for side in (-1.0, 1.0):
@@ -39,7 +37,7 @@ def shell(
             slab, at = np.array([x, y, z]), np.array([0.0, 0.0, 0.5 * z])
             slab[axis], at[axis] = 0.1, side * (0.5 * size_m[axis] + 0.05)
             slab[1 - axis] += 0.2
-            parts.append(_slab(slab, at, material))
+            parts.append(board(slab, material, ORIGIN, at))
     return parts
 
 
@@ -48,15 +46,9 @@ def wall_pose(
 ) -> FloatArray:
     """Pose against one of four walls, front (-y) to the room, ``along_m`` from the wall's middle."""
     reach_m = 0.5 * (size_m[1] if wall % 2 == 0 else size_m[0]) - inset_m
-    return placing.place(0.0, 0.0, wall * np.pi / 2.0) @ placing.place(along_m, reach_m, 0.0, z_m)
+    return place(0.0, 0.0, wall * np.pi / 2.0) @ place(along_m, reach_m, 0.0, z_m)
 
 
 def wall_length(size_m: FloatArray, wall: int) -> float:
     """How long one of the four walls is, metres."""
     return float(size_m[0] if wall % 2 == 0 else size_m[1])
-
-
-def _slab(
-    size_m: FloatArray | tuple[float, ...], at_m: FloatArray | tuple[float, ...], material: Material
-) -> Part:
-    return Part(*box(tuple(size_m)), material, rigid(np.eye(3), np.asarray(at_m, float)))

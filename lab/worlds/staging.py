@@ -9,7 +9,7 @@ import numpy as np
 from lab.worlds.furniture.finishes import painted
 from lab.worlds.furniture.placing import ORIGIN, board, place, solid
 from lab.worlds.primitives import Mesh, box, merged, moved
-from lab.worlds.scene import Light, Material, Part
+from lab.worlds.scene import Light, Material, Part, Rng
 from pipeline.geometry import look_at
 from pipeline.types import CameraIntrinsics, FloatArray
 
@@ -24,7 +24,7 @@ Opening = tuple[float, float, float, float]
 
 
 def shell(
-    rng: np.random.Generator,
+    rng: Rng,
     size_m: Sequence[float],
     floor: Material,
     walls: Sequence[Material],
@@ -84,16 +84,12 @@ def sun(through_m: Sequence[float], onto_m: Sequence[float], irradiance: float) 
 
 
 def arc(
-    target_m: Sequence[float],
-    distance_m: float,
-    height_m: float,
-    azimuths_deg: Sequence[float],
+    target_m: Sequence[float], distance_m: float, height_m: float, azimuths_deg: Sequence[float]
 ) -> tuple[FloatArray, ...]:
     """T_world_camera of nodes around a place, at a horizontal distance and a height above the floor."""
     poses = []
     for azimuth in np.radians(azimuths_deg):
-        out = distance_m * np.array([np.cos(azimuth), np.sin(azimuth)])
-        poses.append(
-            look_at(np.array([target_m[0] + out[0], target_m[1] + out[1], height_m]), np.asarray(target_m))
-        )
+        x = target_m[0] + distance_m * np.cos(azimuth)
+        y = target_m[1] + distance_m * np.sin(azimuth)
+        poses.append(look_at((x, y, height_m), target_m))
     return tuple(poses)

@@ -10,8 +10,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from lab.worlds.pieces import bounds
 from lab.worlds.render import Renderer
-from lab.worlds.scene import Scene
+from lab.worlds.scene import Rng, Scene
 from packetmesh.errors import InputError
 from pipeline.geometry import look_at, rigid, rotation_exp
 from pipeline.types import CameraIntrinsics, FloatArray, IntArray
@@ -30,9 +31,7 @@ _PREVIEW = CameraIntrinsics.pinhole(26.25, 26.25, 15.5, 11.5, 32, 24)
 _View = TypeVar("_View")
 
 
-def random_views(
-    scene: Scene, rng: np.random.Generator, count: int, renderer: Renderer | None = None
-) -> list[FloatArray]:
+def random_views(scene: Scene, rng: Rng, count: int, renderer: Renderer | None = None) -> list[FloatArray]:
     """T_world_camera of ``count`` plausible cameras: room views, and close-ups from above.
 
     Args:
@@ -126,14 +125,11 @@ def _things(scene: Scene, low: FloatArray, high: FloatArray) -> FloatArray:
 
 def _boxes(scene: Scene) -> tuple[FloatArray, FloatArray]:
     """(K, 3) low and high corners of the boxes around everything but the shell."""
-    corners = [
-        part.vertices_m @ part.T_world_part[:3, :3].T + part.T_world_part[:3, 3] for part in scene.parts[6:]
-    ]
-    lows = [places.min(axis=0) for places in corners]
-    return np.array(lows).reshape(-1, 3), np.array([places.max(axis=0) for places in corners]).reshape(-1, 3)
+    corners = np.array([bounds([part]) for part in scene.parts[6:]]).reshape(-1, 2, 3)
+    return corners[:, 0], corners[:, 1]
 
 
-def _room_view(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> FloatArray:
+def _room_view(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
     """A camera at 0.5 to 2 m, pitched -38 to +10 degrees, that rather looks across the room."""
     x, y = rng.uniform(low[:2] + _MARGIN_M, high[:2] - _MARGIN_M)
     eye = np.array([x, y, low[2] + rng.uniform(0.5, min(2.0, high[2] - low[2] - 0.2))])
@@ -142,23 +138,18 @@ def _room_view(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> F
     return _rolled(look_at(eye, eye + _direction(yaw, pitch)), rng, 0.03)
 
 
-def _close_up(
-    rng: np.random.Generator, things: FloatArray, low: FloatArray, high: FloatArray
-) -> FloatArray | None:
+def _close_up(rng: Rng, things: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray | None:
     """A camera 0.6 to 1.6 m from a thing, looking down at it by 20 to 65 degrees."""
     target = things[rng.integers(len(things))] + rng.normal(0.0, 0.1, 3)
-    distance, yaw, pitch = (
-        rng.uniform(0.6, 1.6),
-        rng.uniform(0.0, 2.0 * np.pi),
-        np.radians(rng.uniform(20.0, 65.0)),
-    )
+    distance, yaw = rng.uniform(0.6, 1.6), rng.uniform(0.0, 2.0 * np.pi)
+    pitch = np.radians(rng.uniform(20.0, 65.0))
     eye = target + distance * _direction(yaw, pitch)
     if np.any(eye < low + 0.15) or np.any(eye > high - 0.15):
         return None
     return _rolled(look_at(eye, target), rng, 0.03)
 
 
-def _handheld(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> FloatArray:
+def _handheld(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
     """A camera held at 1.0 to 1.8 m, tilted -45 to +10 degrees, rather towards the middle of the room."""
     eye = _somewhere(rng, low, high, rng.uniform(1.0, 1.8), 0.35)
     pitch = np.radians(np.clip(rng.normal(-15.0, 13.0), -45.0, 10.0))
@@ -166,7 +157,7 @@ def _handheld(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> Fl
     return _rolled(look_at(eye, eye + _direction(yaw, pitch)), rng, 0.04)
 
 
-def _overhead(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> FloatArray:
+def _overhead(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
     """A camera mounted at 2.2 to 3 m that looks down by 20 to 80 degrees, often from a corner."""
     height = rng.uniform(2.2, max(2.2, min(3.0, high[2] - low[2] - 0.1)))
     eye = _somewhere(rng, low, high, height, 0.15)
@@ -177,9 +168,7 @@ def _overhead(rng: np.random.Generator, low: FloatArray, high: FloatArray) -> Fl
     return _rolled(look_at(eye, eye + _direction(yaw, pitch)), rng, 0.02)
 
 
-def _somewhere(
-    rng: np.random.Generator, low: FloatArray, high: FloatArray, height_m: float, margin_m: float
-) -> FloatArray:
+def _somewhere(rng: Rng, low: FloatArray, high: FloatArray, height_m: float, margin_m: float) -> FloatArray:
     x, y = rng.uniform(low[:2] + margin_m, high[:2] - margin_m)
     return np.array([x, y, low[2] + height_m])
 
@@ -195,7 +184,7 @@ def _direction(yaw_rad: float, pitch_rad: float) -> FloatArray:
     return np.array([level * np.cos(yaw_rad), level * np.sin(yaw_rad), np.sin(pitch_rad)])
 
 
-def _rolled(T_world_camera: FloatArray, rng: np.random.Generator, sigma_rad: float) -> FloatArray:
+def _rolled(T_world_camera: FloatArray, rng: Rng, sigma_rad: float) -> FloatArray:
     """The camera turned a little about its axis, as nobody holds one level."""
     roll = np.array([0.0, 0.0, rng.normal(0.0, sigma_rad)])
     return np.asarray(T_world_camera @ rigid(rotation_exp(roll), np.zeros(3)))

@@ -1,8 +1,8 @@
-"""What every medium access works with."""
+"""What every medium access works with, and random numbers for its backoffs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,9 @@ from network_sim.types import Packet
 if TYPE_CHECKING:
     from network_sim.mac.medium import Medium
     from network_sim.trace import Recorder
+
+_BLOCK = 4096
+"""Random numbers are drawn in blocks: a call for each would dominate the run time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,3 +38,9 @@ class MacContext:
     """Whether a node is awake."""
     receive: Callable[[Packet, int], None]
     """Gets each packet once per ``send`` at most, and the node that it has reached."""
+
+
+def random_below(most: int, rng: np.random.Generator) -> Iterator[int]:
+    """Random numbers below a power of two; their lowest bits are those of smaller windows."""
+    while True:
+        yield from rng.integers(0, most, size=_BLOCK).tolist()

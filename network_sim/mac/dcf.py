@@ -9,12 +9,12 @@ it ends, to start a SIFS later: listeners do not see the channel idle between th
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import simpy
 
-from network_sim.mac.context import MacContext
-from network_sim.mac.random_blocks import random_below
+from network_sim.mac.context import MacContext, random_below
 from network_sim.types import Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:
@@ -60,6 +60,7 @@ def data_ns(size_bytes: int) -> int:
     return PLCP_NS + (8 * (size_bytes + HEADER_BYTES) * 1000 + 5) // 11
 
 
+@dataclass(slots=True, eq=False)
 class _Station:
     """A node's view of the channel, and its countdown.
 
@@ -67,54 +68,31 @@ class _Station:
     packet only the backoff after the last one goes on; when that is over it leaves the channel.
     """
 
-    __slots__ = (
-        "_counting",
-        "_eifs_ns",
-        "_unsubscribe",
-        "arrived",
-        "begins_ns",
-        "event",
-        "free_ns",
-        "from_ns",
-        "listener",
-        "node",
-        "own_free_ns",
-        "reserved_ns",
-        "sending",
-        "slots",
-    )
-
-    def __init__(
-        self,
-        node: int,
-        counting: dict[int, _Station],
-        unsubscribe: Callable[[_Station], None],
-        eifs_ns: int,
-    ) -> None:
-        """``counting`` holds the stations with a packet that are not frozen; ``unsubscribe`` ends one."""
-        self.node = node
-        self._counting = counting
-        self._unsubscribe = unsubscribe
-        self._eifs_ns = eifs_ns
-        self.listener: Listener | None = None
-        """Its subscription to the channel; None when there is nothing to count down."""
-        self.event: simpy.Event | None = None
-        """Succeeds when it may send; None without a packet."""
-        self.slots = 0
-        """Left to count down."""
-        self.begins_ns = 0
-        """When its next frame begins, once that is certain."""
-        self.from_ns = _NEVER
-        """Start of the countdown; never while frozen."""
-        self.free_ns = 0
-        """End of the interframe space after the last frame it heard."""
-        self.reserved_ns = -DIFS_NS
-        """End of the reservations that it has read (NAV)."""
-        self.own_free_ns = 0
-        """End of the interframe space after its own last frame, with the wait for a reply."""
-        self.sending = False
-        self.arrived = False
-        """Its packet has reached the receiver, whether or not it knows."""
+    node: int
+    counting: dict[int, _Station]
+    """The stations with a packet that are not frozen."""
+    unsubscribe: Callable[[_Station], None]
+    """Ends a station's subscription."""
+    eifs_ns: int
+    listener: Listener | None = None
+    """Its subscription to the channel; None when there is nothing to count down."""
+    event: simpy.Event | None = None
+    """Succeeds when it may send; None without a packet."""
+    slots: int = 0
+    """Left to count down."""
+    begins_ns: int = 0
+    """When its next frame begins, once that is certain."""
+    from_ns: int = _NEVER
+    """Start of the countdown; never while frozen."""
+    free_ns: int = 0
+    """End of the interframe space after the last frame it heard."""
+    reserved_ns: int = -DIFS_NS
+    """End of the reservations that it has read (NAV)."""
+    own_free_ns: int = 0
+    """End of the interframe space after its own last frame, with the wait for a reply."""
+    sending: bool = False
+    arrived: bool = False
+    """Its packet has reached the receiver, whether or not it knows."""
 
     @property
     def expiry_ns(self) -> int:
@@ -128,12 +106,12 @@ class _Station:
             return
         if from_ns + self.slots * SLOT_NS <= now_ns:
             if self.event is None:
-                self._unsubscribe(self)
+                self.unsubscribe(self)
             return
         if now_ns > from_ns:
             self.slots -= (now_ns - from_ns) // SLOT_NS
         self.from_ns = _NEVER
-        self._counting.pop(self.node, None)
+        self.counting.pop(self.node, None)
 
     def on_idle(self, free_ns: int, damaged: bool) -> None:
         """Resume the countdown after the interframe space."""
@@ -144,7 +122,7 @@ class _Station:
     def update_nav(self, free_ns: int, damaged: bool) -> None:
         """Update the reservation from the last frame; a longer one than its own stays valid."""
         if damaged:
-            self.free_ns = max(free_ns + self._eifs_ns, self.reserved_ns + DIFS_NS)
+            self.free_ns = max(free_ns + self.eifs_ns, self.reserved_ns + DIFS_NS)
         else:
             if free_ns > self.reserved_ns:
                 self.reserved_ns = free_ns
@@ -154,7 +132,7 @@ class _Station:
         """Count down as soon as both interframe spaces are over."""
         self.from_ns = self.free_ns if self.free_ns > self.own_free_ns else self.own_free_ns
         if self.event is not None:
-            self._counting[self.node] = self
+            self.counting[self.node] = self
 
 
 class Dcf:

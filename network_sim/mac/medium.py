@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import simpy
@@ -32,51 +33,27 @@ _NONE = Cause.NONE
 """An enumeration is slow to look up, and this is for every frame."""
 
 
+@dataclass(slots=True, eq=False)
 class Transmission:
     """A frame on the air, on its way to one receiver."""
 
-    __slots__ = (
-        "earlier",
-        "end_ns",
-        "heard",
-        "modulation",
-        "overlaps",
-        "power_w",
-        "receiver",
-        "reserved_ns",
-        "sender",
-        "size_bytes",
-        "start_ns",
-    )
-
-    def __init__(
-        self,
-        sender: int,
-        receiver: int,
-        start_ns: int,
-        end_ns: int,
-        reserved_ns: int,
-        power_w: float,
-        size_bytes: int,
-        modulation: Modulation,
-    ) -> None:
-        self.sender = sender
-        self.receiver = receiver
-        self.start_ns = start_ns
-        self.end_ns = end_ns
-        self.reserved_ns = reserved_ns
-        """End of the reservation (NAV): the end of the frame, or of the exchange it belongs to."""
-        self.power_w = power_w
-        """At the receiver, with fading."""
-        self.size_bytes = size_bytes
-        self.modulation = modulation
-        """For ``Radio.error_rate``."""
-        self.overlaps: list[Transmission] = []
-        """Frames that were on the air at the same time, in the order in which they began."""
-        self.earlier = 0
-        """How many of them began before it."""
-        self.heard: list[Listener] = []
-        """Listeners that sense it."""
+    sender: int
+    receiver: int
+    start_ns: int
+    end_ns: int
+    reserved_ns: int
+    """End of the reservation (NAV): the end of the frame, or of the exchange it belongs to."""
+    power_w: float
+    """At the receiver, with fading."""
+    size_bytes: int
+    modulation: Modulation
+    """For ``Radio.error_rate``."""
+    overlaps: list[Transmission]
+    """Frames that were on the air at the same time, in the order in which they began."""
+    heard: list[Listener]
+    """Listeners that sense it."""
+    earlier: int = 0
+    """How many of the overlapping frames began before it."""
 
     def peak_interference_w(self, powers_w: list[float]) -> float:
         """The largest sum of overlapping powers at any instant of this frame.
@@ -98,19 +75,15 @@ class Transmission:
         )
 
 
+@dataclass(slots=True, eq=False)
 class Listener:
     """Callbacks of a node for when its channel becomes busy and idle."""
 
-    __slots__ = ("busy", "node", "on_busy", "on_idle")
-
-    def __init__(
-        self, node: int, on_busy: Callable[[int], None], on_idle: Callable[[int, bool], None]
-    ) -> None:
-        self.node = node
-        self.on_busy = on_busy
-        self.on_idle = on_idle
-        self.busy = 0
-        """How many transmissions it senses now."""
+    node: int
+    on_busy: Callable[[int], None]
+    on_idle: Callable[[int, bool], None]
+    busy: int = 0
+    """How many transmissions it senses now."""
 
 
 class Medium:
@@ -191,7 +164,7 @@ class Medium:
             self._rows_end_ns = start_ns + REFRESH_NS
         power_w = self.radio.faded_w(self.power_w(sender, receiver))
         frame = Transmission(
-            sender, receiver, start_ns, end_ns, end_ns + reserve_ns, power_w, size_bytes, modulation
+            sender, receiver, start_ns, end_ns, end_ns + reserve_ns, power_w, size_bytes, modulation, [], []
         )
         for other in self._active:
             if other.end_ns > start_ns:

@@ -6,31 +6,13 @@ They follow Bruno & Nurchis, "Efficient data collection in multimedia vehicular 
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from network_sim.config import SchemeConfig
-from network_sim.schemes.baseline import Baseline
 from network_sim.schemes.greedy import Greedy
 from network_sim.schemes.pdc import Pdc
+from network_sim.schemes.scheme import Baseline, Scheme
 from network_sim.types import to_ns
-
-
-class Scheme(Protocol):
-    """Decides which of the offered images the collector requests."""
-
-    asks: bool
-    """Images come only on request."""
-
-    def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
-        """Positions of the images to upload, in that order, of those that a summary offers (T,)."""
-
-    def received(self, cell: int, now_ns: int) -> None:
-        """An image arrived."""
-
-    def missed(self, cell: int, captured_ns: int) -> None:
-        """A requested image did not arrive."""
 
 
 def make_scheme(config: SchemeConfig, cells: int, rng: np.random.Generator) -> Scheme:

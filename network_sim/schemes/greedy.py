@@ -8,11 +8,46 @@ the largest.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right, insort
+from collections import defaultdict
 from heapq import heapify, heappop, heappush
 
 import numpy as np
 
-from network_sim.schemes.coverage import Coverage
+from network_sim.schemes.scheme import Scheme
+
+
+class Coverage:
+    """The images of a set by cell, and the gain of one more.
+
+    An image of cell c taken at tau covers c during [tau, tau + T_v). The utility of a set A is F(A) = sum
+    over cells of the length of the union of its intervals: monotone and submodular.
+    """
+
+    def __init__(self, validity_ns: int) -> None:
+        self.validity_ns = validity_ns
+        self._taken_ns: defaultdict[int, list[int]] = defaultdict(list)
+
+    def gain_ns(self, cell: int, captured_ns: int) -> int:
+        """F(A + a) - F(A). All intervals are equally long, so only the nearest on each side matter."""
+        taken = self._taken_ns[cell]
+        after = bisect_right(taken, captured_ns)
+        start_ns = captured_ns
+        end_ns = captured_ns + self.validity_ns
+        if after and taken[after - 1] + self.validity_ns > start_ns:
+            start_ns = taken[after - 1] + self.validity_ns
+        if after < len(taken) and taken[after] < end_ns:
+            end_ns = taken[after]
+        return end_ns - start_ns if end_ns > start_ns else 0
+
+    def add(self, cell: int, captured_ns: int) -> None:
+        """Add an image."""
+        insort(self._taken_ns[cell], captured_ns)
+
+    def remove(self, cell: int, captured_ns: int) -> None:
+        """Remove an image that did not arrive."""
+        taken = self._taken_ns[cell]
+        del taken[bisect_left(taken, captured_ns)]
 
 
 def select(coverage: Coverage, cells: list[int], captured_ns: list[int], k: int | None) -> list[int]:
@@ -45,10 +80,8 @@ def select(coverage: Coverage, cells: list[int], captured_ns: list[int], k: int 
     return chosen
 
 
-class Greedy:
+class Greedy(Scheme):
     """Counts requested images as covered until they are reported missing."""
-
-    asks = True
 
     def __init__(self, validity_ns: int, k: int | None) -> None:
         self.coverage = Coverage(validity_ns)
@@ -57,9 +90,6 @@ class Greedy:
     def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
         """Positions of the images to ask for, best first."""
         return select(self.coverage, cells.tolist(), captured_ns.tolist(), self.k)
-
-    def received(self, cell: int, now_ns: int) -> None:
-        """It was counted as covered with the request."""
 
     def missed(self, cell: int, captured_ns: int) -> None:
         """A requested image did not arrive."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from network_sim.config import SchemeConfig
+from network_sim.schemes.scheme import Scheme
 from network_sim.types import to_ns
 
 FLOOR = 0.02
@@ -40,10 +41,8 @@ def adapted(previous: np.ndarray, rates: np.ndarray, config: SchemeConfig) -> np
     return np.clip(np.where(rates < config.r_low, fewer + INCREASE, fewer), FLOOR, 1.0)
 
 
-class Pdc:
+class Pdc(Scheme):
     """Counts images by cell and control period, over the observation period."""
-
-    asks = True
 
     def __init__(self, config: SchemeConfig, cells: int, rng: np.random.Generator) -> None:
         """``cells`` is one more than the largest number of a cell."""
@@ -69,9 +68,6 @@ class Pdc:
         if self._by_received:
             self._advance(now_ns)
             self._counts[self._period % len(self._counts), cell] += 1
-
-    def missed(self, cell: int, captured_ns: int) -> None:
-        """Only offered or received images count."""
 
     def _advance(self, now_ns: int) -> None:
         """Update the probabilities at the end of every control period that has passed."""

@@ -40,10 +40,7 @@ class AlignmentResult:
 
 
 def align_depth(
-    inferred: DepthMap,
-    sensor: DepthMap,
-    mode: AlignmentMode = "local",
-    disparity: bool = False,
+    inferred: DepthMap, sensor: DepthMap, mode: AlignmentMode = "local", disparity: bool = False
 ) -> AlignmentResult:
     """Map inferred depth to the sensor's metres.
 

@@ -6,6 +6,7 @@ The Hide tool compares the network's fill with them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import cv2
 import numpy as np
@@ -26,18 +27,11 @@ LEAST_WEIGHT = 1e-6
 """What the colour leaves at least of a neighbour's weight, so that no pixel stays without depth."""
 
 
-def inpaint_telea(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
-    """Fast marching (Telea 2004), OpenCV's; the colours are not used."""
-    return inpainted(sensor, cv2.INPAINT_TELEA)
+def inpainted(method: int, sensor: DepthMap, rgb: ByteArray) -> DepthMap:
+    """OpenCV's inpainting of 16-bit depth; measured pixels keep their bits. The colours are not used.
 
-
-def inpaint_ns(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
-    """Navier-Stokes (Bertalmio et al. 2001), OpenCV's; the colours are not used."""
-    return inpainted(sensor, cv2.INPAINT_NS)
-
-
-def inpainted(sensor: DepthMap, method: int) -> DepthMap:
-    """OpenCV's inpainting of 16-bit depth; measured pixels keep their bits."""
+    ``method`` is fast marching (Telea 2004) or Navier-Stokes (Bertalmio et al. 2001).
+    """
     require_depth(sensor)
     step_m = float(np.nanmax(sensor.z_m)) / FULL_SCALE
     steps = np.rint(np.where(sensor.valid, sensor.z_m, 0.0) / step_m).astype(np.uint16)
@@ -101,8 +95,8 @@ def require_depth(sensor: DepthMap) -> None:
 
 
 PEERS: dict[str, Callable[[DepthMap, ByteArray], DepthMap]] = {
-    "inpaint-telea": inpaint_telea,
-    "inpaint-ns": inpaint_ns,
+    "inpaint-telea": partial(inpainted, cv2.INPAINT_TELEA),
+    "inpaint-ns": partial(inpainted, cv2.INPAINT_NS),
     "nearest": nearest,
     "joint-bilateral": joint_bilateral,
 }

@@ -20,11 +20,7 @@ LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
 
 
 def load_frame(
-    color: AnyPath,
-    depth: AnyPath,
-    intrinsics: AnyPath,
-    depth_scale: float = 1000.0,
-    name: str = "node_00",
+    color: AnyPath, depth: AnyPath, intrinsics: AnyPath, depth_scale: float = 1000.0, name: str = "node_00"
 ) -> RgbdFrame:
     """One registered RGB-D pair, at the origin, upright, looking along +y.
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.config import RegistrationConfig
-from pipeline.registration.degenerate import DegenerateError
 from pipeline.registration.matching import Matching
+from pipeline.registration.residual import DegenerateError
 from pipeline.registration.weighting import PairWeighting, PairWeights
 from pipeline.types import FloatArray, PointCloud
 

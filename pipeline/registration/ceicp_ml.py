@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.config import Direction, RegistrationConfig
+from pipeline.config import RegistrationConfig
 from pipeline.registration.ceicp import CeicpA
 from pipeline.registration.matching import Matching
 from pipeline.registration.weighting import PairWeighting, PairWeights
@@ -31,6 +31,8 @@ class CeicpMl(PairWeighting):
     coherent point drift (Myronenko, Song 2010) cut off after five neighbours.
     """
 
+    direction = "p2q"
+    """Every target point is explained by source points."""
     sigma_min_m: float
     outlier_density: float
     """w0 / (1 - w0) |Q| / V, in one over cubic metres."""
@@ -76,11 +78,6 @@ class CeicpMl(PairWeighting):
     def neighbours(self) -> int:
         """Five, or all source points of a smaller cloud."""
         return self.count
-
-    @property
-    def direction(self) -> Direction | None:
-        """Every target point is explained by source points."""
-        return "p2q"
 
     def following(self, kept: PairWeights, still: bool) -> CeicpMl:
         """With the re-estimated scale."""

@@ -35,6 +35,7 @@ class FastRobustIcp(PairWeighting):
     authors' program.
     """
 
+    accelerated = True
     nu_min_m: float
     nu_m: float | None = None
     """The scale; None takes it from the first matching."""
@@ -60,11 +61,6 @@ class FastRobustIcp(PairWeighting):
     def settled(self) -> bool:
         """Whether the scale has reached its smallest value."""
         return self.nu_m is not None and self.nu_m <= self.nu_min_m
-
-    @property
-    def accelerated(self) -> bool:
-        """Poses are extrapolated."""
-        return True
 
     def following(self, kept: PairWeights, still: bool) -> FastRobustIcp:
         """With half the scale, if the poses have come to rest."""

@@ -27,16 +27,17 @@ class Ficp(PairWeighting):
         return evenly(closest_rows(matching.distances_m, inlier_fraction(matching.distances_m)))
 
 
-def inlier_fraction(distances_m: FloatArray) -> float:
+def inlier_fraction(distances_m: FloatArray, exponent: float = LAMBDA) -> float:
     """The f in [0.05, 1] that minimises FRMSD(f) = f^-lambda sqrt(mean of the f n smallest d^2).
 
     Of several minima the largest, so that perfect pairs are all kept.
 
     Args:
         distances_m: (M,) distances, M >= 1.
+        exponent: lambda.
     """
     total = len(distances_m)
     squared_m2 = np.cumsum(np.sort(distances_m) ** 2)
     counts = np.arange(int(np.ceil(SMALLEST_FRACTION * total)), total + 1)
-    frmsd_m = (counts / total) ** -LAMBDA * np.sqrt(squared_m2[counts - 1] / counts)
+    frmsd_m = (counts / total) ** -exponent * np.sqrt(squared_m2[counts - 1] / counts)
     return float(counts[::-1][np.argmin(frmsd_m[::-1])] / total)

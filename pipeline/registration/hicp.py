@@ -9,7 +9,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.config import RegistrationConfig
-from pipeline.registration.trimmed import TrimmedIcp
+from pipeline.registration.icp import TrimmedIcp
 from pipeline.types import ByteArray, FloatArray, PointCloud
 
 LEAST_SATURATION = 0.1

@@ -1,4 +1,4 @@
-"""Plain ICP: every closest pair counts the same (thesis Table 3.1, SPEC 4.2)."""
+"""Plain ICP, where every closest pair counts the same (thesis Table 3.1, SPEC 4.2), and trimmed ICP."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.config import RegistrationConfig
 from pipeline.registration.matching import Matching
-from pipeline.registration.weighting import PairWeighting, PairWeights, evenly
+from pipeline.registration.weighting import PairWeighting, PairWeights, closest_rows, evenly
+from pipeline.types import PointCloud
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,3 +19,24 @@ class Icp(PairWeighting):
     def weigh(self, matching: Matching) -> PairWeights:
         """All pairs, with equal weights."""
         return evenly(np.arange(len(matching.distances_m)))
+
+
+@dataclass(frozen=True, slots=True)
+class TrimmedIcp(PairWeighting):
+    """Equal weights for a fixed share of the pairs, the closest ones.
+
+    Source: Chetverikov, Svirko, Stepanov, Krsek, "The trimmed iterative closest point algorithm",
+    ICPR 2002, with the overlap given instead of searched.
+    """
+
+    share: float
+    """Share of the pairs that is kept, above 0 up to 1."""
+
+    @classmethod
+    def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> TrimmedIcp:
+        """With the configured share."""
+        return cls(config.trim)
+
+    def weigh(self, matching: Matching) -> PairWeights:
+        """The closest share, with equal weights."""
+        return evenly(closest_rows(matching.distances_m, self.share))

@@ -12,12 +12,11 @@ from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import drain
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import apply, rotation_angle_rad
-from pipeline.registration.acceleration import Acceleration
-from pipeline.registration.degenerate import DegenerateError
+from pipeline.registration.anderson import Acceleration
 from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.registration.matching import Matcher, Matching
 from pipeline.registration.methods import METHODS, MethodStart
-from pipeline.registration.residual import residual_for
+from pipeline.registration.residual import DegenerateError, residual_for
 from pipeline.registration.sample import Sample, draw
 from pipeline.registration.stop import TRANSLATION_TOLERANCE_OF_GATE, StopRule
 from pipeline.registration.weighting import PairWeighting, PairWeights

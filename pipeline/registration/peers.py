@@ -12,6 +12,7 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
@@ -74,9 +75,6 @@ Outcome = tuple[FloatArray, int | None, str]
 class Peer:
     """Another program's method."""
 
-    label: str
-    note: str
-    """What to know when reading its numbers."""
     module: str
     """What must be importable."""
     solve: Callable[[Problem], Outcome]
@@ -126,38 +124,42 @@ def run_peer(
     return PeerResult(np.array(T), iterations, time.perf_counter() - started, reason)
 
 
-def _open3d(problem: Problem, register: Any, estimation: Any, with_normals: bool = False) -> Outcome:
+def _open3d(problem: Problem, estimation: str) -> Outcome:
     """One of Open3D's loops; it tells neither its iterations nor why it stopped."""
     source, target = (
         o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
         for points_m in (problem.source_m, problem.target_m)
     )
-    if with_normals:
+    register = o3d_registration.registration_icp
+    if estimation == "ForGeneralizedICP":
+        register = o3d_registration.registration_generalized_icp
+    if estimation == "PointToPlane":
         target.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS))
     criteria = o3d_registration.ICPConvergenceCriteria(
         RELATIVE_TOLERANCE, RELATIVE_TOLERANCE, problem.max_iterations
     )
-    result = register(source, target, problem.gate_m, problem.T_init, estimation, criteria)
+    solver = getattr(o3d_registration, f"TransformationEstimation{estimation}")()
+    result = register(source, target, problem.gate_m, problem.T_init, solver, criteria)
     return result.transformation, None, "finished" if result.fitness > 0 else _NO_PAIRS
 
 
-def _small_gicp(problem: Problem, gates_m: tuple[float, ...]) -> Outcome:
+def _small_gicp(problem: Problem, staged: bool) -> Outcome:
     import small_gicp
 
     clouds = [small_gicp.PointCloud(points_m) for points_m in (problem.source_m, problem.target_m)]
     trees = [small_gicp.KdTree(cloud, num_threads=_threads()) for cloud in clouds]
     for cloud, tree in zip(clouds, trees, strict=True):
         small_gicp.estimate_covariances(cloud, tree, NEIGHBOURS, _threads())
-    return _in_stages(
-        problem,
-        gates_m,
-        lambda T, gate_m, limits: small_gicp.align(
+
+    def align(T: FloatArray, gate_m: float, limits: dict[str, Any]) -> Any:
+        return small_gicp.align(
             clouds[1], clouds[0], trees[1], T, "GICP", max_correspondence_distance=gate_m, **limits
-        ),
-    )
+        )
+
+    return _in_stages(problem, staged, align)
 
 
-def _small_vgicp(problem: Problem, gates_m: tuple[float, ...]) -> Outcome:
+def _small_vgicp(problem: Problem, staged: bool) -> Outcome:
     """Voxels as wide as the gate: a smaller voxel would be a smaller gate."""
     import small_gicp
 
@@ -170,17 +172,18 @@ def _small_vgicp(problem: Problem, gates_m: tuple[float, ...]) -> Outcome:
         voxels.insert(target)
         return small_gicp.align(voxels, source, T, max_correspondence_distance=gate_m, **limits)
 
-    return _in_stages(problem, gates_m, align)
+    return _in_stages(problem, staged, align)
 
 
 def _in_stages(
-    problem: Problem,
-    gates_m: tuple[float, ...],
-    align: Callable[[FloatArray, float, dict[str, Any]], Any],
+    problem: Problem, staged: bool, align: Callable[[FloatArray, float, dict[str, Any]], Any]
 ) -> Outcome:
-    """small_gicp once for every gate, each from the pose of the one before."""
+    """small_gicp with the gate T_d, or with T_d, T_d / 2, 0.1 m, 0.06 m from the pose of the one before."""
+    gates_m = {problem.gate_m}
+    if staged:
+        gates_m |= {0.5 * problem.gate_m, *(m for m in STAGES_M if m < problem.gate_m)}
     T, iterations, reason = problem.T_init, 0, "max_iterations"
-    for gate_m in gates_m:
+    for gate_m in sorted(gates_m, reverse=True):
         limits = {
             "num_threads": _threads(),
             "max_iterations": max(1, problem.max_iterations - iterations),
@@ -193,11 +196,6 @@ def _in_stages(
         T, iterations = result.T_target_source, iterations + result.iterations
         reason = "converged" if result.converged else "max_iterations"
     return T, iterations, reason
-
-
-def _stages_m(gate_m: float) -> tuple[float, ...]:
-    """T_d, T_d / 2, 0.1 m, 0.06 m, descending."""
-    return tuple(sorted({gate_m, 0.5 * gate_m, *(m for m in STAGES_M if m < gate_m)}, reverse=True))
 
 
 def _threads() -> int:
@@ -245,69 +243,15 @@ def _rigid_cpd(base: Any) -> Any:
     return RigidCpd
 
 
-_STAGED = "max distance T_d, T_d/2, 10 cm, 6 cm in turn"
-
 PEERS: dict[str, Peer] = {
-    "open3d-point": Peer(
-        "Open3D ICP, point to point",
-        "hard gate",
-        "open3d",
-        lambda problem: _open3d(
-            problem,
-            o3d_registration.registration_icp,
-            o3d_registration.TransformationEstimationPointToPoint(),
-        ),
-    ),
-    "open3d-plane": Peer(
-        "Open3D ICP, point to plane",
-        "hard gate; its normals are in the time",
-        "open3d",
-        lambda problem: _open3d(
-            problem,
-            o3d_registration.registration_icp,
-            o3d_registration.TransformationEstimationPointToPlane(),
-            with_normals=True,
-        ),
-    ),
-    "open3d-gicp": Peer(
-        "Open3D GICP",
-        "hard gate; its covariances are in the time",
-        "open3d",
-        lambda problem: _open3d(
-            problem,
-            o3d_registration.registration_generalized_icp,
-            o3d_registration.TransformationEstimationForGeneralizedICP(),
-        ),
-    ),
-    "small-gicp": Peer(
-        "small_gicp GICP",
-        "hard gate; trees and covariances are in the time",
-        "small_gicp",
-        lambda problem: _small_gicp(problem, (problem.gate_m,)),
-    ),
-    "small-vgicp": Peer(
-        "small_gicp VGICP",
-        "voxels as wide as the gate; covariances and voxels are in the time",
-        "small_gicp",
-        lambda problem: _small_vgicp(problem, (problem.gate_m,)),
-    ),
-    "small-gicp-staged": Peer(
-        "small_gicp GICP, staged",
-        _STAGED,
-        "small_gicp",
-        lambda problem: _small_gicp(problem, _stages_m(problem.gate_m)),
-    ),
-    "small-vgicp-staged": Peer(
-        "small_gicp VGICP, staged",
-        _STAGED,
-        "small_gicp",
-        lambda problem: _small_vgicp(problem, _stages_m(problem.gate_m)),
-    ),
-    "cpd": Peer(
-        "CPD (pycpd)",
-        f"at most {CPD_POINTS} points of each cloud, because its cost is quadratic; no gate",
-        "pycpd",
-        _cpd,
-    ),
+    "open3d-point": Peer("open3d", partial(_open3d, estimation="PointToPoint")),
+    "open3d-plane": Peer("open3d", partial(_open3d, estimation="PointToPlane")),
+    "open3d-gicp": Peer("open3d", partial(_open3d, estimation="ForGeneralizedICP")),
+    "small-gicp": Peer("small_gicp", partial(_small_gicp, staged=False)),
+    "small-vgicp": Peer("small_gicp", partial(_small_vgicp, staged=False)),
+    "small-gicp-staged": Peer("small_gicp", partial(_small_gicp, staged=True)),
+    "small-vgicp-staged": Peer("small_gicp", partial(_small_vgicp, staged=True)),
+    "cpd": Peer("pycpd", _cpd),
 }
-"""Every peer by name, installed or not."""
+"""Every peer by name, installed or not: Open3D's ICP and GICP, small_gicp's GICP and VGICP, both also in
+stages, and pycpd's CPD. Their gates are hard; CPD has none."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -39,6 +40,11 @@ class PairWeights:
 @dataclass(frozen=True, slots=True)
 class PairWeighting(ABC):
     """A method in the state of one iteration; plain defaults for all but the weights."""
+
+    direction: ClassVar[Direction | None] = None
+    """The direction the method insists on; None for the configured one."""
+    accelerated: ClassVar[bool] = False
+    """Whether Anderson acceleration extrapolates the poses."""
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> PairWeighting:
@@ -89,18 +95,8 @@ class PairWeighting(ABC):
         return 1
 
     @property
-    def direction(self) -> Direction | None:
-        """The direction the method insists on; None for the configured one."""
-        return None
-
-    @property
     def unweighted_centroids(self) -> bool:
         """Whether the point residual takes plain centroids of the kept pairs, as eq. 3.12 does."""
-        return False
-
-    @property
-    def accelerated(self) -> bool:
-        """Whether Anderson acceleration extrapolates the poses."""
         return False
 
     def features(self, cloud: PointCloud) -> FloatArray | None:

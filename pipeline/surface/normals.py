@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
 from pipeline.open3d_runtime import o3d
+from pipeline.surface.boundary import connected_parts
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 NEIGHBOURS = 20
@@ -96,9 +97,8 @@ def _turned_outwards(points_m: FloatArray, normals: FloatArray) -> FloatArray:
     count = min(GRAPH_NEIGHBOURS + 1, len(points_m))
     distances_m, rows = cKDTree(points_m).query(points_m, k=count, workers=-1)
     normals = normals * _agreeing_signs(normals, rows[:, 1:])[:, None]
-    ends = np.repeat(np.arange(len(rows)), count - 1), rows[:, 1:].reshape(-1)
-    graph = coo_matrix((np.ones(len(ends[0]), np.int8), ends), (len(rows), len(rows)))
-    part = connected_components(graph, directed=False)[1]
+    edges = np.stack([np.repeat(np.arange(len(rows)), count - 1), rows[:, 1:].reshape(-1)], axis=1)
+    part = connected_parts(edges, len(rows))
     facing = _facing(points_m, normals, distances_m[:, -1] ** 2, part)
     return normals * np.where(facing < 0.0, -1.0, 1.0)[:, None]
 

@@ -34,10 +34,7 @@ def sweep_radii_m(r_F_m: float, others_m: Iterable[float] = ()) -> tuple[float, 
 
 
 def iterate_sweep(
-    cloud: PointCloud,
-    radii_m: Sequence[float],
-    cameras: Sequence[Camera] = (),
-    truth: RigTruth | None = None,
+    cloud: PointCloud, radii_m: Sequence[float], cameras: Sequence[Camera] = (), truth: RigTruth | None = None
 ) -> Generator[SweepPoint]:
     """Roll each ball alone over the cloud, one for each step.
 

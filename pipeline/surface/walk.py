@@ -208,11 +208,7 @@ def _left_front(
 
 
 def _arcs(
-    vertices_m: FloatArray,
-    triangles: IntArray,
-    centers_m: FloatArray,
-    radius_m: FloatArray,
-    parent: IntArray,
+    vertices_m: FloatArray, triangles: IntArray, centers_m: FloatArray, radius_m: FloatArray, parent: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """(F, 3) where each ball set off, and (F,) how far it turned about its edge, right-handed."""
     start_m, turn_rad = centers_m.copy(), np.zeros(len(triangles))

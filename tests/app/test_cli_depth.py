@@ -6,23 +6,17 @@ import cv2
 import numpy as np
 import pytest
 
-from app.cli import main
 from app.drawing.colors import HOLE
 from pipeline.depth import DepthNetwork
 from pipeline.io.images import read_color
+from tests.app import commands
 from tests.paths import ASSETS
 
 PAIR = ASSETS / "scenes" / "box-on-table" / "node_00"
 
 
 def run(capsys, *argv: object) -> tuple[int, str, str]:
-    try:
-        main(["infer-depth", *map(str, argv)])
-        code = 0
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err
+    return commands.run(capsys, "infer-depth", *argv)
 
 
 def values(file) -> np.ndarray:
@@ -98,17 +92,8 @@ def test_a_sensor_makes_the_depth_metric(capsys, tmp_path, kind):
     sensor_mm = np.rint(1000.0 * truth_m).astype(np.uint16)
     sensor_mm[5:12, 8:20] = 0
     cv2.imwrite(str(tmp_path / "sensor.png"), sensor_mm)
-    argv = [
-        photo(tmp_path),
-        "--out",
-        tmp_path,
-        "--model",
-        network,
-        "--sensor",
-        tmp_path / "sensor.png",
-        "--json",
-    ]
-    code, out, _ = run(capsys, *argv)
+    given = ("--model", network, "--sensor", tmp_path / "sensor.png")
+    code, out, _ = run(capsys, photo(tmp_path), "--out", tmp_path, *given, "--json")
     (record,) = json.loads(out)["photos"].values()
     assert code == 0
     assert record["alignment"]["mode"] == "local"

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.cli import main
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import read_mesh
 from pipeline.types import PointCloud
+from tests.app import commands
 from tests.pipeline.surface.shapes import perforated_plane, sphere
 
 KEYS = {
@@ -21,13 +21,7 @@ KEYS = {
 
 
 def run(capsys, *argv: object) -> tuple[int, str, str]:
-    try:
-        main(["mesh", *map(str, argv)])
-        code = 0
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err
+    return commands.run(capsys, "mesh", *argv)
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +141,8 @@ BAD_CLOUDS = {
 def test_a_cloud_without_a_surface_is_one_sentence(capsys, tmp_path, case):
     points_m, says = BAD_CLOUDS[case]
     np.savez(tmp_path / "bad.npz", points=points_m)
-    check_one_sentence(run(capsys, tmp_path / "bad.npz", "--out", tmp_path / "out" / "mesh.ply"), 1, says)
+    got = run(capsys, tmp_path / "bad.npz", "--out", tmp_path / "out" / "mesh.ply")
+    commands.check_one_sentence(got, 1, says)
     assert not (tmp_path / "out").exists()
 
 
@@ -174,7 +169,7 @@ def test_what_cannot_be_is_one_sentence_and_writes_nothing(capsys, tmp_path, bal
     (ball.parent / "noise.pcd").write_bytes(np.random.default_rng(0).bytes(3000))
     (ball.parent / "ball.las").write_bytes(ball.read_bytes())
     got = run(capsys, ball.parent / argv[0], "--out", tmp_path / "out" / "mesh.ply", *argv[1:])
-    check_one_sentence(got, code, says)
+    commands.check_one_sentence(got, code, says)
     assert not (tmp_path / "out").exists()
 
 
@@ -188,7 +183,7 @@ def test_what_cannot_be_is_one_sentence_and_writes_nothing(capsys, tmp_path, bal
 )
 def test_a_place_that_takes_no_mesh_is_one_sentence(capsys, tmp_path, ball, out, says):
     (tmp_path / "file").write_text("no folder")
-    check_one_sentence(run(capsys, ball, "--out", tmp_path / out), 1, says)
+    commands.check_one_sentence(run(capsys, ball, "--out", tmp_path / out), 1, says)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
@@ -197,20 +192,10 @@ def test_balls_that_nothing_stops_are_one_sentence(capsys, tmp_path):
     opposite = PointCloud(np.eye(3), normals=np.array([[0, 0, 1.0], [0, 0, -1.0], [0, 0, 1.0]]))
     write_cloud(tmp_path / "cloud.ply", opposite)
     got = run(capsys, tmp_path / "cloud.ply", "--out", tmp_path / "mesh.ply", "--radii-m", 1.0)
-    check_one_sentence(got, 1, "rests on three points whose normals agree")
+    commands.check_one_sentence(got, 1, "rests on three points whose normals agree")
 
 
 def test_an_older_mesh_survives_a_failure(capsys, tmp_path, ball):
     (tmp_path / "mesh.ply").write_text("older")
     assert run(capsys, ball, "--out", tmp_path / "mesh.ply", "--radii-m", 0.001)[0] == 1
     assert (tmp_path / "mesh.ply").read_text() == "older"
-
-
-def check_one_sentence(got: tuple[int, str, str], code: int, says: str) -> None:
-    assert got[0] == code
-    assert got[1] == ""
-    sentences = [line for line in got[2].splitlines() if line.startswith("packetmesh: ")]
-    assert len(sentences) == 1
-    assert sentences[0] == got[2].splitlines()[-1]
-    assert says in sentences[0]
-    assert "Traceback" not in got[2]

@@ -6,26 +6,20 @@ import json
 import numpy as np
 import pytest
 
-from app.cli import main
 from pipeline.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.io.clouds import read_cloud, write_cloud
 from pipeline.registration import point_error_m
 from pipeline.registration.methods import METHODS
 from pipeline.registration.peers import available_peers
 from pipeline.types import PointCloud
+from tests.app import commands
 
 T_TRUE = rigid(rotation_exp(np.radians(4.0) * np.array([0.6, -0.48, 0.64])), [0.03, -0.02, 0.03])
 KEYS = {"T_target_source", "iterations", "stop_reason", "rmse_m", "average_hausdorff_m", "elapsed_s"}
 
 
 def run(capsys, *argv: object) -> tuple[int, str, str]:
-    try:
-        main(["register", *map(str, argv)])
-        code = 0
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err
+    return commands.run(capsys, "register", *argv)
 
 
 def corner(seed: int, count: int = 1200) -> np.ndarray:
@@ -171,9 +165,8 @@ BAD_SOURCES = {
 def test_a_cloud_that_cannot_be_registered_is_one_sentence(capsys, tmp_path, files, case):
     points_m, says = BAD_SOURCES[case]
     np.savez(tmp_path / "bad.npz", points=points_m)
-    check_one_sentence(
-        run(capsys, tmp_path / "bad.npz", files / "target.ply", "--out", tmp_path / "out"), 1, says
-    )
+    got = run(capsys, tmp_path / "bad.npz", files / "target.ply", "--out", tmp_path / "out")
+    commands.check_one_sentence(got, 1, says)
     assert not (tmp_path / "out").exists()
 
 
@@ -182,7 +175,7 @@ def test_planes_alone_are_refused_with_the_motion_they_leave_open(capsys, tmp_pa
     np.savez(tmp_path / "plane.npz", points=SQUARE)
     clouds = (tmp_path / "plane.npz", tmp_path / "plane.npz")
     got = run(capsys, *clouds, "--method", method, "--out", tmp_path / "out")
-    check_one_sentence(got, 1, "sliding across z and turning about z changes nothing")
+    commands.check_one_sentence(got, 1, "sliding across z and turning about z changes nothing")
 
 
 @pytest.mark.parametrize(
@@ -200,15 +193,5 @@ def test_planes_alone_are_refused_with_the_motion_they_leave_open(capsys, tmp_pa
 def test_wrong_use_is_one_sentence_and_leaves_nothing_behind(capsys, tmp_path, files, argv, code, says):
     (files / "cut.ply").write_bytes((files / "target.ply").read_bytes()[:20_000])
     argv = [files / word if word.endswith(".ply") else word for word in argv]
-    check_one_sentence(run(capsys, *argv, "--out", tmp_path / "out"), code, says)
+    commands.check_one_sentence(run(capsys, *argv, "--out", tmp_path / "out"), code, says)
     assert not (tmp_path / "out").exists()
-
-
-def check_one_sentence(got: tuple[int, str, str], code: int, says: str) -> None:
-    assert got[0] == code
-    assert got[1] == ""
-    sentences = [line for line in got[2].splitlines() if line.startswith("packetmesh: ")]
-    assert len(sentences) == 1
-    assert sentences[0] == got[2].splitlines()[-1]
-    assert says in sentences[0]
-    assert "Traceback" not in got[2]

@@ -6,23 +6,17 @@ import sys
 
 import pytest
 
-from app.cli import main
 from network_sim.config import PRESETS, NetworkConfig
 from network_sim.replicate import measured
 from packetmesh.settings import settings, with_settings
+from tests.app import commands
 
 TINY = ("nodes.image_bytes=2000", "run.horizon_s=10")
 CONFIG = with_settings(PRESETS["thesis-link"], TINY)
 
 
 def run(capsys, *argv: object) -> tuple[int, str, str]:
-    try:
-        main(["simulate", *map(str, argv)])
-        code = 0
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err
+    return commands.run(capsys, "simulate", *argv)
 
 
 def test_json_holds_every_metric_with_its_unit_and_definition(capsys):
@@ -116,12 +110,9 @@ def test_a_node_without_a_way_to_the_sink_is_named_and_the_run_ends(capsys):
 )
 def test_wrong_use_is_one_sentence_and_leaves_nothing_behind(capsys, tmp_path, argv, code, names):
     out_folder = tmp_path / "out"
-    got, out, err = run(capsys, *argv, "--out", out_folder)
-    assert got == code
-    assert out == ""
-    assert err.startswith("packetmesh: ")
-    assert err.count("\n") == 1
-    assert names in err
+    got = run(capsys, *argv, "--out", out_folder)
+    commands.check_one_sentence(got, code, names)
+    assert got[2].count("\n") == 1
     assert not out_folder.exists() or not list(out_folder.iterdir())
 
 

@@ -1,8 +1,5 @@
 """The split picture, its captions, and the sensor, residual and confidence pictures it is made of."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -169,10 +166,3 @@ def test_the_area_is_hidden_until_there_is_something():
     np.testing.assert_array_equal(screen.shown, split(plain(BLUE), plain(BLUE), 0.5))
     screen.area.load(None)
     assert not any(handle.seen for handle in screen.gui.handles)
-
-
-def test_the_screen_needs_nothing_heavy():
-    heavy = "{'onnxruntime', 'open3d', 'numba', 'pipeline.surface', 'pipeline.depth'}"
-    script = f"import sys, app.screens.depth.panel; print({heavy} & set(sys.modules))"
-    text = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert text.stdout.strip() == "set()"

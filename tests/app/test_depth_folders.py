@@ -5,12 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import viser
 
 from app.records import Picture
 from app.screens.depth.hide import BESIDE, BUTTON, SILENT, WAITING, HideFolder, fills_table, painted_line
-from app.screens.depth.labels import FILLS
-from app.screens.depth.model import AS_IT_SAYS, LIMIT_BYTES, SHIPPED, ModelFolder
+from app.screens.depth.labels import AS_IT_SAYS, FILLS
+from app.screens.depth.model import LIMIT_BYTES, SHIPPED, ModelFolder
 from app.screens.depth.numbers import LINES, fitted_line
 from app.screens.depth.settings import with_model
 from app.screens.depth.view import Disc, FillRow, HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
@@ -27,13 +26,6 @@ ROWS = (FillRow("ours", 0.0314, 0.81, 1.0, 0.2), FillRow("nearest", float("nan")
 ANSWER = HiddenView(
     HideRequest(), "node_01", 1234, ROWS, dict.fromkeys(("measured", "hidden", "ours", "nearest"), PICTURE)
 )
-
-
-@pytest.fixture(scope="module")
-def server():
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    yield server
-    server.stop()
 
 
 WALL = SeenSample(

@@ -11,7 +11,7 @@ from app.drawing.pictures import UNKNOWN, confidence_colors
 from app.screens.depth.discs import window_around
 from app.screens.depth.hide_job import LEAST_HIDDEN_PX, believed, fill_row, hidden_pixels, hide_job
 from app.screens.depth.job import depth_job, judged_view, residual_view
-from app.screens.depth.labels import FILLS, NETWORK_PRESETS, PICTURES
+from app.screens.depth.labels import AS_IT_SAYS, FILLS, NETWORK_PRESETS, PICTURES
 from app.screens.depth.model_job import model_job
 from app.screens.depth.view import Disc, HideRequest, ModelChoice, SeenSample
 from app.state import Spec
@@ -234,7 +234,7 @@ def test_a_node_that_is_not_there_is_one_sentence(store):
 
 
 def test_the_words_of_the_screen_are_those_of_the_pipeline():
-    assert set(NETWORK_PRESETS) == set(PRESETS)
+    assert set(NETWORK_PRESETS) == {AS_IT_SAYS, *PRESETS}
     assert set(FILLS) == {"measured", "hidden", "ours", *PEERS}
 
 

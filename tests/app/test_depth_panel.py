@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import viser
 
 from app.lesson import read_lesson
 from app.screens.depth.brush import painted
@@ -23,14 +22,11 @@ HIDE, MODEL = "Hide a region and see it filled", "Neural network"
 
 
 @pytest.fixture(scope="module")
-def session(store, tmp_path_factory):
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    session = Bench(
-        DepthPanel, ui_of(server.scene), store, tmp_path_factory.mktemp("uploads"), steps=("scene", "depth")
-    )
+def session(store, server, tmp_path_factory):
+    uploads = tmp_path_factory.mktemp("uploads")
+    session = Bench(DepthPanel, ui_of(server.scene), store, uploads, steps=("scene", "depth"))
     session.advance()
-    yield session
-    server.stop()
+    return session
 
 
 def node_of(session):

@@ -66,8 +66,8 @@ def test_every_boundary_loop_is_a_hole_or_a_rim(balls, holes, which):
 
 
 def test_views_say_what_each_registered_camera_knows(store, rig):
-    nodes, placement = end(store.stage(SPEC, "nodes")), end(store.stage(SPEC, "placement"))
-    views = views_of(rig, nodes, placement)
+    nodes, placement = end(store.stages(SPEC, "nodes", "placement"))
+    views = end(views_of(store, SPEC))
     assert len(views) == len(rig.frames)
     for view, camera, frame, node in zip(views, cameras_of(rig, placement), rig.frames, nodes, strict=True):
         np.testing.assert_array_equal(view.camera.T_world_camera, camera.T_world_camera)
@@ -86,14 +86,13 @@ def test_the_parts_of_all_rays_add_up_and_agree_with_the_no_hit_share(store, bal
 
 
 @pytest.mark.parametrize(("which", "index"), [("after", 0), ("after", 3), ("before", 0), ("before", -1)])
-def test_a_hole_is_explained_by_its_own_surface_cloud_and_cameras(store, rig, balls, which, index):
+def test_a_hole_is_explained_by_its_own_surface_cloud_and_cameras(store, balls, which, index):
     surface = balls[which]
     holes = find_holes(surface.vertices_m, surface.triangles)
     index %= len(holes)
     clouds = end(store.stage(SPEC, "clouds"))
-    views = views_of(rig, end(store.stage(SPEC, "nodes")), end(store.stage(SPEC, "placement")))
     cloud = {"after": clouds.fused, "before": clouds.sensor}[which]
-    expected = explain_hole(holes[index], surface, cloud, views)
+    expected = explain_hole(holes[index], surface, cloud, end(views_of(store, SPEC)))
     answer = end(explain_job(store, SPEC, which, index))
     assert (answer.which, answer.index) == (which, index)
     np.testing.assert_equal(asdict(answer.found), asdict(expected))

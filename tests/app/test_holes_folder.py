@@ -1,12 +1,9 @@
 """Which hole a click means, and what the folder of the holes says and asks."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import viser
 
 from app.records import MeshView
 from app.screens.surface.draw_holes import picked_hole, tape
@@ -138,13 +135,6 @@ ANSWER = ExplainView("after", 1, FOUND)
 QUALITY = SurfaceQuality(0.031, 2, 1.0, 0.0, 0, 1, 2.0, 0)
 MESH = MeshView(b"", QUALITY, np.empty((0, 2, 3), np.float32), 4, 2, {"f_score_5cm": 0.87})
 FILLED = FilledView(MESH, 3, 0.0123)
-
-
-@pytest.fixture(scope="module")
-def server():
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    yield server
-    server.stop()
 
 
 FILL = "Fill small holes up to (cm)"
@@ -294,10 +284,3 @@ def test_sentences_carry_the_numbers(screen):
     assert "87.0 %" in text
     assert "F-score" not in filled_sentence(replace(FILLED, mesh=replace(MESH, truth=None)))
     assert filled_sentence(FilledView(MESH, 0, 0.0)).startswith("No hole is that small")
-
-
-def test_the_folder_needs_nothing_heavy():
-    heavy = "{'trimesh', 'open3d', 'numba', 'pipeline.surface'}"
-    script = f"import sys, app.screens.surface.panel; print({heavy} & set(sys.modules))"
-    text = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert text.stdout.strip() == "set()"

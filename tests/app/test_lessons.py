@@ -3,9 +3,11 @@
 import pytest
 
 from app.lesson import BEGIN, OFF, LessonFolder, read_lesson
+from app.screens.depth import lesson as depth
 from app.screens.fuse.labels import STARTS
 from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.view import Race, Start
+from app.screens.surface import lesson as surface
 from packetmesh.errors import InputError
 from tests.app.fakes import ui_of
 
@@ -22,6 +24,16 @@ def test_the_stops_of_the_lesson_that_ships_have_different_titles_and_text():
     assert all("set:" not in stop.text and len(stop.text) > 100 for stop in shipped.stops)
     assert {stop.look.race.mode for stop in shipped.stops} == {"nodes", "inferred"}
     assert any(stop.look.in_ms for stop in shipped.stops)
+
+
+@pytest.mark.parametrize(("screen", "look"), [(depth, depth.DepthLook()), (surface, surface.SurfaceLook())])
+def test_the_stops_of_lessons_that_ask_differ_and_answer(screen, look):
+    shipped = read_lesson(screen.SHIPPED, screen.SETTINGS, look)
+    assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) > 1
+    assert len({stop.look for stop in shipped.stops}) == len(shipped.stops)
+    for stop in shipped.stops:
+        assert stop.text.count("*Question:*") == stop.text.count("*Answer:*") == 1
+        assert "set:" not in stop.text
 
 
 def test_a_stop_sets_what_it_names_and_leaves_the_rest_at_the_default(tmp_path):

@@ -1,6 +1,8 @@
-"""Addresses that cannot be used, and what a session starts with."""
+"""Addresses that cannot be used, what a session starts with, and what serving does not load."""
 
 import socket
+import subprocess
+import sys
 
 import pytest
 
@@ -36,3 +38,10 @@ def test_a_folder_is_a_rig_and_a_name_is_a_demo(tmp_path):
     assert start_spec(str(tmp_path), PipelineConfig()).source == RigFolder(str(tmp_path))
     assert start_spec("office", PRESETS["thesis"]).source == Demo("office")
     assert start_spec("office", PRESETS["thesis"]).preset == "thesis"
+
+
+def test_the_serving_process_loads_nothing_heavy():
+    heavy = "{'onnxruntime', 'trimesh', 'open3d', 'numba', 'pipeline.surface', 'pipeline.depth'}"
+    script = f"import sys, app.server; print({heavy} & set(sys.modules))"
+    text = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert text.stdout.strip() == "set()"

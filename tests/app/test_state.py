@@ -10,8 +10,8 @@ from app.cli import options
 from app.controls import put
 from app.state import CHAIN, Results, Spec
 from network_sim.config import NetworkConfig
-from packetmesh.settings import with_settings
-from pipeline.config import PRESETS, load_config
+from packetmesh.settings import config_named, with_settings
+from pipeline.config import PRESETS
 from pipeline.sources import Demo, ImagePair, RigFolder
 
 SPEC = Spec(Demo("office"))
@@ -107,7 +107,7 @@ def test_the_command_parses_back_to_the_same(spec, monkeypatch):
     words = shlex.split(spec.command())
     assert words[:2] == ["packetmesh", "reconstruct"]
     tyro.cli(reconstruct, args=words[2:])
-    assert with_settings(load_config(seen["preset"]), seen["set"]) == spec.config
+    assert with_settings(config_named(seen["preset"], PRESETS), seen["set"]) == spec.config
     default, wanted = {"depth_scale": 1000.0}, wanted_options(spec.source)
     for name in ("scene", "rig", "color", "depth", "intrinsics", "depth_scale"):
         value = seen[name]

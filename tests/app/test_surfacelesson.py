@@ -34,15 +34,6 @@ def lesson(tmp_path, text):
     return read_lesson(path, SETTINGS, SurfaceLook())
 
 
-def test_the_stops_of_the_lesson_that_ships_differ_ask_and_answer():
-    shipped = read_lesson(SHIPPED, SETTINGS, SurfaceLook())
-    assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) > 1
-    assert len({stop.look for stop in shipped.stops}) == len(shipped.stops)
-    for stop in shipped.stops:
-        assert stop.text.count("*Question:*") == stop.text.count("*Answer:*") == 1
-        assert "set:" not in stop.text
-
-
 def test_a_stop_sets_what_it_names_and_leaves_the_rest_as_the_screen_begins(tmp_path):
     bare, full = lesson(
         tmp_path,

@@ -13,7 +13,7 @@ from app.screens.surface.sweep_job import suggestions_of, sweep_job
 from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
 from app.screens.surface.view import SpacingView, SweepView
 from app.state import Spec
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, drain
 from pipeline.config import PipelineConfig, SurfaceConfig
 from pipeline.findings import Suggestion, SweepPoint
 from pipeline.sources import Demo
@@ -30,11 +30,7 @@ ROWS = (
 def run(job):
     """All that a job says, and what it answers."""
     steps = []
-    while True:
-        try:
-            steps.append(next(job))
-        except StopIteration as stop:
-            return steps, stop.value
+    return steps, drain(job, steps.append)
 
 
 def row(radius_mm, no_hit, accuracy=NAN, triangles=100):

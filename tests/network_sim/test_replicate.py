@@ -10,7 +10,6 @@ from network_sim.metrics import Metric
 from network_sim.replicate import (
     estimates_of,
     iterate_runs,
-    iterate_study,
     iterate_sweep,
     measured,
     replications,
@@ -80,8 +79,8 @@ def test_a_sweep_replicates_every_value_with_the_same_seeds():
     found, reports = answer(iterate_sweep(TINY, "nodes.count", ["1", "2"], 2))
     assert list(found) == ["1", "2"]
     assert len(reports) == 4
-    direct, _ = answer(iterate_study([with_settings(TINY, ["nodes.count=2"])], 2))
-    assert found["2"] == direct[0]
+    direct, _ = answer(iterate_runs(replications(with_settings(TINY, ["nodes.count=2"]), 2)))
+    assert found["2"] == estimates_of(direct)
     assert found["1"]["image_delay_mean"].mean < found["2"]["image_delay_mean"].mean
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 
-from network_sim.collection import reachability
+from network_sim.collection import disconnected
 from network_sim.config import NetworkConfig, NodesConfig, RadioConfig
 from network_sim.places import FixedPlaces
 from network_sim.radio import Radio
@@ -82,7 +82,8 @@ def test_noise_makes_far_links_worse():
 
 def test_who_cannot_reach_the_sink_is_named():
     config = NetworkConfig(nodes=NodesConfig(count=3, layout="line", spacing_m=120.0))
-    assert reachability(config).disconnected == ("node 1", "node 2", "node 3")
+    assert disconnected(config) == ("node 1", "node 2", "node 3")
     near = replace(config, nodes=replace(config.nodes, spacing_m=80.0))
-    assert reachability(near).disconnected == ()
-    assert [reachability(near).routes.hops(node) for node in range(3)] == [1, 2, 3]
+    assert disconnected(near) == ()
+    routes = shortest_paths(line_success(near, 80.0, 160.0, 240.0, 0.0), 3)
+    assert [routes.hops(node) for node in range(3)] == [1, 2, 3]

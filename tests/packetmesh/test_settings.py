@@ -11,7 +11,7 @@ from network_sim.config import NetworkConfig
 from packetmesh.errors import InputError
 from packetmesh.files import write_json
 from packetmesh.settings import config_named, differences, settings, with_settings
-from pipeline.config import PRESETS, PipelineConfig, load_config
+from pipeline.config import PRESETS, PipelineConfig
 
 DEFAULT = PipelineConfig()
 
@@ -79,7 +79,7 @@ def test_a_wrong_setting_is_one_sentence_that_names_it(setting, names):
 def test_a_written_config_file_is_a_preset(tmp_path):
     file = tmp_path / "config.json"
     write_json(file, {"scene": "office", "preset": "thesis", "settings": settings(PRESETS["thesis"])})
-    assert load_config(str(file)) == PRESETS["thesis"]
+    assert config_named(str(file), PRESETS) == PRESETS["thesis"]
 
 
 @pytest.mark.parametrize(
@@ -89,12 +89,12 @@ def test_a_broken_config_file_is_one_sentence(tmp_path, content):
     file = tmp_path / "config.json"
     file.write_text(content)
     with pytest.raises(InputError):
-        load_config(str(file))
+        config_named(str(file), PRESETS)
 
 
 def test_an_unknown_preset_names_the_known_ones():
     with pytest.raises(InputError, match="thesis or packetmesh"):
-        load_config("thesiss")
+        config_named("thesiss", PRESETS)
 
 
 def test_any_config_takes_settings():

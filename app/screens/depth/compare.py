@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from app.drawing.colors import css
-from app.records import ColorBar, Picture
+from app.records import Picture
+from app.tables import bar_html
 from app.ui import Ui
 from pipeline.types import ByteArray
 
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 LINE_PX = 3
-_ROW = "display: flex; justify-content: space-between"
 QUALITY = 92
 """Of JPEG, which takes a tenth of PNG's time and a sixth of its bytes: the slider is dragged."""
 
@@ -127,13 +126,3 @@ def captions_html(left: Picture, right: Picture) -> str:
         for side, picture in (("Left:", left), ("Right:", right))
     )
     return f'<div style="display: flex; gap: 1em; padding: 0 0.8em 0.8em; font-size: 12px">{columns}</div>'
-
-
-def bar_html(bar: ColorBar) -> str:
-    """The colours from left to right over their labels."""
-    stops = ", ".join(css(stop) for stop in bar.stops)
-    labels = "".join(f"<span>{html.escape(label)}</span>" for label in bar.labels)
-    return (
-        f'<div style="height: 0.7em; background: linear-gradient(to right, {stops}); border-radius: 2px; '
-        f'margin-top: 0.3em"></div><div style="{_ROW}">{labels}</div>'
-    )

@@ -28,17 +28,8 @@ BESIDE = "No measured point there. Click a point of the node that is chosen abov
 class HideFolder:
     """A brush, a button, the pictures before and after, and the errors of all ways to fill."""
 
-    def __init__(
-        self,
-        ui: Ui,
-        on_hide: Callable[[HideRequest], None],
-    ) -> None:
-        """Add the folder.
-
-        Args:
-            ui: where to add it.
-            on_hide: called with what to hide, of the node that is shown.
-        """
+    def __init__(self, ui: Ui, on_hide: Callable[[HideRequest], None]) -> None:
+        """Add the folder; ``on_hide`` is called with what to hide, of the node that is shown."""
         self._on_hide = on_hide
         self._drawing = BrushDrawing(ui.scene, "/depth/painted")
         self._cloud: SeenSample | None = None

@@ -34,8 +34,7 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
     Raises:
         InputError: the node does not exist, or hardly anything is measured in the discs.
     """
-    rig = yield from store.stage(spec, "rig")
-    nodes = yield from store.stage(spec, "nodes")
+    rig, nodes = yield from store.stages(spec, "rig", "nodes")
     if not 0 <= request.node < len(rig.frames):
         raise InputError(f"There is no node {request.node}, only {len(rig.frames)} of them; choose one anew.")
     frame, node = rig.frames[request.node], nodes[request.node]

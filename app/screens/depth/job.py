@@ -31,8 +31,7 @@ LEAST_RANGE_M = 0.01
 
 def depth_job(store: Store, spec: Spec) -> Generator[Progress, None, DepthView]:
     """Every node's depth, sensed, inferred and fused."""
-    rig = yield from store.stage(spec, "rig")
-    nodes = yield from store.stage(spec, "nodes")
+    rig, nodes = yield from store.stages(spec, "rig", "nodes")
     views = []
     for index, clouds in enumerate(nodes):
         yield Progress(f"pictures of {clouds.name}", 0.9 + 0.1 * index / len(nodes))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from app.screens.depth.view import PictureName
 from pipeline.config import ModelKind, NetworkPreset, Normalisation
@@ -35,6 +35,12 @@ FILLS = {
     "joint-bilateral": "joint bilateral fill",
 }
 """What was hidden, before, while and after it was filled in each way."""
-NETWORK_PRESETS: tuple[NetworkPreset, ...] = get_args(NetworkPreset)
-NETWORK_KINDS: tuple[ModelKind, ...] = get_args(ModelKind)
-NORMALISATIONS: tuple[Normalisation, ...] = get_args(Normalisation)
+AS_IT_SAYS = "as the file says"
+
+
+def _told(literal: object) -> dict[str, Any]:
+    """What a network's user can say of it by name; None leaves it to the network's file."""
+    return {AS_IT_SAYS: None, **{name: name for name in get_args(literal)}}
+
+
+NETWORK_PRESETS, NETWORK_KINDS, NORMALISATIONS = map(_told, (NetworkPreset, ModelKind, Normalisation))

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import viser
 
-from app.screens.depth.labels import NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
+from app.screens.depth.labels import AS_IT_SAYS, NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
 from app.screens.depth.view import ModelChoice, ModelView
 from app.tables import number, table
 from app.ui import Ui, keep_upload
-from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
+from pipeline.config import DepthConfig, ModelKind
 
-SHIPPED, AS_IT_SAYS = "the network that ships", "as the file says"
+SHIPPED = "the network that ships"
 LIMIT_BYTES = 128 << 20
 TEXT = """Any ONNX network that makes depth of one picture will do. What it expects and what it answers
 (metric, relative or inverse depth, size, colours) is read from the file, or taken from a preset."""
@@ -29,34 +29,22 @@ KEPT = "The network before is kept. Say what this one expects, or choose another
 class ModelFolder:
     """A list of networks, an upload button, a preset, and the description in the network's file."""
 
-    def __init__(
-        self,
-        ui: Ui,
-        folder: Path,
-        on_choose: Callable[[ModelChoice], None],
-    ) -> None:
-        """Add the folder.
-
-        Args:
-            ui: where to add it.
-            folder: where uploaded files are kept.
-            on_choose: called with the network that is wanted.
-        """
+    def __init__(self, ui: Ui, folder: Path, on_choose: Callable[[ModelChoice], None]) -> None:
+        """Add the controls; uploaded files are kept in ``folder``."""
         self._folder, self._on_choose = folder, on_choose
         self._models: dict[str, str | None] = {SHIPPED: None}
-        self._config = DepthConfig()
         gui = ui.gui
         with gui.add_folder("Neural network", expand_by_default=False):
             gui.add_markdown(TEXT)
             self._model = gui.add_dropdown("Network file", [SHIPPED], hint="Which network infers the depth.")
             self._preset = gui.add_dropdown(
                 "Preset",
-                [AS_IT_SAYS, *NETWORK_PRESETS],
+                list(NETWORK_PRESETS),
                 hint="How to feed a network whose file does not say so: size, colours, kind of output.",
             )
             self._kind = gui.add_dropdown(
                 "Gives",
-                [AS_IT_SAYS, *NETWORK_KINDS],
+                list(NETWORK_KINDS),
                 hint="What the network's numbers mean: metric: metres; relative: depth up to a scale; "
                 "inverse: 1/depth up to scale and shift, as MiDaS and Depth Anything have it.",
             )
@@ -86,7 +74,7 @@ class ModelFolder:
             )
             self._normalisation = gui.add_dropdown(
                 "Pixel values",
-                [AS_IT_SAYS, *NORMALISATIONS],
+                list(NORMALISATIONS),
                 hint="imagenet: with ImageNet's mean and deviation; unit: from 0 to 1; bytes: from 0 to 255.",
             )
             gui.add_button("Use this input", icon=viser.Icon.CHECK, hint="Tries the network again.").on_click(
@@ -95,7 +83,6 @@ class ModelFolder:
 
     def write(self, config: DepthConfig) -> None:
         """Show the network that is wanted."""
-        self._config = config
         name = next((name for name, path in self._models.items() if path == config.model), None)
         if name is None:
             name = self._add(Path(str(config.model)).name, str(config.model))
@@ -123,18 +110,15 @@ class ModelFolder:
         self._status.content, self._table.content = TRYING, ""
         model = self._models[self._model.value]
         self._advanced.visible = model is not None
-        presets: dict[str, NetworkPreset] = {preset: preset for preset in NETWORK_PRESETS}
-        kinds: dict[str, ModelKind] = {kind: kind for kind in NETWORK_KINDS}
-        normalisations: dict[str, Normalisation] = {name: name for name in NORMALISATIONS}
         width_px, height_px = (round(side) or None for side in self._size.value)
         self._on_choose(
             ModelChoice(
                 model,
-                presets.get(self._preset.value),
-                kinds.get(self._kind.value),
+                NETWORK_PRESETS[self._preset.value],
+                NETWORK_KINDS[self._kind.value],
                 width_px,
                 height_px,
-                normalisations.get(self._normalisation.value),
+                NORMALISATIONS[self._normalisation.value],
             )
         )
 

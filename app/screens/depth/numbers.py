@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.records import DepthNode
-from app.tables import Row, number, table
+from app.tables import number, table
 
 LINES = {
     "none": "z′ = z",
@@ -25,7 +25,37 @@ def fitted_line(node: DepthNode) -> str:
 
 def depth_table(node: DepthNode) -> str:
     """HTML: the network, the alignment, and the points."""
-    return table([*_network_rows(node), *_point_rows(node)])
+    duration = "remembered" if node.inference_s is None else number(node.inference_s, 0, "ms", 1000)
+    kept, rejected = node.sensor.total, node.outliers.total
+    share = rejected / max(1, kept + rejected)
+    return table(
+        [
+            (
+                "Network ran on",
+                "The execution provider that onnxruntime really used, and its time.",
+                f"{node.provider}, {duration}",
+            ),
+            ("Alignment", "How inferred depth was made metric.", node.alignment_mode),
+            (
+                "Residual",
+                "RMS difference of aligned and sensed depth where both are known.",
+                number(node.residuals.rms_m, 1, "cm", 100),
+            ),
+            (
+                "Inliers",
+                "Share of those pixels whose aligned depth is within 5 % of the sensor's.",
+                number(node.inlier_share, 0, "%", 100),
+            ),
+            (
+                "Error in holes",
+                "Median error of the inferred depth where the sensor is blind, against the truth.",
+                number(node.truth_error_m, 1, "cm", 100),
+            ),
+            ("Outliers", "Sensor points that the filter rejects.", f"{rejected:,} ({share:.1%})"),
+            ("Sensor points", "Points that pass the filter.", f"{kept:,}"),
+            ("Filled points", "Inferred points that fusion adds.", f"{node.filled.total:,}"),
+        ]
+    )
 
 
 def residual_table(node: DepthNode) -> str:
@@ -79,40 +109,3 @@ def confidence_table(node: DepthNode) -> str:
             ),
         ]
     )
-
-
-def _network_rows(node: DepthNode) -> list[Row]:
-    duration = "remembered" if node.inference_s is None else number(node.inference_s, 0, "ms", 1000)
-    return [
-        (
-            "Network ran on",
-            "The execution provider that onnxruntime really used, and its time.",
-            f"{node.provider}, {duration}",
-        ),
-        ("Alignment", "How inferred depth was made metric.", node.alignment_mode),
-        (
-            "Residual",
-            "RMS difference of aligned and sensed depth where both are known.",
-            number(node.residuals.rms_m, 1, "cm", 100),
-        ),
-        (
-            "Inliers",
-            "Share of those pixels whose aligned depth is within 5 % of the sensor's.",
-            number(node.inlier_share, 0, "%", 100),
-        ),
-        (
-            "Error in holes",
-            "Median error of the inferred depth where the sensor is blind, against the truth.",
-            number(node.truth_error_m, 1, "cm", 100),
-        ),
-    ]
-
-
-def _point_rows(node: DepthNode) -> list[Row]:
-    kept, rejected = node.sensor.total, node.outliers.total
-    share = rejected / max(1, kept + rejected)
-    return [
-        ("Outliers", "Sensor points that the filter rejects.", f"{rejected:,} ({share:.1%})"),
-        ("Sensor points", "Points that pass the filter.", f"{kept:,}"),
-        ("Filled points", "Inferred points that fusion adds.", f"{node.filled.total:,}"),
-    ]

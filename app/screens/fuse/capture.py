@@ -32,14 +32,7 @@ class CaptureFolder:
         on_stop: Callable[[], None],
         on_cell: Callable[[float, float], None],
     ) -> None:
-        """Add the folder.
-
-        Args:
-            ui: where to add it.
-            on_compute: called when the map is wanted.
-            on_stop: called when it is no longer wanted.
-            on_cell: called with the rotation in degrees and the translation in metres of a cell.
-        """
+        """Add the folder; ``on_cell`` gets a cell's rotation in degrees and translation in metres."""
         self._view: CaptureView | None = None
         gui = ui.gui
         with gui.add_folder("Capture range", expand_by_default=False):

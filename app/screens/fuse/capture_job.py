@@ -22,8 +22,7 @@ MAP_POINTS = 2_000
 
 def capture_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, CaptureView]:
     """Register from every start of the map with every rival; the race's own start does not matter."""
-    rig = yield from store.stage(spec, "rig")
-    nodes = yield from store.stage(spec, "nodes")
+    rig, nodes = yield from store.stages(spec, "rig", "nodes")
     race = replace(race, start=Start())
 
     def run() -> Generator[Progress, None, CaptureView]:

@@ -16,9 +16,7 @@ from pipeline.types import FloatArray, Rig
 
 def fuse_job(store: Store, spec: Spec) -> Generator[Progress, None, FuseView]:
     """Where registration placed the nodes."""
-    rig = yield from store.stage(spec, "rig")
-    nodes = yield from store.stage(spec, "nodes")
-    placement = yield from store.stage(spec, "placement")
+    rig, nodes, placement = yield from store.stages(spec, "rig", "nodes", "placement")
     believed = tuple(frame.T_world_camera for frame in rig.frames)
     rows = tuple(
         _registration_row(rig, row, nodes, spec.config.node_registration.method)

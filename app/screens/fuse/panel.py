@@ -47,7 +47,6 @@ ADVANCED = (
     Choice("Chain: points", "fusion.align_nodes_with"),
 )
 
-
 _Wanted: TypeAlias = tuple[tuple[Hashable, ...], Race]
 """A race of the clouds with this key."""
 

@@ -56,13 +56,7 @@ class RacePlayer(Player):
     """Moves over a race's clock."""
 
     def __init__(self, ui: Ui, on_place: Callable[[int], None], on_clock: Callable[[], None]) -> None:
-        """Add the buttons and the slider.
-
-        Args:
-            ui: where to add them.
-            on_place: called with every new place.
-            on_clock: called when another clock is chosen.
-        """
+        """Add the buttons and the slider."""
         super().__init__(ui, on_place, Ruler("Iteration"), "Drag to any place of the race.")
         self._on_clock = on_clock
         self._lanes: Sequence[RaceLane] = ()

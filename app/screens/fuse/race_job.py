@@ -59,8 +59,7 @@ class Contest:
 
 def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, RaceView]:
     """Run every rival from the same start."""
-    rig = yield from store.stage(spec, "rig")
-    nodes = yield from store.stage(spec, "nodes")
+    rig, nodes = yield from store.stages(spec, "rig", "nodes")
 
     def run() -> Generator[Progress, None, RaceView]:
         contest = contest_of(rig, nodes, race)
@@ -71,8 +70,6 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
         edges_m = _edges_m([run.records for run in runs])
         staying = race.source if race.mode == "inferred" else race.target
         return RaceView(
-            source_name=rig.frames[race.source].name,
-            target_name=rig.frames[staying].name,
             source=sample(contest.source.points_m, contest.source.colors, LANE_POINTS),
             target=sample(contest.target.points_m, contest.target.colors, LANE_POINTS),
             T_world_target=rig.frames[staying].T_world_camera,

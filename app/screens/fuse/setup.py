@@ -27,12 +27,7 @@ class RaceSetup:
     """The controls of a ``Race``."""
 
     def __init__(self, ui: Ui, on_change: Callable[[], object]) -> None:
-        """Set up without controls, which the panel adds where it wants them.
-
-        Args:
-            ui: where to add them.
-            on_change: called when a person has changed one.
-        """
+        """Set up without controls, which the panel adds where it wants them."""
         self._ui, self._on_change = ui, on_change
         self._race = Race(start=Start.towards(*STARTS[SLIGHTLY], seed=0))
         self._slots: list[viser.GuiDropdownHandle[str]] = []

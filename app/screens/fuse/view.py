@@ -14,9 +14,7 @@ from pipeline.types import FloatArray, IntArray
 RaceMode = Literal["nodes", "inferred"]
 """nodes: one node's sensor cloud onto another's; inferred: a node's inferred cloud onto its sensor cloud."""
 
-
 Rival: TypeAlias = tuple[Method, Metric]
-
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -147,8 +145,6 @@ class RaceLane:
 class RaceView:
     """Up to four methods from the same start."""
 
-    source_name: str
-    target_name: str
     source: Sample
     """Source camera frame."""
     target: Sample
@@ -177,10 +173,8 @@ class CaptureView:
 
 CAPTURE_TURNS_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
 
-
 CAPTURE_SHIFTS_M = (0.1, 0.2, 0.3, 0.4, 0.6)
 """Start errors of a capture-range map (SPEC 4.7)."""
-
 
 SUCCESS_M = 0.02
 """A registration that ends closer to the truth than this has succeeded (SPEC 4.7)."""

@@ -15,7 +15,8 @@ from app.store import Store
 from network_sim.config import NetworkConfig
 from network_sim.energy import cumulative_radio_j
 from network_sim.metrics import camera_nodes, metrics
-from network_sim.simulate import iterate_simulation, street_of
+from network_sim.simulate import iterate_simulation
+from network_sim.street import street_of
 from network_sim.trace import Events, NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns
 from packetmesh.progress import Progress, part

@@ -29,14 +29,7 @@ class AdviceFolder:
         on_stop: Callable[[], None],
         on_radius_m: Callable[[float], None],
     ) -> None:
-        """Add the folder.
-
-        Args:
-            ui: where to add it.
-            on_sweep: called when a sweep is wanted.
-            on_stop: called when it is no longer wanted.
-            on_radius_m: called with a suggested radius that is taken.
-        """
+        """Add the folder; ``on_radius_m`` is called with a suggested radius that is taken."""
         self._on_sweep, self._on_radius_m = on_sweep, on_radius_m
         self._radii_m: dict[str, float] = {}
         self._view: SweepView | None = None

@@ -26,9 +26,7 @@ def baseline_job(store: Store, spec: Spec, name: BaselineName) -> Generator[Prog
     """
     if name not in get_args(BaselineName):
         raise InputError(f"There is no baseline '{name}'; try one of {', '.join(get_args(BaselineName))}.")
-    clouds = yield from store.stage(spec, "clouds")
-    rig = yield from store.stage(spec, "rig")
-    placement = yield from store.stage(spec, "placement")
+    clouds, rig, placement = yield from store.stages(spec, "clouds", "rig", "placement")
     done = yield from compute(spec, name, store)
     truth = compared(rig, placement, done.value)
     return BaselineView(name, mesh_view(done.value, truth), done.elapsed_s, _note(clouds, name, spec))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
@@ -15,14 +15,13 @@ from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.findings import RayParts
-from pipeline.nodes import NodeClouds, Placement
 from pipeline.spec import key
 from pipeline.stages import cameras_of, compared, with_rays
 from pipeline.surface.fill import Filled, fill_holes
 from pipeline.surface.hole_diagnosis import explain_hole
 from pipeline.surface.holes import find_holes
 from pipeline.surface.ray_parts import View, ray_parts
-from pipeline.types import Rig, SurfaceResult
+from pipeline.types import SurfaceResult
 
 
 def hole_views(surface: SurfaceResult) -> tuple[HoleView, ...]:
@@ -39,8 +38,9 @@ def hole_views(surface: SurfaceResult) -> tuple[HoleView, ...]:
     )
 
 
-def views_of(rig: Rig, nodes: Sequence[NodeClouds], placement: Placement) -> list[View]:
+def views_of(store: Store, spec: Spec) -> Generator[Progress, None, list[View]]:
     """What every registered camera knows of its pixels."""
+    rig, nodes, placement = yield from store.stages(spec, "rig", "nodes", "placement")
     return [
         View(camera, frame.depth.valid, node.alignment.depth.valid)
         for camera, frame, node in zip(cameras_of(rig, placement), rig.frames, nodes, strict=True)
@@ -49,7 +49,7 @@ def views_of(rig: Rig, nodes: Sequence[NodeClouds], placement: Placement) -> lis
 
 def parts_of(store: Store, spec: Spec, surface: SurfaceResult) -> Generator[Progress, None, RayParts]:
     """Where the pixel rays of all cameras end on a surface of the spec."""
-    views = yield from _views(store, spec)
+    views = yield from views_of(store, spec)
     return ray_parts(surface, views)
 
 
@@ -57,9 +57,8 @@ def explain_job(store: Store, spec: Spec, which: Which, index: int) -> Generator
     """Why one hole of the surface after or before fusion is there."""
 
     def explain() -> Generator[Progress, None, ExplainView]:
-        views = yield from _views(store, spec)
-        clouds = yield from store.stage(spec, "clouds")
-        surface = yield from store.stage(spec, which)
+        views = yield from views_of(store, spec)
+        clouds, surface = yield from store.stages(spec, "clouds", which)
         yield Progress("looking for the reason of the hole", 0.8)
         holes = find_holes(surface.vertices_m, surface.triangles)
         if not 0 <= index < len(holes):
@@ -75,22 +74,13 @@ def explain_job(store: Store, spec: Spec, which: Which, index: int) -> Generator
 
 def fill_job(store: Store, spec: Spec, longest_cm: float) -> Generator[Progress, None, FilledView]:
     """The surface after fusion with its holes up to so long a rim filled, and what that makes of it."""
-    rig = yield from store.stage(spec, "rig")
-    placement = yield from store.stage(spec, "placement")
-    after = yield from store.stage(spec, "after")
+    rig, placement, after = yield from store.stages(spec, "rig", "placement", "after")
     yield Progress("filling small holes", 0.6)
     filled = fill_holes(after, longest_cm / 100.0)
     yield Progress("measuring the filled surface", 0.8)
     surface = with_rays(filled.surface, rig, placement)
     view = mesh_view(surface, compared(rig, placement, surface))
     return FilledView(replace(view, glb=_marked_glb(filled)), filled.holes, filled.area_m2)
-
-
-def _views(store: Store, spec: Spec) -> Generator[Progress, None, list[View]]:
-    rig = yield from store.stage(spec, "rig")
-    nodes = yield from store.stage(spec, "nodes")
-    placement = yield from store.stage(spec, "placement")
-    return views_of(rig, nodes, placement)
 
 
 def _marked_glb(filled: Filled) -> bytes:

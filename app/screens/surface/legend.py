@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET, css
+from app.records import ColorBar
 from app.screens.surface.view import Coloring
+from app.tables import bar_html
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"
 
@@ -19,12 +21,8 @@ def legend_html(coloring: Coloring, has_truth: bool) -> str:
     elif not has_truth:
         text = f"{_box(NEUTRAL)}The truth of this scene is not known, so there is no distance to show."
     else:
-        stops = ", ".join(css(stop) for stop in DISTANCE_STOPS)
-        bar = f"height: 0.7em; background: linear-gradient(to right, {stops}); border-radius: 2px"
-        ends = f"<span>on the truth</span><span>{100 * MOST_DISTANCE_M / 2:.0f} cm</span>"
-        ends += f"<span>{100 * MOST_DISTANCE_M:.0f} cm or more</span>"
-        row = "display: flex; justify-content: space-between"
-        text = f'<div style="{bar}"></div><div style="{row}">{ends}</div>'
+        half, most = (f"{100 * share * MOST_DISTANCE_M:.0f} cm" for share in (0.5, 1.0))
+        text = bar_html(ColorBar(DISTANCE_STOPS, ("on the truth", half, f"{most} or more")))
     return f'<div style="padding: 0 0.8em; font-size: 13px">{text}</div>'
 
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 
 from app.records import MeshView
 from app.screens.surface.view import BaselineView, PaintedView, SurfaceView
 from app.tables import Row, number, table
 
 
-def quality_table(view: SurfaceView, baselines: Mapping[str, MeshView], has_truth: bool) -> str:
+def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_truth: bool) -> str:
     """HTML: before and after fusion and, beside them, the baselines that have been computed."""
-    columns: dict[str, MeshView | None] = {"before": view.before, "after fusion": view.after, **baselines}
+    columns: dict[str, MeshView | None] = {"before": view.before, "after fusion": view.after}
+    columns |= {baseline.name: baseline.mesh for baseline in baselines}
 
     def row(name: str, hint: str, value: Callable[[MeshView], str]) -> Row:
         return (name, hint, *("…" if mesh is None else value(mesh) for mesh in columns.values()))

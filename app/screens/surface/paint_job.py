@@ -10,6 +10,7 @@ import numpy as np
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET
 from app.drawing.glb import lines_glb
 from app.drawing.meshes import rim_segments_m, surface_glb
+from app.drawing.pictures import ramp
 from app.screens.surface.view import Coloring, PaintedMesh, PaintedView, PaintRequest, Which
 from app.state import Spec
 from app.store import Store
@@ -22,8 +23,7 @@ from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
 def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Progress, None, PaintedView]:
     """The surfaces of a spec, or of one ball instead of the spec's, in colours."""
-    rig = yield from store.stage(spec, "rig")
-    placement = yield from store.stage(spec, "placement")
+    rig, placement = yield from store.stages(spec, "rig", "placement")
     whole = yield from _clouds(store, spec)
     if request.radius_m is None:
         done = yield from run(spec, store, request.which)
@@ -84,7 +84,5 @@ def vertex_colors(surface: Surface, coloring: Coloring, rig: Rig, cameras: list[
         return np.rint(127.5 * (surface.normals + 1.0)).astype(np.uint8)
     if coloring == "distance" and rig.truth is not None:
         distance_m = distances_to_truth_m(surface.vertices_m, rig.truth, cameras)
-        at_m = np.linspace(0.0, MOST_DISTANCE_M, len(DISTANCE_STOPS))
-        channels = [np.interp(distance_m, at_m, channel) for channel in zip(*DISTANCE_STOPS, strict=True)]
-        return np.rint(np.stack(channels, axis=1)).astype(np.uint8)
+        return ramp(distance_m, MOST_DISTANCE_M, DISTANCE_STOPS)
     return np.tile(np.array(NEUTRAL, dtype=np.uint8), (count, 1))

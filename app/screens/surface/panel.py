@@ -12,7 +12,6 @@ from app.drawing.cameras import stage_of, turn
 from app.lesson import LessonFolder, read_lesson
 from app.records import SceneView
 from app.screens.surface.advice import AdviceFolder
-from app.screens.surface.baselines import Baselines
 from app.screens.surface.holes import HolesFolder
 from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN
 from app.screens.surface.legend import legend_html
@@ -56,7 +55,8 @@ class SurfacePanel(Panel):
         """Radius, rule, what to draw; histogram and quality."""
         gui, session = self.gui, self.session
         self._view: SurfaceView | None = None
-        self._baselines = Baselines(session, self._made)
+        self._baselines: dict[BaselineName, BaselineView] = {}
+        """Those that have been made of the surface that is wanted."""
         self._look: SurfaceLook | None = None
         self._quick_line = ""
         self._by_click = False
@@ -122,7 +122,7 @@ class SurfacePanel(Panel):
         if thinning != self._thinning:
             self._advice.forget()
         self._thinning = thinning
-        self._baselines.forget()
+        self._baselines = {}
         if self._shown.value in BASELINES:
             self._shown.value = AFTER
         self._close_walk()
@@ -199,7 +199,8 @@ class SurfacePanel(Panel):
 
     def _show_numbers(self) -> None:
         if self._view is not None:
-            self._table.content = quality_table(self._view, self._baselines.meshes, self._has_truth())
+            baselines = self._baselines.values()
+            self._table.content = quality_table(self._view, baselines, self._has_truth())
 
     def _repaint(self) -> None:
         """Have the surfaces of the settings in the colours chosen."""
@@ -224,12 +225,15 @@ class SurfacePanel(Panel):
 
     def _picked_shown(self) -> None:
         """Show another surface; that of a baseline is made first."""
-        name = BASELINES.get(self._shown.value)
+        session, name = self.session, BASELINES.get(self._shown.value)
         self._quick.content = ""
         if name is None or self._view is None:
             self._load_holes()
         else:
-            self._show_baseline(self._baselines.want(name))
+            if name not in self._baselines:
+                made = functools.partial(self._made, name, session.spec.key("surface"))
+                session.side_job("surface.baselines_job:baseline_job", name, on_end=made)
+            self._show_baseline(self._baselines.get(name))
         self._arrange()
 
     def _show_baseline(self, view: BaselineView | None) -> None:
@@ -237,11 +241,14 @@ class SurfacePanel(Panel):
         self._quick.content = WAIT if view is None else note_html(view)
         self._stage.draw_baseline(None if view is None else view.mesh)
 
-    def _made(self, name: BaselineName, view: BaselineView | None) -> None:
+    def _made(self, name: BaselineName, key: tuple[Hashable, ...], view: BaselineView | None) -> None:
         """A baseline is there, or could not be made."""
+        if key != self.session.spec.key("surface"):
+            return
         if view is None:
             self._shown.value, self._quick.content = AFTER, ""
         else:
+            self._baselines[name] = view
             self._show_numbers()
             if BASELINES.get(self._shown.value) == name:
                 self._show_baseline(view)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from app.acknowledgement import DrawAcknowledgement
 from app.screens.surface.view import QUICK_POINTS, PaintedView, PaintRequest
-from app.ui import Workbench
+from app.session import Session
 
 QUIET_S = 0.4
 """When the radius has not moved for so long, it rests."""
@@ -26,7 +26,7 @@ class QuickLook:
 
     def __init__(
         self,
-        session: Workbench,
+        session: Session,
         on_view: Callable[[PaintedView], None],
         on_drawn: Callable[[], None],
         on_rest: Callable[[], None],

@@ -8,7 +8,8 @@ from app.drawing.clouds import clear
 from app.player import Player, Ruler
 from app.screens.surface.draw_rolling import RollingDrawing
 from app.screens.surface.labels import AFTER, BEFORE
-from app.screens.surface.walk_view import Happening, WalkRequest, WalkView, Which
+from app.screens.surface.view import Which
+from app.screens.surface.walk_view import Happening, WalkRequest, WalkView
 from app.ui import Ui
 from pipeline.types import FloatArray
 
@@ -127,7 +128,7 @@ class RollingFolder:
     def _request(self) -> None:
         self._waiting = True
         self._status.content = WAITING
-        self._on_request(WalkRequest(CLOUDS[self._cloud.value], self._way.value == CLOSE_UP, None))
+        self._on_request(WalkRequest(CLOUDS[self._cloud.value], self._way.value == CLOSE_UP))
 
     def _moved(self, position: int) -> None:
         if self._view is None or self._drawing is None:

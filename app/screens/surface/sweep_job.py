@@ -28,9 +28,7 @@ def suggestions_of(store: Store, spec: Spec) -> Generator[Progress, None, tuple[
 
 def sweep_job(store: Store, spec: Spec) -> Generator[Progress | SweepView, None, SweepView]:
     """Roll one ball after another over the cloud after fusion, each alone; yields what there is so far."""
-    rig = yield from store.stage(spec, "rig")
-    placement = yield from store.stage(spec, "placement")
-    clouds = yield from store.stage(spec, "clouds")
+    rig, placement, clouds = yield from store.stages(spec, "rig", "placement", "clouds")
     suggested = yield from suggestions_of(store, spec)
 
     def sweep() -> Generator[Progress | SweepView, None, SweepView]:

@@ -56,17 +56,32 @@ def sweep_figure(view: SweepView | None, below: str = WORK) -> go.Figure:
 
 def _fill(figure: go.Figure, view: SweepView, below: str) -> None:
     rows = view.points
-    _curve(figure, rows, [100 * row.no_hit_ray_share for row in rows], "y", NO_HIT, ".1f", "% of rays miss")
     accuracies = [100 * row.accuracy_1cm for row in rows]
+    curves: list[tuple[Sequence[float], str, str, str]] = [
+        ([100 * row.no_hit_ray_share for row in rows], "y", NO_HIT, "%{y:.1f} % of rays miss"),
+    ]
     if not np.isnan(accuracies).all():
-        _curve(figure, rows, accuracies, "y", ACCURATE, ".1f", "% of the surface within 1 cm of the truth")
+        curves.append((accuracies, "y", ACCURATE, "%{y:.1f} % of the surface within 1 cm of the truth"))
     if below == WORK:
-        _curve(figure, rows, [row.triangles for row in rows], "y2", LEFT, ",d", "triangles")
-        _curve(figure, rows, [1000 * row.elapsed_s for row in rows], "y3", RIGHT, ".0f", "ms for the ball")
+        curves += [
+            ([row.triangles for row in rows], "y2", LEFT, "%{y:,d} triangles"),
+            ([1000 * row.elapsed_s for row in rows], "y3", RIGHT, "%{y:.0f} ms for the ball"),
+        ]
     else:
-        unused = [100 * row.unused_share for row in rows]
-        _curve(figure, rows, unused, "y2", LEFT, ".1f", "% of the points unused")
-        _curve(figure, rows, [row.hole_area_m2 for row in rows], "y3", RIGHT, ".3f", "m² of holes")
+        curves += [
+            ([100 * row.unused_share for row in rows], "y2", LEFT, "%{y:.1f} % of the points unused"),
+            ([row.hole_area_m2 for row in rows], "y3", RIGHT, "%{y:.3f} m² of holes"),
+        ]
+    for values, axis, color, meaning in curves:
+        figure.add_scatter(
+            x=[1000 * row.radius_m for row in rows],
+            y=values,
+            yaxis=axis,
+            mode="lines+markers",
+            line={"color": color, "width": 2},
+            marker={"size": 5},
+            hovertemplate=f"%{{x:.1f}} mm: {meaning}<extra></extra>",
+        )
     widest_mm = 1000.0 * (view.r_F_m + view.sigma_D_m)
     mark(figure, 1000.0 * view.r_F_m, "r<sub>F</sub>", css(DELIVERED), "right", "dot", log=True)
     mark(figure, widest_mm, "r<sub>F</sub>+σ<sub>D</sub>", css(SOURCE), "left", "dot", log=True)
@@ -121,23 +136,3 @@ def _radius_axis(view: SweepView | None) -> dict[str, object]:
         ends_mm = 1000 * AXIS_ENDS[0] * view.r_F_m, 1000 * widest_m
         axis["range"] = [math.log10(end_mm) for end_mm in ends_mm]
     return axis
-
-
-def _curve(
-    figure: go.Figure,
-    rows: Sequence[SweepPoint],
-    values: Sequence[float],
-    axis: str,
-    color: str,
-    digits: str,
-    unit: str,
-) -> None:
-    figure.add_scatter(
-        x=[1000 * row.radius_m for row in rows],
-        y=list(values),
-        yaxis=axis,
-        mode="lines+markers",
-        line={"color": color, "width": 2},
-        marker={"size": 5},
-        hovertemplate=f"%{{x:.1f}} mm: %{{y:{digits}}} {unit}<extra></extra>",
-    )

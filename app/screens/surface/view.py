@@ -13,7 +13,6 @@ from pipeline.types import FloatArray, IntArray
 Coloring = Literal["color", "source", "distance", "normal"]
 """What the colours of a surface mean."""
 
-
 Which = Literal["after", "before"]
 """Fusion."""
 

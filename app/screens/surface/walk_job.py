@@ -9,13 +9,12 @@ import numpy as np
 from app.screens.surface.walk_view import Happening, WalkRequest, WalkView
 from app.state import Spec
 from app.store import Store
-from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.spec import key
 from pipeline.surface import radii
 from pipeline.surface.pivoting import roll
 from pipeline.surface.walk import Kind, Walk, ball_on_arc, hole_on_flat_ground, iterate_walk, nearest_rows
-from pipeline.types import FloatArray, PointCloud
+from pipeline.types import PointCloud
 
 PATCH_POINTS = 550
 PLACES = 10
@@ -28,7 +27,7 @@ def walk_job(store: Store, spec: Spec, request: WalkRequest) -> Generator[Progre
     """Roll the spec's balls and keep every step.
 
     Raises:
-        InputError: the cloud has no points, or the patch's centre is not finite.
+        InputError: the cloud has no points.
         ReconstructionError: no ball finds three points to rest on.
     """
     clouds = yield from store.stage(spec, "clouds")
@@ -47,23 +46,17 @@ def walk_over(
 ) -> Generator[Progress, None, WalkView]:
     """The walk over a cloud with normals, or over a patch of it; raises as ``walk_job``."""
     if request.close_up:
-        cloud = cloud.select(nearest_rows(cloud.points_m, _center_m(cloud, radii_m, request), PATCH_POINTS))
+        triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
+        assert cloud.normals is not None  # or the ball would not have rolled
+        center_m = hole_on_flat_ground(cloud.points_m, cloud.normals, triangles, PATCH_POINTS)
+        cloud = cloud.select(nearest_rows(cloud.points_m, center_m, PATCH_POINTS))
     batch = 1 if request.close_up else max(1, 2 * len(cloud) // BATCHES)
     walk = yield from iterate_walk(cloud.points_m, cloud.normals, radii_m, batch)
     return _view_of(cloud, walk, request)
 
 
-def _center_m(cloud: PointCloud, radii_m: tuple[float, ...], request: WalkRequest) -> FloatArray:
-    if request.center_m is not None:
-        return np.array(request.center_m)
-    triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
-    assert cloud.normals is not None  # or the ball would not have rolled
-    return hole_on_flat_ground(cloud.points_m, cloud.normals, triangles, PATCH_POINTS)
-
-
 def _view_of(cloud: PointCloud, walk: Walk, request: WalkRequest) -> WalkView:
-    if cloud.normals is None:
-        raise InputError("Ball pivoting needs normals and the cloud has none; try to estimate them first")
+    assert cloud.normals is not None  # or the ball would not have rolled
     last = walk.step_ends - 1
     if request.close_up:
         shares = np.arange(1, PLACES + 1) / PLACES

@@ -7,10 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from app.screens.surface.view import Which
 from pipeline.types import ByteArray, FloatArray, IntArray
 
-Which = Literal["after", "before"]
-"""After fusion, or before it."""
 Happening = Literal["seed", "join", "glue", "end"]
 """A ball was put down on three points, turned onto an unused point or onto one of the front, or came to its
 end because no edge is left to turn about."""
@@ -23,8 +22,6 @@ class WalkRequest:
     which: Which
     close_up: bool
     """Every pivot on a patch of the cloud; otherwise the whole cloud in batches."""
-    center_m: tuple[float, float, float] | None
-    """Of the patch, world frame; None leaves it to the job."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from lab.claims.depth.errors import (
     ALIGNMENTS,
     CHAIN,
     JUDGED,
+    SENSOR,
     WORST_SHOWN,
     SceneErrors,
     distance_curve,
@@ -168,7 +169,7 @@ def judge_against_sensor(measured: Sequence[SceneErrors]) -> Outcome:
     """C14's numbers and verdict, on the scenes whose truth is known."""
     known = [scene for scene in measured if scene.site.truth]
     names = (*ALIGNMENTS, CHAIN)
-    sensor = {scene.site.name: scene.sensor_abs_rel() for scene in known}
+    sensor = {scene.site.name: scene.beside_sensor(SENSOR) for scene in known}
     network = {(scene.site.name, name): scene.beside_sensor(name) for scene in known for name in names}
     least = {place: min(network[place, name] for name in names) for place in sensor}
     worse = [place for place in sensor if least[place] > sensor[place]]

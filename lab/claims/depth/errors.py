@@ -24,6 +24,7 @@ ALIGNMENTS: dict[str, AlignmentMode] = {
 }
 """As the literature aligns: to the depth that judges. Raw takes the network's numbers as metres."""
 JUDGED = "median-scaled"
+SENSOR = "sensor"
 CHAIN = "aligned as in the chain"
 """Locally, to what the sensor sees; only beside the sensor's own error."""
 EDGES_M = (NEAREST_M, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 80.0)
@@ -39,14 +40,11 @@ class FrameErrors:
 
     aligned: dict[str, DepthErrors]
     """By the names of ``ALIGNMENTS``."""
-    total: dict[str, FloatArray]
-    """(bins,) sum of |p - g| / g over the pixels whose true depth is in a bin, by alignment."""
-    pixels: dict[str, FloatArray]
-    """(bins,) their number."""
-    sensor: float
-    """AbsRel of the sensor's own depth; NaN where the sensor is what judges."""
+    binned: dict[str, FloatArray]
+    """By alignment, as ``by_distance`` gives them."""
     beside_sensor: dict[str, float]
-    """AbsRel over the sensor's pixels, by alignment and for ``CHAIN``; empty where the sensor judges."""
+    """AbsRel over the sensor's pixels, of its own depth (``SENSOR``), by alignment and for ``CHAIN``; empty
+    where the sensor is what judges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,16 +66,12 @@ class SceneErrors:
 
     def pooled_abs_rel(self, alignment: str) -> float:
         """Of the pixels, each counting the same."""
-        total = sum(frame.total[alignment].sum() for frame in self.frames)
-        return float(total / sum(frame.pixels[alignment].sum() for frame in self.frames))
+        total, pixels = (sum(frame.binned[alignment][row].sum() for frame in self.frames) for row in (0, 1))
+        return float(total / pixels)
 
-    def sensor_abs_rel(self) -> float:
-        """AbsRel of the sensor's own depth, mean over the images; the site has a truth."""
-        return float(np.mean([frame.sensor for frame in self.frames]))
-
-    def beside_sensor(self, alignment: str) -> float:
-        """AbsRel of inferred depth at the sensor's pixels, mean over the images; the site has a truth."""
-        return float(np.mean([frame.beside_sensor[alignment] for frame in self.frames]))
+    def beside_sensor(self, name: str) -> float:
+        """AbsRel at the sensor's pixels, mean over the images; the site has a truth."""
+        return float(np.mean([frame.beside_sensor[name] for frame in self.frames]))
 
 
 def site_trial(site: Site) -> dict[str, Any]:
@@ -92,9 +86,7 @@ def from_trial(site: Site, result: dict[str, Any]) -> SceneErrors:
     frames = [
         FrameErrors(
             {name: DepthErrors(**errors) for name, errors in frame["aligned"].items()},
-            {name: np.array(total) for name, total in frame["total"].items()},
-            {name: np.array(pixels) for name, pixels in frame["pixels"].items()},
-            float("nan") if frame["sensor"] is None else frame["sensor"],
+            {name: np.array(binned) for name, binned in frame["binned"].items()},
             frame["beside_sensor"],
         )
         for frame in result["frames"]
@@ -143,42 +135,35 @@ def frame_errors(
         aligned_m: (H, W) each, the inferred depth by alignment.
         site: where it belongs.
     """
-    binned = {name: by_distance(z_m, judging_m) for name, z_m in aligned_m.items()}
-    sensor, beside = float("nan"), {}
+    beside = {}
     if site.truth:
         seen_m = np.where(example.sensor.valid, judging_m, np.nan)
-        sensor = depth_errors(example.sensor.z_m, seen_m, site.cap_m).abs_rel
         chain_m = align_depth(inferred, example.sensor, "local").depth.z_m
         beside = {
             name: depth_errors(z_m, seen_m, site.cap_m).abs_rel
-            for name, z_m in (aligned_m | {CHAIN: chain_m}).items()
+            for name, z_m in ({SENSOR: example.sensor.z_m} | aligned_m | {CHAIN: chain_m}).items()
         }
     return FrameErrors(
         {name: depth_errors(z_m, judging_m, site.cap_m) for name, z_m in aligned_m.items()},
-        {name: total for name, (total, _) in binned.items()},
-        {name: pixels for name, (_, pixels) in binned.items()},
-        sensor,
+        {name: by_distance(z_m, judging_m) for name, z_m in aligned_m.items()},
         beside,
     )
 
 
-def by_distance(z_m: FloatArray, judging_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sums of |p - g| / g and numbers of pixels in the bins between ``EDGES_M``, (bins,) each."""
+def by_distance(z_m: FloatArray, judging_m: FloatArray) -> FloatArray:
+    """(2, bins) sums of |p - g| / g and numbers of pixels whose true depth is between two ``EDGES_M``."""
     compared = np.isfinite(z_m) & np.isfinite(judging_m)
     g_m = judging_m[compared].astype(np.float64)
     relative = np.abs(z_m[compared] - g_m) / g_m
     pixels, _ = np.histogram(g_m, EDGES_M)
     total, _ = np.histogram(g_m, EDGES_M, weights=relative)
-    return total, pixels.astype(np.float64)
+    return np.stack([total, pixels])
 
 
 def distance_curve(frames: Iterable[FrameErrors], alignment: str) -> tuple[FloatArray, list[FloatArray]]:
     """The middles (metres) of the bins that have pixels, and in each the AbsRel of the images there."""
     middles_m = 0.5 * (np.array(EDGES_M[1:]) + np.array(EDGES_M[:-1]))
-    total, pixels = (
-        np.array([sums[alignment] for sums in columns])
-        for columns in zip(*((frame.total, frame.pixels) for frame in frames), strict=True)
-    )
+    total, pixels = np.stack([frame.binned[alignment] for frame in frames], axis=1)
     filled = np.flatnonzero(pixels.any(axis=0))
     seen = pixels > 0
     values = [total[seen[:, k], k] / pixels[seen[:, k], k] for k in filled]

@@ -18,9 +18,3 @@ def curve(label: str, x: Sequence[float], runs: Sequence[Iterable[float]]) -> Cu
     """Means with their intervals: one group of runs for each ``x``."""
     means, lows, highs = zip(*(interval(values) for values in runs), strict=True)
     return Curve(label, tuple(float(value) for value in x), means, lows, highs)
-
-
-def plain_curve(label: str, x: Sequence[float], y: Sequence[float]) -> Curve:
-    """A line without a band."""
-    values = tuple(float(value) for value in y)
-    return Curve(label, tuple(float(value) for value in x), values, values, values)

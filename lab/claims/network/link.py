@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit  # student's t; scipy.stats takes a second to import
 
 from lab.claims.claim import Claim, Outcome
-from lab.claims.exhibits import Chart, Exhibit, Table
-from lab.claims.network.intervals import curve, interval, plain_curve
+from lab.claims.exhibits import Chart, Exhibit, Table, plain_curve
+from lab.claims.network.intervals import curve, interval
 from lab.claims.network.tasks import transfer
 from lab.trials import iterate_trials
 from network_sim.config import PRESETS, NetworkConfig
@@ -20,8 +19,7 @@ from network_sim.images import encoded_bytes, pgm_bytes, ppm_bytes
 from network_sim.mac.ieee802154 import LINK_BPS
 from network_sim.replicate import replications
 from packetmesh.progress import Progress
-
-FloatArray = NDArray[np.float64]
+from pipeline.types import FloatArray
 
 IMAGES = (1, 2, 3, 4, 5)
 """Images of each node in the rows of Table 4.6."""

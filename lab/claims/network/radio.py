@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lab.claims.claim import Claim, Outcome
-from lab.claims.exhibits import Chart, Table
-from lab.claims.network.intervals import curve, interval, plain_curve
+from lab.claims.exhibits import Chart, Table, plain_curve
+from lab.claims.network.intervals import curve, interval
 from lab.claims.network.tasks import Crowd, saturated
 from lab.trials import iterate_trials
 from network_sim.config import PRESETS, NodesConfig

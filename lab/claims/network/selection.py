@@ -10,14 +10,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lab.claims.claim import Claim, Outcome
 from lab.claims.exhibits import Chart, Table
 from lab.claims.network.intervals import curve, interval
-from network_sim.selection import all_cameras, at_random, greedy, greedy_by_cost, nearest, view_quality
-
-FloatArray = NDArray[np.float64]
+from network_sim.selection import (
+    FloatArray,
+    all_cameras,
+    at_random,
+    greedy,
+    greedy_by_cost,
+    nearest,
+    view_quality,
+)
+from pipeline.types import BoolArray
 
 SEEDS = 20
 CAMERAS = 12
@@ -74,7 +80,7 @@ def behind_a_sphere(
     lengths_m: FloatArray,
     centers_m: FloatArray,
     radii_m: FloatArray,
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """(N, V) whether a sphere is passed before the voxel is reached."""
     hidden = np.zeros(lengths_m.shape, bool)
     for center_m, radius_m in zip(centers_m, radii_m, strict=True):

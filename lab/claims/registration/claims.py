@@ -113,11 +113,10 @@ def _c17(results: Results) -> Outcome:
     )
 
 
-def ratio_of_medians_ci95(a: FloatArray, b: FloatArray, seed: int = 0) -> tuple[float, float]:
+def ratio_of_medians_ci95(a: FloatArray, b: FloatArray) -> tuple[float, float]:
     """95 % bootstrap interval of median(a) / median(b) over paired cases."""
-    rows = np.random.default_rng(seed).integers(0, len(a), (2000, len(a)))
-    low, high = np.percentile(np.median(a[rows], axis=1) / np.median(b[rows], axis=1), (2.5, 97.5))
-    return float(low), float(high)
+    pairs = np.stack([a, b], axis=1)
+    return bootstrap_ci95(pairs, statistic=lambda pairs, axis: np.divide(*np.median(pairs, axis=axis).T))
 
 
 def _c18(results: Results) -> Outcome:

@@ -45,14 +45,12 @@ def compare(rival: str, ours: FloatArray, theirs: FloatArray) -> Comparison:
 
 def holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
     """The same comparisons with p values corrected for their number (Holm 1979)."""
-    adjusted = holm_p([comparison.p for comparison in comparisons])
+    adjusted = holm_p(np.array([comparison.p for comparison in comparisons])).tolist()
     return tuple(replace(comparison, p=p) for comparison, p in zip(comparisons, adjusted, strict=True))
 
 
-def holm_p(p_values: Sequence[float]) -> list[float]:
-    """Step-down adjusted p values: the k-th smallest times (m - k + 1), never decreasing, at most 1."""
-    count, adjusted, highest = len(p_values), [0.0] * len(p_values), 0.0
-    for rank, row in enumerate(np.argsort(p_values, kind="stable")):
-        highest = min(1.0, max(highest, (count - rank) * p_values[row]))
-        adjusted[row] = float(highest)
+def holm_p(p: FloatArray) -> FloatArray:
+    """(m,) step-down adjusted p values: the k-th smallest times (m - k + 1), never decreasing, at most 1."""
+    order, adjusted = np.argsort(p, kind="stable"), np.empty(len(p))
+    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(np.arange(len(p), 0, -1) * p[order]))
     return adjusted

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -42,30 +42,6 @@ class CaseTask:
 
 
 @dataclass(frozen=True, slots=True)
-class Trial:
-    """How one entrant did on one case; all but the times repeats bit for bit."""
-
-    condition: str
-    room: int
-    direction: Direction
-    entrant: str
-    point_error_cm: float
-    ahd_cm: float
-    iterations: int | None
-    k90: int | None
-    """Iterations until 90 % of the error's drop; None without a drop, or for another program."""
-    stop_reason: str
-    start_error_cm: float
-    overlap: float
-    curve_error_cm: tuple[float, ...] = ()
-    """Point error after 0, 1, ... iterations; empty where curves are not asked for."""
-    curve_ahd_cm: tuple[float, ...] = ()
-    """Average Hausdorff distance after each of ``CURVE_ITERATIONS``, the last one held."""
-    elapsed_s: tuple[float, ...] = ()
-    """From the clouds to the end of each iteration, trees and normals included; empty without curves."""
-
-
-@dataclass(frozen=True, slots=True)
 class Run:
     """An entrant's poses on a case, the start first."""
 
@@ -101,13 +77,15 @@ class Ruler:
 
 
 def run_case(task: CaseTask) -> list[dict[str, Any]]:
-    """The trial of every entrant of the lineup, as plain values."""
+    """How every entrant of the lineup did on the same points from the same start, as plain values.
+
+    All but the times repeats bit for bit. ``k90`` is the number of iterations until 90 % of the error's drop,
+    None without a drop or for another program. The curves are empty where they are not asked for:
+    ``curve_error_cm`` is the point error after 0, 1, ... iterations, ``curve_ahd_cm`` the average Hausdorff
+    distance after each of ``CURVE_ITERATIONS``, the last one held, and ``elapsed_s`` the time from the clouds
+    to the end of each iteration, trees and normals included.
+    """
     case = make_case(task.condition, task.room)
-    return [asdict(trial) for trial in case_trials(task, case)]
-
-
-def case_trials(task: CaseTask, case: Case) -> list[Trial]:
-    """Every entrant of the lineup on the same points from the same start; ``case`` has the whole clouds."""
     ruler, thinned = Ruler(case), case.thinned(task.max_points)
     trials = []
     for direction, entrant in task.lineup:
@@ -115,22 +93,22 @@ def case_trials(task: CaseTask, case: Case) -> list[Trial]:
         errors_cm = [ruler.point_error_cm(T) for T in run.poses]
         is_curve = direction == "q2p" and entrant.name in task.curved
         trials.append(
-            Trial(
-                task.condition.name,
-                task.room,
-                direction,
-                entrant.name,
-                point_error_cm=errors_cm[-1],
-                ahd_cm=ruler.ahd_cm(run.poses[-1]),
-                iterations=run.iterations,
-                k90=None if entrant.is_peer else k90(errors_cm),
-                stop_reason=run.stop_reason,
-                start_error_cm=errors_cm[0],
-                overlap=round(case.overlap, DIGITS),
-                curve_error_cm=tuple(errors_cm) if is_curve else (),
-                curve_ahd_cm=_ahd_curve(ruler, run.poses) if is_curve else (),
-                elapsed_s=tuple(round(s, DIGITS) for s in run.elapsed_s) if is_curve else (),
-            )
+            {
+                "condition": task.condition.name,
+                "room": task.room,
+                "direction": direction,
+                "entrant": entrant.name,
+                "point_error_cm": errors_cm[-1],
+                "ahd_cm": ruler.ahd_cm(run.poses[-1]),
+                "iterations": run.iterations,
+                "k90": None if entrant.is_peer else k90(errors_cm),
+                "stop_reason": run.stop_reason,
+                "start_error_cm": errors_cm[0],
+                "overlap": round(case.overlap, DIGITS),
+                "curve_error_cm": errors_cm if is_curve else [],
+                "curve_ahd_cm": _ahd_curve(ruler, run.poses) if is_curve else [],
+                "elapsed_s": [round(s, DIGITS) for s in run.elapsed_s] if is_curve else [],
+            }
         )
     return trials
 
@@ -170,7 +148,7 @@ def k90(errors: Sequence[float]) -> int | None:
     return next(k for k, error in enumerate(errors) if error <= errors[0] - 0.9 * drop)
 
 
-def _ahd_curve(ruler: Ruler, poses: Sequence[FloatArray]) -> tuple[float, ...]:
+def _ahd_curve(ruler: Ruler, poses: Sequence[FloatArray]) -> list[float]:
     values = {k: ruler.ahd_cm(poses[k]) for k in CURVE_ITERATIONS if k < len(poses)}
     last = ruler.ahd_cm(poses[-1])
-    return tuple(values.get(k, last) for k in CURVE_ITERATIONS)
+    return [values.get(k, last) for k in CURVE_ITERATIONS]

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.config import RegistrationConfig
 from pipeline.registration.ceicp import CeicpA, CeicpN
 from pipeline.registration.ceicp_literal import CeicpLiteral
-from pipeline.registration.ficp import LAMBDA, SMALLEST_FRACTION, Ficp
+from pipeline.registration.ficp import LAMBDA, Ficp, inlier_fraction
 from pipeline.registration.icp import Icp
 from pipeline.registration.matching import Matching
 from pipeline.registration.methods import METHODS, MethodStart
@@ -100,11 +100,8 @@ class FicpWithExponent(Ficp):
 
     def weigh(self, matching: Matching) -> PairWeights:
         """The fraction of the closest pairs with the least fractional RMSD."""
-        total = len(matching.distances_m)
-        counts = np.arange(int(np.ceil(SMALLEST_FRACTION * total)), total + 1)
-        squared_m2 = np.cumsum(np.sort(matching.distances_m) ** 2)
-        frmsd_m = (counts / total) ** -self.exponent * np.sqrt(squared_m2[counts - 1] / counts)
-        return evenly(closest_rows(matching.distances_m, float(counts[np.argmin(frmsd_m)] / total)))
+        fraction = inlier_fraction(matching.distances_m, self.exponent)
+        return evenly(closest_rows(matching.distances_m, fraction))
 
 
 def _gaussian(kept: PairWeights, matching: Matching) -> PairWeights:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from packetmesh.progress import drain
@@ -10,8 +11,8 @@ from pipeline.merging import MergedClouds
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import run
-from pipeline.surface import Camera
-from pipeline.types import DepthMap, PointCloud, Rig, RigTruth
+from pipeline.surface import Camera, reconstruct_surface
+from pipeline.types import DepthMap, Rig, RigTruth, SurfaceResult
 
 CHAINS = {"thesis": "the thesis's union", "packetmesh": "filling only the holes"}
 """The presets, and what each does with the inferred points."""
@@ -22,14 +23,15 @@ class ChainClouds:
     """Sensor and fused cloud of one node at its true pose."""
 
     name: str
-    sensor: PointCloud
-    fused: PointCloud
-    r_F_m: float
-    """Mean nearest-neighbour distance of the fused cloud."""
-    sigma_D_m: float
-    """Its standard deviation."""
+    merged: MergedClouds
     camera: Camera
     true_depth: DepthMap
+
+    def rolled(self, when: str, sigmas: Sequence[float]) -> SurfaceResult:
+        """The surface of the cloud ``before`` or ``after`` fusion, by balls of r_F + ``sigmas`` sigma_D."""
+        merged = self.merged
+        cloud = merged.sensor if when == "before" else merged.fused
+        return reconstruct_surface(cloud, [merged.r_F_m + factor * merged.sigma_D_m for factor in sigmas])
 
 
 def single_node(rig: Rig, index: int) -> Rig:
@@ -48,7 +50,4 @@ def chain_clouds(rig: Rig, index: int, config: PipelineConfig) -> ChainClouds:
     frame = alone.frames[0]
     results = drain(run(Spec(LoadedRig(alone), config=config), stages=("clouds",)))
     camera = Camera(frame.intrinsics, frame.T_world_camera)
-    merged: MergedClouds = results["clouds"].value
-    return ChainClouds(
-        alone.name, merged.sensor, merged.fused, merged.r_F_m, merged.sigma_D_m, camera, alone.truth.depth[0]
-    )
+    return ChainClouds(alone.name, results["clouds"].value, camera, alone.truth.depth[0])

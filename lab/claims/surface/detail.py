@@ -12,14 +12,14 @@ from scipy.optimize import isotonic_regression
 from scipy.stats import spearmanr
 
 from lab.claims.claim import Claim, Outcome, bootstrap_ci95, mean_curve
-from lab.claims.exhibits import Chart, Curve, Table
-from lab.claims.surface.stairs import Stairs, feet_samples, stairs, stairs_cloud
+from lab.claims.exhibits import Chart, Table, plain_curve
+from lab.claims.surface.stairs import feet_samples, stairs, stairs_cloud
 from lab.trials import iterate_trials
 from packetmesh.progress import Progress
 from pipeline.rays import tensor, triangle_scene
 from pipeline.surface import reconstruct_surface, spacing
 from pipeline.surface.truth import sample_surface
-from pipeline.types import FloatArray, IntArray
+from pipeline.types import FloatArray
 
 SPACINGS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 """Ball radii over the mean nearest-neighbour distance."""
@@ -58,27 +58,22 @@ def details(seed: int, spacings: Sequence[float] = SPACINGS) -> tuple[Detail, ..
     """Balls of growing size, each alone, over one noisy cloud of the stairs."""
     target = stairs()
     cloud = stairs_cloud(target, seed)
+    truth, feet_m = triangle_scene(target.vertices_m, target.triangles), feet_samples(target)
     r_F_m, _ = spacing(cloud.points_m)
     rng = np.random.default_rng(seed)
     found = []
     for factor in spacings:
         surface = reconstruct_surface(cloud, [factor * r_F_m])
-        found.append(_compare(surface.vertices_m, surface.triangles, target, factor * r_F_m, rng))
+        mesh = triangle_scene(surface.vertices_m, surface.triangles)
+        on_mesh_m = sample_surface(surface.vertices_m, surface.triangles, SAMPLES, rng)
+        on_target_m = sample_surface(target.vertices_m, target.triangles, SAMPLES, rng)
+        errors_m, missing_m, gaps_m = (
+            scene.compute_distance(tensor(points_m, np.float32)).numpy()
+            for scene, points_m in ((truth, on_mesh_m), (mesh, on_target_m), (mesh, feet_m))
+        )
+        accuracy, coverage = (float((far_m <= CLOSE_M).mean()) for far_m in (errors_m, missing_m))
+        found.append(Detail(factor * r_F_m, accuracy, coverage, float(gaps_m.mean())))
     return tuple(found)
-
-
-def _compare(
-    vertices_m: FloatArray, triangles: IntArray, target: Stairs, radius_m: float, rng: np.random.Generator
-) -> Detail:
-    on_mesh_m = sample_surface(vertices_m, triangles, SAMPLES, rng)
-    on_target_m = sample_surface(target.vertices_m, target.triangles, SAMPLES, rng)
-    mesh, truth = triangle_scene(vertices_m, triangles), triangle_scene(target.vertices_m, target.triangles)
-    errors_m, missing_m, gaps_m = (
-        scene.compute_distance(tensor(points_m, np.float32)).numpy()
-        for scene, points_m in ((truth, on_mesh_m), (mesh, on_target_m), (mesh, feet_samples(target)))
-    )
-    accuracy, coverage = (float((distances_m <= CLOSE_M).mean()) for distances_m in (errors_m, missing_m))
-    return Detail(radius_m, accuracy, coverage, float(gaps_m.mean()))
 
 
 def judge(runs: Sequence[Sequence[Detail]], spacings: Sequence[float] = SPACINGS) -> Outcome:
@@ -124,16 +119,14 @@ def _rank_correlation(spacings: Sequence[float], accuracy: FloatArray) -> float:
 def _chart(
     spacings: Sequence[float], accuracy: FloatArray, coverage: FloatArray, fitted: FloatArray
 ) -> Chart:
-    falling = tuple(float(value) for value in fitted)
-    x = tuple(spacings)
     return Chart(
         "Stairs: accuracy and coverage against the ball's radius",
         "ball radius / point spacing",
         "share within 1 cm",
         (
-            mean_curve("accuracy", x, accuracy.T),
-            mean_curve("coverage", x, coverage.T),
-            Curve("best falling curve", x, falling, falling, falling),
+            mean_curve("accuracy", spacings, accuracy.T),
+            mean_curve("coverage", spacings, coverage.T),
+            plain_curve("best falling curve", spacings, fitted),
         ),
         f"Steps of 3 to 8 cm, points 1 cm apart with 2 mm of noise, {len(accuracy)} clouds; mean and its "
         "95 % bootstrap interval.",

@@ -5,9 +5,8 @@ from __future__ import annotations
 from lab.claims.exhibits import Picture
 from lab.claims.surface.clouds import ChainClouds
 from pipeline.geometry import scaled
-from pipeline.surface import Camera, hit_depth, reconstruct_surface
+from pipeline.surface import Camera, hit_depth
 from pipeline.surface.pictures import mesh_picture
-from pipeline.types import ByteArray, PointCloud
 
 FIGURES: tuple[tuple[str, str, str, float], ...] = (
     ("4.2", "before", "r_F", 0.0),
@@ -28,26 +27,20 @@ def thesis_figures(clouds: ChainClouds, how: str) -> Picture:
     Args:
         how: what the chain does with the inferred points, for the title.
     """
-    images = tuple(
-        _figure(clouds, number, when, name, clouds.r_F_m + factor * clouds.sigma_D_m)
-        for number, when, name, factor in FIGURES
-    )
+    camera = Camera(scaled(clouds.camera.intrinsics, PICTURE_SIZE), clouds.camera.T_world_camera)
+    images = []
+    for number, when, name, factor in FIGURES:
+        surface = clouds.rolled(when, (factor,))
+        depth = hit_depth(surface.vertices_m, surface.triangles, camera.intrinsics, camera.T_world_camera)
+        caption = (
+            f"{number}: {when} fusion, {name} = {1000.0 * surface.radii_m[0]:.1f} mm; "
+            f"{1.0 - depth.coverage:.0%} of the rays find nothing"
+        )
+        images.append((caption, mesh_picture(surface, camera)))
     return Picture(
         f"Figures 4.2 to 4.7 on {clouds.name}, by {how}",
-        images,
+        tuple(images),
         "A single ball radius each, seen from the node's camera; magenta: rays that find nothing. The "
         "thesis's radii are 0.0102, 0.0131, 0.0156 and 0.0209 before and 0.0102 and 0.0156 after fusion: "
         "those of r_F + {0, 1/4, 1/2, 1} sigma_D and of r_F + {0, 1/2} sigma_D.",
     )
-
-
-def _figure(clouds: ChainClouds, number: str, when: str, name: str, radius_m: float) -> tuple[str, ByteArray]:
-    cloud: PointCloud = clouds.sensor if when == "before" else clouds.fused
-    surface = reconstruct_surface(cloud, [radius_m])
-    intrinsics = scaled(clouds.camera.intrinsics, PICTURE_SIZE)
-    pose = clouds.camera.T_world_camera
-    missed = 1.0 - hit_depth(surface.vertices_m, surface.triangles, intrinsics, pose).coverage
-    caption = (
-        f"{number}: {when} fusion, {name} = {1000.0 * radius_m:.1f} mm; {missed:.0%} of the rays find nothing"
-    )
-    return caption, mesh_picture(surface, Camera(intrinsics, pose))

@@ -14,7 +14,7 @@ from scipy.stats import t as student_t
 
 from lab.benchmarks.surface import OURS, TERRAIN, SurfaceRun, roll_ours, terrain, time_alone
 from lab.claims.claim import Claim, Outcome
-from lab.claims.exhibits import Chart, Curve, Table
+from lab.claims.exhibits import Chart, Table, plain_curve
 from lab.trials import iterate_trials
 from packetmesh.progress import Progress
 from pipeline.types import PointCloud
@@ -126,14 +126,14 @@ def judge(growth: Growth) -> Outcome:
 
 
 def _chart(growth: Growth, time: Slope) -> Chart:
-    curves = []
-    for label, runs in (("packetmesh", growth.ours), ("Open3D", growth.open3d)):
-        if runs:
-            seconds = tuple(run.elapsed_s for run in runs)
-            curves.append(Curve(label, tuple(float(run.points) for run in runs), seconds, seconds, seconds))
+    curves = [
+        plain_curve(label, (run.points for run in runs), (run.elapsed_s for run in runs))
+        for label, runs in (("packetmesh", growth.ours), ("Open3D", growth.open3d))
+        if runs
+    ]
     x = curves[0].x
-    fitted = tuple(time.factor * count**time.exponent for count in x)
-    curves.append(Curve(f"power {time.exponent:.2f}", x, fitted, fitted, fitted))
+    fitted = (time.factor * count**time.exponent for count in x)
+    curves.append(plain_curve(f"power {time.exponent:.2f}", x, fitted))
     return Chart(
         "Time against the number of points",
         "points",

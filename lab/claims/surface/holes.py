@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
+from collections.abc import Generator
 from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path
@@ -19,7 +19,7 @@ from packetmesh.progress import Progress
 from pipeline.config import PRESETS
 from pipeline.depth.inference import SHIPPED_MODEL
 from pipeline.io.demos import DEMO_SCENES, SCENES, load_demo
-from pipeline.surface import hit_depth, reconstruct_surface
+from pipeline.surface import hit_depth
 from pipeline.surface.radii import SIGMAS
 from pipeline.types import FloatArray
 
@@ -32,6 +32,13 @@ RULES: dict[str, tuple[float, ...]] = {
 }
 """Multiples of sigma_D that are added to r_F."""
 JUDGED = "r_F + sigma_D"
+CLOUDS = (
+    ("sensor, thesis preset", "thesis", "before"),
+    ("union (thesis)", "thesis", "after"),
+    ("sensor, packetmesh preset", "packetmesh", "before"),
+    ("fill (packetmesh)", "packetmesh", "after"),
+)
+"""Name, chain and moment of each cloud."""
 OWN_RULES = {"thesis": "r_F to r_F + sigma_D", "packetmesh": "r_F to r_F + 4 sigma_D"}
 """Each chain's own, by which its accuracy is reported."""
 
@@ -56,9 +63,7 @@ Measured = dict[tuple[str, str, str], list[Seen]]
 
 def seen(clouds: ChainClouds, when: str, sigmas: tuple[float, ...]) -> Seen:
     """Roll over the cloud before or after fusion and look at the surface from the node's camera."""
-    cloud = clouds.sensor if when == "before" else clouds.fused
-    surface = reconstruct_surface(cloud, [clouds.r_F_m + factor * clouds.sigma_D_m for factor in sigmas])
-    camera = clouds.camera
+    surface, camera = clouds.rolled(when, sigmas), clouds.camera
     depth = hit_depth(surface.vertices_m, surface.triangles, camera.intrinsics, camera.T_world_camera)
     there = clouds.true_depth.valid
     z_m = clouds.true_depth.z_m[there]
@@ -84,11 +89,9 @@ def node_trial(node: tuple[str, int]) -> list[dict[str, Any]]:
     ]
 
 
-def study(
-    folder: Path, scheduler: str | None, scenes: Iterable[str] = tuple(DEMO_SCENES)
-) -> Generator[Progress, None, Measured]:
-    """Every node of the scenes as a rig of its own."""
-    nodes = [(scene, index) for scene in scenes for index in range(len(load_demo(scene).frames))]
+def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Measured]:
+    """Every node of the demo scenes as a rig of its own."""
+    nodes = [(scene, index) for scene in DEMO_SCENES for index in range(len(load_demo(scene).frames))]
     found = yield from iterate_trials(
         "C22, holes", node_trial, nodes, folder, scheduler, data=(SHIPPED_MODEL, SCENES)
     )
@@ -99,9 +102,9 @@ def study(
     return measured
 
 
-def figures(scene: str = next(iter(DEMO_SCENES))) -> tuple[Exhibit, ...]:
-    """The thesis's figures on the first node of a scene, by both chains."""
-    rig = load_demo(scene)
+def figures() -> tuple[Exhibit, ...]:
+    """The thesis's figures on the first node of the first scene, by both chains."""
+    rig = load_demo(next(iter(DEMO_SCENES)))
     return tuple(thesis_figures(chain_clouds(rig, 0, PRESETS[preset]), how) for preset, how in CHAINS.items())
 
 
@@ -150,21 +153,19 @@ def _column(measured: Measured, preset: str, when: str, name: str, rule: str = J
 
 def rays_table(measured: Measured) -> Table:
     """What the cameras see by cloud and radius rule."""
-    rows = []
-    for name, preset, when in _clouds():
-        cells = []
-        for rule in RULES:
-            missed, close, error_m = (
-                float(np.mean(_column(measured, preset, when, quantity, rule)))
-                for quantity in ("no_hit_share", "close_share", "median_depth_error_m")
-            )
-            cells.append(f"{missed:.0%} / {close:.0%} / {100.0 * error_m:.1f} cm")
-        rows.append((name, *cells))
+
+    def cell(preset: str, when: str, rule: str) -> str:
+        missed, close, error_m = (
+            np.mean(_column(measured, preset, when, quantity, rule))
+            for quantity in ("no_hit_share", "close_share", "median_depth_error_m")
+        )
+        return f"{missed:.0%} / {close:.0%} / {100.0 * error_m:.1f} cm"
+
     frames = len(measured["thesis", "before", JUDGED])
     return Table(
         "Rays that find nothing / rays within 5 % of the true depth / median depth error",
         ("cloud", *RULES),
-        tuple(rows),
+        tuple((name, *(cell(preset, when, rule) for rule in RULES)) for name, preset, when in CLOUDS),
         f"Means over {frames} frames, each node alone at its true pose; r_F and sigma_D are those of the "
         "chain's fused cloud, for the cloud before fusion too. The first share is of all rays, the second "
         "of those that truly hit something. The union closes holes at the price of accuracy, because two "
@@ -174,25 +175,17 @@ def rays_table(measured: Measured) -> Table:
 
 def loops_table(measured: Measured) -> Table:
     """Boundary loops by cloud and radius rule."""
-    rows: list[tuple[str | float, ...]] = []
-    for name, preset, when in _clouds():
-        loops = [float(np.mean(_column(measured, preset, when, "loops", rule))) for rule in RULES]
-        rows.append((name, *loops))
+
+    def cell(preset: str, when: str, rule: str) -> float:
+        return float(np.mean(_column(measured, preset, when, "loops", rule)))
+
     return Table(
         "Boundary loops",
         ("cloud", *RULES),
-        tuple(rows),
+        tuple((name, *(cell(preset, when, rule) for rule in RULES)) for name, preset, when in CLOUDS),
         "Mean number. It is no measure of apparent holes: between two layers there are many small loops, "
         "and a large hole is one loop.",
     )
-
-
-def _clouds() -> list[tuple[str, str, str]]:
-    """Name, chain and moment of each cloud."""
-    rows = []
-    for preset, fused in (("thesis", "union (thesis)"), ("packetmesh", "fill (packetmesh)")):
-        rows += [(f"sensor, {preset} preset", preset, "before"), (fused, preset, "after")]
-    return rows
 
 
 C22 = Claim(

@@ -9,7 +9,7 @@ import numpy as np
 from lab.claims.claim import Claim, Outcome
 from lab.claims.exhibits import Table
 from lab.claims.surface.clouds import CHAINS, chain_clouds
-from pipeline.config import PRESETS, SurfaceConfig
+from pipeline.config import PRESETS
 from pipeline.io.demos import DEMO_SCENES, load_demo
 from pipeline.surface import radii, spacing
 from pipeline.surface.radii import SIGMAS
@@ -27,24 +27,19 @@ READINGS: dict[str, tuple[float, ...]] = {
 """The rule, an alternative that goes beyond r_F + sigma_D, and even steps."""
 
 
-def inferred_spacing(printed_m: tuple[float, ...], sigmas: tuple[float, ...]) -> tuple[float, float]:
+def inferred_spacing(sigmas: tuple[float, ...]) -> tuple[float, float]:
     """r_F and sigma_D, metres, that make the first and the last of the printed radii exact."""
-    return printed_m[0], (printed_m[-1] - printed_m[0]) / (sigmas[-1] - sigmas[0])
+    return PRINTED_M[0], (PRINTED_M[-1] - PRINTED_M[0]) / (sigmas[-1] - sigmas[0])
 
 
 def predicted_radii_m(sigmas: tuple[float, ...], r_F_m: float, sigma_D_m: float) -> tuple[float, ...]:
-    """The radii of a reading, by the function that the chain uses."""
-    if sigmas == SIGMAS["thesis"]:
-        return radii(SurfaceConfig(radius_rule="thesis"), r_F_m, sigma_D_m)
-    manual = SurfaceConfig(
-        radius_rule="manual", radii_m=tuple(r_F_m + factor * sigma_D_m for factor in sigmas)
-    )
-    return radii(manual, r_F_m, sigma_D_m)
+    """The radii of a reading."""
+    return tuple(r_F_m + factor * sigma_D_m for factor in sigmas)
 
 
-def deviation(radii_m: tuple[float, ...], printed_m: tuple[float, ...] = PRINTED_M) -> float:
+def deviation(radii_m: tuple[float, ...]) -> float:
     """Largest relative difference from the printed radii."""
-    return float(np.max(np.abs(np.array(radii_m) / np.array(printed_m) - 1.0)))
+    return float(np.max(np.abs(np.array(radii_m) / np.array(PRINTED_M) - 1.0)))
 
 
 def readings_table() -> Table:
@@ -55,7 +50,7 @@ def readings_table() -> Table:
         ("printed after fusion", None, None, first, None, third, None, None),
     ]
     for reading, sigmas in READINGS.items():
-        spacing_m = inferred_spacing(PRINTED_M, sigmas)
+        spacing_m = inferred_spacing(sigmas)
         radii_m = predicted_radii_m(sigmas, *spacing_m)
         rows.append((reading, *_mm(spacing_m), *_mm(radii_m), f"{deviation(radii_m):.1%}"))
     return Table(
@@ -69,16 +64,16 @@ def readings_table() -> Table:
     )
 
 
-def scenes_table(scenes: Iterable[str] = tuple(DEMO_SCENES)) -> Table:
+def scenes_table() -> Table:
     """Our own r_F, sigma_D and radii, before and after fusion, of the first node of each scene."""
     rows: list[tuple[str | float, ...]] = []
-    for scene in scenes:
+    for scene in DEMO_SCENES:
         rig = load_demo(scene)
         for preset, how in CHAINS.items():
-            clouds = chain_clouds(rig, 0, PRESETS[preset])
-            for when, cloud in (("before", clouds.sensor), ("after", clouds.fused)):
+            merged = chain_clouds(rig, 0, PRESETS[preset]).merged
+            for when, cloud in (("before", merged.sensor), ("after", merged.fused)):
                 spacing_m = spacing(cloud.points_m)
-                radii_m = predicted_radii_m(SIGMAS["thesis"], *spacing_m)
+                radii_m = radii(PRESETS["thesis"].surface, *spacing_m)
                 rows.append((f"{scene}, {how}, {when} fusion", len(cloud), *_mm((*spacing_m, *radii_m))))
     return Table(
         "The rule on our scenes, in millimetres",
@@ -95,15 +90,13 @@ def _mm(values_m: Iterable[float]) -> tuple[float, ...]:
 
 def _experiment() -> Outcome:
     rule = READINGS["r_F + {0, 1/4, 1/2, 1} sigma_D"]
-    r_F_m, sigma_D_m = inferred_spacing(PRINTED_M, rule)
+    r_F_m, sigma_D_m = inferred_spacing(rule)
     radii_m = predicted_radii_m(rule, r_F_m, sigma_D_m)
     worst = deviation(radii_m)
     ours = {"r_F_m": r_F_m, "sigma_D_m": sigma_D_m, "largest_deviation": worst}
     ours |= {f"radius_{place}_m": radius_m for place, radius_m in enumerate(radii_m, 1)}
     even = READINGS["r_F + {0, 1/3, 2/3, 1} sigma_D"]
-    ours["largest_deviation_even_steps"] = deviation(
-        predicted_radii_m(even, *inferred_spacing(PRINTED_M, even))
-    )
+    ours["largest_deviation_even_steps"] = deviation(predicted_radii_m(even, *inferred_spacing(even)))
     predicted = ", ".join(f"{radius_m:.4f}" for radius_m in radii_m)
     return Outcome(
         ours,

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from lab.worlds import textures
+from lab.worlds.primitives import Vector
 from lab.worlds.room_finishes import draw_seed
-from lab.worlds.scene import Material
+from lab.worlds.scene import Material, Rng
+from lab.worlds.textures.mixing import Color, linear
 from pipeline.types import FloatArray
-
-Color = str | FloatArray | Sequence[float]
-"""A "#rrggbb" colour as seen on a screen, or linear RGB."""
 
 FABRICS = ("#8a9a8e", "#b7a58c", "#5d6d7e", "#a4533c", "#d8cfc0", "#3f4f4a", "#7b6c8d", "#c29a5b", "#8c8c88")
 WOODS = ("#b98a58", "#8a5a33", "#d2b083", "#5b3a24", "#a8754a", "#c9a06c")
@@ -31,14 +30,7 @@ BOOKS = (
 )
 
 
-def linear(color: Color) -> FloatArray:
-    """(3,) linear RGB of a colour."""
-    if not isinstance(color, str):
-        return np.asarray(color, float)
-    return textures.from_srgb(*(int(color[i : i + 2], 16) for i in (1, 3, 5)))
-
-
-def pick(rng: np.random.Generator, palette: Sequence[str], color: str | None = None) -> FloatArray:
+def pick(rng: Rng, palette: Sequence[str], color: str | None = None) -> FloatArray:
     """The colour asked for, or one of a palette, slightly off."""
     if color is not None:
         return linear(color)
@@ -47,26 +39,24 @@ def pick(rng: np.random.Generator, palette: Sequence[str], color: str | None = N
 
 def plain(color: Color, gloss: float = 0.0, infrared: float = 1.0) -> Material:
     """One colour all over."""
-    return Material(textures.solid(linear(color)), gloss, infrared)
+    return Material(textures.solid(color), gloss, infrared)
 
 
-def fabric(rng: np.random.Generator, color: Color, second: Color | None = None) -> Material:
+def fabric(rng: Rng, color: Color, second: Color | None = None) -> Material:
     """Woven cloth, plain or of two colours."""
-    other = None if second is None else linear(second)
-    return Material(textures.fabric(linear(color), other, draw_seed(rng), rng.uniform(0.004, 0.008)))
+    return Material(textures.fabric(color, second, draw_seed(rng), rng.uniform(0.004, 0.008)))
 
 
-def wood(rng: np.random.Generator, color: Color, along: int = 0, gloss: float = 0.05) -> Material:
+def wood(rng: Rng, color: Color, along: int = 0, gloss: float = 0.05) -> Material:
     """Oiled wood, its grain along an axis of the part."""
     light = linear(color)
-    return Material(
-        textures.wood(light * 1.08, light * [0.62, 0.56, 0.5], draw_seed(rng), 0.05, along), gloss
-    )
+    grain = textures.wood(light * 1.08, light * [0.62, 0.56, 0.5], draw_seed(rng), 0.05, along)
+    return Material(grain, gloss)
 
 
-def painted(rng: np.random.Generator, color: Color, gloss: float = 0.08) -> Material:
+def painted(rng: Rng, color: Color, gloss: float = 0.08) -> Material:
     """Paint or lacquer, hardly mottled."""
-    return Material(textures.paint(linear(color), draw_seed(rng)), gloss)
+    return Material(textures.paint(color, draw_seed(rng)), gloss)
 
 
 def ceramic(color: Color) -> Material:
@@ -84,27 +74,22 @@ def chrome() -> Material:
     return plain((0.55, 0.56, 0.58), 0.95, infrared=0.3)
 
 
-def steel(rng: np.random.Generator, color: Color = "#8b8f93", axis: int = 0) -> Material:
+def steel(rng: Rng, color: Color = "#8b8f93", axis: int = 0) -> Material:
     """Brushed or rolled metal."""
-    return Material(textures.brushed_metal(linear(color), draw_seed(rng), axis), 0.4, infrared=0.8)
+    return Material(textures.brushed_metal(color, draw_seed(rng), axis), 0.4, infrared=0.8)
 
 
-def glass(color: Color = "#27402f") -> Material:
-    """Dark bottle glass."""
-    return plain(color, 0.9, infrared=0.1)
-
-
-def leaf(rng: np.random.Generator, color: Color) -> Material:
+def leaf(rng: Rng, color: Color) -> Material:
     """A plant's leaf, bright in the infrared."""
-    return Material(textures.leaf(linear(color), draw_seed(rng)), 0.12, infrared=1.6)
+    return Material(textures.leaf(color, draw_seed(rng)), 0.12, infrared=1.6)
 
 
-def cardboard(rng: np.random.Generator, size_m: float, color: Color = "#b08a5b") -> Material:
+def cardboard(rng: Rng, size_m: float) -> Material:
     """Corrugated board with tape, on a box about its part's origin."""
-    return Material(textures.cardboard(linear(color), draw_seed(rng), size_m))
+    return Material(textures.cardboard("#b08a5b", draw_seed(rng), size_m))
 
 
-def book(rng: np.random.Generator, color: Color) -> Material:
+def book(rng: Rng, color: Color) -> Material:
     """Cloth-bound books that stand on z = 0 with their spines towards -y: lettering there, paper on top."""
     cover, title, pages = linear(color), linear("#d8c48e"), linear("#e8e0cc")
     bands = rng.uniform(0.03, 0.2, (3, 1)) + np.array([0.0, 0.004])
@@ -132,10 +117,10 @@ def enamel(color: Color) -> Material:
 
 def glow(color: Color, strength: float) -> Material:
     """A lit lamp shade or bulb."""
-    return Material(textures.solid(linear(color)), emission=strength)
+    return Material(textures.solid(color), emission=strength)
 
 
-def screen(rng: np.random.Generator, size_m: tuple[float, float], lit: bool) -> Material:
+def screen(rng: Rng, size_m: Vector, lit: bool) -> Material:
     """A glossy display: black when off."""
     if not lit:
         return plain((0.012, 0.013, 0.016), 0.85, infrared=0.1)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from lab.worlds.furniture.finishes import leaf, linear, pick, plain
+from lab.worlds.furniture.finishes import leaf, pick, plain
 from lab.worlds.furniture.placing import ORIGIN, solid
-from lab.worlds.primitives import Mesh, lathe, merged, transformed, tube
-from lab.worlds.scene import Part
+from lab.worlds.primitives import Mesh, lathe, merged, quads_of, thickened, transformed, tube
+from lab.worlds.scene import Part, Rng
+from lab.worlds.textures.mixing import linear
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
@@ -15,11 +16,7 @@ POTS = ("#a65a3a", "#e6e1d6", "#4a5357", "#c9b28a", "#8fa79b")
 
 
 def potted_plant(
-    rng: np.random.Generator,
-    T_world: FloatArray = ORIGIN,
-    height_m: float = 1.1,
-    color: str | None = None,
-    leaves: int = 26,
+    rng: Rng, T_world: FloatArray = ORIGIN, height_m: float = 1.1, color: str | None = None, leaves: int = 26
 ) -> list[Part]:
     """A leafy plant (rubber tree or fig): stems from a pot, a broad leaf at every turn."""
     pot_m = float(np.clip(0.16 * height_m, 0.06, 0.17))
@@ -41,11 +38,7 @@ def potted_plant(
 
 
 def grass_plant(
-    rng: np.random.Generator,
-    T_world: FloatArray = ORIGIN,
-    height_m: float = 0.5,
-    color: str | None = None,
-    leaves: int = 24,
+    rng: Rng, T_world: FloatArray = ORIGIN, height_m: float = 0.5, color: str | None = None, leaves: int = 24
 ) -> list[Part]:
     """A tuft of long arching blades (spider plant, snake plant) for shelves and tables."""
     pot_m = float(np.clip(0.2 * height_m, 0.05, 0.13))
@@ -57,7 +50,7 @@ def grass_plant(
     return [*_pot(rng, T_world, pot_m, color), *_foliage(rng, T_world, [], blades, "#6f8f4e")]
 
 
-def _pot(rng: np.random.Generator, T_world: FloatArray, radius_m: float, color: str | None) -> list[Part]:
+def _pot(rng: Rng, T_world: FloatArray, radius_m: float, color: str | None) -> list[Part]:
     """A tapered pot with a rim, filled with earth."""
     clay = plain(pick(rng, POTS, color), 0.1)
     profile = np.array(
@@ -68,9 +61,7 @@ def _pot(rng: np.random.Generator, T_world: FloatArray, radius_m: float, color: 
     return [pot, solid(soil, plain("#2c211a"), T_world)]
 
 
-def _foliage(
-    rng: np.random.Generator, T_world: FloatArray, stems: list[Mesh], blades: list[Mesh], color: str
-) -> list[Part]:
+def _foliage(rng: Rng, T_world: FloatArray, stems: list[Mesh], blades: list[Mesh], color: str) -> list[Part]:
     """Stems and leaves in three greens."""
     parts = [solid(merged(stems), plain("#6b5a3a"), T_world)] if stems else []
     for k in range(3):
@@ -92,13 +83,8 @@ def _leaf_at(
     z = 0.25 * np.abs(y) - bend[:, None]
     top = np.stack([x, y, z], axis=-1).reshape(-1, 3)
     index = np.arange(40).reshape(8, 5)
-    quads = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)
-    face = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     rim = np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
-    ahead = np.roll(rim, -1)
-    walls = np.concatenate([np.stack([rim + 40, ahead + 40, ahead], 1), np.stack([rim + 40, ahead, rim], 1)])
-    vertices = np.concatenate([top, top - [0.0, 0.0, 0.002]])
-    triangles = np.concatenate([face, face[:, ::-1] + 40, walls])
+    blade = thickened(top, quads_of(index)[:, [0, 3, 2, 1]], rim, 0.002)
     pitch = rotation_exp(np.array([0.0, droop_rad, 0.0]))
     turn = rotation_exp(np.array([0.0, 0.0, heading_rad]))
-    return transformed((vertices, triangles), rigid(turn, root_m) @ rigid(pitch, np.zeros(3)))
+    return transformed(blade, rigid(turn, root_m) @ rigid(pitch, np.zeros(3)))

@@ -4,43 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from lab.worlds.furniture.finishes import (
-    FABRICS,
-    WOODS,
-    black_plastic,
-    chrome,
-    fabric,
-    pick,
-    steel,
-    wood,
-)
+from lab.worlds.furniture.finishes import FABRICS, WOODS, black_plastic, chrome, fabric, pick, steel, wood
 from lab.worlds.furniture.placing import ORIGIN, board, corners, solid
 from lab.worlds.primitives import cylinder, frustum, lathe, merged, moved, rounded_box, tube
-from lab.worlds.scene import Material, Part
+from lab.worlds.scene import Part, Rng
 from pipeline.types import FloatArray
 
 
 def sofa(
-    rng: np.random.Generator,
-    T_world: FloatArray = ORIGIN,
-    width_m: float = 1.95,
-    color: str | None = None,
-    seats: int = 2,
+    rng: Rng, T_world: FloatArray = ORIGIN, width_m: float = 1.95, color: str | None = None, seats: int = 2
 ) -> list[Part]:
     """A sofa with loose seat and back cushions, 0.9 m deep; one seat makes an armchair."""
     cloth = pick(rng, FABRICS, color)
     base, pads = fabric(rng, cloth), fabric(rng, cloth * 1.06)
     arm_m, depth_m = 0.19, 0.9
     inside_m = width_m - 2.0 * arm_m
+    behind = rounded_box((inside_m + 0.1, 0.2, 0.56), 0.07)
     parts = [
         solid(rounded_box((width_m - 0.06, depth_m - 0.08, 0.22), 0.04), base, T_world, (0.0, 0.0, 0.23)),
-        solid(
-            rounded_box((inside_m + 0.1, 0.2, 0.56), 0.07),
-            base,
-            T_world,
-            (0.0, depth_m / 2 - 0.11, 0.54),
-            (-0.12, 0.0, 0.0),
-        ),
+        solid(behind, base, T_world, (0.0, depth_m / 2 - 0.11, 0.54), (-0.12, 0.0, 0.0)),
     ]
     arm = rounded_box((arm_m, depth_m, 0.46), 0.075)
     parts += [solid(arm, base, T_world, (s * (width_m - arm_m) / 2.0, 0.0, 0.37)) for s in (-1, 1)]
@@ -52,44 +34,34 @@ def sofa(
         back = rounded_box((pitch_m - 0.02, 0.44, 0.21), 0.06, 0.04)
         parts.append(solid(back, pads, T_world, (x, 0.235, 0.66), (np.pi / 2.0 - 0.22, 0.0, 0.0)))
     legs = wood(rng, WOODS[3], along=2)
-    foot = frustum(0.016, 0.024, 0.13)
-    return parts + [
-        solid(foot, legs, T_world, (x, y, 0.0)) for x, y in corners(width_m / 2 - 0.12, depth_m / 2 - 0.12)
-    ]
+    foot, spots = frustum(0.016, 0.024, 0.13), corners(width_m / 2 - 0.12, depth_m / 2 - 0.12)
+    return parts + [solid(foot, legs, T_world, (x, y, 0.0)) for x, y in spots]
 
 
-def armchair(rng: np.random.Generator, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
+def armchair(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
     """A wide upholstered chair."""
     return sofa(rng, T_world, width_m=0.92, color=color, seats=1)
 
 
 def cushion(
-    rng: np.random.Generator,
-    T_world: FloatArray = ORIGIN,
-    color: str | None = None,
-    size_m: float = 0.44,
-    material: Material | None = None,
+    rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None, size_m: float = 0.44
 ) -> list[Part]:
     """A plump square cushion that lies flat on the origin; turn it with ``T_world``."""
-    cloth = material or fabric(rng, pick(rng, FABRICS, color))
-    pillow = rounded_box((size_m, size_m, 0.15), 0.02, 0.055, cells=10)
+    cloth = fabric(rng, pick(rng, FABRICS, color))
+    vertices, triangles = rounded_box((size_m, size_m, 0.15), 0.02, 0.055, cells=10)
     # Pull the sides in between the tips, as a filled cover does.
-    vertices, triangles = pillow
     along = vertices[:, :2] / (size_m / 2.0)
     vertices[:, :2] *= 1.0 - 0.07 * (1.0 - along[:, ::-1] ** 2)
     return [solid((vertices, triangles), cloth, T_world, (0.0, 0.0, 0.075))]
 
 
-def dining_chair(
-    rng: np.random.Generator, T_world: FloatArray = ORIGIN, color: str | None = None
-) -> list[Part]:
+def dining_chair(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
     """A wooden chair with a slatted back, seat at 0.45 m."""
     grain = pick(rng, WOODS, color)
     timber, upright = wood(rng, grain), wood(rng, grain, along=2)
     seat = solid(rounded_box((0.44, 0.43, 0.035), 0.012), timber, T_world, (0.0, 0.0, 0.45))
-    front = [
-        solid(frustum(0.014, 0.019, 0.435, 16), upright, T_world, (x, -0.18, 0.0)) for x in (-0.18, 0.18)
-    ]
+    leg = frustum(0.014, 0.019, 0.435, 16)
+    front = [solid(leg, upright, T_world, (x, -0.18, 0.0)) for x in (-0.18, 0.18)]
     post = tube([(0.0, 0.2, 0.0), (0.0, 0.19, 0.43), (0.0, 0.21, 0.65), (0.0, 0.27, 0.9)], 0.017)
     back = [solid(post, upright, T_world, (x, 0.0, 0.0)) for x in (-0.19, 0.19)]
     slats = [
@@ -100,7 +72,7 @@ def dining_chair(
     return [seat, *front, *back, *slats, *rail]
 
 
-def stool(rng: np.random.Generator, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
+def stool(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
     """A round workshop stool on four splayed legs, 0.6 m high."""
     grain = pick(rng, WOODS, color)
     seat = lathe([(0.15, 0.0), (0.165, 0.012), (0.165, 0.03), (0.14, 0.04)], bevel_m=0.004)
@@ -114,9 +86,7 @@ def stool(rng: np.random.Generator, T_world: FloatArray = ORIGIN, color: str | N
     return [*parts, solid(merged(rungs), timber, T_world)]
 
 
-def office_chair(
-    rng: np.random.Generator, T_world: FloatArray = ORIGIN, color: str | None = None
-) -> list[Part]:
+def office_chair(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
     """A swivel chair on a five-armed star with castors."""
     cloth = fabric(rng, pick(rng, ("#26282b", "#3a4a58", "#5a5f66"), color))
     black = black_plastic()

@@ -20,15 +20,26 @@ from lab.worlds.furniture.finishes import (
     wood,
 )
 from lab.worlds.furniture.placing import ORIGIN, board, corners, place, solid
-from lab.worlds.primitives import Mesh, box, cylinder, frustum, lathe, merged, moved, transformed, tube
-from lab.worlds.scene import Part
+from lab.worlds.primitives import (
+    Mesh,
+    Vector,
+    box,
+    cylinder,
+    frustum,
+    lathe,
+    merged,
+    moved,
+    transformed,
+    tube,
+)
+from lab.worlds.scene import Part, Rng
 from pipeline.types import FloatArray
 
 
 def bookshelf(
-    rng: np.random.Generator,
+    rng: Rng,
     T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float, float] = (0.9, 0.3, 1.9),
+    size_m: Vector = (0.9, 0.3, 1.9),
     color: str | None = None,
     fill: float = 0.75,
 ) -> list[Part]:
@@ -37,15 +48,9 @@ def bookshelf(
     along, upright = wood(rng, grain), wood(rng, grain, along=2)
     width, depth, height = size_m
     levels = max(2, round(height / 0.36))
-    parts = [
-        board(
-            (0.022, depth, height), upright, T_world, (s * (width - 0.022) / 2, 0.0, height / 2), edge_m=0.002
-        )
-        for s in (-1, 1)
-    ]
-    parts.append(
-        board((width - 0.03, 0.008, height - 0.06), along, T_world, (0.0, depth / 2 - 0.008, height / 2))
-    )
+    side, x, z = (0.022, depth, height), (width - 0.022) / 2, height / 2
+    parts = [board(side, upright, T_world, (s * x, 0.0, z), edge_m=0.002) for s in (-1, 1)]
+    parts.append(board((width - 0.03, 0.008, height - 0.06), along, T_world, (0.0, depth / 2 - 0.008, z)))
     heights = np.linspace(0.06, height - 0.012, levels + 1)
     shelf = (width - 0.044, depth - 0.004, 0.02)
     parts += [board(shelf, along, T_world, (0.0, 0.0, z), edge_m=0.002) for z in heights]
@@ -56,7 +61,7 @@ def bookshelf(
 
 
 def books(
-    rng: np.random.Generator,
+    rng: Rng,
     T_world: FloatArray = ORIGIN,
     length_m: float = 0.5,
     tallest_m: float = 0.3,
@@ -82,9 +87,9 @@ def books(
 
 
 def cabinet(
-    rng: np.random.Generator,
+    rng: Rng,
     T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float, float] = (1.2, 0.45, 0.8),
+    size_m: Vector = (1.2, 0.45, 0.8),
     color: str | None = None,
     doors: int = 3,
 ) -> list[Part]:
@@ -114,10 +119,7 @@ def cabinet(
 
 
 def crate(
-    rng: np.random.Generator,
-    T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float, float] = (0.5, 0.35, 0.28),
-    color: str | None = None,
+    rng: Rng, T_world: FloatArray = ORIGIN, size_m: Vector = (0.5, 0.35, 0.28), color: str | None = None
 ) -> list[Part]:
     """An open crate of rough slats."""
     timber = wood(rng, pick(rng, WOODS[2:6:3], color), gloss=0.03)
@@ -127,74 +129,49 @@ def crate(
     for k in range(3):
         z = height / 6 + k * height / 3
         for s in (-1, 1):
-            parts.append(
-                board((width, 0.012, slat), timber, T_world, (0.0, s * (depth - 0.012) / 2, z), edge_m=0.001)
-            )
-            parts.append(
-                board((0.012, depth - 0.026, slat), timber, T_world, (s * (width - 0.02) / 2, 0.0, z))
-            )
+            x, y = s * (width - 0.02) / 2, s * (depth - 0.012) / 2
+            parts.append(board((width, 0.012, slat), timber, T_world, (0.0, y, z), edge_m=0.001))
+            parts.append(board((0.012, depth - 0.026, slat), timber, T_world, (x, 0.0, z)))
     post = (0.03, 0.03, height - 0.01)
     inner = corners(width / 2 - 0.03, depth / 2 - 0.028)
     return parts + [board(post, timber, T_world, (x, y, height / 2)) for x, y in inner]
 
 
-def cardboard_box(
-    rng: np.random.Generator,
-    T_world: FloatArray = ORIGIN,
-    size_m: tuple[float, float, float] = (0.4, 0.3, 0.3),
-    color: str = "#b08a5b",
-) -> list[Part]:
+def cardboard_box(rng: Rng, T_world: FloatArray = ORIGIN, size_m: Vector = (0.4, 0.3, 0.3)) -> list[Part]:
     """A closed carton with a strip of packing tape."""
-    return [board(size_m, cardboard(rng, max(size_m), color), T_world, (0.0, 0.0, size_m[2] / 2))]
+    return [board(size_m, cardboard(rng, max(size_m)), T_world, (0.0, 0.0, size_m[2] / 2))]
 
 
-def bucket(rng: np.random.Generator, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
+def bucket(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
     """A ten-litre bucket with its wire handle down on one side."""
     tin = painted(rng, pick(rng, PAINTS, color), 0.2)
-    wall = [
-        (0.0, 0.0),
-        (0.1, 0.0),
-        (0.14, 0.25),
-        (0.145, 0.25),
-        (0.145, 0.262),
-        (0.134, 0.262),
-        (0.096, 0.006),
-        (0, 0.006),
-    ]
+    outside, inside = [(0.0, 0.0), (0.1, 0.0), (0.14, 0.25)], [(0.134, 0.262), (0.096, 0.006), (0.0, 0.006)]
+    wall = lathe([*outside, (0.145, 0.25), (0.145, 0.262), *inside], 32, 0.002)
     angle = np.linspace(0.0, np.pi, 15)
     bow = np.stack([0.15 * np.cos(angle), -0.147 * np.sin(angle) ** 0.6, 0.25 - 0.1 * np.sin(angle)], axis=1)
-    return [
-        solid(lathe(wall, 32, 0.002), tin, T_world),
-        solid(tube(bow, 0.003, 8), steel(rng), T_world),
-    ]
+    return [solid(wall, tin, T_world), solid(tube(bow, 0.003, 8), steel(rng), T_world)]
 
 
-def waste_bin(rng: np.random.Generator, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
+def waste_bin(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
     """A waste-paper bin with a few crumpled sheets."""
     shell = painted(rng, color, 0.2) if color else black_plastic()
     wall = [(0.0, 0.0), (0.11, 0.0), (0.14, 0.3), (0.135, 0.3), (0.105, 0.008), (0.0, 0.008)]
+    half_circle = np.array([(np.sin(a), -np.cos(a)) for a in np.linspace(0.0, np.pi, 8)])
     paper = []
     for _ in range(4):
-        radius = rng.uniform(0.045, 0.06)
-        ball, triangles = lathe(
-            radius * np.array([(np.sin(a), -np.cos(a)) for a in np.linspace(0.0, np.pi, 8)]), 11
-        )
+        ball, triangles = lathe(rng.uniform(0.045, 0.06) * half_circle, 11)
         ball = ball * rng.uniform(0.75, 1.1, (len(ball), 1))
-        place_m = np.append(rng.uniform(-0.06, 0.06, 2), rng.uniform(0.17, 0.24))
-        paper.append((ball + place_m, triangles))
+        x, y = rng.uniform(-0.06, 0.06, 2)
+        paper.append(moved((ball, triangles), x, y, rng.uniform(0.17, 0.24)))
     return [
         solid(lathe(wall, 32, 0.002), shell, T_world),
         solid(merged(paper), plain("#e9e6dd"), T_world, smooth=False),
     ]
 
 
-def paint_can(rng: np.random.Generator, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
+def paint_can(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
     """A tin of paint with a coloured label."""
     label = painted(rng, pick(rng, PAINTS, color), 0.15)
-    tin = lathe(
-        [(0.052, 0.0), (0.054, 0.004), (0.054, 0.126), (0.056, 0.13), (0.05, 0.132), (0.048, 0.127)], 32
-    )
-    return [
-        solid(tin, steel(rng), T_world),
-        solid(moved(cylinder(0.0548, 0.09), 0.0, 0.0, 0.02), label, T_world),
-    ]
+    tin = [(0.052, 0.0), (0.054, 0.004), (0.054, 0.126), (0.056, 0.13), (0.05, 0.132), (0.048, 0.127)]
+    band = moved(cylinder(0.0548, 0.09), z_m=0.02)
+    return [solid(lathe(tin, 32), steel(rng), T_world), solid(band, label, T_world)]

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from lab.worlds.furniture import electronics, lights, plants, seating, storage, things
 from lab.worlds.furniture.placing import place
 from lab.worlds.pieces.solids import random_solid
-from lab.worlds.pieces.stock import Rng, bounds, draw, moved
-from lab.worlds.scene import Part
+from lab.worlds.pieces.stock import Makers, bounds, draw, moved
+from lab.worlds.scene import Part, Rng
 from pipeline.types import FloatArray
 
 
 def small_thing(rng: Rng) -> list[Part]:
     """Something that stands or lies on a table or shelf."""
-    makers: list[tuple[float, Callable[[], list[Part]]]] = [
+    makers: Makers[list[Part]] = [
         (2.0, lambda: things.cup(rng)),
         (2.0, lambda: things.bottle(rng)),
         (1.0, lambda: things.vase(rng, height_m=rng.uniform(0.15, 0.4))),
@@ -32,7 +30,7 @@ def small_thing(rng: Rng) -> list[Part]:
         (0.8, lambda: electronics.laptop(rng, lit=bool(rng.integers(2)))),
         (0.6, lambda: electronics.speaker(rng, height_m=rng.uniform(0.15, 0.4))),
         (0.5, lambda: storage.paint_can(rng)),
-        (0.8, lambda: storage.cardboard_box(rng, size_m=tuple(rng.uniform(0.1, 0.35, 3)))),
+        (0.8, lambda: storage.cardboard_box(rng, size_m=rng.uniform(0.1, 0.35, 3))),
         (0.8, lambda: seating.cushion(rng, size_m=rng.uniform(0.3, 0.5))),
         (5.0, lambda: random_solid(rng, 0.05, 0.3)),
     ]

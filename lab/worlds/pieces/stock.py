@@ -9,11 +9,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from lab.worlds.scene import Part
+from lab.worlds.scene import Part, Rng
+from pipeline.geometry import apply
 from pipeline.types import FloatArray
 
-Rng = np.random.Generator
 _Made = TypeVar("_Made")
+Makers = Sequence[tuple[float, Callable[[], _Made]]]
+"""Weights, and what makes a piece (or another thing) where its turn comes."""
 
 
 @lru_cache(maxsize=2048)
@@ -24,7 +26,7 @@ def stocked(maker: Callable[[Rng], _Made], variant: int) -> _Made:
 
 def bounds(parts: list[Part]) -> tuple[FloatArray, FloatArray]:
     """(3,) lowest and (3,) highest corner."""
-    places = [part.vertices_m @ part.T_world_part[:3, :3].T + part.T_world_part[:3, 3] for part in parts]
+    places = [apply(part.T_world_part, part.vertices_m) for part in parts]
     return np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
 
 
@@ -33,7 +35,7 @@ def moved(parts: list[Part], T: FloatArray) -> list[Part]:
     return [replace(part, T_world_part=T @ part.T_world_part) for part in parts]
 
 
-def draw(rng: Rng, makers: Sequence[tuple[float, Callable[[], _Made]]]) -> _Made:
+def draw(rng: Rng, makers: Makers[_Made]) -> _Made:
     """Calls one of the (weight, maker) pairs, chosen by weight."""
     weight = np.array([w for w, _ in makers])
     return makers[int(rng.choice(len(makers), p=weight / weight.sum()))][1]()

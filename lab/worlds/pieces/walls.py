@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from lab.worlds.furniture import fixtures
 from lab.worlds.furniture.placing import place
 from lab.worlds.pieces.small import things_on
-from lab.worlds.pieces.stock import Rng, moved
-from lab.worlds.scene import Part
+from lab.worlds.pieces.stock import moved
+from lab.worlds.scene import Part, Rng
 
 
 @dataclass(frozen=True, slots=True)

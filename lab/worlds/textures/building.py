@@ -12,12 +12,8 @@ from pipeline.types import FloatArray
 
 def paint(color: Color, seed: int = 0, mottling: float = 0.06, scale_m: float = 0.35) -> Texture:
     """Paint, plastic, lacquer: one colour with slight unevenness."""
-    color = as_color(color)
-
-    def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:
-        return shade(color, 1.0 + 2.0 * mottling * (fbm(points_m, scale_m, seed, 3) - 0.5))
-
-    return texture
+    tint, reach = as_color(color), 2.0 * mottling
+    return lambda points_m, normals: shade(tint, 1.0 + reach * (fbm(points_m, scale_m, seed, 3) - 0.5))
 
 
 def plaster(color: Color, seed: int = 0, grain_m: float = 0.012, roughness: float = 0.12) -> Texture:
@@ -32,7 +28,7 @@ def plaster(color: Color, seed: int = 0, grain_m: float = 0.012, roughness: floa
     return texture
 
 
-def concrete(color: Color = (0.36, 0.35, 0.33), seed: int = 0) -> Texture:
+def concrete(color: Color, seed: int = 0) -> Texture:
     """Cast concrete with clouds, pores and grain."""
     color = as_color(color)
 
@@ -95,15 +91,10 @@ def tiles(
     return texture
 
 
-def brick(
-    color: Color = (0.36, 0.13, 0.08),
-    mortar: Color = (0.5, 0.47, 0.42),
-    seed: int = 0,
-    length_m: float = 0.24,
-    height_m: float = 0.075,
-) -> Texture:
+def brick(color: Color, mortar: Color, seed: int = 0) -> Texture:
     """Running-bond brickwork."""
     color, mortar = as_color(color), as_color(mortar)
+    length_m, height_m = 0.24, 0.075
 
     def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:
         u, v = face_uv(points_m, normals).T
@@ -117,9 +108,7 @@ def brick(
     return texture
 
 
-def marble(
-    color: Color = (0.75, 0.74, 0.71), vein: Color = (0.25, 0.26, 0.28), seed: int = 0, scale_m: float = 0.35
-) -> Texture:
+def marble(color: Color, vein: Color, seed: int = 0, scale_m: float = 0.35) -> Texture:
     """Stone with warped veins."""
     color, vein = as_color(color), as_color(vein)
 

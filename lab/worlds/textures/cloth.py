@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lab.worlds.primitives import Vector
 from lab.worlds.scene import Texture
 from lab.worlds.textures.mixing import Color, as_color, mix, shade, soft_step
 from lab.worlds.textures.noise import cell_random, face_uv, fbm
@@ -83,7 +84,7 @@ def checker(color: Color, second: Color, size_m: float = 0.1, seed: int = 0) -> 
     return texture
 
 
-def rug(colors: Sequence[Color], seed: int = 0, size_m: Sequence[float] = (2.0, 1.4)) -> Texture:
+def rug(colors: Sequence[Color], seed: int = 0, size_m: Vector = (2.0, 1.4)) -> Texture:
     """A woven rug about the part's origin: frames around a field of diamonds.
 
     Args:

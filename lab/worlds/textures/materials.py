@@ -14,30 +14,21 @@ from pipeline.types import FloatArray
 
 def solid(color: Color) -> Texture:
     """One colour."""
-    color = as_color(color)
-    return lambda points_m, normals: np.broadcast_to(color, (len(points_m), 3))
+    tint = as_color(color)
+    return lambda points_m, normals: np.broadcast_to(tint, (len(points_m), 3))
 
 
 def wood(light: Color, dark: Color, seed: int = 0, scale_m: float = 0.06, axis: int = 0) -> Texture:
     """Wood with year rings and fibres along one axis of the part."""
-    light, dark = as_color(light), as_color(dark)
-
-    def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:
-        return mix(light, dark, wood_grain(points_m, seed, scale_m, axis))
-
-    return texture
+    early, late = as_color(light), as_color(dark)
+    return lambda points_m, normals: mix(early, late, wood_grain(points_m, seed, scale_m, axis))
 
 
-def brushed_metal(color: Color = (0.55, 0.55, 0.56), seed: int = 0, axis: int = 0) -> Texture:
+def brushed_metal(color: Color, seed: int = 0, axis: int = 0) -> Texture:
     """Metal with fine scratches along one axis; give the material gloss as well."""
-    color = as_color(color)
-    scale = np.full(3, 0.003)
-    scale[axis] = 0.25
-
-    def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:
-        return shade(color, 0.8 + 0.4 * fbm(points_m, tuple(scale), seed, 2))
-
-    return texture
+    tint, scale_m = as_color(color), np.full(3, 0.003)
+    scale_m[axis] = 0.25
+    return lambda points_m, normals: shade(tint, 0.8 + 0.4 * fbm(points_m, scale_m, seed, 2))
 
 
 def patches(colors: Sequence[Color], seed: int = 0, scale_m: float = 0.15) -> Texture:
@@ -66,7 +57,7 @@ def cardboard(color: Color = (0.42, 0.27, 0.14), seed: int = 0, size_m: float = 
     return texture
 
 
-def leaf(color: Color = (0.07, 0.2, 0.04), seed: int = 0) -> Texture:
+def leaf(color: Color, seed: int = 0) -> Texture:
     """Foliage: veins and light and dark greens."""
     color = as_color(color)
     young = np.clip(color * [2.2, 1.6, 1.2], 0.0, 1.0)

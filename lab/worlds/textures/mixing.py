@@ -6,30 +6,34 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lab.worlds.scene import Rng
 from lab.worlds.textures.noise import fbm
 from pipeline.types import FloatArray
 
-Color = Sequence[float] | FloatArray
+Color = str | Sequence[float] | FloatArray
+"""A "#rrggbb" colour as seen on a screen (sRGB), or linear RGB, 0 to 1."""
 
 
-def from_srgb(red: float, green: float, blue: float) -> FloatArray:
-    """(3,) linear colour of an sRGB colour, 0 to 255."""
-    c = np.array([red, green, blue], float) / 255.0
+def linear(color: Color) -> FloatArray:
+    """(3,) linear RGB of a colour."""
+    if not isinstance(color, str):
+        return np.asarray(color, float)
+    c = np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
-def random_palette(rng: np.random.Generator, count: int, saturation: float = 0.75) -> FloatArray:
+def random_palette(rng: Rng, count: int) -> FloatArray:
     """(count, 3) float32 linear colours of things people own: from muted to vivid, dark to light."""
     hue = rng.random(count)[:, None] + np.array([0.0, 1.0, 2.0]) / 3.0
     vivid = np.clip(np.abs((hue % 1.0) * 6.0 - 3.0) - 1.0, 0.0, 1.0)
-    chroma = saturation * rng.random((count, 1)) ** 0.7
+    chroma = 0.75 * rng.random((count, 1)) ** 0.7
     value = rng.uniform(0.05, 0.95, (count, 1)) ** 1.4
     return (value * (1.0 - chroma + chroma * vivid)).astype(np.float32)
 
 
 def as_color(color: Color) -> FloatArray:
-    """(3,) float32."""
-    return np.asarray(color, np.float32)
+    """(3,) float32 linear RGB."""
+    return linear(color).astype(np.float32)
 
 
 def mix(a: FloatArray, b: FloatArray, share: FloatArray) -> FloatArray:
@@ -57,6 +61,6 @@ def wood_grain(points_m: FloatArray, seed: int, scale_m: float, axis: int) -> Fl
     """(N,) darkness of wood, 0 to 1: warped year rings and fibres along an axis."""
     stretch, fibre = np.full(3, scale_m), np.full(3, scale_m / 12.0)
     stretch[axis], fibre[axis] = 12.0 * scale_m, 4.0 * scale_m
-    rings = (9.0 * fbm(points_m, tuple(stretch), seed, 2)) % 1.0
-    fibres = fbm(points_m, tuple(fibre), seed + 1, 2)
+    rings = (9.0 * fbm(points_m, stretch, seed, 2)) % 1.0
+    fibres = fbm(points_m, fibre, seed + 1, 2)
     return np.clip(0.65 * rings * rings + 0.7 * (fibres - 0.35), 0.0, 1.0)

@@ -50,17 +50,13 @@ def _fbm(lattice, points, frequency, offset, octaves, gain, out):  # type: ignor
 
 
 def fbm(
-    points_m: FloatArray,
-    scale_m: float | tuple[float, float, float],
-    seed: int,
-    octaves: int = 3,
-    gain: float = 0.5,
+    points_m: FloatArray, scale_m: float | FloatArray, seed: int, octaves: int = 3, gain: float = 0.5
 ) -> FloatArray:
     """(N,) float32 fractal value noise, 0 to 1, mean one half, of (N, 3) places.
 
     Args:
         points_m: (N, 3).
-        scale_m: size of the largest blobs, the same in all directions or one for each axis.
+        scale_m: size of the largest blobs, the same in all directions or (3,) one for each axis.
         seed: chooses the part of the (tileable) noise.
         octaves: each is half the size of the one before.
         gain: strength of an octave relative to the one before.
@@ -73,7 +69,9 @@ def fbm(
 
 
 @numba.njit(cache=True, nogil=True)
-def _face_uv(points, normals, out):  # type: ignore[no-untyped-def]
+def face_uv(points, normals):  # type: ignore[no-untyped-def]
+    """(N, 2) float32 coordinates on the face of the box that each normal points out of; v is up on walls."""
+    out = np.empty((len(points), 2), np.float32)
     for n in range(len(points)):
         ax, ay, az = abs(normals[n, 0]), abs(normals[n, 1]), abs(normals[n, 2])
         if az >= ax and az >= ay:
@@ -82,17 +80,13 @@ def _face_uv(points, normals, out):  # type: ignore[no-untyped-def]
             out[n, 0], out[n, 1] = points[n, 1], points[n, 2]
         else:
             out[n, 0], out[n, 1] = points[n, 0], points[n, 2]
-
-
-def face_uv(points_m: FloatArray, normals: FloatArray) -> FloatArray:
-    """(N, 2) float32 coordinates on the face of the box that each normal points out of; v is up on walls."""
-    out = np.empty((len(points_m), 2), np.float32)
-    _face_uv(points_m, normals, out)
     return out
 
 
 @numba.njit(cache=True, nogil=True)
-def _cell_hash(i, j, seed, out):  # type: ignore[no-untyped-def]
+def cell_random(i, j, seed):  # type: ignore[no-untyped-def]
+    """(N,) float32 uniform random numbers, one for each pair of (N,) whole numbers."""
+    out = np.empty(len(i), np.float32)
     for n in range(len(i)):
         h = np.uint32(np.int64(i[n])) * np.uint32(0x9E3779B1)
         h ^= np.uint32(np.int64(j[n])) * np.uint32(0x85EBCA77)
@@ -101,10 +95,4 @@ def _cell_hash(i, j, seed, out):  # type: ignore[no-untyped-def]
         h = np.uint32((h ^ (h >> np.uint32(12))) * np.uint32(0x297A2D39))
         h ^= h >> np.uint32(15)
         out[n] = np.float32(h & np.uint32(0xFFFFFF)) / np.float32(0x1000000)
-
-
-def cell_random(i: FloatArray, j: FloatArray, seed: int) -> FloatArray:
-    """(N,) float32 uniform random numbers, one for each pair of (N,) whole numbers."""
-    out = np.empty(len(i), np.float32)
-    _cell_hash(i, j, seed & 0xFFFFFFFF, out)
     return out

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from lab.worlds.primitives import Vector
 from lab.worlds.scene import Texture
 from lab.worlds.textures.mixing import mix, random_palette, shade, soft_step
 from lab.worlds.textures.noise import cell_random, face_uv, fbm
@@ -16,15 +15,10 @@ def painting(seed: int = 0, scale_m: float = 0.4) -> Texture:
     """A poster or painting: overlapping blobs, bars and washes in a palette of its own."""
     rng = np.random.default_rng(seed)
     palette = random_palette(rng, 6)
-    shapes = [
-        (
-            rng.uniform(-0.6, 0.6, 2) * scale_m,
-            rng.uniform(0.08, 0.5, 2) * scale_m,
-            rng.uniform(0, np.pi),
-            rng.integers(2),
-        )
-        for _ in range(rng.integers(4, 11))
-    ]
+    shapes = []
+    for _ in range(rng.integers(4, 11)):
+        center, radius = rng.uniform(-0.6, 0.6, 2) * scale_m, rng.uniform(0.08, 0.5, 2) * scale_m
+        shapes.append((center, radius, rng.uniform(0, np.pi), rng.integers(2)))
 
     def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:
         uv = face_uv(points_m, normals)
@@ -41,32 +35,6 @@ def painting(seed: int = 0, scale_m: float = 0.4) -> Texture:
     return texture
 
 
-def book_spines(seed: int = 0, width_m: float = 0.035, height_m: float = 0.3) -> Texture:
-    """A row of books seen from the side: spines of uneven width along the face's u axis, with titles.
-
-    A single box with this texture stands for the whole row; ``height_m`` is its height.
-    """
-    rng = np.random.default_rng(seed)
-    edges = np.cumsum(rng.uniform(0.5, 1.6, 64)) * width_m
-    colors = random_palette(rng, 64)
-    title = np.clip(colors.mean(axis=1, keepdims=True) < 0.25, 0.05, 0.8) * np.array([1.0, 0.93, 0.75])
-    place = rng.uniform(0.1, 0.6, (64, 2)) * [1.0, 0.5]
-
-    def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:
-        u, v = face_uv(points_m, normals).T
-        x = u % edges[-1]
-        book = np.minimum(np.searchsorted(edges, x), 63)
-        across = np.minimum(edges[book] - x, x - np.where(book > 0, edges[book - 1], 0.0))
-        height = v / height_m + 0.5
-        label = (
-            (height > place[book, 0]) & (height < place[book, 0] + place[book, 1]) & (across > 0.2 * width_m)
-        )
-        color = np.where(label[:, None], title[book], colors[book])
-        return shade(color, np.clip(across / (0.15 * width_m), 0.25, 1.0))
-
-    return texture
-
-
 def paper(seed: int = 0, line_m: float = 0.008) -> Texture:
     """A printed page: lines of text on white."""
 
@@ -75,14 +43,13 @@ def paper(seed: int = 0, line_m: float = 0.008) -> Texture:
         line = np.floor(v / line_m)
         word = np.floor(u / 0.012 + 5.0 * cell_random(line, line, seed))
         ink = (cell_random(word, line, seed) > 0.25) & (v / line_m - line < 0.5) & (line % 7.0 > 0.5)
-        return np.where(ink[:, None], np.float32(0.3), np.float32(0.78)) * np.array(
-            [1.0, 0.99, 0.95], np.float32
-        )
+        tone = np.where(ink[:, None], np.float32(0.3), np.float32(0.78))
+        return tone * np.array([1.0, 0.99, 0.95], np.float32)
 
     return texture
 
 
-def display(seed: int = 0, size_m: Sequence[float] = (0.5, 0.3)) -> Texture:
+def display(seed: int, size_m: Vector) -> Texture:
     """What a computer screen shows: a desktop with windows full of lines, about the part's origin."""
     rng = np.random.default_rng(seed)
     palette = random_palette(rng, 4)
@@ -94,9 +61,8 @@ def display(seed: int = 0, size_m: Sequence[float] = (0.5, 0.3)) -> Texture:
         for k, (center, half, light) in enumerate(windows):
             x, y = u - center[0], v - center[1]
             line = np.floor(y * 40.0)
-            text = (y * 40.0 - line < 0.5) & (
-                x < half[0] * (0.9 * cell_random(line, line, seed + k) * 2.0 - 1.0)
-            )
+            end = half[0] * (0.9 * cell_random(line, line, seed + k) * 2.0 - 1.0)
+            text = (y * 40.0 - line < 0.5) & (x < end)
             page = np.where(text[:, None], 0.25 if light else 0.6, 0.85 if light else 0.03)
             page = np.where((y > half[1] - 0.03)[:, None], palette[2 + k % 2], page)
             inside = (np.abs(x) < half[0]) & (np.abs(y) < half[1])
@@ -106,8 +72,8 @@ def display(seed: int = 0, size_m: Sequence[float] = (0.5, 0.3)) -> Texture:
     return texture
 
 
-def outdoors(seed: int = 0, horizon_m: float = -0.2) -> Texture:
-    """What is seen through a window: a bright sky, clouds and far trees or houses below the horizon."""
+def outdoors(seed: int) -> Texture:
+    """What is seen through a window: a bright sky, clouds, far trees or houses below z = -0.2."""
     rng = np.random.default_rng(seed)
     sky, haze = np.array([0.45, 0.68, 0.98]), np.array([0.93, 0.95, 0.97])
     ground = np.array([[0.12, 0.22, 0.08], [0.32, 0.29, 0.26]][int(rng.integers(2))])
@@ -115,7 +81,7 @@ def outdoors(seed: int = 0, horizon_m: float = -0.2) -> Texture:
     def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:
         v = face_uv(points_m, normals)[:, 1]
         color = mix(sky, haze, np.clip(2.2 * fbm(points_m, 0.8, seed, 4) - 0.7, 0.0, 1.0))
-        skyline = horizon_m + 0.5 * (fbm(points_m * [1.0, 1.0, 0.0], 0.35, seed + 1, 3) - 0.5)
+        skyline = -0.2 + 0.5 * (fbm(points_m * [1.0, 1.0, 0.0], 0.35, seed + 1, 3) - 0.5)
         trees = shade(ground, 0.4 + 1.2 * fbm(points_m, 0.1, seed + 2, 3))
         return mix(color, trees, soft_step(skyline - v, 0.01))
 

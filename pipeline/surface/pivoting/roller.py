@@ -78,7 +78,7 @@ class Roller:
         self._middle_m = np.median(points_m, axis=0)  # near it, numbers are finest
         self._points_m = points_m - self._middle_m
         self._normals = np.ascontiguousarray(normals, dtype=np.float64)
-        self._ids = _distinct(points_m)
+        self._ids = distinct_rows(points_m)
         n = len(points_m)
         self._scratch = new_scratch(n)
         self._front = new_front(n)
@@ -207,13 +207,6 @@ def compile_all() -> None:
     """Compile the ball, which takes ten seconds once; the result is kept on the disk."""
     corner_m = np.eye(3)
     roll(corner_m, np.full((3, 3), 0.6), [1.0, 2.0])
-
-
-def _distinct(points_m: FloatArray) -> IntArray:
-    """(m,) ascending indices of the points, of those at one place only the first."""
-    if np.diff(np.sort(points_m[:, 0])).all():  # the usual case, found in a fraction of the time
-        return np.arange(len(points_m))
-    return distinct_rows(points_m)
 
 
 def _check_radius(radius_m: float) -> None:

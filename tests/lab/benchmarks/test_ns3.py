@@ -7,13 +7,13 @@ from functools import partial
 import pytest
 
 from lab.benchmarks import ns3 as peer
-from lab.benchmarks.network import SATURATED, network
+from lab.benchmarks.network import SATURATED, benchmark
 from network_sim.config import NetworkConfig
 from network_sim.mac.saturation import saturation
 from packetmesh.errors import PacketMeshError
 
 SCENARIOS = [(mac, nodes) for mac, counts in SATURATED.items() for nodes in counts]
-SMALL_STUDY = partial(network, objects=4, horizon_s=1860.0, runs=1, saturated_s=1.0)
+SMALL_STUDY = partial(benchmark, objects=4, horizon_s=1860.0, runs=1, saturated_s=1.0)
 STAND_IN = f"""#!{sys.executable}
 import json, sys
 if sys.argv[1] == "-c":

@@ -1,6 +1,7 @@
 """The surface benchmark gives everyone the same cloud and knows what good surfaces look like."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,32 +90,15 @@ def test_a_fresh_process_measures_its_own_memory():
 
 
 def test_the_case_takes_its_numbers_from_the_four_balls(monkeypatch):
-    def alone(program, cloud, name, balls, multiples, rounds=3):
+    def alone(program, cloud, name, balls, multiples):
         seconds = len(multiples) * (1.0 if program == OURS else 2.0)
-        return surface_speed.SurfaceRun(
-            program,
-            name,
-            balls,
-            len(cloud),
-            0.01,
-            tuple(multiples),
-            seconds,
-            rounds,
-            0.5,
-            10,
-            5,
-            7,
-            1.0,
-            1.0,
-            0,
-            2.0,
-        )
+        return replace(_run(len(cloud), seconds, program), cloud=name, balls=balls)
 
     monkeypatch.setattr(surface_speed, "time_alone", alone)
     monkeypatch.setattr(surface_speed, "room_cloud", lambda points, smoothed=True: terrain(100))
     monkeypatch.setattr(surface_speed, "MANY_POINTS", 400)
     monkeypatch.setattr(surface_speed, "available_programs", lambda: BOTH)
-    runs = list(measure_speed(many=400))
+    runs = list(measure_speed())
     assert [(run.program, run.balls) for run in runs[:2]] == [(OURS, "r_F"), ("open3d", "r_F")]
     assert len(runs) == 2 * 7 + 2
     assert [run.points for run in runs] == [100] * 14 + [400] * 2
@@ -127,24 +111,8 @@ def test_the_case_takes_its_numbers_from_the_four_balls(monkeypatch):
 
 
 def _run(points: int, seconds: float, program: str = OURS) -> surface_speed.SurfaceRun:
-    return surface_speed.SurfaceRun(
-        program,
-        "t",
-        "four",
-        points,
-        0.01,
-        (0.01,),
-        seconds,
-        3,
-        0.5,
-        10**8,
-        10**7,
-        2 * points,
-        1.0,
-        1.0,
-        0,
-        2.0,
-    )
+    after = (3, 0.5, 10**8, 10**7, 2 * points, 1.0, 1.0, 0, 2.0)
+    return surface_speed.SurfaceRun(program, "t", "four", points, 0.01, (0.01,), seconds, *after)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from lab.claims.depth.errors import (
     CHAIN,
     EDGES_M,
     JUDGED,
+    SENSOR,
     STRIP_HEIGHT_PX,
     by_distance,
     distance_curve,
@@ -144,16 +145,14 @@ def test_the_sensor_is_judged_where_it_sees_and_the_network_beside_it_there():
     given = example(truth_m, sensor_factor=1.02)
     judging_m = within(truth_m, 10.0)
     frame = frame_errors(given, DepthMap(inferred_m), judging_m, {"raw": inferred_m}, site([]))
-    assert frame.sensor == pytest.approx(0.02, abs=1e-5)
+    assert frame.beside_sensor[SENSOR] == pytest.approx(0.02, abs=1e-5)
     assert frame.beside_sensor["raw"] < 1e-6
     assert frame.aligned["raw"].abs_rel == pytest.approx(0.4, abs=1e-5)
     assert frame.beside_sensor[CHAIN] == pytest.approx(0.02, abs=1e-3)  # pulled onto the sensor
 
 
 def test_a_site_without_truth_says_nothing_of_the_sensor():
-    scene = measured(slope_m(), truth=False)
-    assert np.isnan(scene.sensor_abs_rel())
-    assert not scene.frames[0].beside_sensor
+    assert not measured(slope_m(), truth=False).frames[0].beside_sensor
 
 
 def test_the_strip_shows_equal_depths_alike_and_unknown_ones_black():
@@ -292,9 +291,9 @@ def test_the_shipped_network_errs_less_than_half_of_a_flat_wall_and_of_its_own_d
         error = seen.mean(alignment, "abs_rel")
         assert error < 0.5 * flat.mean(alignment, "abs_rel")
         assert error < 0.5 * mirrored.mean(alignment, "abs_rel")
-    assert seen.sensor_abs_rel() < 0.02 < seen.beside_sensor(JUDGED)
+    assert seen.beside_sensor(SENSOR) < 0.02 < seen.beside_sensor(JUDGED)
     np.testing.assert_array_equal(
-        scene_errors(room, network).frames[0].total["raw"], seen.frames[0].total["raw"]
+        scene_errors(room, network).frames[0].binned["raw"], seen.frames[0].binned["raw"]
     )
 
 
@@ -304,14 +303,9 @@ def test_a_stored_site_is_the_measured_one():
     again = from_trial(room, json.loads(json.dumps(finite(site_trial(room)))))
     np.testing.assert_array_equal(again.strip, measured.strip)
     for before, after in zip(measured.frames, again.frames, strict=True):
-        assert (after.aligned, after.sensor, after.beside_sensor) == (
-            before.aligned,
-            before.sensor,
-            before.beside_sensor,
-        )
+        assert (after.aligned, after.beside_sensor) == (before.aligned, before.beside_sensor)
         for name in ALIGNMENTS:
-            np.testing.assert_array_equal(after.total[name], before.total[name])
-            np.testing.assert_array_equal(after.pixels[name], before.pixels[name])
+            np.testing.assert_array_equal(after.binned[name], before.binned[name])
 
 
 def test_real_folders_are_found_where_the_variable_says(tmp_path, monkeypatch):
@@ -352,7 +346,7 @@ def test_a_folder_of_pairs_is_measured_like_any_other_site(tmp_path, monkeypatch
     monkeypatch.setenv("PACKETMESH_DEPTH_SETS", f"folder={tmp_path}")
     (site,) = user_sets()
     result = scene_errors(site, DepthNetwork())
-    assert sum(result.frames[0].pixels["raw"]) == 96 * 128
+    assert sum(result.frames[0].binned["raw"][1]) == 96 * 128
     inferred_m, true_m = DepthNetwork().infer(rgb).z_m, z_mm / 1000.0
     scaled_m = inferred_m * np.median(true_m) / np.median(inferred_m)
     for alignment, z_m in (("raw", inferred_m), (JUDGED, scaled_m)):

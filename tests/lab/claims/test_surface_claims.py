@@ -38,7 +38,7 @@ def _distances_m(vertices_m, triangles, points_m):
 
 def test_the_rule_gives_the_printed_radii_and_even_steps_do_not():
     sigmas = rule.READINGS["r_F + {0, 1/4, 1/2, 1} sigma_D"]
-    spacing_m = rule.inferred_spacing(rule.PRINTED_M, sigmas)
+    spacing_m = rule.inferred_spacing(sigmas)
     assert spacing_m == pytest.approx((0.0102, 0.0107))
     radii_m = rule.predicted_radii_m(sigmas, *spacing_m)
     assert np.round(radii_m, 4) == pytest.approx([0.0102, 0.0129, 0.0155, 0.0209], abs=1.01e-4)
@@ -71,9 +71,10 @@ def small_clouds():
 
 
 def test_a_chain_s_clouds_have_the_spacing_of_the_fused_one(small_clouds):
-    assert len(small_clouds.fused) == pytest.approx(3000, rel=0.1)
-    assert len(small_clouds.sensor) < len(small_clouds.fused)
-    assert (small_clouds.r_F_m, small_clouds.sigma_D_m) == spacing(small_clouds.fused.points_m)
+    merged = small_clouds.merged
+    assert len(merged.fused) == pytest.approx(3000, rel=0.1)
+    assert len(merged.sensor) < len(merged.fused)
+    assert (merged.r_F_m, merged.sigma_D_m) == spacing(merged.fused.points_m)
     assert small_clouds.name == "box-on-table/node_00"
 
 
@@ -86,12 +87,12 @@ def test_a_larger_ball_misses_fewer_rays_and_shares_are_shares(small_clouds):
 
 
 def test_the_figures_are_the_thesis_s_six_with_what_they_miss_in_magenta(small_clouds):
-    picture = thesis_figures(small_clouds, "the union")
+    picture, merged = thesis_figures(small_clouds, "the union"), small_clouds.merged
     assert len(picture.images) == len(FIGURES) == 6
     for (number, when, _, factor), (caption, rgb) in zip(FIGURES, picture.images, strict=True):
         assert rgb.shape == (240, 320, 3)
         assert caption.startswith(f"{number}: {when} fusion")
-        assert f"{1000 * (small_clouds.r_F_m + factor * small_clouds.sigma_D_m):.1f} mm" in caption
+        assert f"{1000 * (merged.r_F_m + factor * merged.sigma_D_m):.1f} mm" in caption
         assert f"{np.all(rgb == MISSED, axis=2).mean():.0%} of the rays" in caption
 
 

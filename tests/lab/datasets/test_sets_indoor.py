@@ -1,7 +1,5 @@
 """SUN RGB-D's rotated depth and TUM's clocks."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -27,43 +25,35 @@ def _sun(folder, kind="depth_bfx", millimetres=MILLIMETRES):
 def test_sun_depth_is_rotated_back_and_capped(tmp_path):
     _sun(tmp_path / "kv2/kinect2data/000002")
     (pair,) = open_set(f"sunrgbd={tmp_path}")
-    assert pair.name == "kv2/kinect2data/000002"
+    assert pair.picture == tmp_path / "kv2/kinect2data/000002/image/0001.png"
     np.testing.assert_array_equal(pair.rgb, picture(5, 3))
     expected_m = np.where(MILLIMETRES > 0, np.minimum(MILLIMETRES / 1000.0, 8.0), np.nan)
     np.testing.assert_allclose(pair.truth_m, expected_m, rtol=1e-6)
     np.testing.assert_array_equal(pair.judged, MILLIMETRES <= 8000)
-    assert pair.intrinsics is None
 
 
-def test_sun_prefers_the_merged_depth_and_reads_the_camera(tmp_path):
+def test_sun_prefers_the_merged_depth(tmp_path):
     _sun(tmp_path / "a", "depth", np.full((3, 5), 1000))
     _sun(tmp_path / "b", "depth", np.full((3, 5), 1000))
     _sun(tmp_path / "b", "depth_bfx", np.full((3, 5), 2000))
-    (tmp_path / "b/intrinsics.txt").write_text("529.5 0 365 0 530.5 265 0 0 1")
     first, second = open_set(f"sunrgbd={tmp_path}")
-    assert (first.name, second.name) == ("a", "b")
     np.testing.assert_array_equal(first.truth_m, 1.0)
     np.testing.assert_array_equal(second.truth_m, 2.0)
-    camera = second.intrinsics
-    assert (camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px) == (529.5, 530.5, 365.0, 265.0)
-    (tmp_path / "b/intrinsics.txt").write_text("529.5 0 365")
-    with pytest.raises(InputError, match=r"b/intrinsics\.txt does not have nine numbers"):
-        list(open_set(f"sunrgbd={tmp_path}"))
     cut(tmp_path / "a/depth/0001.png")
     with pytest.raises(InputError, match=r"a/depth/0001\.png is truncated or damaged"):
         next(open_set(f"sunrgbd={tmp_path}"))
 
 
-def _tum(folder, rgb_s, depth_s, size=(8, 6)):
+def _tum(folder, rgb_s, depth_s):
     folder.mkdir(parents=True)
     for kind, times_s in (("rgb", rgb_s), ("depth", depth_s)):
         lines = ["# timestamp filename"]
         for index, time_s in enumerate(times_s):
             file = folder / kind / f"{time_s:.6f}.png"
             if kind == "rgb":
-                write_rgb(file, picture(*size, seed=index))
+                write_rgb(file, picture(seed=index))
             else:
-                write_units(file, np.full(size[::-1], 5000 + 1000 * index))
+                write_units(file, np.full((6, 8), 5000 + 1000 * index))
             lines.append(f"{time_s:.6f} {kind}/{file.name}")
         (folder / f"{kind}.txt").write_text("\n".join(lines) + "\n")
 
@@ -71,8 +61,7 @@ def _tum(folder, rgb_s, depth_s, size=(8, 6)):
 def test_tum_frames_are_matched_by_time_and_scaled_by_5000(tmp_path):
     _tum(tmp_path / "rgbd_dataset_freiburg1_desk", [1.0, 1.03, 1.5, 2.0], [1.011, 1.034, 1.519, 2.021])
     pairs = list(open_set(f"tum={tmp_path}"))
-    names = [f"rgbd_dataset_freiburg1_desk/{time}" for time in ("1.000000", "1.030000", "1.500000")]
-    assert [pair.name for pair in pairs] == names
+    assert [pair.picture.stem for pair in pairs] == ["1.000000", "1.030000", "1.500000"]
     for index, pair in enumerate(pairs):
         np.testing.assert_array_equal(pair.rgb, picture(seed=index))
         np.testing.assert_allclose(pair.truth_m, 1.0 + 0.2 * index, rtol=1e-6)
@@ -88,26 +77,6 @@ def test_association_takes_each_time_once_and_the_nearest_first():
     pairs = associate(first_s, second_s)
     assert all(len(set(side)) == len(pairs) for side in zip(*pairs, strict=True))
     assert all(abs(first_s[i] - second_s[j]) < 0.02 for i, j in pairs)
-
-
-@pytest.mark.parametrize(
-    ("sequence", "fx_px", "k1"),
-    [
-        ("freiburg1_xyz", 517.3, 0.2624),
-        ("fr2_desk", 520.9, 0.2312),
-        ("freiburg3_office", 535.4, 0.0),
-        ("x", 525.0, 0.0),
-    ],
-)
-def test_tum_cameras_follow_the_name(tmp_path, sequence, fx_px, k1):
-    _tum(tmp_path / sequence, [1.0], [1.0], size=(640, 480))
-    (pair,) = open_set(f"tum={tmp_path / sequence}")
-    assert pair.intrinsics.fx_px == fx_px
-    assert pair.intrinsics.distortion[0] == k1
-    camera = {"width": 640, "height": 480, "fx": 600.0, "fy": 600.0, "cx": 320.0, "cy": 240.0}
-    (tmp_path / sequence / "intrinsics.json").write_text(json.dumps(camera))
-    (pair,) = open_set(f"tum={tmp_path}")
-    assert pair.intrinsics.fx_px == 600.0
 
 
 def test_bad_tum_lists_are_named(tmp_path):

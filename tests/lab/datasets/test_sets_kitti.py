@@ -53,7 +53,7 @@ def _units():
 def test_the_improved_truth_is_read_and_only_the_crop_of_garg_is_judged(tmp_path):
     _add(tmp_path, DRIVE, 5, units=_units())
     (pair,) = open_set(f"kitti={tmp_path}")
-    assert pair.name == f"{DAY}_drive_0002_sync/0000000005l"
+    assert pair.picture == tmp_path / DRIVE / "image_02/data/0000000005.png"
     np.testing.assert_array_equal(pair.rgb, picture(WIDTH_PX, HEIGHT_PX, 5))
     np.testing.assert_allclose(pair.truth_m, np.where(_units() > 0, _units() / 256.0, np.nan), rtol=1e-6)
     rows, columns = np.nonzero(pair.judged)
@@ -64,10 +64,6 @@ def test_the_improved_truth_is_read_and_only_the_crop_of_garg_is_judged(tmp_path
         int(0.96405229 * 124) - 1,
     )
     assert (rows.min(), rows.max(), columns.min(), columns.max()) == limits
-    assert pair.intrinsics is None
-    _calibrate(tmp_path)
-    (pair,) = open_set(f"kitti={tmp_path}")
-    assert (pair.intrinsics.fx_px, pair.intrinsics.cx_px) == (FOCAL_PX, CX_PX - 1)
 
 
 def test_the_crop_of_garg_is_the_published_one_at_the_common_size():
@@ -100,30 +96,16 @@ def test_the_nearer_of_two_points_on_one_pixel_wins(tmp_path):
     assert np.nanmin(pair.truth_m) == pytest.approx(10.0 - 0.27 + SHIFT[2], abs=0.02)
 
 
-def test_eigens_lists_choose_the_frames(tmp_path, caplog):
+def test_eigens_list_chooses_the_frames(tmp_path, caplog):
     for number in (1, 2, 3):
         _add(tmp_path, DRIVE, number, units=_units())
     _add(tmp_path, OTHER, 4, units=_units(), camera=3)
     (tmp_path / "test_files.txt").write_text(f"{DRIVE} 0000000002 l\n{DRIVE} 0000000099 l\n\n{OTHER} 4 r\n")
-    (tmp_path / "train_files.txt").write_text(
-        f"{DRIVE}/image_02/data/0000000003.png {DRIVE}/proj_depth/groundtruth/image_02/0000000003.png 721.5\n"
-    )
-    names = [f"{DAY}_drive_0002_sync/0000000002l", f"{DAY}_drive_0009_sync/0000000004r"]
-    assert [pair.name for pair in open_set(f"kitti={tmp_path}")] == names
-    assert [pair.name[-3:] for pair in open_set(f"kitti={tmp_path}", "train")] == ["03l"]
-    assert "1 of 4 listed pictures" in caplog.text
-    (tmp_path / "train_files.txt").unlink()
-    with pytest.raises(InputError, match="has no train frames; add its other list"):
-        open_set(f"kitti={tmp_path}", "train")
-
-
-def test_a_list_as_long_as_zhous_is_read(tmp_path):
-    _add(tmp_path, DRIVE, 39_809, units=_units())
-    (tmp_path / "train_files.txt").write_text(
-        "".join(f"{DRIVE} {number:010d} l\n" for number in range(39_810))
-    )
-    (pair,) = open_set(f"kitti={tmp_path}", "train")
-    assert pair.name.endswith("0000039809l")
+    names = [f"{2:010d}.png", f"{4:010d}.png"]
+    assert [pair.picture.name for pair in open_set(f"kitti={tmp_path}")] == names
+    assert "1 of 3 listed pictures" in caplog.text
+    (tmp_path / "test_files.txt").write_text(f"{DRIVE}/image_02/data/0000000003.png improved.png 721.5\n")
+    assert [pair.picture.name for pair in open_set(f"kitti={tmp_path}")] == [f"{3:010d}.png"]
 
 
 def test_the_depth_benchmarks_own_tree_is_found_and_laser_truth_is_not_mixed_in(tmp_path):
@@ -134,7 +116,7 @@ def test_the_depth_benchmarks_own_tree_is_found_and_laser_truth_is_not_mixed_in(
     truth = f"val/{DAY}_drive_0002_sync/proj_depth/groundtruth/image_02/0000000002.png"
     write_units(tmp_path / truth, _units())
     (pair,) = open_set(f"kitti={tmp_path}")
-    assert pair.name.endswith("0000000002l")
+    assert pair.picture.name == "0000000002.png"
     assert np.nanmin(pair.truth_m) == _units()[_units() > 0].min() / 256.0
 
 

@@ -1,4 +1,4 @@
-"""Shards as the renderer writes them, small and made in a moment."""
+"""Shards as the renderer writes them, small and made in a moment, and what an exported network should say."""
 
 from pathlib import Path
 
@@ -15,3 +15,15 @@ def write_rooms(data: Path) -> Path:
         rgb = np.stack([depth_m * 60] * 3, axis=-1) + rng.normal(0, 5, (count, 240, 320, 3))
         np.save(data / f"{split}_0000_rgb.npy", rgb.clip(0, 255).astype(np.uint8))
     return data
+
+
+def mirrored_m(model, rgb: np.ndarray) -> np.ndarray:
+    """(240, 320) geometric mean of a checkpoint's depth of an image and of its mirror image, as exported."""
+    import torch
+
+    from lab.training.train import Stage, collate
+
+    image = collate([(rgb, np.ones((240, 320), np.float32))], Stage(1, (256, 320), 1))[0]
+    with torch.no_grad():
+        both_m = model(image)[0] * model(image.flip(3))[0].flip(3)
+    return torch.sqrt(both_m)[0, 0, 8:-8].numpy()

@@ -138,9 +138,9 @@ def small_shards(monkeypatch):
     monkeypatch.setattr(dataset, "ROOMS_PER_SHARD", 2)
     seeds = []
 
-    def views(seed, *_):
+    def views(seed, **_):
         seeds.append(seed)
-        return np.full((1, 240, 320, 3), seed % 251, np.uint8), np.full((1, 240, 320), 2.0, np.float16)
+        yield np.full((240, 320, 3), seed % 251, np.uint8), np.full((240, 320), 2.0, np.float16)
 
     monkeypatch.setattr(blend, "traced_views", views)
     return seeds
@@ -161,7 +161,7 @@ def test_shards_are_found_beside_ray_cast_ones_and_not_rendered_twice(small_shar
 
 
 def test_an_interrupted_shard_is_done_again(small_shards, tmp_path, monkeypatch):
-    def interrupted(*_):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:

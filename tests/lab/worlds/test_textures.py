@@ -4,33 +4,33 @@ import numpy as np
 import pytest
 
 from lab.worlds import textures
+from lab.worlds.textures.mixing import linear
 from lab.worlds.textures.noise import cell_random, face_uv, fbm
 
 A, B, C = (0.6, 0.4, 0.2), (0.2, 0.1, 0.05), (0.1, 0.3, 0.5)
 MAKERS = {
     "paint": lambda s: textures.paint(A, s),
     "plaster": lambda s: textures.plaster(A, s),
-    "concrete": lambda s: textures.concrete(seed=s),
+    "concrete": lambda s: textures.concrete(A, s),
     "wood": lambda s: textures.wood(A, B, s),
     "planks": lambda s: textures.planks(A, B, s),
     "parquet": lambda s: textures.parquet(A, B, s),
     "tiles": lambda s: textures.tiles(A, B, s),
-    "brick": lambda s: textures.brick(seed=s),
+    "brick": lambda s: textures.brick(A, B, s),
     "carpet": lambda s: textures.carpet(A, s),
     "fabric": lambda s: textures.fabric(A, B, s),
     "stripes": lambda s: textures.stripes(A, B, s),
     "motif": lambda s: textures.motif(A, B, s),
     "checker": lambda s: textures.checker(A, B, 0.1, s),
     "rug": lambda s: textures.rug([A, B, C], s),
-    "marble": lambda s: textures.marble(seed=s),
-    "brushed_metal": lambda s: textures.brushed_metal(seed=s),
+    "marble": lambda s: textures.marble(A, B, s),
+    "brushed_metal": lambda s: textures.brushed_metal(A, s),
     "patches": lambda s: textures.patches([A, B, C], s),
     "painting": textures.painting,
-    "book_spines": textures.book_spines,
     "paper": textures.paper,
     "cardboard": lambda s: textures.cardboard(seed=s),
-    "leaf": lambda s: textures.leaf(seed=s),
-    "display": textures.display,
+    "leaf": lambda s: textures.leaf(A, s),
+    "display": lambda s: textures.display(s, (0.5, 0.3)),
     "outdoors": textures.outdoors,
 }
 
@@ -62,11 +62,11 @@ def test_albedo_of_a_place_does_not_depend_on_its_neighbours_in_the_batch(name: 
 
 def test_solid_is_its_colour_and_srgb_grey_is_linear() -> None:
     np.testing.assert_allclose(textures.solid(A)(*_places(5)), np.tile(A, (5, 1)), rtol=1e-6)
-    np.testing.assert_allclose(textures.from_srgb(0, 255, 128), [0.0, 1.0, 0.21586], atol=1e-5)
+    np.testing.assert_allclose(linear("#00ff80"), [0.0, 1.0, 0.21586], atol=1e-5)
 
 
 def test_every_texture_on_offer_is_tested_here() -> None:
-    assert set(textures.__all__) - {"from_srgb", "random_palette", "solid"} == set(MAKERS)
+    assert set(textures.__all__) - {"random_palette", "solid"} == set(MAKERS)
 
 
 def test_noise_is_continuous_centred_and_between_0_and_1() -> None:

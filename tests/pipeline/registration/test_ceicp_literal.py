@@ -10,7 +10,7 @@ from pipeline.config import RegistrationConfig
 from pipeline.geometry import inverse
 from pipeline.registration import point_error_m, register
 from pipeline.registration.ceicp_literal import CeicpLiteral, density_information
-from pipeline.registration.degenerate import DegenerateError
+from pipeline.registration.residual import DegenerateError
 from pipeline.types import PointCloud
 from tests.pipeline.registration.pairs import pairs_at
 

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import inverse, rigid, rotation_exp
 from pipeline.registration import iterate_registration, point_error_m, register
-from pipeline.registration.ceicp import CeicpA, entropy_weights
+from pipeline.registration.ceicp import CeicpA, CeicpR, entropy_weights
 from pipeline.registration.ceicp_ml import CeicpMl, box_volume_m3, responsibilities
-from pipeline.registration.ceicp_r import CeicpR
 from pipeline.registration.kernel_correlation import KernelCorrelation
 from pipeline.types import PointCloud
 from tests.pipeline.registration.pairs import pairs_at

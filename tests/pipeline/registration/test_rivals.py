@@ -13,12 +13,12 @@ from pipeline.registration import iterate_registration, point_error_m, register
 from pipeline.registration.fast_robust import FastRobustIcp, neighbourhood_m
 from pipeline.registration.ficp import Ficp, inlier_fraction
 from pipeline.registration.hicp import Hicp, hue_coordinates
+from pipeline.registration.icp import TrimmedIcp
 from pipeline.registration.matching import Matching
 from pipeline.registration.methods import METHODS
 from pipeline.registration.mricp import Mricp
 from pipeline.registration.picp import Picp
 from pipeline.registration.ricp import Ricp, rigid_fits
-from pipeline.registration.trimmed import TrimmedIcp
 from pipeline.types import PointCloud
 from tests.pipeline.registration.pairs import pairs_at
 

@@ -10,10 +10,13 @@ from lab.claims.registration.statistics import Comparison, compare, holm, holm_p
 
 def test_holm_by_hand():
     """Sorted .01, .02, .03, .04 times 4, 3, 2, 1, never falling: .04, .06, .06, .06."""
-    assert holm_p([0.04, 0.01, 0.03, 0.02]) == pytest.approx([0.06, 0.04, 0.06, 0.06])
-    assert holm_p([0.9, 0.6]) == pytest.approx([1.0, 1.0])
-    assert holm_p([]) == []
-    assert holm_p([0.02]) == [0.02]
+    for p, adjusted in (
+        ([0.04, 0.01, 0.03, 0.02], [0.06, 0.04, 0.06, 0.06]),
+        ([0.9, 0.6], [1.0, 1.0]),
+        ([], []),
+        ([0.02], [0.02]),
+    ):
+        assert holm_p(np.array(p)) == pytest.approx(adjusted)
 
 
 def test_holm_keeps_the_order_and_everything_but_p():

@@ -1,9 +1,72 @@
+"""Both residuals of a pair: the motions that make them least, and when there is none."""
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from pipeline.geometry import apply, rigid, rotation_exp
-from pipeline.registration.degenerate import DegenerateError
-from pipeline.registration.plane import solve_plane
+from pipeline.registration.residual import DegenerateError, solve_plane, weighted_procrustes
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@given(seed=seeds, angle_rad=st.floats(0.0, np.pi), scale=st.floats(0.2, 5.0))
+@settings(max_examples=50, deadline=None)
+def test_recovers_a_random_similarity_exactly(seed, angle_rad, scale):
+    rng = np.random.default_rng(seed)
+    axis = rng.normal(size=3)
+    rotation = rotation_exp(angle_rad * axis / np.linalg.norm(axis))
+    T = rigid(scale * rotation, rng.normal(size=3))
+    q = rng.normal(size=(30, 3))
+    weights = rng.uniform(0.1, 1.0, 30)
+    np.testing.assert_allclose(weighted_procrustes(q, apply(T, q), weights, True), T, atol=1e-9)
+    rigid_T = rigid(rotation, T[:3, 3])
+    np.testing.assert_allclose(weighted_procrustes(q, apply(rigid_T, q), weights), rigid_T, atol=1e-9)
+
+
+@given(seed=seeds)
+@settings(max_examples=25, deadline=None)
+def test_no_other_motion_has_a_smaller_cost(seed):
+    """The closed form is the minimum: every small motion away from it costs more."""
+    rng = np.random.default_rng(seed)
+    q, p = rng.normal(size=(2, 20, 3))
+    weights = rng.uniform(size=20)
+
+    def cost(T):
+        return weights @ np.sum((apply(T, q) - p) ** 2, axis=1)
+
+    best = weighted_procrustes(q, p, weights)
+    for omega, shift in rng.normal(scale=1e-3, size=(10, 2, 3)):
+        assert cost(best) <= cost(rigid(rotation_exp(omega), shift) @ best)
+    assert cost(weighted_procrustes(q, p, weights, with_scale=True)) <= cost(best)
+
+
+def test_mirrored_points_still_give_a_rotation():
+    q = np.random.default_rng(0).normal(size=(50, 3))
+    T = weighted_procrustes(q, q * [1.0, 1.0, -1.0], np.ones(50))
+    assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_points_of_a_plane_are_enough():
+    q = np.random.default_rng(0).normal(size=(50, 3)) * [1.0, 1.0, 0.0]
+    T = rigid(rotation_exp(np.array([0.3, -0.2, 0.5])), [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(weighted_procrustes(q, apply(T, q), np.ones(50)), T, atol=1e-12)
+
+
+def test_zero_weight_means_absent():
+    rng = np.random.default_rng(1)
+    q, p = rng.normal(size=(2, 20, 3))
+    weights = np.r_[np.ones(10), np.zeros(10)]
+    np.testing.assert_allclose(
+        weighted_procrustes(q, p, weights), weighted_procrustes(q[:10], p[:10], np.ones(10)), atol=1e-12
+    )
+
+
+def test_a_line_of_points_is_refused():
+    q = np.linspace(0.0, 1.0, 20)[:, None] * np.array([1.0, 2.0, 3.0])
+    with pytest.raises(DegenerateError, match="one line"):
+        weighted_procrustes(q, q, np.ones(20))
 
 
 def _patches(rng, count=300):

@@ -1,0 +1,73 @@
+"""The shipped depth network: its time and size, what its 8 bits cost, and how it fills holes beside peers."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from dataclasses import asdict, dataclass
+
+from lab.benchmarks.benchmark import Benchmark
+from lab.benchmarks.filling import OURS, fillings
+from packetmesh.memory import peak_memory_bytes
+from pipeline.depth import DepthNetwork
+from pipeline.io.demos import load_demo
+from pipeline.types import ByteArray
+
+ROUNDS = 50
+WARM_UP = 5
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkSpeed:
+    """The shipped network on one image."""
+
+    elapsed_s: float
+    """Median for a frame of 640 x 480, its resizing included."""
+    slowest_s: float
+    rounds: int
+    provider: str
+    """What really ran it."""
+    file_bytes: int
+    abs_rel: float | None
+    """From the file's metadata: AbsRel of the quantised network on held-out rooms."""
+    quantisation_cost: float | None
+    """AbsRel that quantisation added to the float network's, from the metadata; None without them."""
+
+
+def benchmark() -> Benchmark:
+    """The shipped network, and hidden holes filled by us and by the obvious peers.
+
+    The times are those of filling one frame, the errors medians in the real frames' hidden pixels, or in
+    the demo scenes' where there are no real frames.
+    """
+    network = DepthNetwork()
+    speed = network_speed(network, load_demo("living-room").frames[0].rgb)
+    groups = fillings(network)
+    chosen = {run.program: run for run in groups if run.group == groups[-1].group}
+    seconds = {name: run.elapsed_s for name, run in chosen.items()}
+    errors_m = {name: run.median_error_m for name, run in chosen.items()}
+    runs = (asdict(speed), *(asdict(run) for run in groups))
+    return Benchmark(seconds.pop(OURS), seconds, peak_memory_bytes(), errors_m=errors_m, runs=runs)
+
+
+def network_speed(network: DepthNetwork, rgb: ByteArray, rounds: int = ROUNDS) -> NetworkSpeed:
+    """Infer one (H, W, 3) image over and over, warm."""
+    seconds = []
+    for _ in range(WARM_UP + rounds):
+        started = time.perf_counter()
+        network.infer(rgb)
+        seconds.append(time.perf_counter() - started)
+    seconds = seconds[WARM_UP:]
+    abs_rel, float_abs_rel = (
+        None if (text := network.description.get(name)) is None else float(text)
+        for name in ("abs_rel", "float_abs_rel")
+    )
+    return NetworkSpeed(
+        elapsed_s=statistics.median(seconds),
+        slowest_s=max(seconds),
+        rounds=rounds,
+        provider=network.provider,
+        file_bytes=network.model_path.stat().st_size,
+        abs_rel=abs_rel,
+        quantisation_cost=None if abs_rel is None or float_abs_rel is None else abs_rel - float_abs_rel,
+    )
