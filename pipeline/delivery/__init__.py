@@ -14,7 +14,7 @@ _ALL: tuple[Coding, ...] = (
     Whole("jpeg", "RVL depth, JPEG colour", RVL, JPEG),
     Whole("rvl", "RVL depth, PNG colour", RVL, PNG),
     Tiled("tiles", "Tiles that stand alone", base=False, repair_every=64),
-    Tiled("layered", "Coarse base, then tiles", base=True, repair_every=24),
+    Tiled("layered", "Coarse base, then tiles", base=True, repair_every=12),
 )
 
 CODINGS: dict[str, Coding] = {coding.name: coding for coding in _ALL}

@@ -142,7 +142,10 @@ def _decode(stream: ByteArray, values: NDArray[np.uint16]) -> tuple[int, int]:
 
 @_compiled
 def _get(stream: ByteArray, nibbles: int, most_bits: int) -> tuple[int, int]:
-    """Reads one number behind so many nibbles: -1 if the stream ends in it, -2 if it has too many bits."""
+    """Reads one number behind so many nibbles: -1 if the stream ends in it, -2 if it has too many bits.
+
+    Of a number in which the stream ends one nibble more is counted than there is.
+    """
     number = np.int64(0)
     shift = 0
     while nibbles < 2 * stream.size:
@@ -155,4 +158,4 @@ def _get(stream: ByteArray, nibbles: int, most_bits: int) -> tuple[int, int]:
         if nibble < 8:
             return number, nibbles
         shift += 3
-    return np.int64(-1), nibbles
+    return np.int64(-1), nibbles + 1
