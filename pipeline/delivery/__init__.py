@@ -1,1 +1,23 @@
 """What a node sends of its images, in what form, and what is left of them at the sink (SPEC 6.5)."""
+
+from pipeline.delivery.coding import Coding
+from pipeline.delivery.raw import Raw, raster, spread_rows, tile_after_tile
+from pipeline.delivery.tiled import Tiled
+from pipeline.delivery.whole import JPEG, PNG, RVL, Whole
+
+_ALL: tuple[Coding, ...] = (
+    Raw("raw", "Raw, depth first", raster),
+    Raw("raw-color-first", "Raw, colour first", raster, color_first=True),
+    Raw("raw-rows", "Raw, rows spread", spread_rows),
+    Raw("raw-tiles", "Raw, 16 × 16 tiles", tile_after_tile),
+    Whole("png", "PNG depth, PNG colour", PNG, PNG),
+    Whole("jpeg", "RVL depth, JPEG colour", RVL, JPEG),
+    Whole("rvl", "RVL depth, PNG colour", RVL, PNG),
+    Tiled("tiles", "Tiles that stand alone", base=False, repair_every=64),
+    Tiled("layered", "Coarse base, then tiles", base=True, repair_every=12),
+)
+
+CODINGS: dict[str, Coding] = {coding.name: coding for coding in _ALL}
+"""By name, as in ``--coding``."""
+
+__all__ = ["CODINGS", "Coding"]

@@ -36,14 +36,29 @@ class Received:
     coarse: DepthArray
     """(H, W) depth known from a base layer only, 0 wherever ``depth`` has arrived: a guess, no measurement."""
 
+    @staticmethod
+    def nothing(shape: tuple[int, int]) -> Received:
+        """Of images of (H, W) pixels nothing is known; decoders fill its arrays."""
+        return Received(
+            rgb=np.zeros((*shape, 3), np.uint8),
+            rgb_known=np.zeros(shape, np.bool_),
+            depth=np.zeros(shape, np.uint16),
+            coarse=np.zeros(shape, np.uint16),
+        )
+
 
 class Coding(Protocol):
     """One way to write a node's images as bytes."""
 
-    name: str
-    """As in ``--coding``."""
-    title: str
-    """A few words for people."""
+    @property
+    def name(self) -> str:
+        """As in ``--coding``."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """A few words for people."""
+        ...
 
     def encode(self, images: Images, packet_bytes: int) -> bytes:
         """The bytes of a frame in the order in which they are sent.

@@ -1,0 +1,90 @@
+"""A coarse likeness of the images, small enough to be protected well: the base layer of SPEC 6.5."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.delivery import rvl
+from pipeline.delivery.coding import DepthArray
+from pipeline.delivery.pictures import read_scan, write_scan
+from pipeline.types import ByteArray
+
+DEPTH_BLOCK = 8
+"""Pixels of a side that share one depth."""
+COLOR_BLOCK = 4
+COLOR_QUALITY = 75
+SAME_SURFACE = 0.05
+"""Neighbouring depths that differ by more, relatively, are not blended: nothing lies between two surfaces."""
+
+
+def write_depth(depth: DepthArray) -> bytes:
+    """The medians of blocks as an RVL stream, 0 where most of a block has no depth."""
+    height, width = depth.shape
+    padded = np.pad(depth, ((0, -height % DEPTH_BLOCK), (0, -width % DEPTH_BLOCK)))
+    shape = (padded.shape[0] // DEPTH_BLOCK, DEPTH_BLOCK, padded.shape[1] // DEPTH_BLOCK, DEPTH_BLOCK)
+    blocks = np.sort(padded.reshape(shape).swapaxes(1, 2).reshape(shape[0], shape[2], -1), axis=2)
+    known = np.count_nonzero(blocks, axis=2)
+    middle = blocks.shape[2] - known + np.maximum(known - 1, 0) // 2
+    middle = np.minimum(middle, blocks.shape[2] - 1)
+    medians = np.take_along_axis(blocks, middle[..., None], axis=2)[..., 0]
+    inside = np.outer(_inside(height, shape[0]), _inside(width, shape[2]))
+    return rvl.encode(np.where(2 * known >= inside, medians, 0).astype(np.uint16))
+
+
+def write_color(rgb: ByteArray) -> bytes:
+    """A small JPEG picture, without its header."""
+    height, width = rgb.shape[:2]
+    size = (-(-width // COLOR_BLOCK), -(-height // COLOR_BLOCK))
+    return write_scan(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), COLOR_QUALITY)
+
+
+@lru_cache(maxsize=16)
+def read_depth(stream: bytes, shape: tuple[int, int]) -> DepthArray:
+    """(H, W) depth blended between the blocks' centres, not to be written to; 0 where a block has none."""
+    grid_shape = (-(-shape[0] // DEPTH_BLOCK), -(-shape[1] // DEPTH_BLOCK))
+    grid = rvl.decode(np.frombuffer(stream, np.uint8), grid_shape[0] * grid_shape[1]).reshape(grid_shape)
+    depth = _blended(grid.astype(np.float32), shape)
+    depth.setflags(write=False)
+    return depth
+
+
+@lru_cache(maxsize=16)
+def read_color(scan: bytes, shape: tuple[int, int]) -> ByteArray:
+    """(H, W, 3) RGB, not to be written to."""
+    small = read_scan(scan, (-(-shape[0] // COLOR_BLOCK), -(-shape[1] // COLOR_BLOCK)), COLOR_QUALITY)
+    rgb = cv2.resize(small, (shape[1], shape[0]), interpolation=cv2.INTER_CUBIC)
+    rgb.setflags(write=False)
+    return rgb
+
+
+def _inside(size: int, blocks: int) -> NDArray[np.integer]:
+    """How many pixels of each block lie in the image, along one side."""
+    return np.minimum(DEPTH_BLOCK, size - DEPTH_BLOCK * np.arange(blocks))
+
+
+def _blended(grid: NDArray[np.float32], shape: tuple[int, int]) -> DepthArray:
+    """Bilinear among those of the four nearest blocks that continue the surface of the pixel's own."""
+    (top, bottom, down), (left, right, across) = (
+        _neighbours(size, blocks) for size, blocks in zip(shape, grid.shape, strict=True)
+    )
+    own = np.repeat(np.repeat(grid, DEPTH_BLOCK, axis=0), DEPTH_BLOCK, axis=1)[: shape[0], : shape[1]]
+    total, weights = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+    for rows, row_weight in ((top, 1 - down), (bottom, down)):
+        for columns, column_weight in ((left, 1 - across), (right, across)):
+            corner = grid[np.ix_(rows, columns)]
+            weight = np.where(np.abs(corner - own) <= SAME_SURFACE * own, np.outer(row_weight, column_weight), 0)
+            total += weight * corner
+            weights += weight
+    return np.rint(np.divide(total, weights, out=np.zeros_like(total), where=weights > 0)).astype(np.uint16)
+
+
+def _neighbours(size: int, blocks: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
+    """Along one side, for each pixel: the block before it, the one behind it, and how near the latter is."""
+    position = (np.arange(size) + 0.5) / DEPTH_BLOCK - 0.5
+    before = np.floor(position).astype(np.int64)
+    share = (position - before).astype(np.float32)
+    return np.maximum(before, 0), np.minimum(before + 1, blocks - 1), share

@@ -1,0 +1,140 @@
+"""Two kinds of bytes in one stream of packets: a base that must not be lost, and a body of which any part may be.
+
+The base is cut into symbols, with which repair symbols are made; any of them, as many as the base has, give it
+back (``erasure``). Its own symbols come first, so that a transfer that stops early has it; the repair symbols are
+spread over the whole stream, one packet in so many, so that a burst takes only few of them. Each such packet
+starts with the number of its symbol and the length of the base.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.types import BoolArray, ByteArray
+
+BASE_LOSS = 0.3
+"""Share of its packets that a base survives (SPEC 6.5)."""
+_UNIT_BYTES = (64, 8192)
+_NUMBER_BYTES = 2
+_LENGTH_BYTES = 3
+_HEADER_BYTES = _NUMBER_BYTES + _LENGTH_BYTES
+_WORD_BYTES = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Unprotected:
+    """What arrived of a stream."""
+
+    base: bytes | None
+    """All of the base, if enough of its packets arrived."""
+    body: ByteArray
+    """(B,) zero where it has not arrived; empty without the base."""
+    arrived: BoolArray
+    """(B,)"""
+
+
+def protect(base: bytes, body: bytes, packet_bytes: int, repair_every: int) -> bytes:
+    """One stream of whole packets with a base, its repair symbols and the body, with zeros at its end.
+
+    Args:
+        base: at least one byte, less than 16 MiB.
+        body: bytes.
+        packet_bytes: how many the network carries at once.
+        repair_every: of so many packets one holds a repair symbol; more where that is too few for ``BASE_LOSS``.
+    """
+    from pipeline.delivery.erasure import repair_symbols
+
+    unit = _unit_bytes(packet_bytes)
+    symbol_bytes = _symbol_bytes(unit)
+    source_count = -(-len(base) // symbol_bytes)
+    body_count = -(-len(body) // unit)
+    count = source_count + body_count
+    while (free := count - np.count_nonzero(_of_base(source_count, count, repair_every))) < body_count:
+        count += body_count - free
+    of_base = _of_base(source_count, count, repair_every)
+
+    source = np.frombuffer(base.ljust(source_count * symbol_bytes, b"\0"), ">u2").astype(np.uint16)
+    source = source.reshape(source_count, -1)
+    numbers = np.arange(np.count_nonzero(of_base))
+    symbols = np.concatenate([source, repair_symbols(source, numbers[source_count:])])
+    units = np.zeros((count, unit), np.uint8)
+    packed = np.zeros((len(numbers), unit), np.uint8)
+    packed[:, :_NUMBER_BYTES] = _big_endian(numbers, _NUMBER_BYTES)
+    packed[:, _NUMBER_BYTES:_HEADER_BYTES] = _big_endian(np.full(len(numbers), len(base)), _LENGTH_BYTES)
+    packed[:, _HEADER_BYTES : _HEADER_BYTES + symbol_bytes] = symbols.astype(">u2").view(np.uint8)
+    units[of_base] = packed
+    padded = body.ljust((count - len(numbers)) * unit, b"\0")
+    units[~of_base] = np.frombuffer(padded, np.uint8).reshape(-1, unit)
+    return units.tobytes()
+
+
+def unprotect(data: ByteArray, arrived: BoolArray, packet_bytes: int, repair_every: int) -> Unprotected:
+    """What of ``protect``'s parts can be told from the bytes that arrived.
+
+    Args:
+        data: (S,) all bytes of a stream, zero where they have not arrived.
+        arrived: (S,)
+        packet_bytes: as in ``protect``.
+        repair_every: as in ``protect``.
+    """
+    from pipeline.delivery.erasure import recover
+
+    unit = _unit_bytes(packet_bytes)
+    symbol_bytes = _symbol_bytes(unit)
+    units, whole = data.reshape(-1, unit), arrived.reshape(-1, unit).all(axis=1)
+    nothing = Unprotected(None, data[:0], arrived[:0])
+    certain = np.flatnonzero(_certainly_of_base(len(units), repair_every) & whole)
+    if certain.size == 0:
+        return nothing
+    base_bytes = int.from_bytes(units[certain[0], _NUMBER_BYTES:_HEADER_BYTES].tobytes(), "big")
+    source_count = -(-base_bytes // symbol_bytes)
+    of_base = _of_base(source_count, len(units), repair_every)
+    packed = units[of_base & whole]
+    numbers = packed[:, 0].astype(np.int64) << 8 | packed[:, 1]
+    symbols = np.ascontiguousarray(packed[:, _HEADER_BYTES : _HEADER_BYTES + symbol_bytes])
+    source = recover(source_count, numbers, symbols.view(">u2").astype(np.uint16))
+    if source is None:
+        return nothing
+    base = source.astype(">u2").tobytes()[:base_bytes]
+    body_arrived = arrived.reshape(-1, unit)[~of_base].reshape(-1)
+    return Unprotected(base, units[~of_base].reshape(-1), body_arrived)
+
+
+def _unit_bytes(packet_bytes: int) -> int:
+    """Of one symbol with its header: a packet where that is possible, else some small packets or a part of one."""
+    least, most = _UNIT_BYTES
+    return min(packet_bytes * max(1, -(-least // packet_bytes)), most)
+
+
+def _symbol_bytes(unit_bytes: int) -> int:
+    return (unit_bytes - _HEADER_BYTES) // _WORD_BYTES * _WORD_BYTES
+
+
+def _certainly_of_base(count: int, repair_every: int) -> BoolArray:
+    """(count,) units that belong to the base however long it is: here a reader finds out its length."""
+    certain = np.zeros(count, np.bool_)
+    certain[repair_every - 1 :: repair_every] = True
+    certain[[0, -1]] = True
+    return certain
+
+
+def _of_base(source_count: int, count: int, repair_every: int) -> BoolArray:
+    """(count,) units that belong to a base of so many symbols; more at the end if else they were too few."""
+    of_base = _certainly_of_base(count, repair_every)
+    of_base[:source_count] = True
+    lacking = _enough(source_count) - np.count_nonzero(of_base)
+    if lacking > 0:
+        of_base[np.flatnonzero(~of_base)[-lacking:]] = True
+    return of_base
+
+
+def _enough(source_count: int) -> int:
+    """Symbols of which, after the loss, so many arrive nearly always: bursts make few of them vary much."""
+    return math.ceil((source_count + 2 * math.sqrt(source_count) + 1) / (1 - BASE_LOSS))
+
+
+def _big_endian(numbers: np.ndarray, byte_count: int) -> ByteArray:
+    return numbers.astype(">u4").view(np.uint8).reshape(-1, 4)[:, 4 - byte_count :]
