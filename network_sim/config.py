@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from network_sim.checks import above, at_least, one_each, share
+from network_sim.losses import LossConfig
 from packetmesh.errors import InputError
 
 Propagation = Literal["friis", "two-ray", "log-distance"]
@@ -307,6 +308,7 @@ class NetworkConfig:
     """Nodes that stand still around one sink (collection), or vehicles on a street grid (street-grid)."""
     radio: RadioConfig = field(default_factory=RadioConfig)
     mac: MacConfig = field(default_factory=MacConfig)
+    loss: LossConfig = field(default_factory=LossConfig)
     nodes: NodesConfig = field(default_factory=NodesConfig)
     uplink: UplinkConfig = field(default_factory=UplinkConfig)
     scheme: SchemeConfig = field(default_factory=SchemeConfig)
