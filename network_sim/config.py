@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+from network_sim.checks import above, at_least, one_each, share
+from network_sim.losses import LossConfig
 from packetmesh.errors import InputError
 
 Propagation = Literal["friis", "two-ray", "log-distance"]
@@ -17,21 +19,6 @@ Scenario = Literal["collection", "street-grid"]
 
 MAX_PAYLOAD_BYTES: dict[MacKind, int] = {"ieee802154": 116, "ieee80211b": 2304}
 """Largest payload of a frame: 127 B less 11 B of header and check sum, and IEEE 802.11's largest."""
-
-
-def _at_least(key: str, value: float | None, least: float) -> None:
-    if value is not None and not least <= value < math.inf:
-        raise InputError(f"{key} is {value}; try at least {least}")
-
-
-def _above(key: str, value: float | None, bound: float) -> None:
-    if value is not None and not bound < value < math.inf:
-        raise InputError(f"{key} is {value}; try a value above {bound}")
-
-
-def _share(key: str, value: float, least: float = 0.0) -> None:
-    if not least <= value <= 1.0:
-        raise InputError(f"{key} is {value}; try a share between {least} and 1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,13 +57,13 @@ class RadioConfig:
 
     def __post_init__(self) -> None:
         for key in ("frequency_hz", "antenna_gain", "antenna_height_m", "path_loss_exponent", "range_m"):
-            _above(f"radio.{key}", getattr(self, key), 0.0)
-        _above("radio.reference_m", self.reference_m, 0.0)
-        _at_least("radio.system_loss", self.system_loss, 1.0)
-        _at_least("radio.shadowing_db", self.shadowing_db, 0.0)
-        _at_least("radio.nakagami_m", self.nakagami_m, 0.5)
-        _at_least("radio.sense_range_m", self.sense_range_m, self.range_m)
-        _at_least("radio.capture_db", self.capture_db, 0.0)
+            above(f"radio.{key}", getattr(self, key), 0.0)
+        above("radio.reference_m", self.reference_m, 0.0)
+        at_least("radio.system_loss", self.system_loss, 1.0)
+        at_least("radio.shadowing_db", self.shadowing_db, 0.0)
+        at_least("radio.nakagami_m", self.nakagami_m, 0.5)
+        at_least("radio.sense_range_m", self.sense_range_m, self.range_m)
+        at_least("radio.capture_db", self.capture_db, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +81,7 @@ class MacConfig:
     """Rate of the ideal link or the serial line."""
 
     def __post_init__(self) -> None:
-        _above("mac.link_bps", self.link_bps, 0.0)
+        above("mac.link_bps", self.link_bps, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +95,8 @@ class NodesConfig:
     at random in a square with the sink in its middle."""
     spacing_m: float = 20.0
     """Distance to the sink (star) or between neighbours (line, grid; on average: random)."""
+    places_m: tuple[float, ...] = ()
+    """x and y of every node and, last, of the sink, in a row; empty places them by the layout."""
     images: int = 1
     """Images of each node; 0 takes them until the horizon."""
     interval_s: float = 0.0
@@ -116,6 +105,8 @@ class NodesConfig:
     """Size of a colour image as encoded; a 640 x 480 PPM file by default."""
     depth_bytes: int = 0
     """Size of the depth image that goes with it, and follows it as one image's bytes; 0 sends none."""
+    bytes_by_node: tuple[int, ...] = ()
+    """Size of each node's own image, depth included; empty gives every node both sizes above."""
     payload_bytes: int = 116
     """Bytes that a packet hands to the medium access."""
     header_bytes: int = 0
@@ -137,19 +128,31 @@ class NodesConfig:
     """How long a failed node stays down; its buffer is lost."""
 
     def __post_init__(self) -> None:
-        _at_least("nodes.count", self.count, 1)
+        at_least("nodes.count", self.count, 1)
         for key in ("images", "interval_s", "depth_bytes", "header_bytes", "failures_per_h"):
-            _at_least(f"nodes.{key}", getattr(self, key), 0)
+            at_least(f"nodes.{key}", getattr(self, key), 0)
         for key in ("image_bytes", "payload_bytes", "buffer_packets"):
-            _at_least(f"nodes.{key}", getattr(self, key), 1)
+            at_least(f"nodes.{key}", getattr(self, key), 1)
         for key in ("spacing_m", "deadline_s", "duty_cycle", "duty_period_s", "recovery_s"):
-            _above(f"nodes.{key}", getattr(self, key), 0.0)
-        _share("nodes.duty_cycle", self.duty_cycle)
+            above(f"nodes.{key}", getattr(self, key), 0.0)
+        share("nodes.duty_cycle", self.duty_cycle)
+        nodes = f"nodes.count is {self.count}"
+        places = f"x and y of each node and of the sink ({nodes})"
+        one_each("nodes.places_m", self.places_m, 2 * (self.count + 1), places)
+        one_each("nodes.bytes_by_node", self.bytes_by_node, self.count, f"one size for each node ({nodes})")
+        if not all(map(math.isfinite, self.places_m)):
+            raise InputError(f"nodes.places_m holds {self.places_m}; try metres")
+        for size_bytes in self.bytes_by_node:
+            at_least("nodes.bytes_by_node", size_bytes, 1)
         if self.header_bytes >= self.payload_bytes:
             raise InputError(
                 f"nodes.header_bytes is {self.header_bytes}, which leaves no room for data in a payload of "
                 f"{self.payload_bytes} bytes; try a larger nodes.payload_bytes"
             )
+
+    def size_bytes(self, node: int) -> int:
+        """Size of a node's image, with the depth that goes with it."""
+        return self.bytes_by_node[node] if self.bytes_by_node else self.image_bytes + self.depth_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,9 +167,9 @@ class UplinkConfig:
     """Share of packets that get lost."""
 
     def __post_init__(self) -> None:
-        _above("uplink.rate_bps", self.rate_bps, 0.0)
-        _at_least("uplink.latency_s", self.latency_s, 0.0)
-        _share("uplink.loss", self.loss)
+        above("uplink.rate_bps", self.rate_bps, 0.0)
+        at_least("uplink.latency_s", self.latency_s, 0.0)
+        share("uplink.loss", self.loss)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,13 +215,13 @@ class SchemeConfig:
 
     def __post_init__(self) -> None:
         for key in ("validity_s", "observation_s", "control_s", "sample_s", "cell_m", "summary_interval_s"):
-            _above(f"scheme.{key}", getattr(self, key), 0.0)
+            above(f"scheme.{key}", getattr(self, key), 0.0)
         for key in ("k", "buffer_images", "image_bytes", "tag_bytes", "id_bytes"):
-            _at_least(f"scheme.{key}", getattr(self, key), 1)
-        _at_least("scheme.datagram_bytes", self.datagram_bytes, max(self.tag_bytes, self.id_bytes))
-        _at_least("scheme.headers_bytes", self.headers_bytes, 0)
-        _at_least("scheme.r_low", self.r_low, 0.0)
-        _above("scheme.r_high", self.r_high, self.r_low)
+            at_least(f"scheme.{key}", getattr(self, key), 1)
+        at_least("scheme.datagram_bytes", self.datagram_bytes, max(self.tag_bytes, self.id_bytes))
+        at_least("scheme.headers_bytes", self.headers_bytes, 0)
+        at_least("scheme.r_low", self.r_low, 0.0)
+        above("scheme.r_high", self.r_high, self.r_low)
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,9 +241,9 @@ class StreetConfig:
 
     def __post_init__(self) -> None:
         for key in ("vehicles", "blocks", "access_points"):
-            _at_least(f"street.{key}", getattr(self, key), 1)
-        _above("street.block_m", self.block_m, 0.0)
-        _above("street.speed_mps", self.speed_mps, 0.0)
+            at_least(f"street.{key}", getattr(self, key), 1)
+        above("street.block_m", self.block_m, 0.0)
+        above("street.speed_mps", self.speed_mps, 0.0)
         if self.access_points > (self.blocks + 1) ** 2:
             raise InputError(
                 f"street.access_points is {self.access_points}, more than there are crossings; "
@@ -269,8 +272,8 @@ class EnergyConfig:
 
     def __post_init__(self) -> None:
         for key in ("tx_w", "rx_w", "idle_w", "sleep_w", "platform_w", "platform_sleep_w"):
-            _at_least(f"energy.{key}", getattr(self, key), 0.0)
-        _above("energy.battery_j", self.battery_j, 0.0)
+            at_least(f"energy.{key}", getattr(self, key), 0.0)
+        above("energy.battery_j", self.battery_j, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,9 +290,9 @@ class RunConfig:
     """Keep every event, those of images only, or counters only."""
 
     def __post_init__(self) -> None:
-        _above("run.horizon_s", self.horizon_s, 0.0)
-        _at_least("run.warmup_s", self.warmup_s, 0.0)
-        _at_least("run.seed", self.seed, 0)
+        above("run.horizon_s", self.horizon_s, 0.0)
+        at_least("run.warmup_s", self.warmup_s, 0.0)
+        at_least("run.seed", self.seed, 0)
         if self.warmup_s >= self.horizon_s:
             raise InputError(
                 f"run.warmup_s is {self.warmup_s}, which leaves nothing of run.horizon_s {self.horizon_s}; "
@@ -305,6 +308,7 @@ class NetworkConfig:
     """Nodes that stand still around one sink (collection), or vehicles on a street grid (street-grid)."""
     radio: RadioConfig = field(default_factory=RadioConfig)
     mac: MacConfig = field(default_factory=MacConfig)
+    loss: LossConfig = field(default_factory=LossConfig)
     nodes: NodesConfig = field(default_factory=NodesConfig)
     uplink: UplinkConfig = field(default_factory=UplinkConfig)
     scheme: SchemeConfig = field(default_factory=SchemeConfig)

@@ -309,7 +309,7 @@ class Camera:
         """Take an image; returns the event that it is settled, None without a route to the sink."""
         shared, config = self._shared, self._shared.config
         node = self._station.index
-        image = shared.book.capture(node, config.image_bytes + config.depth_bytes)
+        image = shared.book.capture(node, config.size_bytes(node))
         if node in shared.unreachable:
             shared.book.close(image, -1, Cause.NO_ROUTE)
             return None

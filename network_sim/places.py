@@ -45,15 +45,17 @@ class FixedPlaces:
 
 
 def place_nodes(config: NodesConfig, rng: np.random.Generator) -> FixedPlaces:
-    """Positions of the nodes, then the sink, by ``config.layout``.
+    """Positions of the nodes, then the sink: as given, or by ``config.layout``.
 
     Args:
-        config: Count, layout and spacing.
+        config: Count, places, or layout and spacing.
         rng: Draws the random layout; the others do not use it.
 
     Returns:
-        Places of ``config.count`` + 1 nodes; the sink is the last and stands at the origin.
+        Places of ``config.count`` + 1 nodes; the sink is the last and stands at the origin of a layout.
     """
+    if config.places_m:
+        return FixedPlaces(np.reshape(config.places_m, (-1, 2)))
     count = config.count
     index = np.arange(count)
     if config.layout == "star":

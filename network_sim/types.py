@@ -97,6 +97,8 @@ class Cause(IntEnum):
     """Lost between sink and cloud."""
     ACK_LOST = 11
     """The frame arrived, its acknowledgement did not."""
+    LINK = 12
+    """Lost on the link, by a share that was set or a recording."""
 
 
 class Packet(NamedTuple):

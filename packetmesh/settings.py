@@ -131,7 +131,7 @@ def _parsed(hint: Any, text: str, key: str) -> Any:
     if hint is bool:
         return _parsed(Literal["true", "false"], text, key) == "true"
     if typing.get_origin(hint) is tuple:
-        return tuple(_parsed(float, item, key) for item in text.split(",") if item)
+        return tuple(_parsed(typing.get_args(hint)[0], item, key) for item in text.split(",") if item)
     try:
         value = hint(text)
     except ValueError:

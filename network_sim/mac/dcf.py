@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import simpy
 
+<<<<<<< HEAD
 from network_sim.mac.context import MacContext, random_below
+=======
+from network_sim.losses import LinkLosses
+from network_sim.mac.context import MacContext
+from network_sim.mac.random_blocks import random_below
+>>>>>>> netloss
 from network_sim.types import Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:
@@ -154,6 +160,7 @@ class Dcf:
         self._receive = context.receive
         self._eifs_ns = EIFS_NS if wait_after_loss else DIFS_NS
         self._reply_wait_ns = REPLY_WAIT_NS if wait_after_loss else 0
+        self._lost = LinkLosses(context.config.loss, context.config.run.seed).lost
         self._stations: dict[int, _Station] = {}
         self._counting: dict[int, _Station] = {}
         self._backing_off: dict[int, _Station] = {}
@@ -284,7 +291,8 @@ class Dcf:
             _AIR, packet, sender, receiver, frame_bytes, begins_ns, duration_ns, rest_ns, cts
         )
         yield env.timeout(frame.end_ns - env.now)
-        cause = self._outcome(frame)
+        lost = self._lost(sender, receiver)
+        cause = self._outcome(frame) or (Cause.LINK if lost else _NONE)
         if cause:
             self._fail_attempt(packet, station, frame, cause, self._reply_wait_ns)
             return cause

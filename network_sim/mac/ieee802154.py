@@ -12,6 +12,7 @@ from typing import Any
 
 import simpy
 
+from network_sim.losses import LinkLosses
 from network_sim.mac.context import MacContext, random_below
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet
 
@@ -53,6 +54,7 @@ class Ieee802154:
         self._recorder = context.recorder
         self._up = context.up
         self._receive = context.receive
+        self._lost = LinkLosses(context.config.loss, context.config.run.seed).lost
         self._ready_ns: dict[int, int] = {}
         self._acking_until_ns: dict[int, int] = {}
         """Until when in ns each receiver is busy with an acknowledgement."""
@@ -117,7 +119,8 @@ class Ieee802154:
         self._record(EventKind.AIR, packet, sender, receiver, size_bytes, duration_ns=duration_ns)
         transmission = self._medium.start(sender, duration_ns, receiver, size_bytes, "oqpsk")
         yield self._env.timeout(duration_ns)
-        cause = self._medium.finish(transmission)
+        lost = self._lost(sender, receiver)
+        cause = self._medium.finish(transmission) or (Cause.LINK if lost else Cause.NONE)
         if not (self._up(sender) and self._up(receiver)):
             cause = Cause.NODE_DOWN
         if cause:

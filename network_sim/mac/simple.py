@@ -7,6 +7,7 @@ from typing import Any
 
 import simpy
 
+from network_sim.losses import LinkLosses
 from network_sim.mac.context import MacContext
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet
 
@@ -17,11 +18,12 @@ SERIAL_BITS = 10
 
 
 class OwnLink:
-    """Every sender has a link of its own; only packets of nodes that are down are lost."""
+    """Every sender has a link of its own, which loses what ``config.loss`` says and nothing else."""
 
     def __init__(self, context: MacContext) -> None:
         mac = context.config.mac
         self._context = context
+        self._lost = LinkLosses(context.config.loss, context.config.run.seed).lost
         self._byte_ns = (SERIAL_BITS if mac.kind == "serial" else IDEAL_BITS) * NS_PER_S / mac.link_bps
 
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
@@ -36,8 +38,10 @@ class OwnLink:
         record = self._context.recorder.add_packet
         record(start_ns, EventKind.AIR, packet, sender, receiver, size_bytes, duration_ns=duration_ns)
         yield env.timeout(duration_ns)
+        cause = Cause.LINK if self._lost(sender, receiver) else Cause.NONE
         if not (up(sender) and up(receiver)):
             cause = Cause.NODE_DOWN
+        if cause:
             record(end_ns, EventKind.LOSS, packet, sender, receiver, size_bytes, cause)
             return Delivery(False, cause, 1)
         record(end_ns, EventKind.DELIVER, packet, sender, receiver, size_bytes)

@@ -1,5 +1,6 @@
 """What a node sends of its images, in what form, and what is left of them at the sink (SPEC 6.5)."""
 
+from packetmesh.errors import InputError
 from pipeline.delivery.coding import Coding
 from pipeline.delivery.raw import Raw, raster, spread_rows, tile_after_tile
 from pipeline.delivery.tiled import Tiled
@@ -20,4 +21,17 @@ _ALL: tuple[Coding, ...] = (
 CODINGS: dict[str, Coding] = {coding.name: coding for coding in _ALL}
 """By name, as in ``--coding``."""
 
-__all__ = ["CODINGS", "Coding"]
+
+
+def coding_named(name: str) -> Coding:
+    """The coding of that name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if name not in CODINGS:
+        raise InputError(f"There is no coding '{name}'; try one of {', '.join(CODINGS)}")
+    return CODINGS[name]
+
+
+__all__ = ["CODINGS", "Coding", "coding_named"]

@@ -1,14 +1,20 @@
 """Configs say in one sentence what cannot be; layouts stand where they should."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from network_sim.config import NetworkConfig, NodesConfig
 from network_sim.places import FixedPlaces, place_nodes
+from network_sim.simulate import simulate
+from network_sim.types import EventKind
 from packetmesh.errors import InputError
-from packetmesh.settings import with_settings
+from packetmesh.settings import settings, with_settings
+from packetmesh.settings_help import describe
 
 
 @pytest.mark.parametrize(
@@ -81,3 +87,63 @@ def test_random_places_follow_their_stream():
 def test_distances_are_those_of_the_plane():
     places = FixedPlaces(np.array([[0.0, 0.0], [3.0, 4.0]]))
     assert places.distance_m(0, 1, 0) == places.distance_m(1, 0, 10**12) == 5.0
+
+
+def test_nodes_stand_where_they_are_put_and_the_sink_comes_last():
+    config = with_settings(NetworkConfig(), ["nodes.count=2", "nodes.places_m=1,2.5,-3,4,0.25,0"]).nodes
+    places = place_nodes(config, np.random.default_rng(0))
+    np.testing.assert_array_equal(places.positions_m, [[1.0, 2.5], [-3.0, 4.0], [0.25, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("changes", "names"),
+    [
+        (["nodes.places_m=0,0,1,1"], "nodes.places_m has 4 numbers; try 8"),
+        (["nodes.count=1", "nodes.places_m=0,0,1,1,2,2"], "nodes.count is 1"),
+        (["nodes.places_m=0,0,1,1,2,2,3,here"], "nodes.places_m=here is not a number"),
+        (["nodes.bytes_by_node=5,6"], "nodes.bytes_by_node has 2 numbers; try 3"),
+        (["nodes.bytes_by_node=5,0,6"], "nodes.bytes_by_node is 0"),
+        (["nodes.bytes_by_node=5,1.5,6"], "nodes.bytes_by_node=1.5 is not a number"),
+    ],
+)
+def test_places_and_sizes_agree_with_the_number_of_nodes(changes, names):
+    with pytest.raises(InputError) as error:
+        with_settings(NetworkConfig(), changes)
+    assert names in str(error.value)
+
+
+def test_no_place_is_nan():
+    with pytest.raises(InputError, match=r"nodes\.places_m holds"):
+        NodesConfig(count=1, places_m=(0.0, 0.0, 1.0, math.nan))
+
+
+@given(
+    places_m=st.lists(st.floats(-1e6, 1e6), min_size=4, max_size=12).filter(lambda xy: len(xy) % 2 == 0),
+    data=st.data(),
+)
+def test_places_and_sizes_survive_as_text(places_m, data):
+    count = len(places_m) // 2 - 1
+    sizes = data.draw(st.lists(st.integers(1, 10**9), min_size=count, max_size=count))
+    nodes = NodesConfig(count=count, places_m=tuple(places_m), bytes_by_node=tuple(sizes))
+    config = replace(NetworkConfig(), nodes=nodes)
+    text = settings(config)
+    again = with_settings(NetworkConfig(), [f"{key}={value}" for key, value in text.items()])
+    assert again == config
+    assert all(type(size) is int for size in again.nodes.bytes_by_node)
+    assert {row.key: row.value for row in describe(config)} == text
+
+
+def test_every_node_sends_its_own_bytes():
+    own = ["nodes.bytes_by_node=1000,117,116", "nodes.places_m=0,20,20,0,0,-20,0,0", "nodes.depth_bytes=9"]
+    trace = simulate(with_settings(NetworkConfig(), own))
+    for kind in (EventKind.CAPTURE, EventKind.ARRIVE):
+        events = trace.events.of(kind)
+        assert dict(zip(events.node.tolist(), events.size_bytes.tolist(), strict=True)) == {
+            0: 1000,
+            1: 117,
+            2: 116,
+        }
+    fragments = trace.events.of(EventKind.RECEIVE)
+    sums = np.bincount(fragments.node, fragments.size_bytes)
+    assert sums.tolist() == [1000.0, 117.0, 116.0]
+    np.testing.assert_array_equal(trace.positions_m, [[0, 20], [20, 0], [0, -20], [0, 0]])

@@ -36,6 +36,8 @@ PACKET_SIZE = 0.11
 ARC = 0.12
 """How high a packet rises over the length of its way."""
 LOSS_HEIGHT = 0.22
+ON_THE_WAY = (Cause.COLLISION, Cause.NOISE, Cause.RANGE, Cause.UPLINK, Cause.LINK)
+"""Causes of losses that are drawn where the frame went."""
 CIRCLE = np.linspace(0.0, 2.0 * np.pi, 73)
 STREET, RANGE, NODE_RANGE = (170, 176, 182), (0, 158, 115), (150, 170, 190)
 ELEVATION_RAD = np.radians(52.0)
@@ -265,7 +267,7 @@ class Flights:
         """
         failures = self.failures
         rows = _since(failures, now_ns - shown_ns, now_ns)
-        sent = np.isin(failures.cause[rows], (Cause.COLLISION, Cause.NOISE, Cause.RANGE, Cause.UPLINK))
+        sent = np.isin(failures.cause[rows], ON_THE_WAY)
         sent &= (failures.peer[rows] >= 0) & (failures.what[rows] == What.LOSS)
         where = np.where(sent, failures.peer[rows], failures.node[rows])
         places = at[np.unique(where)] + (0.0, 0.0, LOSS_HEIGHT)

@@ -35,7 +35,7 @@ INSTANTS = {
     EventKind.DROP: What.DROP,
     EventKind.EXPIRE: What.EXPIRE,
 }
-NOT_HEARD = (Cause.COLLISION, Cause.NOISE, Cause.RANGE, Cause.NODE_DOWN, Cause.UPLINK)
+NOT_HEARD = (Cause.COLLISION, Cause.NOISE, Cause.RANGE, Cause.NODE_DOWN, Cause.UPLINK, Cause.LINK)
 """Causes for which a frame did not reach its receiver."""
 
 

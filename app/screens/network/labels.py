@@ -153,6 +153,7 @@ CAUSES: Mapping[Cause, str] = MappingProxyType(
         Cause.NO_ROUTE: "no route",
         Cause.UPLINK: "lost on the uplink",
         Cause.ACK_LOST: "acknowledgement lost",
+        Cause.LINK: "lost on the link",
     }
 )
 

@@ -1,0 +1,32 @@
+"""Checks of a config's values: each refuses what cannot be in one sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sized
+
+from packetmesh.errors import InputError
+
+
+def at_least(key: str, value: float | None, least: float) -> None:
+    """Refuses a value below ``least``, and what is no number."""
+    if value is not None and not least <= value < math.inf:
+        raise InputError(f"{key} is {value}; try at least {least}")
+
+
+def above(key: str, value: float | None, bound: float) -> None:
+    """Refuses a value that is not above ``bound``, and what is no number."""
+    if value is not None and not bound < value < math.inf:
+        raise InputError(f"{key} is {value}; try a value above {bound}")
+
+
+def share(key: str, value: float, least: float = 0.0) -> None:
+    """Refuses what is no share."""
+    if not least <= value <= 1.0:
+        raise InputError(f"{key} is {value}; try a share between {least} and 1")
+
+
+def one_each(key: str, values: Sized, wanted: int, what: str) -> None:
+    """Refuses values that are neither none nor as many as wanted; ``what`` says which these are."""
+    if len(values) not in (0, wanted):
+        raise InputError(f"{key} has {len(values)} numbers; try {wanted}: {what}")
