@@ -14,13 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import simpy
 
-<<<<<<< HEAD
-from network_sim.mac.context import MacContext, random_below
-=======
 from network_sim.losses import LinkLosses
-from network_sim.mac.context import MacContext
-from network_sim.mac.random_blocks import random_below
->>>>>>> netloss
+from network_sim.mac.context import MacContext, random_below
 from network_sim.types import Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:
