@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -115,6 +115,8 @@ def prepare_node(
     alignment = _aligned(frame, inferred, depth)
     judged = judge(alignment, frame.depth, frame.rgb, depth.reach, depth.least_confidence)
     believed = _guesses(frame, judged.depth if mode == "fill" else alignment.depth)
+    if not believed.valid.any():
+        return _measured_only(frame, sensor, filtered, inferred, alignment, judged)
     cloud = back_project(frame, believed, PointSource.INFERRED)
     result = None
     if registration is not None:
@@ -133,13 +135,27 @@ def prepare_node(
     )
 
 
+def _measured_only(
+    frame: RgbdFrame,
+    sensor: PointCloud,
+    filtered: FilterResult,
+    inferred: InferredDepth,
+    alignment: AlignmentResult,
+    judged: JudgedDepth,
+) -> NodeClouds:
+    """A node to whose sensor cloud there is nothing to add."""
+    labelled = replace(sensor, source=np.full(len(sensor), PointSource.SENSOR, np.uint8))
+    nothing = labelled.select(np.zeros(len(sensor), bool))
+    return NodeClouds(frame.name, sensor, filtered, inferred, alignment, judged, nothing, None, labelled)
+
+
 def _aligned(frame: RgbdFrame, inferred: InferredDepth, config: DepthConfig) -> AlignmentResult:
     """Inferred depth made metric; none where nothing could be inferred.
 
     Coarse depth guides the alignment as measured depth does.
     """
     if inferred.provider == "none":
-        return AlignmentResult(inferred.depth, config.alignment, {}, float("nan"), 0.0)
+        return AlignmentResult(DepthMap(inferred.depth.z_m), config.alignment, {}, float("nan"), 0.0)
     guide = frame.depth
     if frame.coarse is not None:
         guide = DepthMap(np.where(guide.valid, guide.z_m, frame.coarse.z_m))

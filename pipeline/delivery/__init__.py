@@ -22,7 +22,6 @@ CODINGS: dict[str, Coding] = {coding.name: coding for coding in _ALL}
 """By name, as in ``--coding``."""
 
 
-
 def coding_named(name: str) -> Coding:
     """The coding of that name.
 

@@ -69,7 +69,9 @@ class Coding(Protocol):
         """
         ...
 
-    def decode(self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int) -> Received:
+    def decode(
+        self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int
+    ) -> Received:
         """What can be read of a frame of which some packets are missing.
 
         Args:
