@@ -9,7 +9,8 @@ from typing import Any
 
 from packetmesh.files import atomic_path, write_json
 from packetmesh.settings import settings
-from pipeline.deliver import Delivery, Moment, NodeArrival
+from pipeline.deliver import Delivery
+from pipeline.delivery.moments import Moment, NodeArrival
 from pipeline.run_folder import config_of, metrics_of, surface_metrics, write_run_folder
 
 

@@ -124,7 +124,7 @@ def _decode(stream: ByteArray, values: NDArray[np.uint16]) -> tuple[int, int]:
             return (index if zeros == -1 else _BROKEN), nibbles
         index += zeros
         others, nibbles = _get(stream, nibbles, _RUN_BITS)
-        if others > values.size - index or others == 0 and index < values.size:
+        if others > values.size - index or (others == 0 and index < values.size):
             return _BROKEN, nibbles
         if others < 0:
             return (index if others == -1 else _BROKEN), nibbles

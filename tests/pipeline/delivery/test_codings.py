@@ -98,8 +98,6 @@ def test_names_are_keys_and_titles_differ():
 
 
 def test_a_list_of_codings_needs_no_large_library():
-    code = (
-        "import sys; import pipeline.delivery; print([m for m in ('cv2', 'numba', 'scipy') if m in sys.modules])"
-    )
+    code = "import sys; import pipeline.delivery; print([m for m in ('cv2', 'numba', 'scipy') if m in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
