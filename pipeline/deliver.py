@@ -40,7 +40,8 @@ def deliver(spec: DeliverySpec, processes: int = 1) -> Delivery:
     >>> import packetmesh as pm
     >>> rig = pm.Rig("one node", pm.load_demo("office").frames[:1])
     >>> config = pm.with_settings(pm.PRESETS["packetmesh"], ["surface.max_points=3000"])
-    >>> result = pm.deliver(pm.DeliverySpec(pm.Spec(pm.LoadedRig(rig), config=config), coding="jpeg", moments=2))
+    >>> spec = pm.Spec(pm.LoadedRig(rig), config=config)
+    >>> result = pm.deliver(pm.DeliverySpec(spec, coding="jpeg", moments=2))
     >>> [moment.surface is None for moment in result.moments]
     [False, False]
     """

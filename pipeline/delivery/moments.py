@@ -70,7 +70,7 @@ NOTHING: Rebuilt = None, None, {}
 
 
 class Rebuilder:
-    """Rebuilds the moments of one delivery, best by time: what has not changed since the last is not redone."""
+    """Rebuilds moments of one delivery, best by time: what has not changed since the last is kept."""
 
     def __init__(self, sending: Sending) -> None:
         self.sending = sending
@@ -150,7 +150,7 @@ def whole_placement(rig: Rig, present: Sequence[int], placement: Placement) -> P
     believed = [frame.T_world_camera for frame in rig.frames]
     reference = believed if rig.truth is None else rig.truth.T_world_camera
     T_here_reference = placement.T_world_camera[0] @ geometry.inverse(reference[present[0]])
-    poses = [T_here_reference @ pose for pose in reference]
+    poses: list[FloatArray] = [T_here_reference @ pose for pose in reference]
     for index, pose in zip(present, placement.T_world_camera, strict=True):
         poses[index] = pose
     return Placement(placement.registrations, tuple(poses))
