@@ -10,11 +10,15 @@ import numpy as np
 import simpy
 
 from network_sim.config import NetworkConfig
-from network_sim.types import Packet
+from network_sim.types import Delivery, Packet
 
 if TYPE_CHECKING:
     from network_sim.mac.medium import Medium
     from network_sim.trace import Recorder
+
+
+def ignore(packet: Packet, sender: int, receiver: int, delivery: Delivery) -> None:
+    """For senders that never ask what became of a packet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,3 +39,5 @@ class MacContext:
     """Whether a node is awake."""
     receive: Callable[[Packet, int], None]
     """Gets each packet once per ``send`` at most, and the node that it has reached."""
+    report: Callable[[Packet, int, int, Delivery], None] = ignore
+    """Gets each packet that was under way when ``send`` ended, its sender, its receiver, and the outcome."""
