@@ -99,17 +99,17 @@ def until(trace: NetworkTrace, t_ns: ArrayLike) -> Spent:
     Raises:
         InputError: the run kept no log of its packets.
     """
-    log, moments = _log(trace), np.clip(np.ravel(t_ns), 0, trace.horizon_ns)
+    log, moments = _log(trace), np.clip(np.ravel(np.asarray(t_ns, np.int64)), 0, trace.horizon_ns)
     frames, lost = log.of(EventKind.AIR), log.of(EventKind.LOSS)
     sent_bytes = np.append(0, np.cumsum(frames.size_bytes, dtype=np.int64))
     spent = energy.joules(_radio_times(trace, log, moments), trace.config.energy)
-    columns = (
-        sent_bytes[np.searchsorted(frames.t_ns, moments, side="right")],
-        np.searchsorted(lost.t_ns, moments, side="right"),
-        spent.radio_j,
-        spent.platform_j + spent.platform_sleep_j,
+    shape = np.shape(t_ns)
+    return Spent(
+        sent_bytes=sent_bytes[np.searchsorted(frames.t_ns, moments, side="right")].reshape(shape)[()],
+        lost=np.searchsorted(lost.t_ns, moments, side="right").reshape(shape)[()],
+        radio_j=spent.radio_j.reshape(shape)[()],
+        platform_j=(spent.platform_j + spent.platform_sleep_j).reshape(shape)[()],
     )
-    return Spent(*(column.reshape(np.shape(t_ns))[()] for column in columns))
 
 
 def _log(trace: NetworkTrace) -> Events:
