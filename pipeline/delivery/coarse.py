@@ -76,7 +76,9 @@ def _blended(grid: NDArray[np.float32], shape: tuple[int, int]) -> DepthArray:
     for rows, row_weight in ((top, 1 - down), (bottom, down)):
         for columns, column_weight in ((left, 1 - across), (right, across)):
             corner = grid[np.ix_(rows, columns)]
-            weight = np.where(np.abs(corner - own) <= SAME_SURFACE * own, np.outer(row_weight, column_weight), 0)
+            weight = np.where(
+                np.abs(corner - own) <= SAME_SURFACE * own, np.outer(row_weight, column_weight), 0
+            )
             total += weight * corner
             weights += weight
     return np.rint(np.divide(total, weights, out=np.zeros_like(total), where=weights > 0)).astype(np.uint16)

@@ -34,7 +34,7 @@ class Received:
     depth: DepthArray
     """(H, W) as ``Images.depth``, 0 where nothing is known or was measured."""
     coarse: DepthArray
-    """(H, W) depth known from a base layer only, 0 wherever ``depth`` has arrived: a guess, no measurement."""
+    """(H, W) depth known from a base layer only, 0 where the image itself arrived: a guess, not measured."""
 
     @staticmethod
     def nothing(shape: tuple[int, int]) -> Received:
@@ -69,7 +69,9 @@ class Coding(Protocol):
         """
         ...
 
-    def decode(self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int) -> Received:
+    def decode(
+        self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int
+    ) -> Received:
         """What can be read of a frame of which some packets are missing.
 
         Args:
