@@ -71,7 +71,7 @@ def iterate_delivery(spec: DeliverySpec, processes: int = 1) -> Generator[Moment
 
 def _moments(sending: Sending, processes: int) -> Iterator[Moment]:
     here = Rebuilder(sending)
-    first, *others = sending.times_ns.tolist()
+    first, *others = range(len(sending.times_ns))
     yield here.moment(first)
     if processes < 2 or len(others) < 2:
         yield from map(here.moment, others)
@@ -92,8 +92,8 @@ def _start(sending: Sending) -> None:
     _there = Rebuilder(sending)
 
 
-def _moment_there(t_ns: int) -> Moment:
-    return _there.moment(t_ns)
+def _moment_there(index: int) -> Moment:
+    return _there.moment(index)
 
 
 def _last(sending: Sending, lossless: Reconstruction) -> Reconstruction | None:

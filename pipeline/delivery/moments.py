@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from network_sim.arrivals import until
 from network_sim.types import to_s
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain
@@ -77,18 +76,18 @@ class Rebuilder:
         self._memory = Memory(sending.spec.spec.config.fusion.align_nodes_with == "sensor")
         self._rebuilt = NOTHING
 
-    def moment(self, t_ns: int) -> Moment:
-        """What there is at a time in nanoseconds."""
-        received = received_at(self.sending, t_ns)
+    def moment(self, index: int) -> Moment:
+        """What there is at one of ``sending.times_ns``."""
+        received = received_at(self.sending, int(self.sending.times_ns[index]))
         frames = frames_at_sink(self.sending, received)
         if self._memory.look_at([frame for frame in frames if heard(frame)]):
             self._rebuilt = _rebuilt(self.sending, frames, self._memory)
-        return _moment(self.sending, t_ns, received, self._rebuilt)
+        return _moment(self.sending, index, received, self._rebuilt)
 
 
-def _moment(sending: Sending, t_ns: int, received: Sequence[Received], rebuilt: Rebuilt) -> Moment:
-    there, (surface, truth, poses) = arrived_bytes(sending, t_ns), rebuilt
-    spent = until(sending.trace, t_ns)
+def _moment(sending: Sending, index: int, received: Sequence[Received], rebuilt: Rebuilt) -> Moment:
+    t_ns, (surface, truth, poses) = int(sending.times_ns[index]), rebuilt
+    there, spent = arrived_bytes(sending, t_ns), sending.spent
     nodes = tuple(
         _arrival(frame, stream, bytes_there, one)
         for frame, stream, bytes_there, one in zip(
@@ -97,11 +96,11 @@ def _moment(sending: Sending, t_ns: int, received: Sequence[Received], rebuilt: 
     )
     return Moment(
         t_s=to_s(t_ns),
-        sent_bytes=spent.sent_bytes,
+        sent_bytes=int(spent.sent_bytes[index]),
         delivered_bytes=sum(node.delivered_bytes for node in nodes),
-        packets_lost=spent.lost,
-        radio_j=spent.radio_j,
-        energy_j=spent.radio_j + spent.platform_j,
+        packets_lost=int(spent.lost[index]),
+        radio_j=float(spent.radio_j[index]),
+        energy_j=float(spent.radio_j[index] + spent.platform_j[index]),
         nodes=nodes,
         T_world_camera=poses,
         surface=surface,

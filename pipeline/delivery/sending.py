@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from network_sim.arrivals import Arrivals, arrivals
+from network_sim.arrivals import Arrivals, Spent, arrivals, until
 from network_sim.config import PRESETS, NetworkConfig
 from network_sim.simulate import simulate
 from network_sim.trace import NetworkTrace
@@ -47,6 +47,8 @@ class Sending:
     arrivals: Arrivals
     times_ns: NDArray[np.int64]
     """(M,) of the moments."""
+    spent: Spent
+    """(M,) until each of them."""
 
     @property
     def packet_bytes(self) -> int:
@@ -66,7 +68,8 @@ def send(spec: DeliverySpec) -> Sending:
     trace = simulate(network_of(rig, [len(data) for data in encoded], spec.network))
     streams = tuple(np.frombuffer(data, np.uint8) for data in encoded)
     came = arrivals(trace)
-    return Sending(spec, rig, coding, streams, trace, came, moment_times_ns(came, trace, spec.moments))
+    times_ns = moment_times_ns(came, trace, spec.moments)
+    return Sending(spec, rig, coding, streams, trace, came, times_ns, until(trace, times_ns))
 
 
 def packet_bytes_of(network: NetworkConfig) -> int:
