@@ -158,4 +158,5 @@ def _zigzag(steps: IntArray) -> IntArray:
 def _planes(columns: IntArray, kind: str) -> ByteArray:
     """The bytes of (N, 3) numbers, plane by plane."""
     numbers = np.ascontiguousarray(columns.T).astype(kind)
-    return np.ascontiguousarray(np.moveaxis(numbers.view(np.uint8).reshape(3, len(columns), -1), 2, 1))
+    bytes_ = numbers.view(np.uint8).reshape(3, len(columns), numbers.itemsize)
+    return np.ascontiguousarray(np.moveaxis(bytes_, 2, 1))
