@@ -18,7 +18,7 @@ from pipeline.delivery.moments import Moment
 from pipeline.delivery.sending import Sending, received_at
 
 RECEIVED = "received"
-PAGE, ANIMATION = "delivery.html", "delivery.webp"
+PAGE, ANIMATION = "delivery.html", "delivery.gif"
 
 
 def write_hand_out(delivery: Delivery, folder: Path) -> Path:
@@ -63,9 +63,7 @@ def _moment(sending: Sending, index: int, moment: Moment) -> HandOutMoment:
         packets_lost=moment.packets_lost,
         energy_j=moment.energy_j,
         surface=moment.surface,
-        thumbnails=tuple(
-            thumbnail(one.rgb, one.rgb_known) if one.rgb_known.any() else b"" for one in received
-        ),
+        thumbnails=tuple(thumbnail(one.rgb, one.rgb_known) for one in received),
         f_score=None if moment.truth is None else moment.truth["f_score_5cm"],
         no_hit_share=None if moment.surface is None else moment.surface.quality.no_hit_ray_share,
     )
