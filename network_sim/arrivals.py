@@ -60,9 +60,8 @@ def arrivals(trace: NetworkTrace, at: Place = "sink") -> Arrivals:
         InputError: the run kept no log of its packets, or has no such place.
 
     >>> import packetmesh as pm
-    >>> from network_sim.arrivals import arrivals
     >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
-    >>> came = arrivals(pm.simulate(config))
+    >>> came = pm.arrivals(pm.simulate(config))
     >>> len(came), int(came.byte_count.sum())
     (54, 6000)
     """

@@ -13,13 +13,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from network_sim.config import PRESETS as NETWORKS
+from network_sim.config import NetworkConfig
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain
+from pipeline.config import PRESETS, PipelineConfig
 from pipeline.delivery.moments import Moment, Rebuilder, spec_of
 from pipeline.delivery.sending import DeliverySpec, Sending, frames_at_sink, received_at, send
 from pipeline.delivery.sink import heard
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.types import RgbdFrame
+from pipeline.sources import LoadedRig
+from pipeline.spec import Spec
+from pipeline.types import RgbdFrame, Rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,25 +39,45 @@ class Delivery:
     """Of the images as they were taken."""
 
 
-def deliver(spec: DeliverySpec, processes: int = 1) -> Delivery:
-    """The fold of ``iterate_delivery``.
+def deliver(
+    rig: Rig,
+    network: NetworkConfig = NETWORKS["office"],
+    coding: str = "raw",
+    moments: int = 40,
+    config: PipelineConfig = PRESETS["packetmesh"],
+) -> Delivery:
+    """Send a rig's images through a network and rebuild the scene from what has arrived at each moment.
+
+    Args:
+        rig: one to six camera nodes with colour and depth images, intrinsics and believed poses.
+        network: any that collects images from nodes that stand still.
+        coding: how images become bytes: a name of ``pipeline.delivery.CODINGS``.
+        moments: how often, after equal shares of the bytes that ever arrive, the scene is rebuilt.
+        config: settings of the reconstruction.
+
+    Returns:
+        The moments by time, with surfaces in metres, times in seconds and energies in joules.
+
+    Raises:
+        InputError: the rig, the network or the coding cannot be used; the message says why.
 
     >>> import packetmesh as pm
     >>> rig = pm.Rig("one node", pm.load_demo("office").frames[:1])
     >>> config = pm.with_settings(pm.PRESETS["packetmesh"], ["surface.max_points=3000"])
-    >>> spec = pm.Spec(pm.LoadedRig(rig), config=config)
-    >>> result = pm.deliver(pm.DeliverySpec(spec, coding="jpeg", moments=2))
-    >>> [moment.surface is None for moment in result.moments]
-    [False, False]
+    >>> result = pm.deliver(rig, coding="jpeg", moments=2, config=config)
+    >>> [moment.surface is not None for moment in result.moments]
+    [False, True]
     """
-    return drain(iterate_delivery(spec, processes))
+    return drain(
+        iterate_delivery(DeliverySpec(Spec(LoadedRig(rig), config=config), network, coding, moments))
+    )
 
 
 def iterate_delivery(spec: DeliverySpec, processes: int = 1) -> Generator[Moment, None, Delivery]:
-    """Send a rig's images and rebuild the scene from what has arrived at each moment.
+    """The same for any source, moment by moment.
 
     Args:
-        spec: the rig, the network, the coding, and how many moments.
+        spec: the source, the network, the coding, and how many moments.
         processes: how many rebuild moments at the same time; the results are the same.
 
     Yields:

@@ -53,7 +53,7 @@ def test_lost_depth_is_a_hole_and_lost_colour_is_remembered_as_lost():
     assert np.array_equal(there.rgb[part.rgb_known], FRAME.rgb[part.rgb_known])
 
 
-def test_a_node_is_heard_once_a_hundredth_of_its_depth_is_there():
+def test_a_node_is_heard_once_a_fiftieth_of_its_depth_is_there():
     assert not heard(frame_at_sink(FRAME, received(depth=0.0)))
     assert heard(frame_at_sink(FRAME, received(depth=0.1)))
 
