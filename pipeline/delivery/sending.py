@@ -12,6 +12,7 @@ from network_sim.arrivals import Arrivals, Spent, arrivals, until
 from network_sim.config import PRESETS, NetworkConfig
 from network_sim.simulate import simulate
 from network_sim.trace import NetworkTrace
+from packetmesh.errors import InputError
 from pipeline.delivery import coding_named
 from pipeline.delivery.coding import Coding, Received
 from pipeline.delivery.plan import network_of
@@ -32,6 +33,10 @@ class DeliverySpec:
     coding: str = "raw"
     """A name of ``pipeline.delivery.CODINGS``."""
     moments: int = MOMENTS
+
+    def __post_init__(self) -> None:
+        if self.moments < 1:
+            raise InputError(f"{self.moments} moments show nothing; try at least 1")
 
 
 @dataclass(frozen=True, slots=True)
