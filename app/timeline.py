@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -88,7 +88,7 @@ class FramesLane:
 
     title = "Frames"
     grows = False
-    legend = (("frames on the air", TARGET), ("lost; where many, the redder the larger their share", LOSS))
+    legend = (("frames on the air", TARGET), ("lost; from afar, the share lost", LOSS))
 
     def __init__(
         self, levels: Levels, names: Sequence[str], about: Callable[[int], str], causes: Sequence[str]
@@ -116,15 +116,15 @@ class FramesLane:
         taken, lost = (np.clip(ns / pixel_ns, 0.0, 1.0) for ns in (counts.taken_ns, counts.lost_ns))
         frames = _around(counts.frames)
         many = frames * NEAR_PX > 1.0
+        share = FAINTEST + (1.0 - FAINTEST) * _around(taken)
         rate = np.clip(_around(counts.lost) / np.maximum(frames, 1e-6), 0.0, 1.0)
         cells = np.empty((len(self._names), self._row_px, width, 3), np.float32)
         cells[0::2], cells[1::2] = PAPER, STRIPE
         body = cells[:, : self._row_px - self._gap_px]
         _blend(body, np.where(many, 0.0, _one_by_one(counts.frames, taken)), TARGET)
         _blend(body, np.where(many, 0.0, _one_by_one(counts.lost, lost)), LOSS)
-        many &= (counts.frames > 0) | (taken > 0.0)
         strip = max(1, round(0.3 * self._row_px))
-        _blend(body[:, :-strip], np.where(many, FAINTEST + (1.0 - FAINTEST) * taken, 0.0), TARGET)
+        _blend(body[:, :-strip], np.where(many, share, 0.0), TARGET)
         _blend(body[:, -strip:], np.where(many, np.sqrt(rate), 0.0), LOSS)
         picture[:] = cells.reshape(self.height_px, width, 3)
 
@@ -187,7 +187,7 @@ class FramesLane:
         return int(levels.start_ns[at]), int(levels.end_ns[at]), *edges
 
 
-def _around(counts: NDArray[np.int64]) -> FloatArray:
+def _around(counts: NDArray[Any]) -> FloatArray:
     """(R, W) mean over the pixels around each."""
     return cv2.blur(counts.astype(np.float32), (AROUND_PX, 1), borderType=cv2.BORDER_REPLICATE)
 
