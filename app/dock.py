@@ -37,13 +37,10 @@ WIDTH_PX = (200, 2400)
 """Of a picture, at least and at most."""
 LEAST_SPAN_NS = 1000
 """Of a window."""
-MARK = """<span class="packetmesh-dock" data-dock="{name}"></span>
-<style>[data-floating-window]:has(.packetmesh-dock) {{ display: none !important; }}</style>"""
-"""By which the page finds the panel."""
 PAGES = 50
 """As many pages are known apart."""
 
-_SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
+_SCRIPT, _STYLE = (Path(__file__).with_suffix(end).read_text(encoding="utf-8") for end in (".js", ".css"))
 
 
 class Dock:
@@ -80,7 +77,8 @@ class Dock:
         panel.float(x=0, y=0)
         panel.expand()
         with panel.add_tab("Dock"):
-            ui.gui.add_html(MARK.format(name=self._name) + running(_SCRIPT))
+            mark = f'<span class="packetmesh-dock" data-dock="{self._name}"></span>'
+            ui.gui.add_html(f"{mark}<style>{_STYLE}</style>{running(_SCRIPT)}")
             self._field = ui.when_changed(ui.gui.add_text("Dock", ""), self._hear)
             self._setup, self._picture, self._state = (ui.gui.add_html("") for _ in range(3))
         self._ticker = Ticker(lambda: ui.post(self._tick), PICTURE_S)
@@ -287,7 +285,14 @@ class Dock:
             encoded = cv2.imencode(".png", picture[..., ::-1], (cv2.IMWRITE_PNG_COMPRESSION, 1))[1]
             pictures.append(f"data:image/png;base64,{base64.b64encode(encoded).decode()}")
             words.append([astuple(word) for word in lane.words(*self._window_ns, self._width_px)])
-        self._tell(self._picture, kind="picture", window=self._window_ns, pictures=pictures, words=words)
+        self._tell(
+            self._picture,
+            kind="picture",
+            window=self._window_ns,
+            pictures=pictures,
+            words=words,
+            heard=self._heard,
+        )
 
 
 def _looks(lane: Lane) -> dict[str, Any]:
