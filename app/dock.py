@@ -1,9 +1,9 @@
 """The dock at the lower edge of the window: one clock, its buttons, and a timeline of anything in lanes.
 
-The page's side is ``dock.js``. What the page is to know is in three hidden pieces of HTML, each of which says
-all of its part, so that a page that comes later knows as much. What a hand does there comes back through a
-hidden text field, as the list of all that the server has not yet said to have heard: of many changes within
-50 ms viser sends only the last.
+The page's side is ``dock.js``, and ``dock_view.js`` for what it looks like. What the page is to know is in
+three hidden pieces of HTML, each of which says all of its part, so that a page that comes later knows as much.
+What a hand does there comes back through a hidden text field, as the list of all that the server has not yet
+said to have heard: of many changes within 50 ms viser sends only the last.
 """
 
 from __future__ import annotations
@@ -40,7 +40,10 @@ LEAST_SPAN_NS = 1000
 PAGES = 50
 """As many pages are known apart."""
 
-_SCRIPT, _STYLE = (Path(__file__).with_suffix(end).read_text(encoding="utf-8") for end in (".js", ".css"))
+_VIEW, _SCRIPT, _STYLE = (
+    Path(__file__).with_name(name).read_text(encoding="utf-8")
+    for name in ("dock_view.js", "dock.js", "dock.css")
+)
 
 
 class Dock:
@@ -78,7 +81,7 @@ class Dock:
         panel.expand()
         with panel.add_tab("Dock"):
             mark = f'<span class="packetmesh-dock" data-dock="{self._name}"></span>'
-            ui.gui.add_html(f"{mark}<style>{_STYLE}</style>{running(_SCRIPT)}")
+            ui.gui.add_html(f"{mark}<style>{_STYLE}</style>{running(_VIEW + _SCRIPT)}")
             self._field = ui.when_changed(ui.gui.add_text("Dock", ""), self._hear)
             self._setup, self._picture, self._state = (ui.gui.add_html("") for _ in range(3))
         self._ticker = Ticker(lambda: ui.post(self._tick), PICTURE_S)

@@ -172,7 +172,7 @@ class FramesLane:
         if end - begin < 3:
             return self._about(item)
         by_cause = np.bincount(self._levels.cause[begin:end], minlength=1).tolist()
-        why = ", ".join(f"{n:,} {self._causes[cause]}" for cause, n in enumerate(by_cause) if cause and n)
+        why = ", ".join(f"{self._causes[cause]} {n:,}" for cause, n in enumerate(by_cause) if cause and n)
         lost = f"{end - begin - by_cause[0]:,} of them lost ({why})" if why else "none of them lost"
         return f"{self._names[row]}: {end - begin:,} frames within a few pixels, {lost}"
 
