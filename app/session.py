@@ -276,6 +276,7 @@ class Session:
 
     def show(self, title: str) -> None:
         """Make a step the current one."""
+        self._current.on_hide()
         self._current = next(panel for panel in self._panels if panel.title == title)
         with self.target.atomic():
             for panel in self._panels:

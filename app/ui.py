@@ -134,6 +134,9 @@ class Panel(ABC):
     def on_show(self) -> None:
         """This became the current step."""
 
+    def on_hide(self) -> None:
+        """Another step becomes the current one."""
+
     def on_action(self, action: str) -> None:
         """A button for all steps was pressed."""
 

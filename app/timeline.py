@@ -1,0 +1,291 @@
+"""Lanes of a timeline: pictures of a window of simulated time, whose cost hardly grows with the events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.drawing.colors import LOSS, TARGET
+from app.levels import Levels, counts_of
+from pipeline.types import ByteArray, FloatArray
+
+Color = tuple[int, int, int]
+
+PAPER, STRIPE, RULE = (250, 251, 252), (241, 243, 246), (222, 226, 231)
+TEXT = (70, 78, 86)
+FAINTEST = 0.35
+"""Strength of a pixel of whose time hardly anything is taken."""
+NEAR_PX = 4.0
+"""Frames at least so far apart on average are shown one by one, others as rates."""
+AROUND_PX = 9
+"""Neighbouring pixels over which frames and losses are averaged, so that a rate can be read."""
+ROWS_PX, ROW_PX = 180, (3, 24)
+"""Height of all rows if they fit, and of the lowest and the highest row."""
+NAME_PX = 13
+"""Height of a row's name."""
+WORD_PX, WORDS = 56.0, 60
+"""Least width of a frame with a word in it, and how many are written at most."""
+BEFORE = 8
+"""Frames before a time among which one that is still on the air is looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A word beside a lane."""
+
+    y_px: float
+    """Its middle, from the lane's upper edge."""
+    text: str
+    color: Color = TEXT
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A word in a lane's picture, in the middle of a span of time."""
+
+    start_ns: int
+    end_ns: int
+    y_px: float
+    text: str
+
+
+class Lane(Protocol):
+    """What a dock shows below its buttons: one picture of any window of time, and what is in it."""
+
+    title: str
+    height_px: int
+    grows: bool
+    """Whether what lies after the clock is not known yet and shown faintly."""
+    legend: Sequence[tuple[str, Color]]
+    """What its colours mean."""
+
+    def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
+        """Paint (height, width, 3) RGB of the window."""
+
+    def labels(self, now_ns: int) -> Sequence[Label]:
+        """What stands to the left of the picture while the clock shows ``now_ns``."""
+
+    def words(self, start_ns: int, end_ns: int, width_px: int) -> Sequence[Word]:
+        """What is written into a picture of that width."""
+
+    def pick(self, t_ns: int, y_px: int, tolerance_ns: int) -> int:
+        """The nearest item, or -1."""
+
+    def tell(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
+        """One line about what is there; empty for nothing."""
+
+    def place(self, item: int) -> tuple[int, int, int, int]:
+        """Start and end in ns, upper and lower edge in px of an item."""
+
+
+class FramesLane:
+    """One row a node: its frames on the air; lost ones are red when near and a rate when far."""
+
+    title = "Frames"
+    grows = False
+    legend = (("frames on the air", TARGET), ("lost; from afar, the share lost", LOSS))
+
+    def __init__(
+        self, levels: Levels, names: Sequence[str], about: Callable[[int], str], causes: Sequence[str]
+    ) -> None:
+        """Show frames.
+
+        Args:
+            levels: of the frames.
+            names: of the rows, from the top.
+            about: one line about the frame with an index.
+            causes: why a frame was lost, in a word or two; the first stands for those that were not.
+        """
+        self._levels, self._names, self._about = levels, tuple(names), about
+        self._causes = tuple(causes)
+        least, most = ROW_PX
+        self._row_px = min(max(ROWS_PX // max(len(names), 1), least), most)
+        self._gap_px = 1 if self._row_px > 4 else 0
+        self.height_px = self._row_px * len(names)
+
+    def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
+        """Paint the frames of the window."""
+        width = picture.shape[1]
+        counts = counts_of(self._levels, start_ns, end_ns, width)
+        pixel_ns = (end_ns - start_ns) / width
+        taken, lost = (ns.astype(np.float32) / pixel_ns for ns in (counts.taken_ns, counts.lost_ns))
+        frames = _around(counts.frames)
+        many = frames * NEAR_PX > 1.0
+        share = FAINTEST + (1.0 - FAINTEST) * np.minimum(_around(taken), 1.0)
+        rate = np.clip(_around(counts.lost) / np.maximum(frames, 1e-6), 0.0, 1.0)
+        every, red = _one_by_one(counts.frames, taken), _one_by_one(counts.lost, lost)
+        strip_px = max(1, round(0.3 * self._row_px))
+        rows = picture.reshape(len(self._names), self._row_px, width, 3)
+        rows[0::2], rows[1::2] = PAPER, STRIPE
+        body = rows[:, : self._row_px - self._gap_px]
+        _paint(body[:, :-strip_px], np.where(many, share, every), np.where(many, 0.0, red))
+        _paint(body[:, -strip_px:], np.where(many, 0.0, every), np.where(many, np.sqrt(rate), red))
+
+    def labels(self, now_ns: int) -> Sequence[Label]:
+        """The nodes' names, as many as there is room for."""
+        every = -(-NAME_PX // self._row_px)
+        rows = range(0, len(self._names), every)
+        return [Label((row + 0.5) * self._row_px, self._names[row]) for row in rows]
+
+    def words(self, start_ns: int, end_ns: int, width_px: int) -> Sequence[Word]:
+        """Why frames were lost, where there is room for it."""
+        if self._row_px < NAME_PX:
+            return []
+        levels, least_ns = self._levels, (end_ns - start_ns) * WORD_PX / width_px
+        words: list[Word] = []
+        for row in range(levels.rows):
+            begin, end = levels.near(row, start_ns, end_ns)
+            span = slice(max(begin - 1, levels.row(row)[0]), end)
+            starts, ends, cause = levels.start_ns[span], levels.end_ns[span], levels.cause[span]
+            seen_ns = np.minimum(ends, end_ns) - np.maximum(starts, start_ns)
+            y_px = (row + 0.5) * self._row_px
+            wide = np.flatnonzero((cause > 0) & (seen_ns >= least_ns))[:WORDS].tolist()
+            words += [Word(int(starts[i]), int(ends[i]), y_px, self._causes[cause[i]]) for i in wide]
+        return words[:WORDS]
+
+    def pick(self, t_ns: int, y_px: int, tolerance_ns: int) -> int:
+        """The frame at a place, or the nearest in its row."""
+        row, levels = y_px // self._row_px, self._levels
+        if not 0 <= row < levels.rows:
+            return -1
+        first, last = levels.row(row)
+        at = first + int(np.searchsorted(levels.start_ns[first:last], t_ns, side="right"))
+        some = slice(max(at - BEFORE, first), min(at + 1, last))
+        away_ns = np.maximum(np.maximum(levels.start_ns[some] - t_ns, t_ns - levels.end_ns[some]), 0)
+        if not len(away_ns) or away_ns.min() > tolerance_ns:
+            return -1
+        latest = len(away_ns) - 1 - int(np.argmin(away_ns[::-1]))
+        return int(levels.item[some][latest])
+
+    def tell(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
+        """About the one frame at a place, or how many there are and why some of them were lost."""
+        item = self.pick(t_ns, y_px, tolerance_ns)
+        if item < 0:
+            return ""
+        row = y_px // self._row_px
+        begin, end = self._levels.near(row, t_ns - tolerance_ns, t_ns + tolerance_ns)
+        if end - begin < 3:
+            return self._about(item)
+        by_cause = np.bincount(self._levels.cause[begin:end], minlength=1).tolist()
+        why = ", ".join(f"{self._causes[cause]} {n:,}" for cause, n in enumerate(by_cause) if cause and n)
+        lost = f"{end - begin - by_cause[0]:,} of them lost ({why})" if why else "none of them lost"
+        return f"{self._names[row]}: {end - begin:,} frames within a few pixels, {lost}"
+
+    def place(self, item: int) -> tuple[int, int, int, int]:
+        """Where a frame is."""
+        levels = self._levels
+        at = int(np.flatnonzero(levels.item == item)[0])
+        row = int(np.searchsorted(levels.row_at, at, side="right")) - 1
+        edges = row * self._row_px, (row + 1) * self._row_px - self._gap_px
+        return int(levels.start_ns[at]), int(levels.end_ns[at]), *edges
+
+
+def _around(counts: NDArray[Any]) -> FloatArray:
+    """(R, W) mean over the pixels around each."""
+    return cv2.blur(counts.astype(np.float32), (AROUND_PX, 1), borderType=cv2.BORDER_REPLICATE)
+
+
+def _one_by_one(begun: NDArray[np.int64], taken: FloatArray) -> FloatArray:
+    """(R, W) strength of frames, each at least a pixel wide, with a light edge where two touch."""
+    strength = np.where((begun > 0) | (taken > 0.0), np.clip(taken, 0.75, 1.0), np.float32(0.0))
+    touching = (begun[:, 1:] > 0) & (taken[:, :-1] > 0.5) & (taken[:, 1:] > 0.5)
+    strength[:, 1:][touching] = 0.5
+    return strength
+
+
+def _paint(rows: ByteArray, frames: FloatArray, lost: FloatArray) -> None:
+    """Lay frames, and above them lost ones, in (R, W) strengths over (R, H, W, 3) rows."""
+    for channel, (target, loss) in enumerate(zip(TARGET, LOSS, strict=True)):
+        color = rows[:, 0, :, channel].astype(np.float32)
+        color += frames * (target - color)
+        color += lost * (loss - color)
+        rows[..., channel] = color[:, None]
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A quantity that holds from each of its times to the next."""
+
+    name: str
+    unit: str
+    color: Color
+    t_ns: NDArray[np.int64]
+    """(T,) ascending."""
+    values: FloatArray
+    """(T,) NaN where there is none."""
+    low: float = 0.0
+    high: float = 1.0
+    """Values at the lower and upper edge of the lane."""
+
+    def at(self, t_ns: NDArray[np.int64]) -> FloatArray:
+        """The value at each time; NaN before the first."""
+        index = np.searchsorted(self.t_ns, t_ns, side="right")
+        return np.concatenate([[np.nan], self.values])[index]
+
+    def text(self, now_ns: int) -> str:
+        """Its name and value at a time."""
+        value = float(self.at(np.array(now_ns)))
+        if not np.isfinite(value):
+            return f"{self.name} –"
+        number = f"{value:.0f}" if self.unit == "%" else f"{value:.3g}"
+        return f"{self.name} {number} {self.unit}".rstrip()
+
+
+class CurvesLane:
+    """Curves, each on a scale of its own; beside them what they are at the clock."""
+
+    grows = True
+
+    def __init__(self, title: str, curves: Sequence[Curve], height_px: int = 60) -> None:
+        """Show curves in so many pixels."""
+        self.title, self.height_px, self._curves = title, height_px, tuple(curves)
+        self.legend = tuple((curve.name, curve.color) for curve in curves)
+
+    def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
+        """Paint the curves in the window."""
+        picture[:] = PAPER
+        picture[[0, self.height_px // 2, -1]] = RULE
+        pixels = 2 * np.arange(picture.shape[1], dtype=np.int64) + 1
+        middles_ns = start_ns + pixels * (end_ns - start_ns) // (2 * len(pixels))
+        for curve in self._curves:
+            share = (curve.at(middles_ns) - curve.low) / (curve.high - curve.low)
+            _draw_curve(picture, np.clip(share, 0.0, 1.0), curve.color)
+
+    def labels(self, now_ns: int) -> Sequence[Label]:
+        """Name and value of each curve."""
+        gap_px = self.height_px / (len(self._curves) + 1)
+        return [
+            Label((index + 1) * gap_px, curve.text(now_ns), curve.color)
+            for index, curve in enumerate(self._curves)
+        ]
+
+    def words(self, start_ns: int, end_ns: int, width_px: int) -> Sequence[Word]:
+        """None."""
+        return []
+
+    def pick(self, t_ns: int, y_px: int, tolerance_ns: int) -> int:
+        """Curves have no items."""
+        return -1
+
+    def tell(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
+        """The values at a time."""
+        return ", ".join(curve.text(t_ns) for curve in self._curves)
+
+    def place(self, item: int) -> tuple[int, int, int, int]:
+        """Curves have no items."""
+        raise IndexError(item)
+
+
+def _draw_curve(picture: ByteArray, share: FloatArray, color: Color) -> None:
+    """A line through (W,) shares of the height, with gaps where they are NaN."""
+    there = np.flatnonzero(np.isfinite(share))
+    for run in np.split(there, np.flatnonzero(np.diff(there) > 1) + 1):
+        if len(run):
+            y_px = 2.0 + (len(picture) - 5.0) * (1.0 - share[run])
+            points = (16.0 * np.stack([run, y_px], axis=1)).round().astype(np.int32)
+            cv2.polylines(picture, [points], False, color, 2, cv2.LINE_AA, shift=4)
