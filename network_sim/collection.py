@@ -19,7 +19,7 @@ from network_sim.places import FixedPlaces, place_nodes
 from network_sim.radio import Radio
 from network_sim.routing import link_success, shortest_paths
 from network_sim.sink import Sink
-from network_sim.types import BEGIN_WITHIN_NS, Cause, EventKind, Packet, to_ns
+from network_sim.types import BEGIN_WITHIN_NS, Cause, Delivery, EventKind, Packet, to_ns
 
 if TYPE_CHECKING:
     from network_sim.trace import Recorder
@@ -44,7 +44,7 @@ def _topology(
 
 def collection_names(config: NetworkConfig) -> tuple[str, ...]:
     """Names of the nodes, the sink and the cloud if there is one, in the order of their numbers."""
-    cloud = ("cloud",) if config.uplink.rate_bps is not None else ()
+    cloud = ("cloud",) if config.uplink.exists else ()
     return (*(f"node {node + 1}" for node in range(config.nodes.count)), "sink", *cloud)
 
 
@@ -72,7 +72,8 @@ class Collection:
         self._sink = Sink(self.shared, self.stations[-1], config.uplink, recorder, uplink_rng)
         medium = Medium(env, radio, self.places, medium_rng)
         up = self.shared.up.__getitem__
-        self.shared.mac = make_mac(MacContext(env, medium, config, recorder, mac_rng, up, self._receive))
+        context = MacContext(env, medium, config, recorder, mac_rng, up, self._receive, self._report)
+        self.shared.mac = make_mac(context)
         if config.nodes.failures_per_h:
             for camera, station in zip(self._cameras, self.stations, strict=False):
                 env.process(self._fail_and_recover(camera, station))
@@ -92,8 +93,8 @@ class Collection:
             ),
             routes=routes,
             unreachable=routes.unreachable,
-            destination=sink if self._config.uplink.rate_bps is None else sink + 1,
-            acknowledged=self._config.mac.ack or self._config.mac.kind != "ieee802154",
+            destination=sink + 1 if self._config.uplink.exists else sink,
+            acknowledged=self._config.mac.ack or self._config.mac.kind not in ("ieee802154", "replay"),
             failed=[False] * count,
             up=[True] * count,
         )
@@ -130,6 +131,9 @@ class Collection:
             self._cameras[receiver].on_status(packet.image, shared.requested.pop(packet.id))
         else:
             self.stations[receiver].put(packet)
+
+    def _report(self, packet: Packet, sender: int, receiver: int, delivery: Delivery) -> None:
+        self.stations[sender].report(packet, receiver, delivery)
 
     def _fail_and_recover(self, camera: Camera, station: Station) -> Generator[simpy.Event, Any, None]:
         """Random failures and recoveries of one node."""

@@ -11,7 +11,7 @@ from network_sim.losses import LossConfig
 from packetmesh.errors import InputError
 
 Propagation = Literal["friis", "two-ray", "log-distance"]
-MacKind = Literal["ieee80211b", "ieee802154", "ideal", "serial"]
+MacKind = Literal["ieee80211b", "ieee802154", "ideal", "serial", "replay"]
 Layout = Literal["star", "line", "grid", "random"]
 SchemeName = Literal["baseline", "greedy", "pdc", "pdc-received"]
 Keep = Literal["all", "images", "counters"]
@@ -71,17 +71,21 @@ class MacConfig:
     """Who may send when (SPEC 6.1, 6.3)."""
 
     kind: MacKind = "ieee802154"
-    """Unslotted IEEE 802.15.4, IEEE 802.11b DCF, a link of its own for every node (ideal), or a serial line
-    with ten bits a byte."""
+    """Unslotted IEEE 802.15.4, IEEE 802.11b DCF, a link of its own for every node (ideal), a serial line
+    with ten bits a byte, or a recorded link for every node (replay)."""
     rts: bool = False
     """Ask for the channel before every packet (RTS/CTS); only IEEE 802.11b can."""
     ack: bool = True
     """Acknowledge frames and send lost ones again; IEEE 802.11b always does."""
     link_bps: float = 250e3
     """Rate of the ideal link or the serial line."""
+    trace: str | None = None
+    """File of the recorded link: columns of time in s, rate in Mbit/s, round trip in ms, share lost."""
 
     def __post_init__(self) -> None:
         above("mac.link_bps", self.link_bps, 0.0)
+        if self.kind == "replay" and not self.trace:
+            raise InputError("mac.kind is replay, but of which recorded link? Try mac.trace=FILE")
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +169,13 @@ class UplinkConfig:
     """Time that a packet travels after it was sent."""
     loss: float = 0.0
     """Share of packets that get lost."""
+    trace: str | None = None
+    """File of a recorded link, as for the nodes, which replaces rate, latency and loss."""
+
+    @property
+    def exists(self) -> bool:
+        """Whether packets go on from the sink to the cloud."""
+        return self.rate_bps is not None or self.trace is not None
 
     def __post_init__(self) -> None:
         above("uplink.rate_bps", self.rate_bps, 0.0)
@@ -253,7 +264,7 @@ class StreetConfig:
 
 @dataclass(frozen=True, slots=True)
 class EnergyConfig:
-    """Power of each state: a CC2420 radio and a Raspberry Pi 4 (SPEC 6.3)."""
+    """Power of each state: by default a CC2420 radio and a Raspberry Pi 4 (SPEC 6.3)."""
 
     tx_w: float = 0.0522
     """Radio while it sends."""
@@ -318,6 +329,8 @@ class NetworkConfig:
 
     def __post_init__(self) -> None:
         if self.scenario == "street-grid":
+            if self.mac.kind == "replay":
+                raise InputError("mac.kind is replay, but vehicles have no link to record; try ieee80211b")
             key, size_bytes = "scheme.datagram_bytes", self.scheme.datagram_bytes + self.scheme.headers_bytes
         else:
             key, size_bytes = "nodes.payload_bytes", self.nodes.payload_bytes
@@ -326,11 +339,16 @@ class NetworkConfig:
             raise InputError(f"{key} makes packets of {size_bytes} bytes, but {self.mac.kind} carries {most}")
 
 
+WAVELAN = EnergyConfig(tx_w=1.346, rx_w=0.901, idle_w=0.739, sleep_w=0.0474)
+"""An IEEE 802.11b card, Lucent's WaveLAN "Silver" at 11 Mb/s: 284, 190, 156 and 10 mA at 4.74 V as measured
+by Feeney and Nilsson (INFOCOM 2001); from memory."""
+
 PRESETS: dict[str, NetworkConfig] = {
     "thesis-link": NetworkConfig(),
     "street-grid": NetworkConfig(
         scenario="street-grid",
         mac=MacConfig(kind="ieee80211b"),
+        energy=WAVELAN,
         run=RunConfig(horizon_s=18_000.0, warmup_s=1800.0, keep="images"),
     ),
     "greenhouse": NetworkConfig(
@@ -369,6 +387,7 @@ PRESETS: dict[str, NetworkConfig] = {
             deadline_s=10.0,
         ),
         uplink=UplinkConfig(rate_bps=10e6),
+        energy=WAVELAN,
         run=RunConfig(horizon_s=600.0),
     ),
 }

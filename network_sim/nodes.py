@@ -117,10 +117,25 @@ class Station:
                 continue
             hop = shared.next_hop(self.index, packet.destination)
             delivery = yield from shared.mac.send(packet, self.index, hop)
+            if delivery.under_way:
+                self._count_own(packet, -1)
+                continue
             self._finish_attempt(packet, hop, delivery)
             pause_ns = self._pause_ns(delivery)
             if pause_ns:
                 yield shared.env.timeout(pause_ns)
+
+    def report(self, packet: Packet, hop: int, delivery: Delivery) -> None:
+        """The outcome of a packet that was under way when its attempt ended."""
+        self._count_own(packet, 1)
+        self._finish_attempt(packet, hop, delivery)
+        self.wake()
+
+    def _count_own(self, packet: Packet, change: int) -> None:
+        """Packets that are under way take no room in the buffer."""
+        if self._is_own_fragment(packet):
+            assert self.camera is not None
+            self.camera.waiting += change
 
     def _finish_attempt(self, packet: Packet, hop: int, delivery: Delivery) -> None:
         """After an attempt to send: the packet has arrived, stays in the buffer, or is dropped."""
@@ -211,7 +226,8 @@ class Camera:
         self._shared = shared
         self._station = station
         self._open: dict[int, Outgoing] = {}
-        self._waiting = 0
+        self.waiting = 0
+        """Its fragments in the buffer, and the one that is being sent."""
         self._buffer_share = max(1, shared.config.buffer_packets // 2)
         station.camera = self
         shared.book.cameras += 1
@@ -222,19 +238,19 @@ class Camera:
         shared = self._shared
         for outgoing in self._open.values():
             while outgoing.to_send:
-                if self._waiting >= self._buffer_share or len(buffer) >= shared.config.buffer_packets:
+                if self.waiting >= self._buffer_share or len(buffer) >= shared.config.buffer_packets:
                     return
                 index = outgoing.to_send.popleft()
                 packet = shared.book.fragment(outgoing.image, index, self._station.index, shared.destination)
                 outgoing.queued.add(index)
-                self._waiting += 1
+                self.waiting += 1
                 shared.book.entered(packet, self._station.index)
                 buffer.append(packet)
 
     def on_sent(self, packet: Packet, ok: bool, confirmed: bool) -> None:
         """A fragment was sent: delivered as far as the node knows (``ok``), ``confirmed`` by the sink."""
         shared = self._shared
-        self._waiting -= 1
+        self.waiting -= 1
         outgoing = self._open.get(packet.image)
         if outgoing is None:
             return

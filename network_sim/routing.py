@@ -85,7 +85,7 @@ def link_success(config: NetworkConfig, radio: Radio, places: Places) -> NDArray
     """How likely an undisturbed data frame arrives over each link.
 
     Args:
-        config: Size and medium access of the packets. A serial line joins every two nodes.
+        config: Size and medium access of the packets. Serial lines and recorded links join every two nodes.
         radio: Powers, threshold and noise.
         places: Where the nodes are.
 
@@ -93,7 +93,7 @@ def link_success(config: NetworkConfig, radio: Radio, places: Places) -> NDArray
         (N, N) probabilities, the mean over fading; 0 where the mean power is below the receive threshold.
     """
     count = places.count
-    if config.mac.kind == "serial":
+    if config.mac.kind in ("serial", "replay"):
         return 1.0 - np.eye(count)
     success = np.zeros((count, count))
     for a in range(count):

@@ -34,12 +34,12 @@ class Sink:
         recorder: Recorder,
         rng: np.random.Generator,
     ) -> None:
-        """``station`` sends the STATUS packets; with an uplink rate, fragments go on to the cloud."""
+        """``station`` sends the STATUS packets; with an uplink, fragments go on to the cloud."""
         self._shared = shared
         self._station = station
         self._reported_ns: dict[int, int] = {}
         self._uplink: Uplink | None = None
-        if uplink.rate_bps is not None:
+        if uplink.exists:
             places = shared.sink, shared.destination
             callbacks = self._receive_at_cloud, self._lost_in_uplink
             self._uplink = Uplink(shared.env, uplink, recorder, rng, *places, *callbacks)

@@ -128,3 +128,5 @@ class Delivery(NamedTuple):
     """Why it was not delivered; ``NONE`` if it was."""
     attempts: int
     """Frames sent for it."""
+    under_way: bool = False
+    """It was sent and is on its way; whether it arrives is reported later."""

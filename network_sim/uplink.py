@@ -1,4 +1,7 @@
-"""The cellular hop from the sink to the cloud: one sender with a queue, a latency and random loss."""
+"""The cellular hop from the sink to the cloud: one sender with a queue, a latency and random loss.
+
+They are set, or those of a recorded link, which begins with the run.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,8 @@ import numpy as np
 import simpy
 
 from network_sim.config import UplinkConfig
-from network_sim.types import NS_PER_S, Cause, EventKind, Packet, to_ns
+from network_sim.link_trace import LinkTrace, Replay, constant_link, read_link_trace
+from network_sim.types import Cause, EventKind, Packet
 from packetmesh.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,14 +42,11 @@ class Uplink:
         """``receive(packet, cloud)`` gets each packet that arrives, ``lost(packet)`` each other one.
 
         Raises:
-            InputError: ``config`` has no rate.
+            InputError: ``config`` has neither a rate nor a recorded link that can be read.
         """
-        if config.rate_bps is None:
-            raise InputError("uplink.rate_bps is not set, so there is no way to the cloud; try 10e6")
         self._env = env
-        self._byte_ns = 8 * NS_PER_S / config.rate_bps
-        self._latency_ns = to_ns(config.latency_s)
-        self._loss = config.loss
+        self._link = Replay(_link_trace(config))
+        self._arrives_ns = 0
         self._recorder = recorder
         self._rng = rng
         self._sink = sink
@@ -66,24 +67,28 @@ class Uplink:
     def _serve(self) -> Generator[simpy.Event, Any, None]:
         while self._waiting:
             packet = self._waiting.popleft()
-            duration_ns = round(packet.size_bytes * self._byte_ns)
+            begins_ns = int(self._env.now)
+            ends_ns = self._link.ends_ns(begins_ns, packet.size_bytes)
+            duration_ns = ends_ns - begins_ns
             yield self._env.timeout(duration_ns)
-            if self._rng.random() < self._loss:
+            self._arrives_ns = max(self._arrives_ns, ends_ns + self._link.latency_ns(ends_ns))
+            travels_ns = self._arrives_ns - ends_ns
+            if self._rng.random() < self._link.loss(ends_ns):
                 self._record(EventKind.LOSS, packet, Cause.UPLINK, duration_ns)
                 self._record(EventKind.DROP, packet, Cause.UPLINK)
-                self._env.process(self._report_loss(packet))
+                self._env.process(self._report_loss(packet, travels_ns))
             else:
-                self._env.process(self._travel(packet, duration_ns))
+                self._env.process(self._travel(packet, travels_ns, duration_ns))
         self._sending = False
 
-    def _travel(self, packet: Packet, duration_ns: int) -> Generator[simpy.Event, Any, None]:
-        yield self._env.timeout(self._latency_ns)
+    def _travel(self, packet: Packet, travels_ns: int, duration_ns: int) -> Generator[simpy.Event, Any, None]:
+        yield self._env.timeout(travels_ns)
         self._record(EventKind.DELIVER, packet, duration_ns=duration_ns)
         self._receive(packet, self._cloud)
 
-    def _report_loss(self, packet: Packet) -> Generator[simpy.Event, Any, None]:
+    def _report_loss(self, packet: Packet, travels_ns: int) -> Generator[simpy.Event, Any, None]:
         """The sink finds out right after the packet should have arrived."""
-        yield self._env.timeout(self._latency_ns + 1)
+        yield self._env.timeout(travels_ns + 1)
         self._lost(packet)
 
     def _record(
@@ -93,3 +98,11 @@ class Uplink:
         self._recorder.add_packet(
             now_ns, kind, packet, self._sink, self._cloud, size_bytes, cause, duration_ns
         )
+
+
+def _link_trace(config: UplinkConfig) -> LinkTrace:
+    if config.trace is not None:
+        return read_link_trace(config.trace)
+    if config.rate_bps is None:
+        raise InputError("uplink.rate_bps is not set, so there is no way to the cloud; try 10e6")
+    return constant_link(config.rate_bps, 2.0 * config.latency_s, config.loss)

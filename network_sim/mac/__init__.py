@@ -10,6 +10,7 @@ import simpy
 from network_sim.mac.context import MacContext
 from network_sim.mac.dcf import Dcf
 from network_sim.mac.ieee802154 import Ieee802154
+from network_sim.mac.replay import RecordedLink
 from network_sim.mac.simple import OwnLink
 from network_sim.types import Delivery, Packet
 
@@ -20,7 +21,8 @@ class Mac(Protocol):
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.
 
-        A sender has one packet at a time. ``Delivery.ok`` is what the sender knows.
+        A sender has one packet at a time, besides those that are ``under_way``. ``Delivery.ok`` is what the
+        sender knows.
         """
 
 
@@ -29,4 +31,6 @@ def make_mac(context: MacContext) -> Mac:
     kind = context.config.mac.kind
     if kind in ("ideal", "serial"):
         return OwnLink(context)
+    if kind == "replay":
+        return RecordedLink(context)
     return Ieee802154(context) if kind == "ieee802154" else Dcf(context)

@@ -10,7 +10,7 @@ import numpy as np
 import simpy
 
 from network_sim.config import NetworkConfig
-from network_sim.types import Packet
+from network_sim.types import Delivery, Packet
 
 if TYPE_CHECKING:
     from network_sim.mac.medium import Medium
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 _BLOCK = 4096
 """Random numbers are drawn in blocks: a call for each would dominate the run time."""
+
+
+def ignore(packet: Packet, sender: int, receiver: int, delivery: Delivery) -> None:
+    """For senders that never ask what became of a packet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +42,8 @@ class MacContext:
     """Whether a node is awake."""
     receive: Callable[[Packet, int], None]
     """Gets each packet once per ``send`` at most, and the node that it has reached."""
+    report: Callable[[Packet, int, int, Delivery], None] = ignore
+    """Gets each packet that was under way when ``send`` ended, its sender, its receiver, and the outcome."""
 
 
 def random_below(most: int, rng: np.random.Generator) -> Iterator[int]:

@@ -34,6 +34,17 @@ def test_a_bit_sent_at_250_kbps_costs_209_nj() -> None:
     )
 
 
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_has_the_power_of_its_own_radio(preset):
+    """What a radio draws, listening and sending: tens of milliwatts in 802.15.4, about a watt in 802.11b."""
+    config = PRESETS[preset]
+    least_w, most_w = {"ieee802154": (0.03, 0.1), "ieee80211b": (0.5, 2.0)}[config.mac.kind]
+    power = config.energy
+    assert least_w < min(power.tx_w, power.rx_w, power.idle_w)
+    assert max(power.tx_w, power.rx_w, power.idle_w) < most_w
+    assert 0.0 < power.sleep_w < 0.1 * power.idle_w
+
+
 def test_the_platform_dominates_the_transfer_of_one_image() -> None:
     packets = math.ceil(921_615 / 116)
     energy = e.joules(times(138.0, packets * 133 * 32e-6, 0.0, 0.0), EnergyConfig())

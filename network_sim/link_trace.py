@@ -1,0 +1,174 @@
+"""Recorded links, and what a packet meets that is sent over one again (SPEC 6.5)."""
+
+from __future__ import annotations
+
+import math
+import sys
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from network_sim.types import NS_PER_S, to_ns
+from packetmesh.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+HOLE_ROWS = 10.0
+HOLE_S = 1.0
+"""A gap is a hole from this long, and from this many times the usual time between rows."""
+_COLUMNS = ("time in s", "rate in Mbit/s", "round trip in ms", "share lost from 0 to 1")
+_FOR_EVER_NS = 2**62
+
+
+@dataclass(frozen=True, slots=True)
+class LinkTrace:
+    """A recording of a link, T rows; each holds until the next, the last as long as rows usually do."""
+
+    t_s: FloatArray
+    """(T,) times, rising from 0; a single row holds for ever."""
+    rate_bps: FloatArray
+    """(T,) bits a second; 0 while nothing can be sent, but not throughout."""
+    round_trip_s: FloatArray
+    """(T,) from sender to receiver and back."""
+    loss: FloatArray
+    """(T,) share of packets that get lost, 0 to 1."""
+
+    @property
+    def edges_ns(self) -> NDArray[np.int64]:
+        """(T + 1,) where the rows begin, and where the recording ends."""
+        starts_ns = np.rint(self.t_s * NS_PER_S).astype(np.int64)
+        last_ns = _FOR_EVER_NS
+        if len(starts_ns) > 1:
+            last_ns = int(starts_ns[-1] + np.rint(np.median(np.diff(starts_ns))))
+        return np.append(starts_ns, last_ns)
+
+    @property
+    def mean_loss(self) -> float:
+        """Share lost, averaged over time: what packets lose that come evenly in time."""
+        return float(np.average(self.loss, weights=np.diff(self.edges_ns)))
+
+
+def constant_link(rate_bps: float, round_trip_s: float, loss: float) -> LinkTrace:
+    """A link that never changes."""
+    return LinkTrace(*(np.array([value]) for value in (0.0, rate_bps, round_trip_s, loss)))
+
+
+def read_link_trace(path: str | Path) -> LinkTrace:
+    """Reads a recorded link: a text file with four columns (``_COLUMNS``).
+
+    Times rise from row to row and count from the first one. Lines may be blank, and what follows a # is
+    a comment. A share between -1 and 0 counts as 0: more packets came in its row than were sent in it.
+
+    Raises:
+        InputError: the file cannot be read, has no rows, a row with another number of columns, with what is
+            no number or out of range; times that do not rise; a hole in time, in which nobody knows what the
+            link did; or a rate of 0 throughout.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise InputError(f"The recorded link {path} cannot be read ({error}); try a text file") from None
+    lines, rows = [], []
+    for number, line in enumerate(text.splitlines(), 1):
+        if fields := line.partition("#")[0].split():
+            lines.append(number)
+            rows.append(_row(fields, f"{path}, line {number}"))
+    if not rows:
+        raise InputError(f"The recorded link {path} has no rows; try columns of {', '.join(_COLUMNS)}")
+    t_s, rate_mbps, round_trip_ms, loss = np.array(rows).T
+    _check_times(t_s, lines, path)
+    if not rate_mbps.any():
+        raise InputError(f"The recorded link {path} has a rate of 0 throughout; try another recording")
+    return LinkTrace(t_s - t_s[0], 1e6 * rate_mbps, 1e-3 * round_trip_ms, np.maximum(loss, 0.0))
+
+
+def _row(fields: list[str], where: str) -> list[float]:
+    if len(fields) != len(_COLUMNS):
+        wanted = f"{len(_COLUMNS)}: {', '.join(_COLUMNS)}"
+        raise InputError(f"{where} has {len(fields)} columns; try {wanted}")
+    row = []
+    for name, text in zip(_COLUMNS, fields, strict=True):
+        try:
+            value = float(text)
+        except ValueError:
+            raise InputError(f"{where} has '{text}' as {name}; try a number, or # before a comment") from None
+        least, most, hint = 0.0, sys.float_info.max, "0 or more"
+        if name == _COLUMNS[-1]:
+            least, most, hint = -1.0, 1.0, "a share, not per cent"
+        if not least <= value <= most:
+            raise InputError(f"{where} has {text} as {name}; try {hint}")
+        row.append(value)
+    return row
+
+
+def _check_times(t_s: FloatArray, lines: list[int], path: str | Path) -> None:
+    if len(t_s) < 2:
+        return
+    steps_s = np.diff(t_s)
+    if (steps_s <= 0.0).any():
+        row = int(np.argmax(steps_s <= 0.0)) + 1
+        where = f"{path}, line {lines[row]}"
+        raise InputError(f"{where} is at {t_s[row]:g} s, after {t_s[row - 1]:g} s; try rows in order of time")
+    usual_s = float(np.median(steps_s))
+    holes = steps_s > max(HOLE_S, HOLE_ROWS * usual_s)
+    if holes.any():
+        row = int(np.argmax(holes)) + 1
+        raise InputError(
+            f"{path}, line {lines[row]} comes {steps_s[row - 1]:g} s after the row before, and most rows are "
+            f"{usual_s:g} s apart; try to cut the recording at this hole"
+        )
+
+
+class Replay:
+    """A recording that is played again and again; its times are nanoseconds of the simulation."""
+
+    def __init__(self, trace: LinkTrace, from_share: float = 0.0) -> None:
+        """``from_share`` of the recording, 0 to 1, is over when the simulation begins."""
+        edges_ns = trace.edges_ns
+        with np.errstate(divide="ignore"):
+            byte_ns = 8 * NS_PER_S / trace.rate_bps
+        self._edges_ns: list[int] = edges_ns.tolist()
+        self._byte_ns: list[float] = byte_ns.tolist()
+        self._carried: list[float] = np.append(0.0, np.cumsum(np.diff(edges_ns) / byte_ns)).tolist()
+        """Bytes that the link can carry until each edge."""
+        self._latency_ns = [to_ns(0.5 * round_trip_s) for round_trip_s in trace.round_trip_s.tolist()]
+        self._loss: list[float] = trace.loss.tolist()
+        self._span_ns = self._edges_ns[-1]
+        self._start_ns = int(from_share * self._span_ns) if len(self._loss) > 1 else 0
+
+    def opens_ns(self, now_ns: int) -> int:
+        """From when the link carries something: now, or when its rate rises above 0."""
+        turn, _, row = self._at(now_ns)
+        edge = bisect_right(self._carried, self._carried[row])
+        if edge == len(self._carried):
+            turn, edge = turn + 1, bisect_right(self._carried, 0.0)
+        return max(now_ns, turn * self._span_ns + self._edges_ns[edge - 1] - self._start_ns)
+
+    def ends_ns(self, now_ns: int, size_bytes: int) -> int:
+        """When a packet that is sent from now on is sent whole."""
+        turn, at_ns, row = self._at(now_ns)
+        duration_ns = size_bytes * self._byte_ns[row]
+        if at_ns + duration_ns <= self._edges_ns[row + 1]:
+            return now_ns + round(duration_ns)
+        target = self._carried[row] + (at_ns - self._edges_ns[row]) / self._byte_ns[row] + size_bytes
+        turns = math.ceil(target / self._carried[-1]) - 1
+        target -= turns * self._carried[-1]
+        row = min(max(bisect_left(self._carried, target), 1), len(self._byte_ns)) - 1
+        rest_ns = round((target - self._carried[row]) * self._byte_ns[row])
+        return (turn + turns) * self._span_ns + self._edges_ns[row] + rest_ns - self._start_ns
+
+    def latency_ns(self, now_ns: int) -> int:
+        """Half the round trip: how long what is sent now travels."""
+        return self._latency_ns[self._at(now_ns)[2]]
+
+    def loss(self, now_ns: int) -> float:
+        """Probability that what is sent now gets lost."""
+        return self._loss[self._at(now_ns)[2]]
+
+    def _at(self, now_ns: int) -> tuple[int, int, int]:
+        """How often the recording has begun again, the time within it, and the row of that time."""
+        turn, at_ns = divmod(now_ns + self._start_ns, self._span_ns)
+        return turn, at_ns, bisect_right(self._edges_ns, at_ns) - 1
