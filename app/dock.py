@@ -1,0 +1,318 @@
+"""The dock at the lower edge of the window: one clock, its buttons, and a timeline of anything in lanes.
+
+The page's side is ``dock.js``. What the page is to know is in three hidden pieces of HTML, each of which says
+all of its part, so that a page that comes later knows as much. What a hand does there comes back through a
+hidden text field, as the list of all that the server has not yet said to have heard: of many changes within
+50 ms viser sends only the last.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import time
+import uuid
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.page import running
+from app.player import Ticker
+from app.timeline import Lane
+from app.ui import Ui
+
+PICTURE_S = 0.04
+"""Between two pictures while it plays."""
+RUN_S = 30.0
+"""How long a whole run takes at first, about."""
+SPEEDS = tuple(m * 10.0**p for p in range(-4, 4) for m in (1.0, 2.0, 5.0))
+"""Simulated seconds in a second that can be chosen."""
+WIDTH_PX = (200, 2400)
+"""Of a picture, at least and at most."""
+LEAST_SPAN_NS = 1000
+"""Of a window."""
+PAGES = 50
+"""As many pages are known apart."""
+
+_SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
+
+
+class Dock:
+    """Shows lanes of a timeline and moves over it; knows no network."""
+
+    def __init__(
+        self,
+        ui: Ui,
+        on_move: Callable[[int], None],
+        on_pick: Callable[[int, int], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Add the dock, which is empty and hidden until ``load`` and ``show``.
+
+        Args:
+            ui: of the browser. The dock is seen while the container that is open now is.
+            on_move: called with the new time in ns whenever the clock moved.
+            on_pick: called with the index of a lane and of an item in it, or -1, that were clicked.
+            clock: seconds of the person who looks.
+        """
+        self._ui, self._on_move, self._on_pick, self._clock = ui, on_move, on_pick, clock
+        self._name = uuid.uuid4().hex
+        self._lanes: tuple[Lane, ...] = ()
+        self._start_ns, self._end_ns, self.now_ns = 0, 1, 0
+        self._window_ns, self._width_px = (0, 1), 1200
+        self._stops_ns: NDArray[np.int64] = np.zeros(0, np.int64)
+        self._playing, self._visible, self._speed = False, False, 1.0
+        self._anchor = (0.0, 0)
+        self._heard: dict[str, int] = {}
+        self._tip: dict[str, Any] = {}
+        self._chosen: dict[str, Any] | None = None
+        self._labels_sent: list[Any] = []
+        mark = f'<span class="packetmesh-dock" data-dock="{self._name}"></span>'
+        # Its text field follows: it is there only for what it sends.
+        hide = "<style>div:has(> .packetmesh-dock) + * { display: none !important; }</style>"
+        ui.gui.add_html(mark + hide + running(_SCRIPT))
+        self._field = ui.when_changed(ui.gui.add_text("Dock", ""), self._hear)
+        self._setup, self._picture, self._state = (ui.gui.add_html("") for _ in range(3))
+        self._ticker = Ticker(lambda: ui.post(self._tick), PICTURE_S)
+        ui.closers.append(self._ticker.close)
+
+    # What screens ask of it.
+
+    @property
+    def playing(self) -> bool:
+        """Whether the clock moves."""
+        return self._playing
+
+    @property
+    def shown_ns(self) -> int:
+        """Simulated time from one picture to the next while it plays."""
+        return round(self._speed * PICTURE_S * 1e9)
+
+    @property
+    def speed(self) -> float:
+        """Simulated seconds in a second."""
+        return self._speed
+
+    def load(self, start_ns: int, end_ns: int, stops_ns: NDArray[np.int64], lanes: Sequence[Lane]) -> None:
+        """Take another timeline, at its start and paused.
+
+        Args:
+            start_ns: where it begins.
+            end_ns: where it ends; later than the start.
+            stops_ns: (S,) ascending times at which the step buttons halt.
+            lanes: from the top.
+        """
+        self.pause()
+        self._start_ns, self._end_ns = start_ns, max(end_ns, start_ns + LEAST_SPAN_NS)
+        self._stops_ns, self._lanes = stops_ns, tuple(lanes)
+        self._window_ns, self._tip, self._chosen = (self._start_ns, self._end_ns), {}, None
+        self._pace((self._end_ns - self._start_ns) / 1e9 / RUN_S)
+        self._send_setup()
+        self._draw()
+        self._go(start_ns)
+
+    def show(self, visible: bool) -> None:
+        """Show or hide it."""
+        if visible != self._visible:
+            self._visible = visible
+            if not visible:
+                self.pause()
+            self._send_setup()
+
+    def redraw(self) -> None:
+        """Paint the lanes again: what they show has changed."""
+        self._draw()
+        self._send_state()
+
+    def play(self) -> None:
+        """Start moving; from the beginning if the end was reached."""
+        if self.now_ns >= self._end_ns:
+            self._go(self._start_ns)
+        self._playing = True
+        self._anchor = (self._clock(), self.now_ns)
+        self._ticker.run(True)
+        self._send_state()
+
+    def pause(self) -> None:
+        """Stay."""
+        self._playing = False
+        self._ticker.run(False)
+        self._send_state()
+
+    def seek(self, t_ns: int) -> None:
+        """Go to a time, not beyond the ends, and play on from there if playing."""
+        self._go(t_ns)
+        self._anchor = (self._clock(), self.now_ns)
+
+    def step(self, count: int) -> None:
+        """Pause at the next stop, or at the one before."""
+        self.pause()
+        if count > 0:
+            at = int(np.searchsorted(self._stops_ns, self.now_ns, side="right"))
+        else:
+            at = int(np.searchsorted(self._stops_ns, self.now_ns)) - 1
+        if 0 <= at < len(self._stops_ns):
+            self.seek(int(self._stops_ns[at]))
+
+    # The clock.
+
+    def _tick(self) -> None:
+        if not self._playing:
+            return
+        began_s, origin_ns = self._anchor
+        t_ns = origin_ns + round((self._clock() - began_s) * self._speed * 1e9)
+        if t_ns >= self._end_ns:
+            self._playing = False
+            self._ticker.run(False)
+        self._go(t_ns)
+
+    def _go(self, t_ns: int) -> None:
+        t_ns = min(max(t_ns, self._start_ns), self._end_ns)
+        moved, self.now_ns = t_ns != self.now_ns, t_ns
+        with self._ui.atomic():
+            self._send_state()
+            if moved:
+                self._on_move(t_ns)
+
+    def _pace(self, speed: float) -> None:
+        """Take the speed on the list that is nearest."""
+        self._speed = min(SPEEDS, key=lambda one: abs(math.log(one / max(speed, 1e-9))))
+        self._anchor = (self._clock(), self.now_ns)
+
+    # What a hand does.
+
+    def _hear(self) -> None:
+        """Do what the page did that was not yet heard of."""
+        try:
+            said = json.loads(self._field.value)
+            page, actions = str(said["page"]), list(said["actions"])
+        except (ValueError, KeyError, TypeError):
+            return
+        heard = self._heard.pop(page, 0)
+        for number, name, *arguments in actions:
+            if number > heard and name in ACTIONS:
+                ACTIONS[name](self, *arguments)
+                heard = number
+        self._heard[page] = heard
+        while len(self._heard) > PAGES:
+            del self._heard[next(iter(self._heard))]
+        self._send_state()
+        self._ui.flush()
+
+    def _toggle(self) -> None:
+        if self._playing:
+            self.pause()
+        else:
+            self.play()
+
+    def _faster(self, count: int) -> None:
+        at = SPEEDS.index(self._speed) + int(count)
+        self._pace(SPEEDS[min(max(at, 0), len(SPEEDS) - 1)])
+
+    def _look(self, start_ns: float, end_ns: float, width_px: float) -> None:
+        """Show another window."""
+        span = min(max(round(end_ns - start_ns), LEAST_SPAN_NS), self._end_ns - self._start_ns)
+        start = min(max(round(start_ns), self._start_ns), self._end_ns - span)
+        self._window_ns = (start, start + span)
+        self._width_px = min(max(round(width_px), WIDTH_PX[0]), WIDTH_PX[1])
+        self._draw()
+
+    def _point(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> None:
+        """Say what is under the pointer."""
+        self._tip = self._item(lane, self._picked(lane, t_ns, y_px, tolerance_ns))
+
+    def _click(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> None:
+        item = self._picked(lane, t_ns, y_px, tolerance_ns)
+        self._chosen = self._item(lane, item) or None
+        self.seek(round(t_ns))
+        self._on_pick(lane, item)
+
+    def _picked(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> int:
+        if not 0 <= lane < len(self._lanes):
+            return -1
+        return self._lanes[lane].pick(round(t_ns), int(y_px), round(tolerance_ns))
+
+    def _item(self, lane: int, item: int) -> dict[str, Any]:
+        if item < 0:
+            return {}
+        one = self._lanes[lane]
+        return {"lane": lane, "place": one.place(item), "text": one.describe(item)}
+
+    # What the page is told.
+
+    def _tell(self, handle: Any, **what: Any) -> None:
+        message = json.dumps({"dock": self._name, **what}, separators=(",", ":"))
+        handle.content = running(f"(window.packetmeshDocks ??= []).push({message})")
+
+    def _send_setup(self) -> None:
+        lanes = [
+            {
+                "title": lane.title,
+                "height": lane.height_px,
+                "grows": lane.grows,
+                "legend": lane.legend,
+            }
+            for lane in self._lanes
+        ]
+        self._labels_sent = []
+        ends = [self._start_ns, self._end_ns]
+        visible = self._visible and bool(lanes)
+        self._tell(self._setup, kind="setup", visible=visible, ends=ends, lanes=lanes)
+
+    def _send_state(self) -> None:
+        self._tell(
+            self._state,
+            kind="state",
+            now=self.now_ns,
+            playing=self._playing,
+            speed=speed_text(self._speed),
+            heard=self._heard,
+            tip=self._tip,
+            chosen=self._chosen,
+            labels=[
+                [(label.y_px, label.text, label.color) for label in lane.labels(self.now_ns)]
+                for lane in self._lanes
+            ],
+        )
+
+    def _draw(self) -> None:
+        """Paint all lanes for the window."""
+        pictures = []
+        for lane in self._lanes:
+            picture = np.empty((lane.height_px, self._width_px, 3), np.uint8)
+            lane.draw(picture, *self._window_ns)
+            encoded = cv2.imencode(".png", picture[..., ::-1], (cv2.IMWRITE_PNG_COMPRESSION, 1))[1]
+            pictures.append(f"data:image/png;base64,{base64.b64encode(encoded.tobytes()).decode()}")
+        self._tell(self._picture, kind="picture", window=self._window_ns, pictures=pictures)
+
+
+ACTIONS: dict[str, Callable[..., None]] = {
+    "toggle": Dock._toggle,
+    "step": Dock.step,
+    "seek": lambda dock, t_ns: dock.seek(round(t_ns)),
+    "faster": Dock._faster,
+    "look": Dock._look,
+    "point": Dock._point,
+    "click": Dock._click,
+}
+"""By the name that the page gives them."""
+
+
+def speed_text(speed: float) -> str:
+    """Simulated seconds in a second: ×4, ×1/50."""
+    return f"×{speed:.3g}" if speed >= 1.0 else f"×1/{1.0 / speed:.3g}"
+
+
+def time_text(t_ns: int) -> str:
+    """A length of time in a sentence: 3.21 s, 12.4 ms."""
+    for unit, ns in (("s", 1e9), ("ms", 1e6), ("µs", 1e3)):
+        if abs(t_ns) >= ns or unit == "µs":
+            value = t_ns / ns
+            digits = 0 if abs(value) >= 100 else 1 if abs(value) >= 10 else 2
+            return f"{value:.{digits}f} {unit}"
+    raise AssertionError
