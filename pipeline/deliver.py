@@ -6,8 +6,8 @@ the bytes that have arrived by then, and the usual chain makes of them what it c
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Generator, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,8 @@ from network_sim.config import PRESETS, NetworkConfig
 from network_sim.simulate import simulate
 from network_sim.trace import NetworkTrace
 from network_sim.types import to_s
-from packetmesh.errors import ReconstructionError
-from packetmesh.progress import drain
+from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.progress import Progress, drain
 from pipeline import geometry
 from pipeline.delivery import coding_named
 from pipeline.delivery.coding import Coding, Received
@@ -47,6 +47,8 @@ class DeliverySpec:
     coding: str = "raw"
     """A name of ``pipeline.delivery.CODINGS``."""
     moments: int = MOMENTS
+    down: tuple[str, ...] = ()
+    """Names of nodes that have failed and send nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,18 +145,28 @@ def iterate_delivery(spec: DeliverySpec) -> Generator[Moment, None, Delivery]:
     Raises:
         InputError: the rig, the network or the coding cannot be used; the message says why.
     """
-    sending, moments, rebuilt = send(spec), [], NOTHING
-    memory = Memory(spec.spec.config.fusion.align_nodes_with == "sensor")
-    for t_ns in sending.times_ns.tolist():
-        received = received_at(sending, t_ns)
-        frames = frames_at_sink(sending, received)
-        if memory.look_at([frame for frame in frames if heard(frame)]):
-            rebuilt = _rebuilt(sending, frames, memory)
-        moments.append(_moment(sending, t_ns, received, rebuilt))
-        yield moments[-1]
+    sending, moments = send(spec), []
+    for step in rebuild(sending, sending.times_ns.tolist()):
+        if isinstance(step, Moment):
+            moments.append(step)
+            yield step
     lossless = drain(iterate_reconstruction(spec.spec))
     last = _last(sending, lossless)
     return Delivery(sending, tuple(moments), last, lossless)
+
+
+def rebuild(sending: Sending, times_ns: Iterable[int]) -> Generator[Progress | Moment, None, None]:
+    """The moments at some times, in this order; between them the progress of the chain.
+
+    Next to each other in time they share the most work.
+    """
+    memory, rebuilt = Memory(sending.spec.spec.config.fusion.align_nodes_with == "sensor"), NOTHING
+    for t_ns in times_ns:
+        received = received_at(sending, t_ns)
+        frames = frames_at_sink(sending, received)
+        if memory.look_at([frame for frame in frames if heard(frame)]):
+            rebuilt = yield from _rebuilt(sending, frames, memory)
+        yield _moment(sending, t_ns, received, rebuilt)
 
 
 def send(spec: DeliverySpec) -> Sending:
@@ -165,11 +177,31 @@ def send(spec: DeliverySpec) -> Sending:
     """
     coding, rig = coding_named(spec.coding), spec.spec.source.load()
     packet_bytes = packet_bytes_of(spec.network)
-    encoded = [coding.encode(images_of(frame), packet_bytes) for frame in rig.frames]
-    trace = simulate(network_of(rig, [len(data) for data in encoded], spec.network))
-    streams = tuple(np.frombuffer(data, np.uint8) for data in encoded)
+    streams = tuple(
+        np.frombuffer(coding.encode(images_of(frame), packet_bytes), np.uint8) for frame in rig.frames
+    )
+    senders = senders_of(rig, spec.down)
+    part = Rig(rig.name, tuple(rig.frames[node] for node in senders))
+    trace = simulate(network_of(part, [len(streams[node]) for node in senders], spec.network))
     came = arrivals(trace)
+    came = replace(came, node=np.array(senders)[came.node])
     return Sending(spec, rig, coding, streams, trace, came, moment_times_ns(came, trace, spec.moments))
+
+
+def senders_of(rig: Rig, down: Sequence[str]) -> list[int]:
+    """Which of a rig's nodes send, by their order in the network.
+
+    Raises:
+        InputError: a node that is down is not one of the rig's, or none is left.
+    """
+    names = [frame.name for frame in rig.frames]
+    for name in down:
+        if name not in names:
+            raise InputError(f"There is no node '{name}' that could be down; try one of {', '.join(names)}")
+    senders = [node for node, name in enumerate(names) if name not in down]
+    if not senders:
+        raise InputError("All nodes are down, so nothing is sent; leave at least one of them running")
+    return senders
 
 
 def packet_bytes_of(network: NetworkConfig) -> int:
@@ -255,13 +287,15 @@ def _arrival(frame: RgbdFrame, stream: ByteArray, there: BoolArray, received: Re
     )
 
 
-def _rebuilt(sending: Sending, frames: Sequence[RgbdFrame], memory: Memory) -> Rebuilt:
+def _rebuilt(
+    sending: Sending, frames: Sequence[RgbdFrame], memory: Memory
+) -> Generator[Progress, None, Rebuilt]:
     present = [index for index, frame in enumerate(frames) if heard(frame)]
     if not present:
         return NOTHING
     spec = _spec_of(sending, frames, present)
     try:
-        results = drain(run(spec, memory, REBUILT))
+        results = yield from run(spec, memory, REBUILT)
     except ReconstructionError:  # a handful of points has no surface yet
         return NOTHING
     placement, surface = results["placement"].value, results["after"].value
