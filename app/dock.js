@@ -2,8 +2,9 @@
 (() => {
   if (window.packetmeshDocks?.made) return;
 
-  const GUTTER_PX = 128; // for the names beside the lanes
-  const AXIS_PX = 20;
+  const GUTTER_PX = 150; // for the names beside the lanes
+  const AXIS_PX = 20; // below the lanes; a hand on it moves the clock
+  const LANES_GAP_PX = 4;
   const DRAG_PX = 4; // less is a click
   const REACH_PX = 4; // how far beside an item still means it
   const AGAIN_MS = 150; // before what was not heard is said again
@@ -71,6 +72,8 @@
           bar, {textContent: text, title, type: "button"});
         one.setAttribute("aria-label", title.split(":")[0]);
         one.addEventListener("click", action);
+        // So that keys go on to mean the same after it.
+        one.addEventListener("pointerdown", () => setTimeout(() => this.row.focus({preventScroll: true})));
         return one;
       };
       const space = px => make("span", `width: ${px}px`, bar);
@@ -93,8 +96,12 @@
       this.cursor = make("div", "position: absolute; top: 0; bottom: 0; width: 2px; margin-left: -1px; " +
         "background: #1b1f24; pointer-events: none; z-index: 3", this.field,
         {className: "packetmesh-dock-cursor"});
+      make("div", "position: absolute; bottom: 0; left: -4px; width: 10px; height: 10px; border-radius: 5px; " +
+        "background: #1b1f24", this.cursor);
       this.box = make("div", "position: absolute; border: 2px solid #111; box-shadow: 0 0 0 1px #fff; " +
         "pointer-events: none; z-index: 2; display: none; box-sizing: content-box; margin: -2px", this.field);
+      make("div", `position: absolute; left: 0; right: 0; bottom: 0; height: ${AXIS_PX}px; ` +
+        "cursor: ew-resize", this.field, {title: "Drag to move the clock"});
       this.axis = make("div", `position: absolute; left: 0; right: 0; bottom: 0; height: ${AXIS_PX}px; ` +
         "overflow: hidden; pointer-events: none; color: #56606a", this.field);
       this.tip = make("div", "position: fixed; z-index: 500; max-width: 420px; padding: 5px 8px; " +
@@ -120,13 +127,16 @@
       field.addEventListener("pointerdown", event => {
         if (event.button !== 0) return;
         field.setPointerCapture(event.pointerId);
-        down = {x: event.clientX, window: this.window, dragged: false};
+        const scrubs = event.clientY > field.getBoundingClientRect().bottom - AXIS_PX;
+        down = {x: event.clientX, window: this.window, dragged: false, scrubs};
+        if (scrubs) this.scrub(event);
         this.row.focus({preventScroll: true});
         event.preventDefault();
       });
       field.addEventListener("pointermove", event => {
         this.pointer = event;
         if (!down) return this.point(event);
+        if (down.scrubs) return this.scrub(event);
         const moved = event.clientX - down.x;
         if (Math.abs(moved) >= DRAG_PX) down.dragged = true;
         if (!down.dragged) return;
@@ -136,7 +146,7 @@
         this.look(down.window[0] - ns, down.window[1] - ns);
       });
       const up = event => {
-        if (down && !down.dragged && event.type === "pointerup") this.click(event);
+        if (down && !down.dragged && !down.scrubs && event.type === "pointerup") this.click(event);
         down = null;
         field.style.cursor = "crosshair";
       };
@@ -148,6 +158,7 @@
       });
       this.row.addEventListener("keydown", event => {
         if (event.ctrlKey || event.metaKey || event.altKey) return;
+        if (event.key === " " && event.target !== this.row) return; // a button that has the focus
         const action = {
           " ": () => this.say("toggle"),
           ArrowLeft: () => this.say("step", -1),
@@ -217,6 +228,13 @@
       this.say("click", ...this.where(event));
     }
 
+    // The cursor follows the hand at once.
+    scrub(event) {
+      this.now = Math.min(Math.max(this.at(this.x(event)), this.start), this.end);
+      this.say("seek", this.now);
+      this.draw();
+    }
+
     resized() {
       if (!this.visible) return;
       this.draw();
@@ -254,20 +272,21 @@
       this.place();
     }
 
-    setup({visible, ends, lanes}) {
+    setup({visible, ends, window: shown, lanes}) {
       this.wanted = visible;
       [this.start, this.end] = ends;
-      for (const lane of this.lanes) for (const part of [lane.image, lane.veil, lane.names]) part.remove();
+      for (const lane of this.lanes)
+        for (const part of [lane.image, lane.words, lane.veil, lane.names]) part.remove();
       let top = 0;
       this.lanes = lanes.map(lane => {
-        const place = `position: absolute; top: ${top}px; height: ${lane.height}px`;
-        const image = make("img", `${place}; image-rendering: pixelated; max-width: none; pointer-events: none`,
-          this.field, {alt: lane.title, draggable: false});
+        const place = `position: absolute; top: ${top}px; height: ${lane.height}px; pointer-events: none`;
+        const image = make("img", place, this.field);
+        const words = make("div", `${place}; left: 0; right: 0; overflow: hidden`, this.field);
         const veil = make("div", `${place}; right: 0; background: rgba(250, 251, 252, 0.82); ` +
-          `pointer-events: none; z-index: 1; display: ${lane.grows ? "block" : "none"}`, this.field);
+          `display: ${lane.grows ? "block" : "none"}`, this.field);
         const names = make("div", `${place}; left: 0; right: 6px`, this.names);
-        const made = {...lane, top, image, veil, names};
-        top += lane.height + 4;
+        const made = {...lane, top, image, words, veil, names, wordsSaid: []};
+        top += lane.height + LANES_GAP_PX;
         return made;
       });
       this.field.style.height = this.names.style.height = `${top + AXIS_PX}px`;
@@ -277,14 +296,28 @@
           `margin-right: 5px; background: ${css(color)}`, null));
         return word;
       }));
-      this.window = this.shown = ends;
+      this.window = this.shown = shown;
     }
 
-    picture({window: shown, pictures}) {
-      const mine = this.unheard.some(([, name]) => name === "look");
+    // New pictures take the place of the old ones once they can be drawn at once.
+    async picture({window: shown, pictures, words}) {
+      const lanes = this.lanes;
+      const turn = this.turn = (this.turn ?? 0) + 1;
+      const images = pictures.map(src => Object.assign(new Image(), {src, alt: "", draggable: false}));
+      await Promise.all(images.map(image => image.decode().catch(() => {})));
+      if (turn < (this.drawnTurn ?? 0) || lanes !== this.lanes) return;
+      this.drawnTurn = turn;
       this.shown = shown;
-      if (!mine) this.window = shown;
-      this.lanes.forEach((lane, index) => { lane.image.src = pictures[index] ?? ""; });
+      if (!this.unheard.some(([, name]) => name === "look")) this.window = shown;
+      lanes.forEach((lane, index) => {
+        images[index].style.cssText = lane.image.style.cssText;
+        images[index].style.imageRendering = "pixelated";
+        images[index].style.maxWidth = "none";
+        lane.image.replaceWith(images[index]);
+        lane.image = images[index];
+        lane.wordsSaid = words[index];
+      });
+      this.row.dataset.window = shown.join(" ");
       this.draw();
     }
 
@@ -292,7 +325,8 @@
       this.unheard = this.unheard.filter(([number]) => number > (heard[PAGE] ?? 0));
       if (!this.unheard.length) clearTimeout(this.again);
       const moved = this.now !== now;
-      Object.assign(this, {now, playing, tipSaid: tip, chosen});
+      Object.assign(this, {playing, tipSaid: tip, chosen});
+      if (!this.unheard.some(([, name]) => name === "seek")) this.now = now; // else the hand is ahead
       this.play.textContent = playing ? "❚❚" : "▶";
       this.speed.textContent = speed;
       this.lanes.forEach((lane, index) => {
@@ -325,17 +359,28 @@
         lane.image.style.left = `${left}px`;
         lane.image.style.width = `${(this.shown[1] - this.shown[0]) * scale}px`;
         lane.veil.style.left = `${Math.max(cursor, 0)}px`;
+        this.write(lane, scale);
       }
       this.cursor.style.left = `${cursor}px`;
       const step = (this.window[1] - this.window[0]) / width;
-      this.time.textContent = `${timeText(this.now, Math.max(10 ** Math.floor(Math.log10(step * 10)), 1))}`;
-      this.time.textContent += ` of ${timeText(this.end)}`;
+      const now = timeText(this.now, Math.max(10 ** Math.floor(Math.log10(2 * step)), 1));
+      this.time.textContent = `${now} of ${timeText(this.end)}`;
       this.drawBox(scale);
       this.drawAxis(width);
     }
 
+    write(lane, scale) {
+      lane.words.replaceChildren(...lane.wordsSaid.map(([from, to, y, text]) => {
+        const [left, right] = [from, to].map(ns => (ns - this.window[0]) * scale);
+        const [begin, end] = [Math.max(left, 0), Math.min(right, this.width())];
+        return make("div", `position: absolute; left: ${begin}px; width: ${Math.max(end - begin, 0)}px; ` +
+          `top: ${y - 8}px; line-height: 15px; font-size: 10.5px; color: #fff; text-align: center; ` +
+          "overflow: hidden; white-space: nowrap", null, {textContent: text});
+      }));
+    }
+
     drawBox(scale) {
-      const lane = this.chosen && this.lanes[this.chosen.lane];
+      const lane = this.lanes[this.chosen?.lane];
       this.box.style.display = lane ? "block" : "none";
       if (!lane) return;
       const [start, end, top, bottom] = this.chosen.place;
@@ -364,7 +409,7 @@
     }
 
     showTip() {
-      const text = this.tipSaid?.text;
+      const text = this.tipSaid;
       this.tip.style.display = this.pointer && text ? "block" : "none";
       if (!this.pointer || !text) return;
       this.tip.textContent = text;

@@ -14,6 +14,7 @@ import math
 import time
 import uuid
 from collections.abc import Callable, Sequence
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -69,9 +70,8 @@ class Dock:
         self._playing, self._visible, self._speed = False, False, 1.0
         self._anchor = (0.0, 0)
         self._heard: dict[str, int] = {}
-        self._tip: dict[str, Any] = {}
-        self._chosen: dict[str, Any] | None = None
-        self._labels_sent: list[Any] = []
+        self._tip = ""
+        self._chosen: dict[str, Any] = {}
         mark = f'<span class="packetmesh-dock" data-dock="{self._name}"></span>'
         # Its text field follows: it is there only for what it sends.
         hide = "<style>div:has(> .packetmesh-dock) + * { display: none !important; }</style>"
@@ -110,7 +110,7 @@ class Dock:
         self.pause()
         self._start_ns, self._end_ns = start_ns, max(end_ns, start_ns + LEAST_SPAN_NS)
         self._stops_ns, self._lanes = stops_ns, tuple(lanes)
-        self._window_ns, self._tip, self._chosen = (self._start_ns, self._end_ns), {}, None
+        self._window_ns, self._tip, self._chosen = (self._start_ns, self._end_ns), "", {}
         self._pace((self._end_ns - self._start_ns) / 1e9 / RUN_S)
         self._send_setup()
         self._draw()
@@ -124,8 +124,11 @@ class Dock:
                 self.pause()
             self._send_setup()
 
-    def redraw(self) -> None:
-        """Paint the lanes again: what they show has changed."""
+    def update(self, lanes: Sequence[Lane]) -> None:
+        """Take other lanes for the same timeline, such as curves that have grown."""
+        before, self._lanes = self._lanes, tuple(lanes)
+        if [_looks(lane) for lane in before] != [_looks(lane) for lane in lanes]:
+            self._send_setup()
         self._draw()
         self._send_state()
 
@@ -224,24 +227,17 @@ class Dock:
 
     def _point(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> None:
         """Say what is under the pointer."""
-        self._tip = self._item(lane, self._picked(lane, t_ns, y_px, tolerance_ns))
+        there = 0 <= lane < len(self._lanes)
+        self._tip = self._lanes[lane].tell(round(t_ns), int(y_px), round(tolerance_ns)) if there else ""
 
     def _click(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> None:
-        item = self._picked(lane, t_ns, y_px, tolerance_ns)
-        self._chosen = self._item(lane, item) or None
+        """Go there, and mark what is there."""
+        there = 0 <= lane < len(self._lanes)
+        item = self._lanes[lane].pick(round(t_ns), int(y_px), round(tolerance_ns)) if there else -1
+        self._chosen = {"lane": lane, "place": self._lanes[lane].place(item)} if item >= 0 else {}
         self.seek(round(t_ns))
-        self._on_pick(lane, item)
-
-    def _picked(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> int:
-        if not 0 <= lane < len(self._lanes):
-            return -1
-        return self._lanes[lane].pick(round(t_ns), int(y_px), round(tolerance_ns))
-
-    def _item(self, lane: int, item: int) -> dict[str, Any]:
-        if item < 0:
-            return {}
-        one = self._lanes[lane]
-        return {"lane": lane, "place": one.place(item), "text": one.describe(item)}
+        if there:
+            self._on_pick(lane, item)
 
     # What the page is told.
 
@@ -250,19 +246,14 @@ class Dock:
         handle.content = running(f"(window.packetmeshDocks ??= []).push({message})")
 
     def _send_setup(self) -> None:
-        lanes = [
-            {
-                "title": lane.title,
-                "height": lane.height_px,
-                "grows": lane.grows,
-                "legend": lane.legend,
-            }
-            for lane in self._lanes
-        ]
-        self._labels_sent = []
-        ends = [self._start_ns, self._end_ns]
-        visible = self._visible and bool(lanes)
-        self._tell(self._setup, kind="setup", visible=visible, ends=ends, lanes=lanes)
+        self._tell(
+            self._setup,
+            kind="setup",
+            visible=self._visible and bool(self._lanes),
+            ends=(self._start_ns, self._end_ns),
+            window=self._window_ns,
+            lanes=[_looks(lane) for lane in self._lanes],
+        )
 
     def _send_state(self) -> None:
         self._tell(
@@ -282,13 +273,20 @@ class Dock:
 
     def _draw(self) -> None:
         """Paint all lanes for the window."""
-        pictures = []
+        pictures, words = [], []
         for lane in self._lanes:
             picture = np.empty((lane.height_px, self._width_px, 3), np.uint8)
             lane.draw(picture, *self._window_ns)
             encoded = cv2.imencode(".png", picture[..., ::-1], (cv2.IMWRITE_PNG_COMPRESSION, 1))[1]
-            pictures.append(f"data:image/png;base64,{base64.b64encode(encoded.tobytes()).decode()}")
-        self._tell(self._picture, kind="picture", window=self._window_ns, pictures=pictures)
+            pictures.append(f"data:image/png;base64,{base64.b64encode(encoded).decode()}")
+            words.append([astuple(word) for word in lane.words(*self._window_ns, self._width_px)])
+        self._tell(self._picture, kind="picture", window=self._window_ns, pictures=pictures, words=words)
+
+
+def _looks(lane: Lane) -> dict[str, Any]:
+    """What the page knows of a lane from the start."""
+    legend = list(lane.legend)
+    return {"title": lane.title, "height": lane.height_px, "grows": lane.grows, "legend": legend}
 
 
 ACTIONS: dict[str, Callable[..., None]] = {

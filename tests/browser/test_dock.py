@@ -9,7 +9,8 @@ import pytest
 import viser
 
 from app.dock import Dock
-from app.timeline import Curve, CurvesLane, FramesLane, levels_of
+from app.levels import levels_of
+from app.timeline import Curve, CurvesLane, FramesLane
 from app.ui import Ui
 
 END_NS = 10_000_000_000
@@ -35,7 +36,10 @@ class Stage:
         ends_ns = starts_ns + 40_000_000
         row, lost = np.arange(100) % 2, np.arange(100) % 10 == 3
         frames = FramesLane(
-            levels_of(starts_ns, ends_ns, row, lost, 2), ("porch", "window"), lambda item: f"frame {item}"
+            levels_of(starts_ns, ends_ns, row, lost, 2),
+            ("porch", "window"),
+            "frame {}".format,
+            ("", "collision"),
         )
         t_ns = np.linspace(0, END_NS, 11).astype(np.int64)
         curve = Curve("F-score", "", (0, 158, 115), t_ns, np.linspace(0.0, 1.0, 11))
