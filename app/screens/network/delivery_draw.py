@@ -61,6 +61,18 @@ class DeliveryDrawing:
             precision="float32",
         )
 
+    def viewpoint(self, fov_rad: float, aspect: float) -> tuple[FloatArray, FloatArray]:
+        """(3,) where to look and (3,) where to stand to see cameras, room and sink in a window."""
+        stage = self._view.stage
+        cameras_m = np.array([node.T_world_camera[:3, 3] for node in self._view.nodes]).mean(axis=0)
+        middle_m = 0.5 * (stage.middle_m + cameras_m)
+        back = stage.viewpoint_m - stage.middle_m
+        back = back / max(float(np.linalg.norm(back)), 1e-9)
+        width_m = 1.3 * stage.width_m + 0.6 * self._size_m
+        half = np.tan(0.5 * fov_rad)
+        away_m = max(0.5 * width_m / (half * aspect), 0.75 * self._size_m / half)
+        return middle_m, middle_m + (away_m + 0.3 * self._size_m) * back
+
     # What is there at a time.
 
     def show(self, now_ns: int, shown_ns: int) -> None:
@@ -141,9 +153,7 @@ class DeliveryDrawing:
                 self._meshes.pop().remove()
             return
         self._made += 1
-        self._meshes.append(
-            self._scene.add_glb(f"{self._below}/mesh-{self._made}", glb, cast_shadow=False)
-        )
+        self._meshes.append(self._scene.add_glb(f"{self._below}/mesh-{self._made}", glb, cast_shadow=False))
 
     def drop_old(self) -> None:
         """Take away the mesh that a newer one has replaced."""
@@ -223,7 +233,7 @@ class DeliveryDrawing:
             cloud_m = self._places_m[roles.index("cloud")]
             client_m = cloud_m + 0.35 * self._size_m * self._view.stage.right
             self._mark("client", client_m, NEUTRAL)
-            above_m = client_m + (0.0, 0.0, 0.05 * self._size_m)
+            above_m = client_m + np.array([0.0, 0.0, 0.05 * self._size_m])
             self._label("name-client", "client: you", above_m, 0.9)
             self._lines("to-client", np.array([[cloud_m, client_m]]))
 

@@ -74,14 +74,10 @@ def packet_job(
     frame, stream = sending.rig.frames[row], sending.streams[row]
     there = np.zeros(len(stream), np.bool_)
     there[first_byte : first_byte + byte_count] = True
-    got = sending.coding.decode(
-        np.where(there, stream, 0), there, frame.rgb.shape[:2], sending.packet_bytes
-    )
+    got = sending.coding.decode(np.where(there, stream, 0), there, frame.rgb.shape[:2], sending.packet_bytes)
     depth, color = (got.depth > 0) | (got.coarse > 0), got.rgb_known
     cloud = back_project(replace(frame, depth=DepthMap(np.where(depth, frame.depth.z_m, np.nan))))
-    return PacketView(
-        row, depth, color, _lit(frame.rgb, depth | color), cloud.points_m.astype(np.float32)
-    )
+    return PacketView(row, depth, color, _lit(frame.rgb, depth | color), cloud.points_m.astype(np.float32))
 
 
 def _sending(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:

@@ -38,5 +38,3 @@ def _simulated(config: NetworkConfig) -> Generator[Progress, None, NetworkView]:
     started = time.perf_counter()
     trace = yield from iterate_simulation(config)
     return run_view(trace, time.perf_counter() - started)
-
-

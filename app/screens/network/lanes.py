@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from app.drawing.colors import DELIVERED, INFERRED, LOSS, SOURCE
 from app.screens.network.delivery_view import DeliveryView
+from app.screens.network.labels import CAUSES
 from app.screens.network.packets import Frames
 from app.screens.network.view import NetworkView, What
 from app.timeline import Curve, CurvesLane, FramesLane
-from network_sim.types import to_ns
+from network_sim.types import Cause, to_ns
 from pipeline.types import FloatArray
 
 HALTS = (What.AIR, What.LOSS, What.DROP, What.ARRIVE, What.EXPIRE)
@@ -20,7 +21,7 @@ HALTS = (What.AIR, What.LOSS, What.DROP, What.ARRIVE, What.EXPIRE)
 def frames_lane(view: NetworkView, frames: Frames) -> FramesLane:
     """One row a node."""
     names = [view.names[node] for node in view.lane_nodes]
-    lane = FramesLane(view.levels, names, frames.line)
+    lane = FramesLane(view.levels, names, frames.line, [CAUSES[cause] for cause in Cause])
     if view.label:
         lane.title = view.label
     return lane
@@ -31,15 +32,9 @@ def stops_ns(*views: NetworkView) -> NDArray[np.int64]:
     return np.unique(np.concatenate([one.pieces.start_ns[np.isin(one.pieces.what, HALTS)] for one in views]))
 
 
-class GrowthLane(CurvesLane):
-    """What has arrived, and what the surface of it is worth; grows with the moments that are computed."""
-
-    def __init__(self, view: DeliveryView) -> None:
-        super().__init__("At the sink", _growth(view))
-
-    def take(self, view: DeliveryView) -> None:
-        """Show what is there now."""
-        super().__init__("At the sink", _growth(view))
+def growth_lane(view: DeliveryView) -> CurvesLane:
+    """What has arrived, and what the surface of it is worth, by the moments that are computed."""
+    return CurvesLane("At the sink", _growth(view))
 
 
 def _growth(view: DeliveryView) -> list[Curve]:

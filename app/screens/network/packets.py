@@ -21,6 +21,8 @@ class Frames:
         self.pieces: Pieces = pieces.where(pieces.what == What.AIR)
         self._waits = pieces.where(pieces.what == What.WAIT)
         self._answers = pieces.where(pieces.what == What.ACK)
+        taken = pieces.where(pieces.what == What.CAPTURE)
+        self._cameras = dict(zip(taken.image.tolist(), taken.node.tolist(), strict=True))
 
     def line(self, item: int) -> str:
         """About one frame, for the pointer."""
@@ -50,6 +52,10 @@ class Frames:
     def bytes_of(self, item: int, header_bytes: int) -> tuple[int, int]:
         """First byte and number of bytes of its image that it carries."""
         return int(self.pieces.first_byte[item]), int(self.pieces.size_bytes[item]) - header_bytes
+
+    def camera_of(self, item: int) -> int:
+        """Which node took the image of which it carries a piece."""
+        return int(self._cameras.get(int(self.pieces.image[item]), -1))
 
     def _content(self, item: int) -> str:
         one = self.pieces

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from app.levels import Levels, levels_of
 from app.screens.network.view import Curve, NetworkView, Pieces, Series, What
-from app.timeline import Levels, levels_of
 from network_sim.energy import cumulative_radio_j
 from network_sim.metrics import camera_nodes, metrics
 from network_sim.street import street_of
@@ -69,8 +69,7 @@ def _levels(trace: NetworkTrace, pieces: Pieces) -> tuple[tuple[int, ...], Level
     sends = np.isin(np.arange(len(trace.names)), frames.node)
     nodes = np.flatnonzero(sends | camera_nodes(trace))
     row = np.searchsorted(nodes, frames.node)
-    lost = frames.cause != Cause.NONE
-    return tuple(nodes.tolist()), levels_of(frames.start_ns, frames.end_ns, row, lost, len(nodes))
+    return tuple(nodes.tolist()), levels_of(frames.start_ns, frames.end_ns, row, frames.cause, len(nodes))
 
 
 def pieces_of(trace: NetworkTrace, start_ns: int) -> Pieces:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.timeline import Levels
+from app.levels import Levels
 from network_sim.config import NetworkConfig
 from network_sim.metrics import Metric
 from pipeline.types import FloatArray
