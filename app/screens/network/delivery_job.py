@@ -41,7 +41,7 @@ from pipeline.deliver import (
     send,
     senders_of,
 )
-from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, RgbdFrame
+from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, PointCloud, RgbdFrame
 
 NODE_POINTS = 6000
 """Of the cloud of one node."""
@@ -76,7 +76,7 @@ def packet_job(
     there[first_byte : first_byte + byte_count] = True
     got = sending.coding.decode(np.where(there, stream, 0), there, frame.rgb.shape[:2], sending.packet_bytes)
     depth, color = (got.depth > 0) | (got.coarse > 0), got.rgb_known
-    cloud = back_project(replace(frame, depth=DepthMap(np.where(depth, frame.depth.z_m, np.nan))))
+    cloud = _cloud(replace(frame, depth=DepthMap(np.where(depth, frame.depth.z_m, np.nan))))
     return PacketView(row, depth, color, _lit(frame.rgb, depth | color), cloud.points_m.astype(np.float32))
 
 
@@ -177,7 +177,7 @@ def _node_moment(
     T_world_camera: FloatArray | None,
     whole: RgbdFrame,
 ) -> NodeMoment:
-    cloud = back_project(frame)
+    cloud = _cloud(frame)
     thin = sample(cloud.points_m, cloud.colors, NODE_POINTS)
     colors = thin.colors if thin.colors is not None else np.zeros((0, 3), np.uint8)
     if not known.any():
@@ -192,6 +192,13 @@ def _node_moment(
         colors=colors,
         T_world_camera=whole.T_world_camera if T_world_camera is None else T_world_camera,
     )
+
+
+def _cloud(frame: RgbdFrame) -> PointCloud:
+    """The frame's points, of which there may be none."""
+    if not frame.depth.valid.any():
+        return PointCloud(np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
+    return back_project(frame)
 
 
 def _picture(frame: RgbdFrame, known: BoolArray, range_m: tuple[float, float]) -> ByteArray:

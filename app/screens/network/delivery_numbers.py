@@ -116,12 +116,9 @@ def difference(before: DeliveryView, after: DeliveryView, what: str) -> str:
 
 def changes(before: DeliveryView, after: DeliveryView) -> str:
     """Which settings differ, in a few words."""
-    words = []
+    words = [f"{name} off" for name in after.sent.down if name not in before.sent.down]
     if before.sent.coding != after.sent.coding:
         words.append(f"coding {after.sent.coding} instead of {before.sent.coding}")
-    for name in after.sent.down:
-        if name not in before.sent.down:
-            words.append(f"{name} off")
     words += [f"{name} on again" for name in before.sent.down if name not in after.sent.down]
     words += differences(after.sent.network, before.sent.network)[:4]
     return ", ".join(words) or "Other settings of the reconstruction"

@@ -30,8 +30,8 @@ NETWORKS: Mapping[str, Preset] = MappingProxyType(
     {
         "office": Preset(
             "Office: WLAN to one access point",
-            "IEEE 802.11b at 11 Mbit/s, the sink 8 m away, an uplink to the cloud; what is not there after 10 "
-            "seconds is too late.",
+            "IEEE 802.11b at 11 Mbit/s, the sink 8 m away, an uplink to the cloud; what is not there after "
+            "10 seconds is too late.",
         ),
         "thesis-link": Preset(
             "Thesis: 250 kbit/s to one sink",

@@ -139,7 +139,7 @@ class NetworkPanel(Panel):
                 self._status.content = f"**Not sent**: {sentence} Change a setting or press *Retry*."
 
     def look(self) -> bool:
-        """Turn the view to the cameras and the room, or the whole ground, once for each shape of the window."""
+        """Turn the view to the cameras and the room, or the streets, once for each shape of the window."""
         clients = list(self.session.clients())
         shape = tuple(round(client.camera.aspect, 1) for client in clients)
         if self._drawing is None or shape == self._framed:
@@ -312,7 +312,7 @@ def told(packet: PacketView) -> str:
             where = f"row {rows[0] + 1}" if rows[0] == rows[-1] else f"rows {rows[0] + 1} to {rows[-1] + 1}"
             parts.append(f"{what} of {int(pixels.sum()):,} pixels in {where}")
     if not parts:
-        return "By itself it tells no pixel: it needs the rest of its group or of its file."
+        return "By itself it tells no measured pixel: there is none in its rows, or it needs other packets."
     return f"It tells the {' and the '.join(parts)} (yellow in the picture and the cloud)."
 
 

@@ -1,4 +1,4 @@
-"""What is sent, and how: a preset, a few controls, what might go wrong, and free text for all other settings."""
+"""What is sent, and how: a preset, a few controls, what might go wrong, and free text for the rest."""
 
 from __future__ import annotations
 
