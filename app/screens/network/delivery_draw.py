@@ -17,10 +17,13 @@ from app.screens.network.view import What
 from network_sim.types import Cause
 from pipeline.types import FloatArray
 
-FRUSTUM = 0.2
+FRUSTUM = 0.16
 """Depth of a frustum over the distance from the cameras to what they see."""
-AWAY = 0.55
-"""How far behind the cameras the sink is drawn, over the same distance: it may stand far outside."""
+BESIDE = 0.5
+"""How far beside the cameras the sink is drawn, over the same distance: it may stand far outside."""
+ELEVATION_RAD = np.radians(40.0)
+FILLED = 0.8
+"""Share of the window that all of it takes."""
 PACKET_M, POINT_M = 0.018, 0.008
 """Sizes over the same distance, and of a point."""
 LIT = (255, 230, 0)
@@ -39,6 +42,8 @@ class DeliveryDrawing:
         middle_m = cameras_m.mean(axis=0)
         self._size_m = max(float(np.linalg.norm(stage.middle_m - middle_m)), 0.5)
         self._places_m = self._places(cameras_m)
+        cloud_m = self._places_m[-1]
+        self._client_m = cloud_m + 0.4 * self._size_m * stage.right
         self._flights = Flights.of(view.run.pieces)
         self._frusta: list[viser.CameraFrustumHandle] = []
         self._names: list[viser.LabelHandle] = []
@@ -62,16 +67,23 @@ class DeliveryDrawing:
         )
 
     def viewpoint(self, fov_rad: float, aspect: float) -> tuple[FloatArray, FloatArray]:
-        """(3,) where to look and (3,) where to stand to see cameras, room and sink in a window."""
+        """(3,) where to look and (3,) where to stand to see room, cameras, sink and client in a window."""
         stage = self._view.stage
-        cameras_m = np.array([node.T_world_camera[:3, 3] for node in self._view.nodes]).mean(axis=0)
-        middle_m = 0.5 * (stage.middle_m + cameras_m)
-        back = stage.viewpoint_m - stage.middle_m
-        back = back / max(float(np.linalg.norm(back)), 1e-9)
-        width_m = 1.3 * stage.width_m + 0.6 * self._size_m
-        half = np.tan(0.5 * fov_rad)
-        away_m = max(0.5 * width_m / (half * aspect), 0.75 * self._size_m / half)
-        return middle_m, middle_m + (away_m + 0.3 * self._size_m) * back
+        ends_m = 0.5 * stage.width_m * stage.right
+        seen_m = np.vstack(
+            [stage.middle_m - ends_m, stage.middle_m + ends_m, stage.top_m, self._places_m, self._client_m]
+        )
+        away = stage.viewpoint_m - stage.middle_m
+        away[2] = np.hypot(*away[:2]) * np.tan(ELEVATION_RAD)
+        away /= max(float(np.linalg.norm(away)), 1e-9)
+        middle_m = 0.5 * (seen_m.min(axis=0) + seen_m.max(axis=0))
+        up = np.cross(stage.right, -away)
+        from_middle_m = seen_m - middle_m
+        slope = np.tan(0.5 * fov_rad)
+        across = np.abs(from_middle_m @ stage.right) / (slope * aspect)
+        along = np.abs(from_middle_m @ up) / slope
+        distance_m = float((np.maximum(across, along) / FILLED + from_middle_m @ away).max())
+        return middle_m, middle_m + distance_m * away
 
     # What is there at a time.
 
@@ -183,12 +195,9 @@ class DeliveryDrawing:
     # What stays.
 
     def _places(self, cameras_m: FloatArray) -> FloatArray:
-        """(N, 3) of everybody in the network."""
-        stage, run = self._view.stage, self._view.run
-        back_m = cameras_m.mean(axis=0) - stage.middle_m
-        back_m[2] = 0.0
-        back_m /= max(float(np.linalg.norm(back_m)), 1e-9)
-        sink_m = cameras_m.mean(axis=0) + AWAY * self._size_m * (0.6 * back_m + 0.8 * stage.right)
+        """(N, 3) of everybody in the network; the sink and the cloud beside the cameras."""
+        run, left = self._view.run, -self._view.stage.right
+        sink_m = cameras_m.mean(axis=0) + (np.ptp(cameras_m @ left) / 2.0 + BESIDE * self._size_m) * left
         places_m = np.tile(sink_m, (len(run.names), 1))
         for node, camera_m in zip(self._view.nodes, cameras_m, strict=True):
             if node.row >= 0:
@@ -231,7 +240,7 @@ class DeliveryDrawing:
             self._label(f"name-{role}", text, self._places_m[row] + (0.0, 0.0, 0.05 * self._size_m), 0.9)
         if "cloud" in roles:
             cloud_m = self._places_m[roles.index("cloud")]
-            client_m = cloud_m + 0.35 * self._size_m * self._view.stage.right
+            client_m = self._client_m
             self._mark("client", client_m, NEUTRAL)
             above_m = client_m + np.array([0.0, 0.0, 0.05 * self._size_m])
             self._label("name-client", "client: you", above_m, 0.9)

@@ -45,6 +45,8 @@ from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, PointClou
 
 NODE_POINTS = 6000
 """Of the cloud of one node."""
+CURVE_POINTS = 400
+"""Of the curve of bytes."""
 NOTHING_YET = (48, 52, 58)
 """Pixels of which nothing has arrived."""
 Steps = Generator[Progress | DeliveryView | MomentView, None, DeliveryView]
@@ -136,8 +138,11 @@ def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:
         )
         for row, (frame, stream) in enumerate(zip(rig.frames, sending.streams, strict=True))
     )
+    came = sending.arrivals
+    total = np.cumsum(came.byte_count)
+    some = np.unique(np.linspace(0, len(total) - 1, min(len(total), CURVE_POINTS)).astype(int))
     return DeliveryView(
-        sent, run, nodes, _stage(rig.frames), tuple(sending.times_ns.tolist()), sending.packet_bytes
+        sent, run, nodes, _stage(rig.frames), tuple(sending.times_ns.tolist()), came.t_ns[some], total[some]
     )
 
 

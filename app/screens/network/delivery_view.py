@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from app.drawing.cameras import Stage
 from app.screens.network.view import NetworkView
 from app.state import Sent
@@ -89,7 +92,10 @@ class DeliveryView:
     """Where to stand to see the room and its cameras."""
     times_ns: tuple[int, ...]
     """Of all moments, computed or not."""
-    packet_bytes: int
+    arrived_ns: NDArray[np.int64]
+    """(T,) times, some hundreds at most."""
+    arrived_bytes: NDArray[np.int64]
+    """(T,) of the images that are at the sink by then."""
     moments: tuple[MomentView, ...] = ()
     """By time; while it is computed, those that are there."""
     lossless: Lossless | None = None

@@ -38,20 +38,21 @@ def growth_lane(view: DeliveryView) -> CurvesLane:
 
 
 def _growth(view: DeliveryView) -> list[Curve]:
-    t_ns = np.array([one.t_ns for one in view.moments], np.int64)
+    t_ns = np.array(view.times_ns, np.int64)
+    by_time = {one.t_ns: one for one in view.moments}
+    moments = [by_time.get(t) for t in view.times_ns]
 
     def percent(values: list[float | None]) -> FloatArray:
         return np.array([np.nan if value is None else 100.0 * value for value in values])
 
-    total = max(view.total_bytes, 1)
-    arrived = percent([one.delivered_bytes / total for one in view.moments])
-    score = percent([one.f_score for one in view.moments])
-    holes = percent([one.no_hit_share for one in view.moments])
+    score = percent([one and one.f_score for one in moments])
+    holes = percent([one and one.no_hit_share for one in moments])
+    arrived = 100.0 * view.arrived_bytes / max(view.total_bytes, 1)
     curves = [
-        Curve("bytes", "%", DELIVERED, t_ns, arrived, 0.0, 100.0),
+        Curve("bytes", "%", DELIVERED, view.arrived_ns, arrived, 0.0, 100.0),
         Curve("rays without surface", "%", LOSS, t_ns, holes, 0.0, 100.0),
     ]
-    if np.isfinite(score).any() or not len(score):
+    if np.isfinite(score).any() or not view.moments:
         curves.insert(1, Curve("F-score", "%", INFERRED, t_ns, score, 0.0, 100.0))
     return curves
 

@@ -192,8 +192,7 @@ class NetworkPanel(Panel):
         self._legend.content = _legend_html(legend(view))
         self._packet.content = PICK
         self._load(view.run.start_ns, view.run.end_ns, stops_ns(view.run))
-        if now_ns is not None:
-            self._dock.seek(min(now_ns, view.run.end_ns))
+        self._dock.seek(view.run.end_ns if now_ns is None else now_ns)
         self._grow(view)
         self.session.frame_view()
 
