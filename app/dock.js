@@ -21,9 +21,9 @@
     return element;
   }
 
-  // 3.21 s, 12.4 ms: as many digits as differ between pixels that far apart.
-  function timeText(ns, step = 0) {
-    const size = Math.max(Math.abs(ns), step);
+  // 3.21 s, 12.4 ms; of times a step apart in the unit of the largest, as many digits as tell them apart.
+  function timeText(ns, step = 0, largest = 0) {
+    const size = Math.max(Math.abs(ns), largest);
     const [unit, name] = size >= 1e9 ? [1e9, "s"] : size >= 1e6 ? [1e6, "ms"] : [1e3, "µs"];
     const value = ns / unit;
     const digits = step > 0
@@ -54,7 +54,7 @@
       this.playing = false;
       this.visible = false;
       this.build();
-      // While its place in the control panel is not there, nor is the dock.
+      // Without the panel through which it speaks, as when the server is gone, it is not there.
       new MutationObserver(() => this.place()).observe(document.body, {childList: true, subtree: true});
     }
 
@@ -65,9 +65,10 @@
         null, {className: "packetmesh-dock-row", tabIndex: 0});
       this.row.setAttribute("role", "group");
       this.row.setAttribute("aria-label", "Timeline");
-      const bar = make("div", "display: flex; align-items: center; gap: 6px; height: 28px", this.row);
+      const bar = make("div", "display: flex; flex-wrap: wrap; align-items: center; gap: 2px 6px; " +
+        "min-height: 28px", this.row);
       const button = (text, title, action) => {
-        const one = make("button", "border: 1px solid #c3cbd2; border-radius: 4px; background: #f7f9fa; " +
+        const one = make("button", "flex: none; white-space: nowrap; border: 1px solid #c3cbd2; border-radius: 4px; background: #f7f9fa; " +
           "height: 24px; min-width: 28px; padding: 0 8px; font: inherit; cursor: pointer; color: inherit",
           bar, {textContent: text, title, type: "button"});
         one.setAttribute("aria-label", title.split(":")[0]);
@@ -76,19 +77,20 @@
         one.addEventListener("pointerdown", () => setTimeout(() => this.row.focus({preventScroll: true})));
         return one;
       };
-      const space = px => make("span", `width: ${px}px`, bar);
       button("|◀", "Event back: to the event before (left arrow)", () => this.say("step", -1));
       this.play = button("▶", "Play: or pause (space)", () => this.say("toggle"));
       button("▶|", "Next event: (right arrow)", () => this.say("step", 1));
-      this.time = make("span", "font-variant-numeric: tabular-nums; font-weight: 600; min-width: 150px; " +
+      this.time = make("span", "font-variant-numeric: tabular-nums; font-weight: 600; min-width: 190px; " +
         "padding-left: 6px; font-size: 13px", bar, {className: "packetmesh-dock-time"});
+      make("span", "color: #56606a", bar, {textContent: "Speed"});
       button("−", "Slower", () => this.say("faster", -1));
-      this.speed = make("span", "min-width: 52px; text-align: center", bar, {title: "Speed"});
+      this.speed = make("span", "min-width: 46px; text-align: center", bar, {title: "Speed"});
       button("+", "Faster", () => this.say("faster", 1));
-      space(10);
-      button("Whole run", "Whole run: show all of it", () => this.look(this.start, this.end));
-      this.legend = make("span", "display: flex; gap: 12px; margin-left: auto; overflow: hidden; " +
-        "white-space: nowrap", bar);
+      make("span", "color: #56606a; margin-left: 10px", bar, {textContent: "Zoom"});
+      button("−", "Zoom out: (− or the wheel)", () => this.zoom(2, this.xOf(this.now)));
+      button("+", "Zoom in: about the clock (+ or the wheel)", () => this.zoomClock());
+      button("All", "All: show the whole run", () => this.look(this.start, this.end));
+      this.legend = make("span", "display: flex; flex-wrap: wrap; gap: 0 12px; margin-left: auto", bar);
       this.body = make("div", "position: relative; display: flex", this.row);
       this.names = make("div", `flex: none; width: ${GUTTER_PX}px; position: relative`, this.body);
       this.field = make("div", "flex: 1; position: relative; overflow: hidden; cursor: crosshair; " +
@@ -165,7 +167,7 @@
           ArrowRight: () => this.say("step", 1),
           Home: () => this.say("seek", this.start),
           End: () => this.say("seek", this.end),
-          "+": () => this.zoom(0.5, this.xOf(this.now)),
+          "+": () => this.zoomClock(),
           "-": () => this.zoom(2, this.xOf(this.now)),
         }[event.key];
         if (action === undefined) return;
@@ -197,6 +199,14 @@
       const most = this.end - this.start;
       factor = Math.min(Math.max((to - from) * factor, 1000), most) / (to - from);
       this.look(ns - (ns - from) * factor, ns + (to - ns) * factor);
+    }
+
+    // In, about the clock; first to it if it is out of sight.
+    zoomClock() {
+      const [from, to] = this.window;
+      const span = to - from;
+      if (this.now < from || this.now > to) this.look(this.now - span / 2, this.now + span / 2);
+      this.zoom(0.5, this.xOf(this.now));
     }
 
     pan(px) {
@@ -363,7 +373,7 @@
       }
       this.cursor.style.left = `${cursor}px`;
       const step = (this.window[1] - this.window[0]) / width;
-      const now = timeText(this.now, Math.max(10 ** Math.floor(Math.log10(2 * step)), 1));
+      const now = timeText(this.now, Math.max(10 ** Math.floor(Math.log10(2 * step)), 1), this.end);
       this.time.textContent = `${now} of ${timeText(this.end)}`;
       this.drawBox(scale);
       this.drawAxis(width);
@@ -402,7 +412,7 @@
           "border-left: 1px solid #8b959e", null);
         const word = make("div", `position: absolute; left: ${x}px; top: 4px; transform: translateX(` +
           `${x < 24 ? "0" : x > width - 24 ? "-100%" : "-50%"}); white-space: nowrap; font-size: 11px; ` +
-          "line-height: 15px", null, {textContent: timeText(index * step, step)});
+          "line-height: 15px", null, {textContent: timeText(index * step, step, this.window[1])});
         ticks.push(tick, word);
       }
       this.axis.replaceChildren(...ticks);

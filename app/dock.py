@@ -37,6 +37,9 @@ WIDTH_PX = (200, 2400)
 """Of a picture, at least and at most."""
 LEAST_SPAN_NS = 1000
 """Of a window."""
+MARK = """<span class="packetmesh-dock" data-dock="{name}"></span>
+<style>[data-floating-window]:has(.packetmesh-dock) {{ display: none !important; }}</style>"""
+"""By which the page finds the panel."""
 PAGES = 50
 """As many pages are known apart."""
 
@@ -56,7 +59,7 @@ class Dock:
         """Add the dock, which is empty and hidden until ``load`` and ``show``.
 
         Args:
-            ui: of the browser. The dock is seen while the container that is open now is.
+            ui: of the browser.
             on_move: called with the new time in ns whenever the clock moved.
             on_pick: called with the index of a lane and of an item in it, or -1, that were clicked.
             clock: seconds of the person who looks.
@@ -72,12 +75,14 @@ class Dock:
         self._heard: dict[str, int] = {}
         self._tip = ""
         self._chosen: dict[str, Any] = {}
-        mark = f'<span class="packetmesh-dock" data-dock="{self._name}"></span>'
-        # Its text field follows: it is there only for what it sends.
-        hide = "<style>div:has(> .packetmesh-dock) + * { display: none !important; }</style>"
-        ui.gui.add_html(mark + hide + running(_SCRIPT))
-        self._field = ui.when_changed(ui.gui.add_text("Dock", ""), self._hear)
-        self._setup, self._picture, self._state = (ui.gui.add_html("") for _ in range(3))
+        # Nobody sees this panel. It is one of its own so that it stays when the control panel is closed.
+        panel = ui.gui.add_panel()
+        panel.float(x=0, y=0)
+        panel.expand()
+        with panel.add_tab("Dock"):
+            ui.gui.add_html(MARK.format(name=self._name) + running(_SCRIPT))
+            self._field = ui.when_changed(ui.gui.add_text("Dock", ""), self._hear)
+            self._setup, self._picture, self._state = (ui.gui.add_html("") for _ in range(3))
         self._ticker = Ticker(lambda: ui.post(self._tick), PICTURE_S)
         ui.closers.append(self._ticker.close)
 
@@ -114,7 +119,9 @@ class Dock:
         self._pace((self._end_ns - self._start_ns) / 1e9 / RUN_S)
         self._send_setup()
         self._draw()
-        self._go(start_ns)
+        self.now_ns = start_ns
+        self._send_state()
+        self._on_move(start_ns)
 
     def show(self, visible: bool) -> None:
         """Show or hide it."""
@@ -308,6 +315,8 @@ def speed_text(speed: float) -> str:
 
 def time_text(t_ns: int) -> str:
     """A length of time in a sentence: 3.21 s, 12.4 ms."""
+    if t_ns == 0:
+        return "0 s"
     for unit, ns in (("s", 1e9), ("ms", 1e6), ("µs", 1e3)):
         if abs(t_ns) >= ns or unit == "µs":
             value = t_ns / ns

@@ -9,55 +9,48 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
-class Edges:
-    """Starts and ends of some frames, each ascending in each row, one row after the other.
+class Sums:
+    """Moments at which frames begin, or end, in each row, and what comes before each.
 
     Sums of times may wrap around, as int64 do; that leaves their differences exact.
     """
 
-    row_at: NDArray[np.int64]
-    """(R + 1,) where each row begins in the other arrays."""
-    start_ns: NDArray[np.int64]
-    """(F,)."""
-    end_ns: NDArray[np.int64]
-    """(F,) not of the same frames."""
-    start_sum_ns: NDArray[np.int64]
-    """(F + 1,) of the starts before each."""
-    end_sum_ns: NDArray[np.int64]
+    t_ns: NDArray[np.int64]
+    """(F,) ascending in each row, one row after the other."""
+    before: NDArray[np.int64]
+    """(F + 1, 4): of all before each, how many, the sum of their times, and the same of the lost ones."""
 
-    def until(self, row: int, t_ns: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(T,) frames of a row that have begun before each time, and the air time they had taken by then."""
-        first, last = int(self.row_at[row]), int(self.row_at[row + 1])
-        begun = first + np.searchsorted(self.start_ns[first:last], t_ns)
-        ended = first + np.searchsorted(self.end_ns[first:last], t_ns)
-        starts_ns = self.start_sum_ns[begun] - self.start_sum_ns[first]
-        ends_ns = self.end_sum_ns[ended] - self.end_sum_ns[first]
-        return begun - first, (begun - ended) * t_ns - starts_ns + ends_ns
+    def until(self, first: int, last: int, t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(T, 4) the same for those of a row, from ``first`` on, that come before each of ascending times."""
+        # Most of the row lies outside a narrow window: it is searched twice, not for every pixel.
+        low, high = first + np.searchsorted(self.t_ns[first:last], (t_ns[0], t_ns[-1]))
+        at = low + np.searchsorted(self.t_ns[low:high], t_ns)
+        return self.before[at] - self.before[first]
 
 
 @dataclass(frozen=True, slots=True)
 class Levels:
     """Frames by row and time."""
 
-    every: Edges
-    """Of all frames."""
-    lost: Edges
-    """Of the lost ones."""
+    row_at: NDArray[np.int64]
+    """(R + 1,) where each row begins in the other arrays."""
     item: NDArray[np.int32]
     """(F,) index of each frame as it was given; by row, then by start, as what follows."""
     start_ns: NDArray[np.int64]
     end_ns: NDArray[np.int64]
     cause: NDArray[np.int8]
     """(F,) why it was lost; 0 if it was not."""
+    begun: Sums
+    ended: Sums
 
     @property
     def rows(self) -> int:
         """How many."""
-        return len(self.every.row_at) - 1
+        return len(self.row_at) - 1
 
     def row(self, index: int) -> tuple[int, int]:
         """First frame of a row, and the first behind it."""
-        return int(self.every.row_at[index]), int(self.every.row_at[index + 1])
+        return int(self.row_at[index]), int(self.row_at[index + 1])
 
     def near(self, row: int, start_ns: int, end_ns: int) -> tuple[int, int]:
         """First frame of a row that begins in a span of time, and the first that begins behind it."""
@@ -83,23 +76,24 @@ def levels_of(
         rows: how many; there may be empty ones.
     """
     order = np.lexsort((start_ns, row))
-    starts, ends, at = start_ns[order], end_ns[order], row[order]
-    causes = cause[order].astype(np.int8)
-    lost = causes > 0
+    by_end = np.lexsort((end_ns, row))
     return Levels(
-        every=_edges(starts, ends, at, rows),
-        lost=_edges(starts[lost], ends[lost], at[lost], rows),
+        row_at=np.searchsorted(row[order], np.arange(rows + 1)),
         item=order.astype(np.int32),
-        start_ns=starts,
-        end_ns=ends,
-        cause=causes,
+        start_ns=start_ns[order],
+        end_ns=end_ns[order],
+        cause=cause[order].astype(np.int8),
+        begun=_sums(start_ns[order], cause[order] > 0),
+        ended=_sums(end_ns[by_end], cause[by_end] > 0),
     )
 
 
-def _edges(starts: NDArray[np.int64], ends: NDArray[np.int64], row: NDArray[np.integer], rows: int) -> Edges:
-    ends = ends[np.lexsort((ends, row))]
-    sums = [np.concatenate([[0], np.cumsum(t_ns, dtype=np.int64)]) for t_ns in (starts, ends)]
-    return Edges(np.searchsorted(row, np.arange(rows + 1)), starts, ends, sums[0], sums[1])
+def _sums(t_ns: NDArray[np.int64], lost: NDArray[np.bool_]) -> Sums:
+    before = np.zeros((len(t_ns) + 1, 4), np.int64)
+    columns = (np.ones_like(t_ns), t_ns, lost, np.where(lost, t_ns, 0))
+    for index, column in enumerate(columns):
+        np.cumsum(column, dtype=np.int64, out=before[1:, index])
+    return Sums(t_ns, before)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,9 +113,15 @@ class Counts:
 def counts_of(levels: Levels, start_ns: int, end_ns: int, parts: int) -> Counts:
     """Frames and air time in equal parts of a window."""
     edges_ns = start_ns + np.arange(parts + 1, dtype=np.int64) * (end_ns - start_ns) // parts
-    begun, taken = np.empty((2, 2, levels.rows, parts), np.int64)
-    for which, edges in enumerate((levels.every, levels.lost)):
-        for row in range(levels.rows):
-            until = edges.until(row, edges_ns)
-            begun[which, row], taken[which, row] = np.diff(until[0]), np.diff(until[1])
-    return Counts(begun[0], begun[1], taken[0], taken[1])
+    begun = np.empty((levels.rows, parts + 1, 4), np.int64)
+    ended = np.empty_like(begun)
+    for row in range(levels.rows):
+        begun[row] = levels.begun.until(*levels.row(row), edges_ns)
+        ended[row] = levels.ended.until(*levels.row(row), edges_ns)
+    counts = []
+    for number, times in ((0, 1), (2, 3)):
+        # A frame has been on the air since its start, but not since its end.
+        on_air = begun[..., number] - ended[..., number]
+        taken_ns = on_air * edges_ns - (begun[..., times] - ended[..., times])
+        counts += [np.diff(begun[..., number]), np.diff(taken_ns)]
+    return Counts(frames=counts[0], taken_ns=counts[1], lost=counts[2], lost_ns=counts[3])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -88,7 +88,7 @@ class FramesLane:
 
     title = "Frames"
     grows = False
-    legend = (("frames on the air", TARGET), ("lost; where many, the redder the larger their share", LOSS))
+    legend = (("frames on the air", TARGET), ("lost; from afar, the share lost", LOSS))
 
     def __init__(
         self, levels: Levels, names: Sequence[str], about: Callable[[int], str], causes: Sequence[str]
@@ -113,20 +113,18 @@ class FramesLane:
         width = picture.shape[1]
         counts = counts_of(self._levels, start_ns, end_ns, width)
         pixel_ns = (end_ns - start_ns) / width
-        taken, lost = (np.clip(ns / pixel_ns, 0.0, 1.0) for ns in (counts.taken_ns, counts.lost_ns))
+        taken, lost = (ns.astype(np.float32) / pixel_ns for ns in (counts.taken_ns, counts.lost_ns))
         frames = _around(counts.frames)
         many = frames * NEAR_PX > 1.0
+        share = FAINTEST + (1.0 - FAINTEST) * np.minimum(_around(taken), 1.0)
         rate = np.clip(_around(counts.lost) / np.maximum(frames, 1e-6), 0.0, 1.0)
-        cells = np.empty((len(self._names), self._row_px, width, 3), np.float32)
-        cells[0::2], cells[1::2] = PAPER, STRIPE
-        body = cells[:, : self._row_px - self._gap_px]
-        _blend(body, np.where(many, 0.0, _one_by_one(counts.frames, taken)), TARGET)
-        _blend(body, np.where(many, 0.0, _one_by_one(counts.lost, lost)), LOSS)
-        many &= (counts.frames > 0) | (taken > 0.0)
-        strip = max(1, round(0.3 * self._row_px))
-        _blend(body[:, :-strip], np.where(many, FAINTEST + (1.0 - FAINTEST) * taken, 0.0), TARGET)
-        _blend(body[:, -strip:], np.where(many, np.sqrt(rate), 0.0), LOSS)
-        picture[:] = cells.reshape(self.height_px, width, 3)
+        every, red = _one_by_one(counts.frames, taken), _one_by_one(counts.lost, lost)
+        strip_px = max(1, round(0.3 * self._row_px))
+        rows = picture.reshape(len(self._names), self._row_px, width, 3)
+        rows[0::2], rows[1::2] = PAPER, STRIPE
+        body = rows[:, : self._row_px - self._gap_px]
+        _paint(body[:, :-strip_px], np.where(many, share, every), np.where(many, 0.0, red))
+        _paint(body[:, -strip_px:], np.where(many, 0.0, every), np.where(many, np.sqrt(rate), red))
 
     def labels(self, now_ns: int) -> Sequence[Label]:
         """The nodes' names, as many as there is room for."""
@@ -182,27 +180,31 @@ class FramesLane:
         """Where a frame is."""
         levels = self._levels
         at = int(np.flatnonzero(levels.item == item)[0])
-        row = int(np.searchsorted(levels.every.row_at, at, side="right")) - 1
+        row = int(np.searchsorted(levels.row_at, at, side="right")) - 1
         edges = row * self._row_px, (row + 1) * self._row_px - self._gap_px
         return int(levels.start_ns[at]), int(levels.end_ns[at]), *edges
 
 
-def _around(counts: NDArray[np.int64]) -> FloatArray:
+def _around(counts: NDArray[Any]) -> FloatArray:
     """(R, W) mean over the pixels around each."""
     return cv2.blur(counts.astype(np.float32), (AROUND_PX, 1), borderType=cv2.BORDER_REPLICATE)
 
 
 def _one_by_one(begun: NDArray[np.int64], taken: FloatArray) -> FloatArray:
     """(R, W) strength of frames, each at least a pixel wide, with a light edge where two touch."""
-    strength = np.where((begun > 0) | (taken > 0.0), np.maximum(taken, 0.75), 0.0)
+    strength = np.where((begun > 0) | (taken > 0.0), np.clip(taken, 0.75, 1.0), np.float32(0.0))
     touching = (begun[:, 1:] > 0) & (taken[:, :-1] > 0.5) & (taken[:, 1:] > 0.5)
     strength[:, 1:][touching] = 0.5
     return strength
 
 
-def _blend(cells: FloatArray, strength: FloatArray, color: Color) -> None:
-    """Lay (R, W) of a colour over (R, H, W, 3)."""
-    cells += strength[:, None, :, None].astype(np.float32) * (np.array(color, np.float32) - cells)
+def _paint(rows: ByteArray, frames: FloatArray, lost: FloatArray) -> None:
+    """Lay frames, and above them lost ones, in (R, W) strengths over (R, H, W, 3) rows."""
+    for channel, (target, loss) in enumerate(zip(TARGET, LOSS, strict=True)):
+        color = rows[:, 0, :, channel].astype(np.float32)
+        color += frames * (target - color)
+        color += lost * (loss - color)
+        rows[..., channel] = color[:, None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,6 +53,12 @@ class Handle:
     def close(self):
         self.visible = False
 
+    def float(self, **place):
+        """A panel of its own, somewhere."""
+
+    def expand(self):
+        """It is open."""
+
     @property
     def seen(self):
         """Whether it and all that it lies in are visible."""

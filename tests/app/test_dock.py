@@ -1,0 +1,176 @@
+"""The dock's clock, and what it makes of what a page says."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from app.dock import Dock, speed_text, time_text
+from app.levels import levels_of
+from app.timeline import Curve, CurvesLane, FramesLane
+from tests.app.fakes import ui_of
+
+STOPS_NS = np.array([1_000, 2_000_000_000, 5_000_000_000])
+START_NS, END_NS = 1_000, 10_000_000_000
+
+
+class Hand:
+    """Says what a page would say, and reads what it is told."""
+
+    def __init__(self, page="one"):
+        self.page, self.said, self.now_s = page, 0, 0.0
+        self.moves, self.picks = [], []
+        self.ui = ui_of()
+        self.dock = Dock(
+            self.ui, self.moves.append, lambda *what: self.picks.append(what), lambda: self.now_s
+        )
+        none = np.zeros(3, int)
+        levels = levels_of(STOPS_NS, STOPS_NS + 1000, none, none, 1)
+        self.lane = FramesLane(levels, ("porch",), "frame {}".format, ("",))
+        self.dock.load(START_NS, END_NS, STOPS_NS, [self.lane])
+        self.dock.show(True)
+
+    def say(self, *actions, page=None):
+        numbered = []
+        for action in actions:
+            self.said += 1
+            numbered.append([self.said, *action])
+        self.repeat(numbered, page)
+        return numbered
+
+    def repeat(self, numbered, page=None):
+        text = json.dumps({"page": page or self.page, "again": len(self.moves), "actions": numbered})
+        self.ui.gui.set("Dock", text)
+
+    def told(self, word):
+        """The last that was told with this word in it."""
+        contents = [one.content for one in self.ui.gui.handles if one.kind == "add_html"]
+        return next(content for content in contents if f"&quot;kind&quot;:&quot;{word}&quot;" in content)
+
+    def later(self, seconds):
+        """Let time pass, and the ticker tick."""
+        self.now_s += seconds
+        self.dock._tick()
+
+
+@pytest.fixture
+def hand():
+    hand = Hand()
+    yield hand
+    hand.ui.close()
+
+
+def test_every_timeline_begins_at_its_start_and_paused(hand):
+    assert hand.moves == [START_NS]
+    hand.dock.play()
+    hand.dock.load(0, END_NS, STOPS_NS, [hand.lane])
+    hand.dock.load(0, END_NS, STOPS_NS, [hand.lane])
+    assert (hand.dock.now_ns, hand.dock.playing) == (0, False)
+    assert hand.moves == [START_NS, 0, 0]
+
+
+def test_it_does_not_leave_its_ends(hand):
+    for asked_ns, now_ns in ((-5, START_NS), (3_000_000_000, 3_000_000_000), (10**12, END_NS)):
+        hand.dock.seek(asked_ns)
+        assert hand.dock.now_ns == now_ns == hand.moves[-1]
+
+
+def test_playing_follows_the_persons_clock_and_stops_at_the_end(hand):
+    speed = hand.dock.speed
+    hand.dock.play()
+    hand.later(2.0)
+    assert hand.dock.now_ns == pytest.approx(START_NS + 2e9 * speed)
+    hand.later(3.0)
+    assert hand.dock.now_ns == pytest.approx(START_NS + 5e9 * speed)
+    hand.later(1e6)
+    assert (hand.dock.now_ns, hand.dock.playing) == (END_NS, False)
+    hand.dock.play()
+    assert hand.dock.now_ns == START_NS
+
+
+def test_a_change_of_speed_while_playing_makes_no_jump(hand):
+    hand.dock.play()
+    hand.later(4.0)
+    before_ns, before = hand.dock.now_ns, hand.dock.speed
+    hand.say(["faster", 2])
+    hand.later(0.0)
+    assert hand.dock.now_ns == before_ns
+    assert hand.dock.speed > before
+    hand.later(1.0)
+    assert hand.dock.now_ns - before_ns == pytest.approx(1e9 * hand.dock.speed)
+
+
+def test_steps_halt_at_every_stop_and_stay_at_the_last(hand):
+    hand.dock.play()
+    seen = []
+    for count in (1, 1, 1, -1, -1, -1):
+        hand.dock.step(count)
+        seen.append(hand.dock.now_ns)
+    assert seen == [STOPS_NS[1], STOPS_NS[2], STOPS_NS[2], STOPS_NS[1], STOPS_NS[0], STOPS_NS[0]]
+    assert not hand.dock.playing
+
+
+def test_what_is_said_again_is_done_once(hand):
+    said = hand.say(["step", 1])
+    hand.repeat(said)
+    hand.repeat([*said, [hand.said + 1, "step", 1]])
+    assert hand.dock.now_ns == STOPS_NS[2]
+
+
+def test_two_pages_are_told_apart(hand):
+    hand.say(["seek", 3_000_000_000], page="one")
+    hand.said = 0
+    hand.say(["seek", 4_000_000_000], page="two")
+    assert hand.dock.now_ns == 4_000_000_000
+    assert "&quot;one&quot;:1" in hand.told("state")
+    assert "&quot;two&quot;:1" in hand.told("state")
+
+
+def test_a_click_goes_there_and_picks_what_is_there(hand):
+    hand.say(["click", 0, 2_000_000_500, 3.0, 10.0])
+    assert hand.dock.now_ns == 2_000_000_500
+    hand.say(["click", 0, 3_000_000_000, 3.0, 10.0])
+    assert hand.picks == [(0, 1), (0, -1)]
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"page": 1}', '{"page": "a", "actions": [[1, "close"]]}'])
+def test_what_it_does_not_understand_changes_nothing(hand, text):
+    hand.ui.gui.set("Dock", text)
+    assert hand.moves == [START_NS]
+
+
+def test_a_window_stays_within_the_run(hand):
+    hand.say(["look", -5e9, 20e9, 800])
+    assert f"&quot;window&quot;:[{START_NS},{END_NS}]" in hand.told("picture")
+    hand.say(["look", 9.5e9, 10.5e9, 800])
+    assert f"&quot;window&quot;:[9000000000,{END_NS}]" in hand.told("picture")
+
+
+def test_new_lanes_leave_clock_and_window_as_they_are(hand):
+    hand.say(["look", 2e9, 4e9, 800], ["seek", 3e9])
+    curve = Curve("warmth", "°C", (0, 0, 0), np.array([0]), np.array([21.0]), 0, 30)
+    hand.dock.update([hand.lane, CurvesLane("Weather", [curve])])
+    assert hand.dock.now_ns == 3_000_000_000
+    assert "&quot;window&quot;:[2000000000,4000000000]" in hand.told("setup")
+    assert "warmth 21" in hand.told("state")
+
+
+def test_hiding_it_stops_the_clock(hand):
+    hand.dock.play()
+    hand.dock.show(False)
+    hand.later(5.0)
+    assert hand.dock.now_ns == START_NS
+
+
+def test_speeds_and_times_are_round():
+    assert [speed_text(speed) for speed in (0.02, 0.5, 1.0, 5.0, 100.0)] == [
+        "×1/50",
+        "×1/2",
+        "×1",
+        "×5",
+        "×100",
+    ]
+    times = [3_210_400_000, 12_430_000, 999, 157_228_380_000, 0]
+    assert [time_text(t_ns) for t_ns in times] == ["3.21 s", "12.4 ms", "1.00 µs", "157 s", "0 s"]
