@@ -60,9 +60,8 @@ def arrivals(trace: NetworkTrace, at: Place = "sink") -> Arrivals:
         InputError: the run kept no log of its packets, or has no such place.
 
     >>> import packetmesh as pm
-    >>> from network_sim.arrivals import arrivals
     >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
-    >>> came = arrivals(pm.simulate(config))
+    >>> came = pm.arrivals(pm.simulate(config))
     >>> len(came), int(came.byte_count.sum())
     (54, 6000)
     """
@@ -99,7 +98,7 @@ def until(trace: NetworkTrace, t_ns: ArrayLike) -> Spent:
     Raises:
         InputError: the run kept no log of its packets.
     """
-    log, moments = _log(trace), np.clip(np.ravel(t_ns), 0, trace.horizon_ns)
+    log, moments = _log(trace), np.clip(np.ravel(np.asarray(t_ns, np.int64)), 0, trace.horizon_ns)
     frames, lost = log.of(EventKind.AIR), log.of(EventKind.LOSS)
     sent_bytes = np.append(0, np.cumsum(frames.size_bytes, dtype=np.int64))
     spent = energy.joules(_radio_times(trace, log, moments), trace.config.energy)

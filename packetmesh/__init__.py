@@ -14,9 +14,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from network_sim.arrivals import Arrivals, arrivals
     from network_sim.config import PRESETS as NETWORK_PRESETS
     from network_sim.config import (
         EnergyConfig,
+        LossConfig,
         MacConfig,
         NetworkConfig,
         NodesConfig,
@@ -44,6 +46,8 @@ if TYPE_CHECKING:
         RegistrationConfig,
         SurfaceConfig,
     )
+    from pipeline.deliver import Delivery, deliver
+    from pipeline.delivery.moments import Moment
     from pipeline.io.clouds import read_cloud, write_cloud
     from pipeline.io.demos import DEMO_SCENES, load_demo
     from pipeline.io.meshes import read_mesh, write_mesh
@@ -70,8 +74,9 @@ if TYPE_CHECKING:
     )
 
 _NAMES = {
+    "network_sim.arrivals": "Arrivals arrivals",
     "network_sim.config": (
-        "EnergyConfig MacConfig NetworkConfig NodesConfig RadioConfig RunConfig SchemeConfig "
+        "EnergyConfig LossConfig MacConfig NetworkConfig NodesConfig RadioConfig RunConfig SchemeConfig "
         "StreetConfig UplinkConfig"
     ),
     "network_sim.metrics": "Metric image_delays_s",
@@ -85,6 +90,8 @@ _NAMES = {
     "pipeline.config": (
         "PRESETS AcquisitionConfig DepthConfig FusionConfig PipelineConfig RegistrationConfig SurfaceConfig"
     ),
+    "pipeline.deliver": "Delivery deliver",
+    "pipeline.delivery.moments": "Moment",
     "pipeline.io.clouds": "read_cloud write_cloud",
     "pipeline.io.demos": "DEMO_SCENES load_demo",
     "pipeline.io.meshes": "read_mesh write_mesh",
@@ -107,16 +114,17 @@ _PLACES = {name: (module, name) for module, names in _NAMES.items() for name in 
 """Module and attribute of every public name."""
 
 __all__ = [
-    "DEMO_SCENES", "NETWORK_PRESETS", "PRESETS", "AcquisitionConfig", "BallPivotStep", "CameraIntrinsics",
-    "Cause", "DepthConfig", "DepthMap", "EnergyConfig", "EventKind", "Events", "FusionConfig", "InputError",
-    "MacConfig", "Metric", "NetworkConfig", "NetworkTrace", "NodesConfig", "PacketMeshError",
-    "PipelineConfig", "PointCloud", "PointSource", "Progress", "RadioConfig", "Reconstruction",
-    "ReconstructionError", "RegistrationConfig", "RegistrationResult", "RegistrationStep", "RgbdFrame", "Rig",
-    "RigTruth", "RunConfig", "SchemeConfig", "StreetConfig", "Surface", "SurfaceConfig", "SurfaceQuality",
-    "SurfaceResult", "UplinkConfig", "back_project", "drain", "estimate_normals", "image_delays_s",
-    "iterate_ball", "iterate_registration", "iterate_simulation", "load_demo", "load_frame", "load_rig",
-    "network_metrics", "point_error_m", "read_cloud", "read_mesh", "reconstruct", "register", "roll_ball",
-    "save_rig", "simulate", "spacing", "with_settings", "write_cloud", "write_mesh",
+    "DEMO_SCENES", "NETWORK_PRESETS", "PRESETS", "AcquisitionConfig", "Arrivals", "BallPivotStep",
+    "CameraIntrinsics", "Cause", "Delivery", "DepthConfig", "DepthMap", "EnergyConfig", "EventKind", "Events",
+    "FusionConfig", "InputError", "LossConfig", "MacConfig", "Metric", "Moment", "NetworkConfig",
+    "NetworkTrace", "NodesConfig", "PacketMeshError", "PipelineConfig", "PointCloud", "PointSource",
+    "Progress", "RadioConfig", "Reconstruction", "ReconstructionError", "RegistrationConfig",
+    "RegistrationResult", "RegistrationStep", "RgbdFrame", "Rig", "RigTruth", "RunConfig", "SchemeConfig",
+    "StreetConfig", "Surface", "SurfaceConfig", "SurfaceQuality", "SurfaceResult", "UplinkConfig", "arrivals",
+    "back_project", "deliver", "drain", "estimate_normals", "image_delays_s", "iterate_ball",
+    "iterate_registration", "iterate_simulation", "load_demo", "load_frame", "load_rig", "network_metrics",
+    "point_error_m", "read_cloud", "read_mesh", "reconstruct", "register", "roll_ball", "save_rig",
+    "simulate", "spacing", "with_settings", "write_cloud", "write_mesh",
 ]  # fmt: skip
 
 

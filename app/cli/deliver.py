@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +15,7 @@ from packetmesh.progress import drain
 if TYPE_CHECKING:
     from network_sim.config import NetworkConfig
     from pipeline.config import PipelineConfig
-    from pipeline.deliver import Moment
+    from pipeline.delivery.moments import Moment
 
 
 def deliver(
@@ -47,7 +48,7 @@ def deliver(
         preset: The network: thesis-link, greenhouse, office, or the config.json of a finished simulation.
         coding: How images become bytes: raw, raw-rows, raw-tiles, png, jpeg, rvl, tiles, layered, ...
         moments: How many times, after equal shares of the bytes, the scene is rebuilt.
-        link_trace: A recorded link (time s, rate Mbit/s, round trip ms, share lost) that every node sends over.
+        link_trace: A recorded link (s, Mbit/s, round trip ms, share lost) over which every node sends.
         down: Names of nodes that have failed and send nothing, for example node_02.
         chain: Settings of the reconstruction to start from.
         set: Settings of the network or the reconstruction, for example
@@ -56,25 +57,26 @@ def deliver(
     """
     source = source_named(scene, rig, color, depth, intrinsics, depth_scale)
 
-    from app.reports.delivery import write_hand_out
+    from app.reports.hand_out_of import write_hand_out
     from packetmesh.files import writable_folder
-    from pipeline.deliver import DeliverySpec, iterate_delivery
+    from pipeline.deliver import iterate_delivery
     from pipeline.delivery.folder import delivery_metrics, summary, write_delivery_folder
+    from pipeline.delivery.sending import DeliverySpec
     from pipeline.spec import Spec
 
     network, config = _settings(preset, chain, set)
     if link_trace is not None:
         network = replace(network, mac=replace(network.mac, kind="replay", trace=str(link_trace)))
     asked = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
-    steps = iterate_delivery(asked)
+    steps = iterate_delivery(asked, processes=min(2, os.cpu_count() or 1))
     first = next(steps)  # what cannot be sent leaves no folder
     writable_folder(out)
     _say_moment(first)
     delivery = drain(steps, _say_moment)
     metrics = delivery_metrics(delivery)
     write_delivery_folder(delivery, metrics, preset, out)
-    write_hand_out(delivery, out / "delivery.html")
-    say(f"100%  {summary(delivery)}; see {out / 'delivery.html'}")
+    page = write_hand_out(delivery, out)
+    say(f"100%  {summary(delivery)}; see {page}")
     if json:
         print_json(metrics)
 

@@ -127,7 +127,7 @@ def _frames(hand_out: HandOut) -> tuple[bytes, float, float]:
     since = np.diff(start, prepend=0)
     since[first] = start[first]
     columns = (since.astype("<u4"), duration.astype("<u4"), frames.cause[order].astype(np.uint8))
-    planes = (column.view(np.uint8).reshape(len(column), -1).T.tobytes() for column in columns)
+    planes = (column.view(np.uint8).reshape(len(column), column.itemsize).T.tobytes() for column in columns)
     return zlib.compress(counts.astype("<u4").tobytes() + b"".join(planes), 9), tick_s, until_s
 
 

@@ -1,6 +1,6 @@
 // The network's clock: a row of frames for each node, the curves below, one time axis for both.
 
-const AXIS_PX = 24, RIGHT_PX = 58;
+const AXIS_PX = 24, RIGHT_PX = 64;
 const FAR_BARS_PX = 5; // a bar is at least as wide
 const FRAMES_A_BAR = 8; // and stands for about as many frames, so that a share of them says something
 const NEAR_PX = 4; // frames are drawn one by one from so many pixels a frame
@@ -156,7 +156,7 @@ class Dock {
       this.font(12);
       pen.fillStyle = this.color("soft");
       const lost = some.count ? `${percent(some.lost / some.count)} lost` : "silent";
-      pen.fillText(this.left > 100 && some.count ? `${whole(some.count)} frames, ${lost}` : lost, 4, top + 0.7 * row, this.left - 10);
+      pen.fillText(this.left > 100 && some.count ? `${counted(some.count)}, ${lost}` : lost, 4, top + 0.7 * row, this.left - 10);
     }
     this.inside(() => near ? this.paintFrames(index, top) : this.paintRates(index, top));
   }
@@ -327,7 +327,7 @@ class Dock {
       if (this.frames.cause[each]) why.set(cause, (why.get(cause) ?? 0) + 1);
     }
     const causes = [...why].map(([cause, number]) => `${cause} ${number}`).join(", ");
-    return `${name} around ${clock(t, this.span)}: ${whole(count)} frames, ${lost ? `${whole(lost)} lost (${causes})` : "none lost"}`;
+    return `${name} around ${clock(t, this.span)}: ${counted(count)}, ${lost ? `${whole(lost)} lost (${causes})` : "none lost"}`;
   }
 }
 
@@ -342,6 +342,7 @@ for (const curve of CURVES) curve.known = record => record.moments.some(moment =
 // Numbers in words, with their units.
 
 const whole = number => Math.round(number).toLocaleString("en");
+const counted = number => `${whole(number)} frame${number === 1 ? "" : "s"}`;
 const percent = share => `${+(100 * share).toPrecision(share < 0.1 ? 2 : 3)} %`;
 const BYTE_UNITS = [{bytes: 1e9, unit: "GB"}, {bytes: 1e6, unit: "MB"}, {bytes: 1e3, unit: "kB"}, {bytes: 1, unit: "B"}];
 const byteScale = bytes => BYTE_UNITS.find(each => bytes >= each.bytes) ?? BYTE_UNITS[3];

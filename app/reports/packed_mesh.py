@@ -29,6 +29,8 @@ FEWEST_TRIANGLES = 500
 """That thinning leaves, however few bytes there are."""
 _MORTON_BITS = 10
 _TRIES = 6
+_LEVEL = 6
+"""Of deflate; 9 takes four times as long for 0.7 % fewer bytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,16 +57,16 @@ def pack(mesh: Surface, box: Box) -> bytes:
     order = np.argsort(_morton(steps), kind="stable")
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
-    triangles = _lowest_first(place[triangles.reshape(-1, 3)])
-    low = triangles[:, :1]
-    columns = np.hstack([np.diff(low, axis=0, prepend=0), triangles[:, 1:] - low])
+    faces = _lowest_first(place[triangles.reshape(-1, 3)])
+    low = faces[:, :1]
+    columns = np.hstack([np.diff(low, axis=0, prepend=0), faces[:, 1:] - low])
     parts = (
-        np.array([len(used), len(triangles)], "<u4"),
+        np.array([len(used), len(faces)], "<u4"),
         _planes(_zigzag(steps[order]), "<u2"),
         _planes(_differences(_decorrelated(colors[order])), "u1"),
         _planes(columns, "<u4"),
     )
-    return zlib.compress(b"".join(part.tobytes() for part in parts), 9)
+    return zlib.compress(b"".join(part.tobytes() for part in parts), _LEVEL)
 
 
 def pack_within(meshes: Sequence[Surface], box: Box, most_bytes: int, last: float = 4.0) -> list[bytes]:
@@ -158,4 +160,5 @@ def _zigzag(steps: IntArray) -> IntArray:
 def _planes(columns: IntArray, kind: str) -> ByteArray:
     """The bytes of (N, 3) numbers, plane by plane."""
     numbers = np.ascontiguousarray(columns.T).astype(kind)
-    return np.ascontiguousarray(np.moveaxis(numbers.view(np.uint8).reshape(3, len(columns), -1), 2, 1))
+    bytes_ = numbers.view(np.uint8).reshape(3, len(columns), numbers.itemsize)
+    return np.ascontiguousarray(np.moveaxis(bytes_, 2, 1))

@@ -34,7 +34,7 @@ class Received:
     depth: DepthArray
     """(H, W) as ``Images.depth``, 0 where nothing is known or was measured."""
     coarse: DepthArray
-    """(H, W) depth known from a base layer only, 0 wherever ``depth`` has arrived: a guess, no measurement."""
+    """(H, W) depth known from a base layer only, 0 where the image itself arrived: a guess, not measured."""
 
     @staticmethod
     def nothing(shape: tuple[int, int]) -> Received:

@@ -2,7 +2,7 @@
 
 A systematic Cauchy Reed-Solomon code over GF(2^16) (Bloemer et al., "An XOR-Based Erasure-Resilient Coding
 Scheme", 1995): symbols 0 to k-1 are the source itself; symbol i >= k is the sum over j of source j / (i + j),
-where sums are exclusive ors. Every square part of such a matrix can be inverted, hence *any* k symbols suffice.
+where sums are exclusive ors. Every square part of such a matrix can be inverted, hence any k symbols do.
 """
 
 from __future__ import annotations

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from packetmesh.files import atomic_path, write_json
 from packetmesh.settings import settings
-from pipeline.deliver import Delivery, Moment, NodeArrival
+from pipeline.deliver import Delivery
+from pipeline.delivery.moments import Moment, NodeArrival
 from pipeline.run_folder import config_of, metrics_of, surface_metrics, write_run_folder
 
 
@@ -98,25 +98,25 @@ def _f_score(truth: dict[str, float] | None) -> float | None:
 
 def _write_table(moments: tuple[Moment, ...], path: Path) -> None:
     """One row a moment; shares from 0 to 1, empty where there is no surface or no truth."""
+    rows = [_row(moment) for moment in moments]
     with atomic_path(path) as sibling, sibling.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(
-            ("t_s", "sent_bytes", "delivered_bytes", "packets_lost", "radio_j", "energy_j", "nodes")
-            + ("triangles", "no_hit_ray_share", "hole_area_m2", "f_score_5cm")
-        )
-        writer.writerows(_rows(moments))
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
 
 
-def _rows(moments: tuple[Moment, ...]) -> Iterator[tuple[Any, ...]]:
-    for moment in moments:
-        surface = moment.surface
-        holes = ("", "", "")
-        if surface is not None:
-            quality = surface.quality
-            holes = (len(surface.triangles), quality.no_hit_ray_share, quality.hole_area_m2)
-        score = _f_score(moment.truth)
-        yield (
-            *(moment.t_s, moment.sent_bytes, moment.delivered_bytes, moment.packets_lost),
-            *(moment.radio_j, moment.energy_j, len(moment.T_world_camera), *holes),
-            "" if score is None else score,
-        )
+def _row(moment: Moment) -> dict[str, Any]:
+    surface = moment.surface
+    return {
+        "t_s": moment.t_s,
+        "sent_bytes": moment.sent_bytes,
+        "delivered_bytes": moment.delivered_bytes,
+        "packets_lost": moment.packets_lost,
+        "radio_j": moment.radio_j,
+        "energy_j": moment.energy_j,
+        "nodes": len(moment.T_world_camera),
+        "triangles": 0 if surface is None else len(surface.triangles),
+        "no_hit_ray_share": 1.0 if surface is None else surface.quality.no_hit_ray_share,
+        "hole_area_m2": None if surface is None else surface.quality.hole_area_m2,
+        "f_score_5cm": _f_score(moment.truth),
+    }

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from packetmesh.errors import InputError
 from pipeline.types import ByteArray
 
 COLOR_QUALITY = 90
@@ -28,8 +29,14 @@ def write_jpeg(rgb: ByteArray, quality: int = COLOR_QUALITY) -> bytes:
 
 
 def read_picture(stream: bytes) -> NDArray[np.unsignedinteger]:
-    """The image of a whole PNG or JPEG stream."""
+    """The image of a whole PNG or JPEG stream.
+
+    Raises:
+        InputError: it is none.
+    """
     image = cv2.imdecode(np.frombuffer(stream, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise InputError(f"The {len(stream)} bytes are no PNG or JPEG picture; try to receive them again")
     return _swapped(image)
 
 

@@ -23,8 +23,8 @@ def poses_known(rig: Rig) -> bool:
 def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> NetworkConfig:
     """The network with the rig's cameras as its nodes, each with one image of its own to send.
 
-    Seen from above, nodes stand where their cameras do, and the sink behind them, ``nodes.spacing_m`` from
-    their middle. Where the poses are unknown, they stand as ``nodes.layout`` has it.
+    Seen from above, nodes stand where their cameras do, and the sink behind them,
+    ``nodes.spacing_m`` from their middle. Where the poses are unknown, they stand as ``nodes.layout`` has it.
 
     Args:
         rig: one to six nodes; the world's third axis points up.
@@ -36,8 +36,8 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
     """
     if network.scenario != "collection":
         raise InputError(
-            f"A network of the scenario {network.scenario} has no cameras that stand still; try a preset such "
-            "as office, thesis-link or greenhouse"
+            f"A network of the scenario {network.scenario} has no cameras that stand still; try a preset "
+            "such as office, thesis-link or greenhouse"
         )
     nodes = replace(
         network.nodes,

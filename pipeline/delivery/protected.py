@@ -1,9 +1,9 @@
-"""Two kinds of bytes in one stream of packets: a base that must not be lost, and a body of which any part may be.
+"""Two kinds of bytes in one stream of packets: a base that must not be lost, a body of which any part may be.
 
-The base is cut into symbols, with which repair symbols are made; any of them, as many as the base has, give it
-back (``erasure``). Its own symbols come first, so that a transfer that stops early has it; the repair symbols are
-spread over the whole stream, one packet in so many, so that a burst takes only few of them. Each such packet
-starts with the number of its symbol and the length of the base.
+The base is cut into symbols, with which repair symbols are made; any of them, as many as the base has, give
+it back (``erasure``). Its own symbols come first, so that a transfer that stops early has it; the repair
+symbols are spread over the whole stream, one packet in so many, so that a burst takes only few of them. Each
+such packet starts with the number of its symbol and the length of the base.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pipeline.types import BoolArray, ByteArray
 BASE_LOSS = 0.3
 """Share of its packets that a base survives (SPEC 6.5)."""
 _UNIT_BYTES = (64, 8192)
+_LEAST_CERTAIN = 6  # a loss of three in ten takes all of these once in a thousand times
 _NUMBER_BYTES = 2
 _LENGTH_BYTES = 3
 _HEADER_BYTES = _NUMBER_BYTES + _LENGTH_BYTES
@@ -43,7 +44,7 @@ def protect(base: bytes, body: bytes, packet_bytes: int, repair_every: int) -> b
         base: at least one byte, less than 16 MiB.
         body: bytes.
         packet_bytes: how many the network carries at once.
-        repair_every: of so many packets one holds a repair symbol; more where that is too few for ``BASE_LOSS``.
+        repair_every: of so many packets one holds a repair symbol; more where ``BASE_LOSS`` needs them.
     """
     from pipeline.delivery.erasure import repair_symbols
 
@@ -52,7 +53,7 @@ def protect(base: bytes, body: bytes, packet_bytes: int, repair_every: int) -> b
     source_count = -(-len(base) // symbol_bytes)
     body_count = -(-len(body) // unit)
     count = source_count + body_count
-    while (free := count - np.count_nonzero(_of_base(source_count, count, repair_every))) < body_count:
+    while (free := count - int(_of_base(source_count, count, repair_every).sum())) < body_count:
         count += body_count - free
     of_base = _of_base(source_count, count, repair_every)
 
@@ -104,7 +105,7 @@ def unprotect(data: ByteArray, arrived: BoolArray, packet_bytes: int, repair_eve
 
 
 def _unit_bytes(packet_bytes: int) -> int:
-    """Of one symbol with its header: a packet where that is possible, else some small packets or a part of one."""
+    """Of a symbol with its header: a packet if possible, else some small packets or a part of one."""
     least, most = _UNIT_BYTES
     return min(packet_bytes * max(1, -(-least // packet_bytes)), most)
 
@@ -115,8 +116,9 @@ def _symbol_bytes(unit_bytes: int) -> int:
 
 def _certainly_of_base(count: int, repair_every: int) -> BoolArray:
     """(count,) units that belong to the base however long it is: here a reader finds out its length."""
+    every = min(repair_every, -(-count // _LEAST_CERTAIN))
     certain = np.zeros(count, np.bool_)
-    certain[repair_every - 1 :: repair_every] = True
+    certain[every - 1 :: every] = True
     certain[[0, -1]] = True
     return certain
 

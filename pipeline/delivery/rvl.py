@@ -1,10 +1,10 @@
-"""RVL, a fast lossless coding of depth images by A. D. Wilson (ISS 2017, "Fast Lossless Depth Image Compression").
+"""RVL, a lossless coding of depth images (A. D. Wilson, "Fast Lossless Depth Image Compression", ISS 2017).
 
 The values are read in one row: a run of zeros, a run of others, a run of zeros, and so on. Written are the
 length of each run and, for the others, the difference to the last one that was not zero (to 0 at the start),
-with its sign in the lowest bit (0, -1, 1, -2, 2, ... become 0, 1, 2, 3, 4, ...). Every such number is cut into
-groups of three bits, lowest first; a group and a bit that says whether more follow are a nibble. The paper fills
-32-bit words from the top; here bytes are filled from the top, which is the same without up to three padding bytes.
+with its sign in the lowest bit (0, -1, 1, -2, 2, ... become 0, 1, 2, 3, 4, ...). Every such number is cut
+into groups of three bits, lowest first; a group and a bit that says whether more follow are a nibble. The
+paper fills 32-bit words from the top; here bytes are, which is the same with less padding.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def _read(stream: ByteArray, count: int) -> tuple[NDArray[np.uint16], int]:
 
 def _broken(stream: ByteArray, count: int) -> InputError:
     return InputError(
-        f"The {len(stream)} bytes are no RVL stream of {count} depths: a run or a value does not fit, or the end "
-        "is missing; try to receive them again"
+        f"The {len(stream)} bytes are no RVL stream of {count} depths: a run or a value does not fit, "
+        "or the end is missing; try to receive them again"
     )
 
 
@@ -78,7 +78,7 @@ def _compiled(function: Any) -> Any:
 def _encode(row: NDArray[np.uint16], stream: ByteArray) -> int:
     """Fills ``stream``, which is zero, and returns the number of bytes."""
     nibbles = 0
-    previous = np.int64(0)
+    previous = 0
     index = 0
     while index < row.size:
         start = index
@@ -90,8 +90,8 @@ def _encode(row: NDArray[np.uint16], stream: ByteArray) -> int:
             index += 1
         nibbles = _put(stream, nibbles, index - start)
         for position in range(start, index):
-            difference = np.int64(row[position]) - previous
-            previous = np.int64(row[position])
+            difference = int(row[position]) - previous
+            previous = int(row[position])
             nibbles = _put(stream, nibbles, (difference << 1) ^ (difference >> 63))
     return (nibbles + 1) // 2
 
@@ -113,7 +113,7 @@ def _put(stream: ByteArray, nibbles: int, number: int) -> int:
 @_compiled
 def _decode(stream: ByteArray, values: NDArray[np.uint16]) -> tuple[int, int]:
     """Fills ``values``, which are zero; returns how many are known (or ``_BROKEN``) and the nibbles read."""
-    previous = np.int64(0)
+    previous = 0
     index = 0
     nibbles = 0
     while index < values.size:
@@ -124,7 +124,7 @@ def _decode(stream: ByteArray, values: NDArray[np.uint16]) -> tuple[int, int]:
             return (index if zeros == -1 else _BROKEN), nibbles
         index += zeros
         others, nibbles = _get(stream, nibbles, _RUN_BITS)
-        if others > values.size - index or others == 0 and index < values.size:
+        if others > values.size - index or (others == 0 and index < values.size):
             return _BROKEN, nibbles
         if others < 0:
             return (index if others == -1 else _BROKEN), nibbles
@@ -146,16 +146,16 @@ def _get(stream: ByteArray, nibbles: int, most_bits: int) -> tuple[int, int]:
 
     Of a number in which the stream ends one nibble more is counted than there is.
     """
-    number = np.int64(0)
+    number = 0
     shift = 0
     while nibbles < 2 * stream.size:
         if shift >= most_bits:
-            return np.int64(-2), nibbles
+            return -2, nibbles
         byte = stream[nibbles >> 1]
-        nibble = np.int64(byte & 15 if nibbles & 1 else byte >> 4)
+        nibble = int(byte & 15 if nibbles & 1 else byte >> 4)
         nibbles += 1
         number |= (nibble & 7) << shift
         if nibble < 8:
             return number, nibbles
         shift += 3
-    return np.int64(-1), nibbles + 1
+    return -1, nibbles + 1

@@ -14,7 +14,7 @@ from pipeline.types import DepthMap, RgbdFrame
 UNITS_PER_M = (1000.0, 5000.0, 10_000.0, 256.0, 100.0)
 """What a depth camera counts in: the first that holds an image's depths exactly is what is sent."""
 MOST_UNITS = np.iinfo(np.uint16).max
-LEAST_DEPTH_SHARE = 0.01
+LEAST_DEPTH_SHARE = 0.02
 """Share of pixels with depth from which on a node counts as heard."""
 
 

@@ -22,7 +22,7 @@ class Tiled:
     """RVL depth tiles, then JPEG colour tiles; the lengths of all, and the base layer, are protected.
 
     A depth tile is written as it is: its difference to the base layer's depth takes more bytes, as a camera's
-    depths come in steps. Its rows run to and fro, so that neighbours in the stream are neighbours in the image.
+    depths come in steps. Its rows run to and fro: neighbours in the stream are neighbours in the image.
     All depth comes before all colour, and tiles far apart in the image follow each other.
     """
 

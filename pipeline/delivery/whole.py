@@ -27,8 +27,8 @@ class Format:
 class Whole:
     """A depth stream, then a colour stream.
 
-    Each carries its own length, depth in front of it and colour behind it, so that either one can be found and
-    read without the other.
+    Each carries its own length, depth in front of it and colour behind it, so that either one can be found
+    and read without the other.
     """
 
     name: str

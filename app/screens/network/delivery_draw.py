@@ -24,7 +24,7 @@ BESIDE = 0.5
 ELEVATION_RAD = np.radians(40.0)
 FILLED = 0.8
 """Share of the window that all of it takes."""
-PACKET_M, POINT_M = 0.018, 0.008
+PACKET_M, POINT_M = 0.011, 0.008
 """Sizes over the same distance, and of a point."""
 LIT = (255, 230, 0)
 BUSY, DOWN = BRAND, LOSS
@@ -108,7 +108,7 @@ class DeliveryDrawing:
         for row, node in enumerate(self._view.nodes):
             now = None if moment is None else moment.nodes[row]
             share = 0.0 if now is None else now.delivered_bytes / max(node.total_bytes, 1)
-            state = "down" if node.row < 0 else f"{share:.0%}"
+            state = "off" if node.row < 0 else f"{100.0 * share:.0f} %"
             self._names[row].text = f"{node.name} · {state}"
             self._frusta[row].image = _dark(node.aspect) if now is None else now.picture
             self._frusta[row].color = _state_color(node.row < 0, share)
@@ -244,7 +244,8 @@ class DeliveryDrawing:
             self._mark("client", client_m, NEUTRAL)
             above_m = client_m + np.array([0.0, 0.0, 0.05 * self._size_m])
             self._label("name-client", "client: you", above_m, 0.9)
-            self._lines("to-client", np.array([[cloud_m, client_m]]))
+            sink_m = self._places_m[roles.index("sink")]
+            self._lines("to-client", np.array([[sink_m, cloud_m], [cloud_m, client_m]]))
 
     def _add_routes(self) -> None:
         """Who has sent to whom."""

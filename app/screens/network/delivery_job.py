@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from app.drawing.cameras import Stage, stage_around
-from app.drawing.colors import SOURCE
+from app.drawing.colors import NEUTRAL
 from app.drawing.meshes import surface_glb
 from app.drawing.pictures import cividis, depth_range_m
 from app.records import sample
@@ -30,18 +30,17 @@ from app.store import Store
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import Progress
 from pipeline.acquisition import back_project
-from pipeline.deliver import (
+from pipeline.delivery.coding import Received
+from pipeline.delivery.moments import Moment, NodeArrival, Rebuilder
+from pipeline.delivery.sending import (
     DeliverySpec,
-    Moment,
-    NodeArrival,
     Sending,
     frames_at_sink,
-    rebuild,
     received_at,
     send,
     senders_of,
 )
-from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, PointCloud, RgbdFrame
+from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, PointCloud, RgbdFrame, SurfaceResult
 
 NODE_POINTS = 6000
 """Of the cloud of one node."""
@@ -97,13 +96,12 @@ def _delivered(store: Store, spec: Spec) -> Steps:
     sending = yield from _sending(store, spec)
     view = _first_view(sending, _asked(spec), time.perf_counter() - started)
     yield view
-    times_ns, moments = sending.times_ns.tolist(), []
-    for step in rebuild(sending, [*times_ns[-1:], *times_ns[:-1]]):
-        if isinstance(step, Moment):
-            moments.append(_moment_view(sending, step, times_ns[len(moments) - 1]))
-            yield moments[-1]
-        share = (len(moments) + 0.5) / (len(times_ns) + 1)
-        yield Progress(f"moment {len(moments)} of {len(times_ns)}", share)
+    rebuilder, count = Rebuilder(sending), len(sending.times_ns)
+    moments: list[MomentView] = []
+    for index in (count - 1, *range(count - 1)):
+        yield Progress(f"moment {len(moments) + 1} of {count}", (len(moments) + 0.5) / (count + 1))
+        moments.append(_moment_view(sending, rebuilder.moment(index), int(sending.times_ns[index])))
+        yield moments[-1]
     moments.sort(key=lambda one: one.t_ns)
     return replace(view, moments=tuple(moments), lossless=(yield from _lossless(store, spec)))
 
@@ -168,11 +166,16 @@ def _moment_view(sending: Sending, moment: Moment, t_ns: int) -> MomentView:
                 frames, received, moment.nodes, sending.rig.frames, strict=True
             )
         ),
-        glb=b"" if surface is None else surface_glb(surface, surface.colors, photographed=True),
+        glb=b"" if surface is None else surface_glb(surface, _colors(surface, received), photographed=True),
         triangles=0 if surface is None else len(surface.triangles),
         no_hit_share=None if surface is None else surface.quality.no_hit_ray_share,
         f_score=None if truth is None else truth["f_score_5cm"],
     )
+
+
+def _colors(surface: SurfaceResult, received: Sequence[Received]) -> ByteArray | None:
+    """Of its vertices; none before any colour has arrived."""
+    return surface.colors if any(one.rgb_known.any() for one in received) else None
 
 
 def _node_moment(
@@ -186,7 +189,7 @@ def _node_moment(
     thin = sample(cloud.points_m, cloud.colors, NODE_POINTS)
     colors = thin.colors if thin.colors is not None else np.zeros((0, 3), np.uint8)
     if not known.any():
-        colors = np.broadcast_to(np.array(SOURCE, np.uint8), colors.shape).copy()
+        colors = np.broadcast_to(np.array(NEUTRAL, np.uint8), colors.shape).copy()
     return NodeMoment(
         delivered_bytes=arrival.delivered_bytes,
         color_share=arrival.color_share,

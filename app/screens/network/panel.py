@@ -87,13 +87,14 @@ class NetworkPanel(Panel):
     def on_show(self) -> None:
         """Send at the first visit; turn the view to the cameras."""
         self._framed = ()
+        self._dock.show(True)
         if not self._visited:
             self._visited = True
             self._run()
 
     def on_hide(self) -> None:
-        """Stop the clock."""
-        self._dock.pause()
+        """Stop the clock, and leave the lower edge to others."""
+        self._dock.show(False)
 
     def on_action(self, action: str) -> None:
         """Go back to the settings of the start with the rest of the session."""

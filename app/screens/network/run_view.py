@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from app.levels import Levels, levels_of
 from app.screens.network.view import Curve, NetworkView, Pieces, Series, What
 from network_sim.energy import cumulative_radio_j
+from network_sim.frames import fates
 from network_sim.metrics import camera_nodes, metrics
 from network_sim.street import street_of
 from network_sim.trace import Events, NetworkTrace
-from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns
+from network_sim.types import NS_PER_S, EventKind, PacketKind, to_ns
 from pipeline.types import FloatArray
 
 MOST_PIECES = 500_000
@@ -27,8 +28,6 @@ INSTANTS = {
     EventKind.DROP: What.DROP,
     EventKind.EXPIRE: What.EXPIRE,
 }
-NOT_HEARD = (Cause.COLLISION, Cause.NOISE, Cause.RANGE, Cause.NODE_DOWN, Cause.UPLINK, Cause.LINK)
-"""Causes for which a frame did not reach its receiver."""
 
 
 def run_view(trace: NetworkTrace, elapsed_s: float) -> NetworkView:
@@ -78,7 +77,7 @@ def pieces_of(trace: NetworkTrace, start_ns: int) -> Pieces:
     losses = events.of(EventKind.LOSS)
     frames = events.of(EventKind.AIR)
     parts = [
-        _pieces(frames, What.AIR, frames.t_ns + frames.duration_ns, _fates(frames, losses)),
+        _pieces(frames, What.AIR, frames.t_ns + frames.duration_ns, fates(frames, losses)),
         _waits(events, nodes, trace.horizon_ns),
         _downtimes(events, trace.horizon_ns),
     ]
@@ -114,22 +113,6 @@ def _pieces(
         cause=events.cause if cause is None else cause,
         carries=events.packet_kind,
     )
-
-
-def _fates(frames: Events, losses: Events) -> NDArray[np.int8]:
-    """(F,) why the receiver did not get each frame: a loss belongs to the last frame of its sender."""
-    cause = np.full(len(frames), Cause.NONE, np.int8)
-    unheard = losses.where(np.isin(losses.cause, np.array(NOT_HEARD, np.int8)))
-    if not len(frames) or not len(unheard):
-        return cause
-    order = np.lexsort((frames.t_ns, frames.node))
-    span_ns = int(max(frames.t_ns.max(), unheard.t_ns.max())) + 1
-    begun = (frames.node.astype(np.int64) * span_ns + frames.t_ns)[order]
-    at = np.searchsorted(begun, unheard.node.astype(np.int64) * span_ns + unheard.t_ns, side="right") - 1
-    frame = order[np.maximum(at, 0)]
-    same = (at >= 0) & (frames.node[frame] == unheard.node) & (frames.packet[frame] == unheard.packet)
-    cause[frame[same]] = unheard.cause[same]
-    return cause
 
 
 def _waits(events: Events, nodes: int, horizon_ns: int) -> Pieces:

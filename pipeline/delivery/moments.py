@@ -1,0 +1,155 @@
+"""What the sink can rebuild of a scene at one moment, and what it has cost by then."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from network_sim.types import to_s
+from packetmesh.errors import ReconstructionError
+from packetmesh.progress import drain
+from pipeline import geometry
+from pipeline.delivery.coding import Received
+from pipeline.delivery.memory import Memory
+from pipeline.delivery.sending import Sending, arrived_bytes, frames_at_sink, received_at
+from pipeline.delivery.sink import heard
+from pipeline.nodes import Placement
+from pipeline.sources import LoadedRig
+from pipeline.spec import Spec, StageName
+from pipeline.stages import compared, run, with_rays
+from pipeline.types import BoolArray, ByteArray, FloatArray, RgbdFrame, Rig, SurfaceResult
+
+REBUILT: tuple[StageName, ...] = ("rig", "inferred", "nodes", "placement", "clouds", "after")
+"""The stages of a moment."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeArrival:
+    """How much of one node's images the sink knows."""
+
+    name: str
+    total_bytes: int
+    delivered_bytes: int
+    color_share: float
+    """Of its pixels with colour, 0 to 1."""
+    depth_share: float
+    """Of its measured pixels, those whose depth has arrived, 0 to 1."""
+    coarse_share: float
+    """Of its pixels, those whose depth is known coarsely only, 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What has arrived at one time, and what it is good for."""
+
+    t_s: float
+    """Since the first image was taken."""
+    sent_bytes: int
+    """On the air, frames that were sent again included."""
+    delivered_bytes: int
+    """Of the images at the sink, each counted once."""
+    packets_lost: int
+    """Attempts that failed."""
+    radio_j: float
+    """Energy of all nodes' radios until then."""
+    energy_j: float
+    """The same with the computers and cameras that carry them."""
+    nodes: tuple[NodeArrival, ...]
+    T_world_camera: dict[str, FloatArray]
+    """(4, 4) registered poses of the nodes that were heard by then."""
+    surface: SurfaceResult | None
+    """Measured by the rays of all cameras, heard or not; None where nothing can be rebuilt."""
+    truth: dict[str, float] | None
+    """The surface compared with the truth, where there are both."""
+
+
+Rebuilt = tuple[SurfaceResult | None, dict[str, float] | None, dict[str, FloatArray]]
+"""The surface of a moment, its comparison with the truth, and where the nodes stand."""
+NOTHING: Rebuilt = None, None, {}
+
+
+class Rebuilder:
+    """Rebuilds moments of one delivery, best by time: what has not changed since the last is kept."""
+
+    def __init__(self, sending: Sending) -> None:
+        self.sending = sending
+        self._memory = Memory(sending.spec.spec.config.fusion.align_nodes_with == "sensor")
+        self._rebuilt = NOTHING
+
+    def moment(self, index: int) -> Moment:
+        """What there is at one of ``sending.times_ns``."""
+        received = received_at(self.sending, int(self.sending.times_ns[index]))
+        frames = frames_at_sink(self.sending, received)
+        if self._memory.look_at([frame for frame in frames if heard(frame)]):
+            self._rebuilt = _rebuilt(self.sending, frames, self._memory)
+        return _moment(self.sending, index, received, self._rebuilt)
+
+
+def _moment(sending: Sending, index: int, received: Sequence[Received], rebuilt: Rebuilt) -> Moment:
+    t_ns, (surface, truth, poses) = int(sending.times_ns[index]), rebuilt
+    there, spent = arrived_bytes(sending, t_ns), sending.spent
+    nodes = tuple(
+        _arrival(frame, stream, bytes_there, one)
+        for frame, stream, bytes_there, one in zip(
+            sending.rig.frames, sending.streams, there, received, strict=True
+        )
+    )
+    return Moment(
+        t_s=to_s(t_ns),
+        sent_bytes=int(spent.sent_bytes[index]),
+        delivered_bytes=sum(node.delivered_bytes for node in nodes),
+        packets_lost=int(spent.lost[index]),
+        radio_j=float(spent.radio_j[index]),
+        energy_j=float(spent.radio_j[index] + spent.platform_j[index]),
+        nodes=nodes,
+        T_world_camera=poses,
+        surface=surface,
+        truth=truth,
+    )
+
+
+def _arrival(frame: RgbdFrame, stream: ByteArray, there: BoolArray, received: Received) -> NodeArrival:
+    measured = max(1, int(frame.depth.valid.sum()))
+    return NodeArrival(
+        name=frame.name,
+        total_bytes=len(stream),
+        delivered_bytes=int(there.sum()),
+        color_share=float(received.rgb_known.mean()),
+        depth_share=float((received.depth > 0).sum()) / measured,
+        coarse_share=float((received.coarse > 0).mean()),
+    )
+
+
+def _rebuilt(sending: Sending, frames: Sequence[RgbdFrame], memory: Memory) -> Rebuilt:
+    present = [index for index, frame in enumerate(frames) if heard(frame)]
+    if not present:
+        return NOTHING
+    spec = spec_of(sending, frames, present)
+    try:
+        results = drain(run(spec, memory, REBUILT))
+    except ReconstructionError:  # a handful of points has no surface yet
+        return NOTHING
+    placement, surface = results["placement"].value, results["after"].value
+    everyone = whole_placement(sending.rig, present, placement)
+    if len(present) < len(frames):
+        surface = with_rays(surface, sending.rig, everyone)
+    poses = {frames[index].name: pose for index, pose in zip(present, placement.T_world_camera, strict=True)}
+    return surface, compared(sending.rig, everyone, surface), poses
+
+
+def spec_of(sending: Sending, frames: Sequence[RgbdFrame], present: Sequence[int]) -> Spec:
+    """The chain on the nodes that were heard."""
+    asked = sending.spec.spec
+    rig = Rig(sending.rig.name, tuple(frames[index] for index in present))
+    return Spec(LoadedRig(rig), asked.preset, asked.config)
+
+
+def whole_placement(rig: Rig, present: Sequence[int], placement: Placement) -> Placement:
+    """The registered nodes, and the others beside the first of them, as the truth or the rig believes."""
+    believed = [frame.T_world_camera for frame in rig.frames]
+    reference = believed if rig.truth is None else rig.truth.T_world_camera
+    T_here_reference = placement.T_world_camera[0] @ geometry.inverse(reference[present[0]])
+    poses: list[FloatArray] = [T_here_reference @ pose for pose in reference]
+    for index, pose in zip(present, placement.T_world_camera, strict=True):
+        poses[index] = pose
+    return Placement(placement.registrations, tuple(poses))

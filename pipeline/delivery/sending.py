@@ -1,0 +1,146 @@
+"""A rig's images on their way: what every node sends, and what of it is at the sink at any time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from network_sim.arrivals import Arrivals, Spent, arrivals, until
+from network_sim.config import PRESETS, NetworkConfig
+from network_sim.simulate import simulate
+from network_sim.trace import NetworkTrace
+from packetmesh.errors import InputError
+from pipeline.delivery import coding_named
+from pipeline.delivery.coding import Coding, Received
+from pipeline.delivery.plan import network_of
+from pipeline.delivery.sink import frame_at_sink, images_of
+from pipeline.spec import Spec
+from pipeline.types import BoolArray, ByteArray, RgbdFrame, Rig
+
+MOMENTS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class DeliverySpec:
+    """Everything that decides what is delivered, and what is made of it."""
+
+    spec: Spec
+    """The rig, and the settings of its reconstruction."""
+    network: NetworkConfig = field(default_factory=lambda: PRESETS["office"])
+    coding: str = "raw"
+    """A name of ``pipeline.delivery.CODINGS``."""
+    moments: int = MOMENTS
+    down: tuple[str, ...] = ()
+    """Names of nodes that have failed and send nothing."""
+
+    def __post_init__(self) -> None:
+        if self.moments < 1:
+            raise InputError(f"{self.moments} moments show nothing; try at least 1")
+
+
+@dataclass(frozen=True, slots=True)
+class Sending:
+    """The images on their way: what every node sends, and when which bytes of it arrive."""
+
+    spec: DeliverySpec
+    rig: Rig
+    coding: Coding
+    streams: tuple[ByteArray, ...]
+    """(S,) bytes of each node."""
+    trace: NetworkTrace
+    arrivals: Arrivals
+    times_ns: NDArray[np.int64]
+    """(M,) of the moments."""
+    spent: Spent
+    """(M,) until each of them."""
+
+    @property
+    def packet_bytes(self) -> int:
+        """How many bytes of a stream a packet carries."""
+        return packet_bytes_of(self.trace.config)
+
+
+def send(spec: DeliverySpec) -> Sending:
+    """Encode every node's images and run the network that carries them.
+
+    Raises:
+        InputError: as ``iterate_delivery``.
+    """
+    coding, rig = coding_named(spec.coding), spec.spec.source.load()
+    packet_bytes = packet_bytes_of(spec.network)
+    encoded = [coding.encode(images_of(frame), packet_bytes) for frame in rig.frames]
+    senders = senders_of(rig, spec.down)
+    part = Rig(rig.name, tuple(rig.frames[node] for node in senders))
+    trace = simulate(network_of(part, [len(encoded[node]) for node in senders], spec.network))
+    streams = tuple(np.frombuffer(data, np.uint8) for data in encoded)
+    came = arrivals(trace)
+    came = replace(came, node=np.array(senders)[came.node])
+    times_ns = moment_times_ns(came, trace, spec.moments)
+    return Sending(spec, rig, coding, streams, trace, came, times_ns, until(trace, times_ns))
+
+
+def senders_of(rig: Rig, down: Sequence[str]) -> list[int]:
+    """Which of a rig's nodes send, by their order in the network.
+
+    Raises:
+        InputError: a node that is down is not one of the rig's, or none is left.
+    """
+    names = [frame.name for frame in rig.frames]
+    for name in down:
+        if name not in names:
+            raise InputError(f"There is no node '{name}' that could be down; try one of {', '.join(names)}")
+    senders = [node for node, name in enumerate(names) if name not in down]
+    if not senders:
+        raise InputError("All nodes are down, so nothing is sent; leave at least one of them running")
+    return senders
+
+
+def packet_bytes_of(network: NetworkConfig) -> int:
+    """How many bytes of a node's images a packet carries."""
+    return network.nodes.payload_bytes - network.nodes.header_bytes
+
+
+def moment_times_ns(came: Arrivals, trace: NetworkTrace, count: int) -> NDArray[np.int64]:
+    """(M,) times after which equal shares of the bytes that ever arrive have arrived.
+
+    Args:
+        came: what arrives when.
+        trace: of the run; its end is the only moment if nothing arrives.
+        count: how many moments; fewer where several would be the same.
+    """
+    if not len(came.t_ns):
+        return np.array([trace.horizon_ns])
+    total = np.cumsum(came.byte_count, dtype=np.int64)
+    wanted = np.ceil(total[-1] * np.arange(1, count + 1) / count)
+    return np.unique(came.t_ns[np.searchsorted(total, wanted)])
+
+
+def arrived_bytes(sending: Sending, t_ns: int) -> list[BoolArray]:
+    """(S,) for each node, which bytes of its stream are at the sink at a time."""
+    came, marks = sending.arrivals, []
+    there = came.t_ns <= t_ns
+    for node, stream in enumerate(sending.streams):
+        mine = there & (came.node == node)
+        edges = np.zeros(len(stream) + 1, np.int32)
+        np.add.at(edges, came.first_byte[mine], 1)
+        np.add.at(edges, came.first_byte[mine] + came.byte_count[mine], -1)
+        marks.append(np.cumsum(edges)[:-1] > 0)
+    return marks
+
+
+def received_at(sending: Sending, t_ns: int) -> list[Received]:
+    """What the sink can decode of each node's images at a time."""
+    return [
+        sending.coding.decode(np.where(there, stream, 0), there, frame.rgb.shape[:2], sending.packet_bytes)
+        for frame, stream, there in zip(
+            sending.rig.frames, sending.streams, arrived_bytes(sending, t_ns), strict=True
+        )
+    ]
+
+
+def frames_at_sink(sending: Sending, received: Sequence[Received]) -> list[RgbdFrame]:
+    """Every node's frame as far as it has arrived."""
+    return [frame_at_sink(*both) for both in zip(sending.rig.frames, received, strict=True)]

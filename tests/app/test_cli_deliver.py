@@ -1,0 +1,119 @@
+"""``packetmesh deliver`` as a user meets it."""
+
+import csv
+import json
+
+import pytest
+
+from pipeline.io.rigs import save_rig
+from tests.app.commands import check_one_sentence, run
+from tests.pipeline.delivery.small import small_rig
+
+pytestmark = pytest.mark.xdist_group("cli_deliver")  # one worker makes the shared run once
+FEW = ("--set", "surface.max_points=2500")
+
+
+@pytest.fixture(scope="module")
+def rig_folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rig")
+    save_rig(folder, small_rig())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def delivered(rig_folder, tmp_path_factory):
+    """Everything arrives: the folder and the JSON."""
+    import contextlib
+    import io
+
+    from app.cli import main
+
+    out, text = tmp_path_factory.mktemp("delivered"), io.StringIO()
+    words = ["deliver", "--rig", rig_folder, "--moments", 3, "--out", out, "--json", *FEW]
+    with contextlib.redirect_stdout(text):
+        main([*map(str, words)])
+    return out, json.loads(text.getvalue())
+
+
+def test_the_last_moment_is_the_reconstruction_to_the_byte(capsys, rig_folder, delivered, tmp_path):
+    assert run(capsys, "reconstruct", "--rig", rig_folder, "--out", tmp_path, *FEW)[0] == 0
+    names = [
+        "sensor.ply",
+        "inferred.ply",
+        "fused.ply",
+        "surface_before.ply",
+        "surface_after.ply",
+        "surface.glb",
+    ]
+    for name in names:
+        assert (tmp_path / name).read_bytes() == (delivered[0] / name).read_bytes(), name
+
+
+def test_json_says_what_was_delivered_when_and_what_it_is_good_for(delivered):
+    out, answer = delivered
+    last = answer["moments"][-1]
+    assert last["surface"]["no_hit_ray_share"] == answer["lossless"]["no_hit_ray_share"]
+    assert last["f_score_5cm"] == answer["lossless"]["f_score_5cm"] > 0.5
+    assert last["delivered_bytes"] == answer["bytes"] == sum(node["total_bytes"] for node in last["nodes"])
+    assert json.loads((out / "metrics.json").read_text())["delivery"] == answer
+
+
+def test_the_table_has_a_row_for_every_moment(delivered):
+    out, answer = delivered
+    with (out / "moments.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["t_s"]) for row in rows] == [moment["t_s"] for moment in answer["moments"]]
+    assert float(rows[-1]["no_hit_ray_share"]) == answer["moments"][-1]["surface"]["no_hit_ray_share"]
+
+
+def test_the_hand_out_stands_alone(delivered):
+    page = (delivered[0] / "delivery.html").read_text()
+    assert len(page) < 15_000_000
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    assert (delivered[0] / "delivery.gif").read_bytes()[:4] == b"GIF8"
+
+
+def test_the_settings_are_kept_so_that_the_network_can_run_again(capsys, delivered):
+    config = json.loads((delivered[0] / "config.json").read_text())
+    assert (config["coding"], config["network"]) == ("raw", "office")
+    assert config["network_settings"]["nodes.count"] == "2"
+
+
+def test_nothing_arrives_and_that_is_said(capsys, rig_folder, tmp_path):
+    words = ("--set", "nodes.retransmit=false", "loss.share=1", "surface.max_points=2500")
+    code, out, err = run(capsys, "deliver", "--rig", rig_folder, "--out", tmp_path / "d", "--json", *words)
+    assert code == 0
+    assert "none arrived" in err
+    assert json.loads(out)["moments"][-1]["surface"] is None
+    assert not (tmp_path / "d" / "surface.glb").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--preset", "street-grid"), "cameras that stand still"),
+        (("--coding", "zip"), "layered"),
+        (("--moments", "0"), "moments"),
+        (("--link-trace", "{folder}/none.txt"), "none.txt"),
+        (("--link-trace", "{folder}/back.txt"), "back.txt"),
+    ],
+)
+def test_bad_input_gets_a_sentence_and_leaves_no_folder(capsys, rig_folder, tmp_path, words, says):
+    (tmp_path / "back.txt").write_text("0.0 10 5 0\n-1.0 10 5 0\n")
+    words = [word.format(folder=tmp_path) for word in words]
+    got = run(capsys, "deliver", "--rig", rig_folder, "--out", tmp_path / "out", *words)
+    check_one_sentence(got, 1, says)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_recorded_link_carries_the_images(capsys, rig_folder, tmp_path):
+    trace = tmp_path / "link.txt"
+    trace.write_text("".join(f"{0.01 * row:.2f} 8.0 20 0.0\n" for row in range(200)))
+    words = ("--link-trace", trace, "--moments", 1, "--coding", "jpeg", "--json", *FEW)
+    code, out, _ = run(capsys, "deliver", "--rig", rig_folder, "--out", tmp_path / "out", *words)
+    assert code == 0
+    (moment,) = json.loads(out)["moments"]
+    sending_s = max(node["total_bytes"] for node in moment["nodes"]) / 1e6
+    assert (
+        sending_s + 0.01 <= moment["t_s"] <= 1.03 * sending_s + 0.021
+    )  # half a round trip; begun within 10 ms

@@ -1,0 +1,47 @@
+"""A rig whose images are so small that a delivery takes seconds."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from network_sim.config import PRESETS as NETWORKS
+from packetmesh.settings import with_settings
+from pipeline.config import PRESETS
+from pipeline.delivery.sending import DeliverySpec
+from pipeline.io.demos import load_demo
+from pipeline.sources import LoadedRig
+from pipeline.spec import Spec
+from pipeline.types import CameraIntrinsics, DepthMap, Rig
+
+EVERY = 4
+"""Of the pixels in each direction."""
+CONFIG = with_settings(PRESETS["packetmesh"], ["surface.max_points=2500"])
+
+
+def small_rig(nodes=2, scene="office"):
+    rig = load_demo(scene)
+    truth = replace(
+        rig.truth,
+        T_world_camera=rig.truth.T_world_camera[:nodes],
+        depth=tuple(thinned(depth) for depth in rig.truth.depth[:nodes]),
+    )
+    return Rig(rig.name, tuple(small_frame(frame) for frame in rig.frames[:nodes]), truth)
+
+
+def small_frame(frame):
+    depth, camera = thinned(frame.depth), frame.intrinsics
+    matrix = np.diag([1 / EVERY, 1 / EVERY, 1.0]) @ camera.matrix
+    height, width = depth.z_m.shape
+    rgb = np.ascontiguousarray(frame.rgb[::EVERY, ::EVERY])
+    intrinsics = CameraIntrinsics(matrix, camera.distortion, width, height)
+    return replace(frame, rgb=rgb, depth=depth, intrinsics=intrinsics)
+
+
+def thinned(depth):
+    return DepthMap(np.ascontiguousarray(depth.z_m[::EVERY, ::EVERY]), depth.kind)
+
+
+def delivery_spec(rig, *network, coding="raw", moments=4, preset="office"):
+    return DeliverySpec(
+        Spec(LoadedRig(rig), config=CONFIG), with_settings(NETWORKS[preset], network), coding, moments
+    )
