@@ -62,7 +62,7 @@ class NetworkPanel(Panel):
         self._drawing: DeliveryDrawing | NetworkDrawing | None = None
         self._drawn = 0
         self._framed: tuple[float, ...] = ()
-        self._visited = self._streaming = False
+        self._visited = self._streaming = self._here = False
         self._moment_s = 0.0
         self._resting = ui.debounce(REST_S, self._run)
         self._hand = ui.debounce(HAND_S, self._show_moment)
@@ -86,7 +86,7 @@ class NetworkPanel(Panel):
 
     def on_show(self) -> None:
         """Send at the first visit; turn the view to the cameras."""
-        self._framed = ()
+        self._framed, self._here = (), True
         self._dock.show(True)
         if not self._visited:
             self._visited = True
@@ -94,6 +94,7 @@ class NetworkPanel(Panel):
 
     def on_hide(self) -> None:
         """Stop the clock, and leave the lower edge to others."""
+        self._here = False
         self._dock.show(False)
 
     def on_action(self, action: str) -> None:
@@ -220,7 +221,7 @@ class NetworkPanel(Panel):
     def _load(self, start_ns: int, end_ns: int, stops: Any) -> None:
         self._framed = ()
         self._dock.load(start_ns, end_ns, stops, self._lanes())
-        self._dock.show(True)
+        self._dock.show(self._here)
         self._moved(self._dock.now_ns)
 
     def _lanes(self) -> list[Lane]:
