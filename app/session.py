@@ -204,7 +204,7 @@ class Session:
             track.running = track.submitted = None
             return
         key = self.spec.key(step)
-        if key == track.submitted:
+        if key == track.submitted or self._waits(step):
             return
         track.running, track.submitted = step, key
         track.lane.submit(
@@ -214,6 +214,13 @@ class Session:
             self.spec,
             on_progress=lambda value: self.post(self._progressed, step, value),
             on_end=lambda outcome: self.post(self._ended, track, step, key, outcome),
+        )
+
+    def _waits(self, step: Step) -> bool:
+        """Whether a step is not computed before somebody looks at it."""
+        return any(
+            panel.step == step and panel.only_when_shown and panel is not self._current
+            for panel in self._panels
         )
 
     def _ended(self, track: _Track, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
@@ -272,7 +279,6 @@ class Session:
             with self._folders[panel.title]:
                 panel.build()
         self.show(self._current.title)
-        self.advance()
 
     def show(self, title: str) -> None:
         """Make a step the current one."""
@@ -287,7 +293,7 @@ class Session:
                     frame.visible = name == self._current.drawn_below
         self._current.on_show()
         self.frame_view()
-        self._show_status()
+        self.advance()
 
     def frame_view(self, anew: bool = False) -> None:
         """Turn the view to the scene: a new one, two instead of one, or another shape of the window."""

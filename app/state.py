@@ -17,7 +17,7 @@ Step = Literal["scene", "depth", "fuse", "surface", "network"]
 CHAIN: tuple[Step, ...] = ("scene", "depth", "fuse", "surface")
 """The steps of the chain, each computed from the one before it."""
 STEPS: tuple[Step, ...] = (*CHAIN, "network")
-"""All steps that compute; the network needs nothing of the chain."""
+"""All steps that compute; the network waits for nothing of the chain."""
 StepStatus = Literal["fresh", "stale", "running", "failed", "missing"]
 
 STAGE_OF: Mapping[Step, StageName] = {
@@ -30,18 +30,32 @@ STAGE_OF: Mapping[Step, StageName] = {
 
 
 @dataclass(frozen=True, slots=True)
+class Sent:
+    """How the rig's images are sent: a ``pipeline.deliver.DeliverySpec`` without the rig and its chain."""
+
+    network: NetworkConfig
+    coding: str = "raw"
+    moments: int = 20
+    down: tuple[str, ...] = ()
+    """Names of nodes that have failed."""
+
+
+@dataclass(frozen=True, slots=True)
 class Spec(spec.Spec):
     """Everything that a session asks for."""
 
     shown: Shown = "after"
     """The surface that is drawn, and so exported."""
     networks: tuple[NetworkConfig, ...] = ()
-    """Runs of the camera network, beside each other; none until somebody looks."""
+    """Runs of a camera network of its own, beside each other; none until somebody looks."""
+    sent: Sent | None = None
+    """A delivery of the rig's own images; None until somebody looks."""
 
     def key(self, step: Step) -> tuple[Hashable, ...]:
         """What a step's result depends on; equal keys mean equal results."""
         if step == "network":
-            return (step, self.networks)
+            chain = () if self.sent is None else spec.key(self, "truth")
+            return (step, self.networks, self.sent, chain)
         return spec.key(self, STAGE_OF[step])
 
 
@@ -105,7 +119,7 @@ class Results:
     def first_stale(self, spec: Spec, steps: Sequence[Step] = CHAIN) -> Step | None:
         """The next of ``steps`` to compute; None if all are fresh, one failed, or nobody asks for it."""
         for step in steps:
-            if step == "network" and not spec.networks:
+            if step == "network" and not spec.networks and spec.sent is None:
                 return None
             if not self.fresh(step, spec):
                 return None if self.failure(step, spec) else step

@@ -110,6 +110,8 @@ class Panel(ABC):
     """The step of the chain whose result it shows."""
     drawn_below: ClassVar[str]
     """Scene node under which it draws; only the current step's is visible."""
+    only_when_shown: ClassVar[bool] = False
+    """Whether its step is computed only while it is the current one."""
 
     def __init__(self, session: Session) -> None:
         self.session, self.ui = session, session.ui

@@ -30,6 +30,7 @@ def deliver(
     coding: str = "raw",
     moments: int = 40,
     link_trace: Path | None = None,
+    down: tuple[str, ...] = (),
     chain: PresetName = "packetmesh",
     set: Settings = (),
     json: bool = False,
@@ -48,6 +49,7 @@ def deliver(
         coding: How images become bytes: raw, raw-rows, raw-tiles, png, jpeg, rvl, tiles, layered, ...
         moments: How many times, after equal shares of the bytes, the scene is rebuilt.
         link_trace: A recorded link (s, Mbit/s, round trip ms, share lost) over which every node sends.
+        down: Names of nodes that have failed and send nothing, for example node_02.
         chain: Settings of the reconstruction to start from.
         set: Settings of the network or the reconstruction, for example
             `--set nodes.retransmit=false loss.share=0.1 loss.burst_packets=8`.
@@ -65,7 +67,7 @@ def deliver(
     network, config = _settings(preset, chain, set)
     if link_trace is not None:
         network = replace(network, mac=replace(network.mac, kind="replay", trace=str(link_trace)))
-    asked = DeliverySpec(Spec(source, chain, config), network, coding, moments)
+    asked = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
     steps = iterate_delivery(asked, processes=min(2, os.cpu_count() or 1))
     first = next(steps)  # what cannot be sent leaves no folder
     writable_folder(out)

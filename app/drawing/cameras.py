@@ -50,9 +50,15 @@ class Stage:
 
 def stage_of(nodes: Sequence[SceneNode]) -> Stage:
     """Behind and above the cameras, looking at the middle of what they see."""
-    seen_m = [apply(node.T_world_camera, node.sensor.points_m.astype(float)) for node in nodes]
+    clouds = [node.sensor.points_m.astype(float) for node in nodes]
+    return stage_around(clouds, [node.T_world_camera for node in nodes])
+
+
+def stage_around(clouds_m: Sequence[FloatArray], T_world_camera: Sequence[FloatArray]) -> Stage:
+    """The same for the (N, 3) points that each camera sees, in its own frame."""
+    seen_m = [apply(pose, points_m) for pose, points_m in zip(T_world_camera, clouds_m, strict=True)]
     middle_m = np.mean([np.median(points_m, axis=0) for points_m in seen_m], axis=0)
-    cameras_m = np.mean([node.T_world_camera[:3, 3] for node in nodes], axis=0)
+    cameras_m = np.mean([pose[:3, 3] for pose in T_world_camera], axis=0)
     back_m = cameras_m - middle_m
     distance_m = float(np.linalg.norm(back_m))
     viewpoint_m = cameras_m + 0.4 * back_m + np.array([0.0, 0.0, 0.45 * distance_m])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,8 @@ class DeliverySpec:
     coding: str = "raw"
     """A name of ``pipeline.delivery.CODINGS``."""
     moments: int = MOMENTS
+    down: tuple[str, ...] = ()
+    """Names of nodes that have failed and send nothing."""
 
     def __post_init__(self) -> None:
         if self.moments < 1:
@@ -70,11 +72,30 @@ def send(spec: DeliverySpec) -> Sending:
     coding, rig = coding_named(spec.coding), spec.spec.source.load()
     packet_bytes = packet_bytes_of(spec.network)
     encoded = [coding.encode(images_of(frame), packet_bytes) for frame in rig.frames]
-    trace = simulate(network_of(rig, [len(data) for data in encoded], spec.network))
+    senders = senders_of(rig, spec.down)
+    part = Rig(rig.name, tuple(rig.frames[node] for node in senders))
+    trace = simulate(network_of(part, [len(encoded[node]) for node in senders], spec.network))
     streams = tuple(np.frombuffer(data, np.uint8) for data in encoded)
     came = arrivals(trace)
+    came = replace(came, node=np.array(senders)[came.node])
     times_ns = moment_times_ns(came, trace, spec.moments)
     return Sending(spec, rig, coding, streams, trace, came, times_ns, until(trace, times_ns))
+
+
+def senders_of(rig: Rig, down: Sequence[str]) -> list[int]:
+    """Which of a rig's nodes send, by their order in the network.
+
+    Raises:
+        InputError: a node that is down is not one of the rig's, or none is left.
+    """
+    names = [frame.name for frame in rig.frames]
+    for name in down:
+        if name not in names:
+            raise InputError(f"There is no node '{name}' that could be down; try one of {', '.join(names)}")
+    senders = [node for node, name in enumerate(names) if name not in down]
+    if not senders:
+        raise InputError("All nodes are down, so nothing is sent; leave at least one of them running")
+    return senders
 
 
 def packet_bytes_of(network: NetworkConfig) -> int:

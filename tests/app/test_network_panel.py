@@ -1,18 +1,21 @@
-"""The whole Network screen with real runs and no browser: what is drawn, what settings do, what fails."""
+"""The Network screen with a real delivery and no browser: what is drawn, what settings do, what fails."""
 
-import re
+from __future__ import annotations
+
 import shlex
-from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 import viser
 
+from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.draw import ground_of
 from app.screens.network.labels import NETWORKS
-from app.screens.network.panel import ORIGIN, NetworkPanel
+from app.screens.network.panel import ORIGIN, PICK, NetworkPanel
 from app.screens.network.view import What
 from network_sim.config import PRESETS
+from network_sim.types import Cause
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
 from tests.app.fakes import Bench, Impatient, ui_of
@@ -21,32 +24,29 @@ pytestmark = pytest.mark.xdist_group("network panel")
 
 
 class Screen(Bench):
-    """The screen; keeps the runs that it was answered, and does not wait for a hand to rest."""
+    """The screen with its clock; does not wait for a hand to rest."""
 
     def __init__(self, scene, store):
         super().__init__(NetworkPanel, ui_of(scene, kind=Impatient), store, steps=("network",))
-        self.use("nodes.image_bytes=3000")
+        self.gui.find("Moments").value = 4
         self.panel.on_show()
 
     @property
-    def views(self):
-        """The runs that are there, if they are those that are asked for."""
-        there = self.results.fresh("network", self.spec)
-        return self.results.view("network") if there else ()
+    def view(self) -> DeliveryView:
+        """The delivery that is there, which is the one that is asked for."""
+        assert self.results.fresh("network", self.spec)
+        return self.results.view("network")
 
-    def retry(self):
-        """Press *Retry*."""
-        self.results.retry_failed()
-        self.advance()
+    @property
+    def dock(self):
+        return self.panel._dock
 
-    def use(self, text):
-        """Write free settings and have them simulated."""
-        self.gui.set("Setting key=value", text)
-        self.gui.press("Use these settings")
+    def names(self):
+        """What is drawn of the newest delivery, by the last part of its name."""
+        return [name.split("/")[-1] for name in self.ui.scene.names("/network/runs")]
 
     def handle(self, name):
-        """What is drawn of the newest runs by a name."""
-        (found,) = (node for node in self.ui.scene.names("/network/runs") if node.endswith(f"/{name}"))
+        (found,) = (one for one in self.ui.scene.names("/network/runs") if one.endswith(f"/{name}"))
         return self.drawn(found)
 
     @property
@@ -55,20 +55,13 @@ class Screen(Bench):
         points = self.handle("packets").points
         return points[points[:, 2] > -50.0]
 
-    @property
-    def now_ns(self):
-        """Simulated time that the player shows."""
-        return round(1e9 * self.gui.find("Time (s)").value)
+    def clouds(self):
+        """Which nodes have a cloud."""
+        return {name.rsplit("-", 1)[0] for name in self.names() if name.startswith("cloud-")}
 
-    @property
-    def pages(self):
-        """The pictures of the timelines."""
-        return re.findall('<img alt="timeline"[^>]*src="([^"]*)"', self.gui.text())
-
-    @property
-    def span_s(self):
-        """Length of the timelines' window."""
-        return 10.0 ** self.gui.find_starting("Span").value
+    def use(self, text):
+        self.gui.set("Setting key=value", text)
+        self.gui.press("Use these settings")
 
 
 @pytest.fixture(scope="module")
@@ -80,91 +73,102 @@ def screen(store):
     server.stop()
 
 
-def test_the_first_visit_simulates_and_shows_nodes_numbers_and_timeline(screen):
-    (view,) = screen.views
-    assert view.config.nodes.image_bytes == 3000
-    assert len(screen.handle("0/node").points) == 3
-    assert len(screen.handle("0/sink").points) == 1
-    assert "simulated in" in screen.gui.text()
-    assert "Image delivery ratio" in screen.gui.text()
-    assert len(screen.pages) == 1
-    assert screen.client.camera.position[2] > 3.0
-    np.testing.assert_array_equal(screen.client.camera.look_at, np.zeros(3))
+def test_the_first_visit_sends_the_room(screen):
+    view = screen.view
+    assert len(view.moments) == len(view.times_ns) == 4
+    assert [node.name for node in view.nodes] == ["node_00", "node_01", "node_02"]
+    assert view.moments[-1].delivered_bytes == view.total_bytes
+    assert {"node_00", "node_01", "node_02", "sink", "cloud", "client", "routes"} <= set(screen.names())
+    assert "3 cameras sent" in screen.gui.text()
+    assert "Rays without surface" in screen.gui.text()
 
 
-def test_nodes_and_ranges_are_drawn_to_one_scale(screen):
-    (view,) = screen.views
-    scale = ground_of(screen.views).scale
-    nodes, sink = screen.handle("0/node").points, screen.handle("0/sink").points[0]
-    reach = np.linalg.norm(nodes[:, :2] - sink[:2], axis=1)
-    np.testing.assert_allclose(reach, scale * view.config.nodes.spacing_m, rtol=1e-5)
-    rim = screen.handle("0/range-sink").points.reshape(-1, 3)
-    np.testing.assert_allclose(
-        np.linalg.norm(rim[:, :2] - sink[:2], axis=1), scale * view.config.radio.range_m, rtol=1e-5
-    )
+def test_scrubbing_shows_the_moment_before_and_nothing_before_the_first(screen):
+    view = screen.view
+    screen.dock.seek(view.moments[0].t_ns - 1)
+    assert screen.clouds() == set()
+    for moment in (view.moments[3], view.moments[0], view.moments[2]):
+        screen.dock.seek(moment.t_ns + 1)
+        assert screen.clouds() == {f"cloud-{node.name}" for node in view.nodes}
+        for node, now in zip(view.nodes, moment.nodes, strict=True):
+            (cloud,) = (name for name in screen.names() if name.startswith(f"cloud-{node.name}-"))
+            assert len(screen.handle(cloud).points) == len(now.points_m)
+    assert sum(name.startswith("mesh-") for name in screen.names()) >= 1
 
 
-def test_stepping_goes_from_event_to_event_and_packets_move(screen):
-    (view,), gui = screen.views, screen.gui
-    starts_ns = 1000 * np.unique(-(-view.pieces.start_ns // 1000))  # the player counts microseconds
-    later_ns = starts_ns[starts_ns > view.start_ns]
-    gui.set("Time (s)", view.start_ns / 1e9)
-    for expected_ns in later_ns[:20]:
-        gui.press("Player", "Next event")
-        assert screen.now_ns == expected_ns
-    gui.press("Player", "Event back")
-    assert screen.now_ns == later_ns[18]
-    frame = int(np.flatnonzero(view.pieces.what == What.AIR)[5])
-    gui.set(gui.find_starting("Speed").label, -3.0)
-    places = []
-    for share in (0.25, 0.75):
-        span_ns = view.pieces.end_ns[frame] - view.pieces.start_ns[frame]
-        gui.set("Time (s)", (view.pieces.start_ns[frame] + share * span_ns) / 1e9)
-        assert 1 <= len(screen.packets) < 10
-        places.append(screen.packets)
-    assert not np.array_equal(*places)
-    assert "packetmesh-now" in gui.text()
+def test_more_and_more_arrives(screen):
+    moments = screen.view.moments
+    for one, two in pairwise(moments):
+        assert one.t_ns < two.t_ns
+        assert one.delivered_bytes < two.delivered_bytes
+        assert one.energy_j < two.energy_j
+        for before, after in zip(one.nodes, two.nodes, strict=True):
+            assert before.depth_share <= after.depth_share
+    assert moments[-1].no_hit_share < moments[0].no_hit_share
 
 
-def test_the_window_zooms_about_the_player_and_turns_pages(screen):
-    (view,), gui = screen.views, screen.gui
-    whole_s = screen.span_s
-    gui.set("Time (s)", (view.start_ns + view.end_ns) / 2e9)
-    gui.press("Timeline", "Frames")
-    assert screen.span_s < whole_s / 4
-    frames_ns = view.pieces.start_ns[view.pieces.what == What.AIR]
-    assert 0 <= screen.now_ns - frames_ns[frames_ns <= screen.now_ns].max() < 1000
-    page, span_s = screen.pages, screen.span_s
-    gui.set("Time (s)", screen.now_ns / 1e9 + 0.2 * span_s)
-    assert screen.pages == page
-    gui.set("Time (s)", screen.now_ns / 1e9 + span_s)
-    assert screen.pages != page
-    assert screen.span_s == span_s
-    gui.press("Timeline", "All")
-    assert screen.span_s == pytest.approx(whole_s, rel=0.15)  # the slider has steps
-    gui.set("Time (s)", view.end_ns / 1e9)
-    gui.press("Timeline", "Frames")
-    assert screen.span_s < whole_s / 3
-    assert "packetmesh-now" in gui.text()
+def test_packets_move_and_losses_name_their_cause(screen):
+    pieces = screen.view.run.pieces
+    frame = int(np.flatnonzero(pieces.what == What.AIR)[50])
+    screen.dock.seek(int(pieces.start_ns[frame]) + 1)
+    assert len(screen.packets) >= 1
+    lost = int(np.flatnonzero((pieces.what == What.LOSS) & (pieces.cause == Cause.COLLISION))[0])
+    screen.dock.seek(int(pieces.start_ns[lost]))
+    causes = [screen.handle(name).text for name in screen.names() if name.startswith("cause-")]
+    assert "lost: collision" in causes
 
 
-def test_a_second_run_gets_a_column_rows_and_a_place_beside(screen):
+def test_picking_a_frame_tells_of_it_and_lights_its_pixels(screen):
+    pieces = screen.view.run.pieces
+    frames = pieces.where(pieces.what == What.AIR)
+    item = int(np.flatnonzero((frames.peer == 3) & (frames.first_byte > 300_000))[0])
+    screen.dock.seek(screen.view.moments[-1].t_ns)
+    screen.panel._picked(0, item)
+    text = screen.gui.text("Packet")
+    assert "→ sink" in text
+    assert "Attempt" in text
+    assert "It tells the depth of" in text
+    assert "lit" in screen.names()
+    screen.panel._picked(0, -1)
+    assert PICK in screen.gui.text("Packet")
+    assert "lit" not in screen.names()
+
+
+def test_the_command_delivers_the_same(screen):
+    words = shlex.split(screen.panel.command)
+    assert words[:6] == ["packetmesh", "deliver", "--scene", "box-on-table", "--preset", "office"]
+    assert words[words.index("--moments") + 1] == "4"
+    assert words[words.index("--coding") + 1] == screen.spec.sent.coding
+
+
+def test_a_node_switched_off_is_not_heard_and_the_difference_is_told(screen):
+    before = screen.view
+    screen.gui.set("Switch off", "node_01")
+    view = screen.view
+    assert view.sent.down == ("node_01",)
+    assert view.moments[-1].nodes[1].delivered_bytes == 0
+    assert [node.row for node in view.nodes] == [0, -1, 1]
+    assert view.run.names[:2] == ("node_00", "node_02")
+    screen.dock.seek(view.moments[-1].t_ns)
+    assert screen.clouds() == {"cloud-node_00", "cloud-node_02"}
+    assert "node_01 off" in screen.gui.text()
+    assert f"instead of {100.0 * before.moments[-1].no_hit_share:.1f} %" in screen.gui.text()
+    assert "--down node_01" in screen.panel.command
+    screen.gui.set("Switch off", "nobody")
+
+
+def test_losses_that_nobody_repairs_cost_bytes(screen):
     gui = screen.gui
-    gui.set("Beside", "a link of its own for each")
-    one, two = screen.views
-    assert (one.config.mac.kind, two.config.mac.kind) == ("ieee802154", "ideal")
-    assert ">a link of its own for each</th>" in gui.text()
-    assert len(screen.pages) == 2
-    west, east = (screen.handle(f"{index}/sink").points[0][0] for index in (0, 1))
-    assert east - west > ground_of(screen.views).width
-    lines = screen.panel.command.splitlines()
-    assert len(lines) == 2
-    for line, view in zip(lines, screen.views, strict=True):
-        words = shlex.split(line)
-        assert words[:4] == ["packetmesh", "simulate", "--preset", "thesis-link"]
-        assert with_settings(PRESETS[words[3]], words[5:]) == view.config
-    gui.set("Beside", "nothing")
-    assert len(screen.views) == 1
+    gui.set("Send lost packets again", False)
+    gui.set("in bursts of", 40)
+    gui.set("Lose packets (%)", 40.0)
+    last = screen.view.moments[-1]
+    assert last.delivered_bytes < screen.view.total_bytes
+    words = shlex.split(screen.panel.command)
+    changed = words[words.index("--set") + 1 : words.index("--out")]
+    assert with_settings(PRESETS["office"], changed) == screen.spec.sent.network
+    gui.set("Lose packets (%)", 0.0)
+    gui.set("Send lost packets again", True)
 
 
 def test_a_wrong_key_names_the_nearest_and_keeps_what_was(screen):
@@ -172,26 +176,20 @@ def test_a_wrong_key_names_the_nearest_and_keeps_what_was(screen):
     with pytest.raises(InputError, match=r"try radio\.shadowing_db"):
         screen.use("radio.shadow_db=3")
     assert screen.panel.command == before
-    with pytest.raises(InputError, match=r"run\.horizon_s"):
-        screen.use("run.horizon_s=0")
-    assert screen.panel.command == before
 
 
-@pytest.mark.parametrize("seed", [7, 8])
 @pytest.mark.parametrize("sentence", ["There is no memory left.", "Cancelled."])
-def test_a_failed_or_cancelled_run_says_why_and_retry_runs_it(screen, seed, sentence):
+def test_a_failed_or_cancelled_delivery_says_why_and_retry_runs_it(screen, sentence):
     screen.refuse = sentence
-    screen.gui.set("Seed", seed)
+    screen.gui.set("Seed", 7)
     assert sentence in screen.gui.text()
-    assert screen.ui.scene.names("/network/runs") == []
+    assert screen.names() == []
     screen.refuse = ""
-    screen.retry()
-    assert screen.views[0].config.run.seed == seed
-    assert "simulated in" in screen.gui.text()
     screen.gui.set("Seed", 0)
+    assert "3 cameras sent" in screen.gui.text()
 
 
-def test_vehicles_move_and_the_origin_of_the_schemes_is_named(screen):
+def test_vehicles_move_and_two_schemes_stand_beside_each_other(screen):
     gui, screen.refuse = screen.gui, "not yet"
     gui.set("Preset", NETWORKS["street-grid"].title)
     gui.set("Vehicles", 5)
@@ -199,12 +197,19 @@ def test_vehicles_move_and_the_origin_of_the_schemes_is_named(screen):
     screen.use("run.horizon_s=660")
     assert ORIGIN in gui.text()
     assert gui.find("Scheme").seen
-    (view,) = screen.views
-    assert view.start_ns == 600_000_000_000
-    start = screen.handle("0/vehicle").points.copy()
-    gui.set("Time (s)", 610.0)
-    moved = np.linalg.norm(screen.handle("0/vehicle").points - start, axis=1)
-    assert moved.max() <= 1.001 * 100.0 * ground_of(screen.views).scale
+    assert not gui.find("Coding").seen
+    (run,) = screen.results.view("network")
+    assert run.start_ns == 600_000_000_000
+    start = screen.handle("vehicle").points.copy()
+    screen.dock.seek(610_000_000_000)
+    moved = np.linalg.norm(screen.handle("vehicle").points - start, axis=1)
     assert moved.min() > 0.0
-    screen.want(replace(screen.spec, networks=()))  # as *Reset* does
-    assert gui.find("Preset").value == NETWORKS["thesis-link"].title
+    assert moved.max() <= 1.001 * 100.0 * ground_of([run]).scale
+    gui.set("Beside", "PDC: by chance, as offered")
+    assert len(screen.results.view("network")) == 2
+    assert ">PDC: by chance, as offered</th>" in gui.text()
+    lines = screen.panel.command.splitlines()
+    assert len(lines) == 2
+    screen.refuse = "enough seen"
+    screen.panel.on_action("Reset")
+    assert gui.find("Preset").value == NETWORKS["office"].title

@@ -13,7 +13,7 @@ TEXTS = {
     "Depth": "points the sensor measured",
     "Fuse": "move the orange cloud",
     "Surface": "A ball rolls over the points",
-    "Network": "Every moving point is a frame on the air",
+    "Network": "by radio, packet by packet",
     "Export": "Take it along",
 }
 

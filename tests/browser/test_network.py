@@ -7,90 +7,91 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hands import canvas, changed_from, differing, go, pick, press, slider, unfold
+from app.screens.network import setup
+from tests.browser.conftest import dismiss_notifications
+from tests.browser.hands import canvas, changed_from, differing, go, pick, press
+
+ALL = re.compile(r"^\d cameras sent [\d.]+ MB in [\d,]+ packets; simulated in [\d.]+ s\.$")
 
 
 @pytest.fixture(scope="module")
-def network(tab):
-    """The Network step with the first run done."""
+def few():
+    """Few moments, so that they are soon there."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(setup, "MOMENTS", 3)
+        yield
+
+
+@pytest.fixture(scope="module")
+def network(few, tab):
+    """The Network step with the first delivery done."""
+    tab.set_default_timeout(240_000)
     tab.get_by_text("Up to date").wait_for()
     go(tab, "Network")
-    tab.get_by_text("simulated in").wait_for()
+    tab.get_by_text(ALL).wait_for()
+    tab.get_by_text("Up to date").wait_for()
+    dismiss_notifications(tab)
     return tab
 
 
-def now_s(page):
-    """What the slider of the player says."""
-    return float(slider(page, "Time (s)").get_attribute("aria-valuenow"))
+def seek(page, share):
+    """Click into the rows of the timeline."""
+    rows = page.locator(".packetmesh-dock-row")
+    box = rows.bounding_box()
+    left = box["x"] + 165
+    page.mouse.click(left + share * (box["x"] + box["width"] - 12 - left), box["y"] + 42)
 
 
-def test_frames_are_stepped_played_and_scrubbed(network):
-    expect(slider(network, "Time (s)")).to_have_attribute("aria-valuenow", "0")
-    press(network, "Frames")
-    start = canvas(network, still=4)
-    for _ in range(20):  # until a frame is on its way
-        press(network, "Next event")
-        network.wait_for_timeout(300)
-        if differing(canvas(network), start) > 0.0:  # it is a single small point
-            break
-    else:
-        raise AssertionError("no frame was seen")
-    stepped_s = now_s(network)
-    assert 0.0 < stepped_s < 1.0
-    press(network, "Play")
-    network.wait_for_timeout(1500)
-    press(network, "Pause")
-    assert now_s(network) > stepped_s
-    time = slider(network, "Time (s)")
-    time.focus()
-    time.press("End")
-    network.wait_for_timeout(1000)
-    assert now_s(network) == pytest.approx(float(time.get_attribute("aria-valuemax")), abs=0.1)
+def delivered_mb(page):
+    """What the table says of the clock's moment; 0 before the first."""
+    text = page.get_by_role("row", name="Bytes at the sink").inner_text()
+    first = re.split(r"\s{2,}|\t|\n", text.strip())[1]
+    return 0.0 if first == "–" else float(first.split()[0])
 
 
-def test_the_timeline_tells_causes_and_zooms(network):
-    press(network, "All")
-    network.get_by_text(re.compile(r"Span \(\d+ s\)")).wait_for()
-    expect(network.get_by_alt_text("timeline")).to_have_count(1)
-    expect(network.locator("svg rect title", has_text="collision")).not_to_have_count(0)
-    press(network, "Frames")  # the last ones, as the player stands at the end
-    network.get_by_text(re.compile(r"Span \(\d+ ms\)")).wait_for()
-    assert network.locator(".packetmesh-now").count() == 1
+def test_the_room_fills_in_as_its_bytes_arrive(network):
+    seen, last = [], None
+    for share in (0.01, 0.5, 0.8, 0.995):
+        seek(network, share)
+        network.wait_for_timeout(1500)
+        picture = canvas(network)
+        assert last is None or differing(picture, last) > 0.0
+        seen.append(delivered_mb(network))
+        last = picture
+    assert seen[0] == 0.0
+    assert seen == sorted(set(seen))
 
 
-def test_the_command_is_that_of_the_simulation(network):
+def test_play_moves_the_clock_and_the_mesh_follows(network):
+    seek(network, 0.01)
+    before = canvas(network)
+    network.locator(".packetmesh-dock-row button").nth(1).click()
+    assert changed_from(network, before)
+    network.locator(".packetmesh-dock-row button").nth(1).click()
+
+
+def test_a_frame_is_told_in_words(network):
+    seek(network, 0.6)
+    network.get_by_text(re.compile("node_00 → sink")).first.wait_for()
+    network.get_by_text(re.compile(r"Attempt \d+ of \d+")).wait_for()
+
+
+def test_the_command_is_that_of_the_delivery(network):
     press(network, "Copy as command")
     text = network.locator("pre").first.inner_text()
     press(network, "Close")
-    assert text.startswith("packetmesh simulate --preset thesis-link --set run.horizon_s=600.0")
+    assert text.startswith("packetmesh deliver --scene box-on-table --preset office --coding raw --moments 3")
 
 
-def test_a_wrong_setting_is_a_sentence_with_the_nearest_name(network):
-    unfold(network, "Advanced")
-    label = network.locator("label", has_text="Setting key=value")
-    label.locator("xpath=following::input[1]").fill("nodes.image=2")
-    press(network, "Use these settings")
-    network.get_by_text(re.compile("There is no setting 'nodes.image'; try .*nodes.images")).wait_for()
-
-
-def test_two_schemes_stand_beside_each_other(network):
-    before = canvas(network)
-    pick(network, "Preset", "Street grid: vehicles and access points")
-    network.get_by_text("arXiv 1311.6013").wait_for()
-    network.get_by_text("600.0 s of the network").wait_for()
-    pick(network, "Beside", "PDC: by chance, as offered")
-    network.get_by_role("columnheader", name="PDC: by chance").wait_for()
-    expect(network.get_by_alt_text("timeline")).to_have_count(2)
-    rates = network.get_by_role("row", name="Images per minute").inner_text()
-    baseline, pdc = (float(value.replace(",", "")) for value in re.findall(r"([\d,.]+) 1/min", rates))
-    assert baseline > pdc > 0
-    assert changed_from(network, before)
+def test_a_coding_that_needs_fewer_bytes_is_compared_with_the_one_before(network):
+    pick(network, "Coding", "RVL depth, JPEG colour")
+    network.get_by_text("coding jpeg instead of raw").wait_for()
+    expect(network.get_by_text(re.compile("the last byte came after"))).to_be_visible()
 
 
 def test_leaving_turns_the_view_back_to_the_scene(network):
     go(network, "Scene")
+    expect(network.locator(".packetmesh-dock-row")).to_be_hidden()
     scene = canvas(network)
     go(network, "Network")
     assert changed_from(network, scene)
-    go(network, "Scene")
-    assert differing(canvas(network), scene) < 0.02

@@ -1,4 +1,4 @@
-"""Names of presets, schemes and curves, and how long the Network screen simulates."""
+"""Names of presets, codings, schemes and causes on the Network screen."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from app.drawing.colors import INFERRED, NEUTRAL, SOURCE, TARGET
-from app.screens.network.view import Curve
+from app.drawing.colors import INFERRED, SOURCE, TARGET
 from network_sim.config import PRESETS, NetworkConfig
 from network_sim.types import Cause, PacketKind
 from packetmesh.errors import InputError
@@ -20,56 +19,54 @@ class Preset:
 
     title: str
     sentence: str
-    """What it is and for how long it is simulated here."""
-    settings: tuple[str, ...]
+    """What it is."""
+    settings: tuple[str, ...] = ()
     """What the screen changes of the preset of the same name, so that a run takes seconds."""
-    count_key: str
-    count_label: str
-    most: int
-    schemes: bool = False
-    """Whether it compares data-collection schemes; otherwise ways of medium access."""
+    street: bool = False
+    """Whether vehicles send images of their own, by schemes; otherwise the scene's cameras send theirs."""
 
 
 NETWORKS: Mapping[str, Preset] = MappingProxyType(
     {
+        "office": Preset(
+            "Office: WLAN to one access point",
+            "IEEE 802.11b at 11 Mbit/s, the sink 8 m away, an uplink to the cloud; what is not there after "
+            "10 seconds is too late.",
+        ),
         "thesis-link": Preset(
-            "Thesis: three nodes, one sink",
-            "Each node sends one image of 921,615 bytes to the sink; simulated until all have arrived, at "
-            "most ten minutes.",
-            ("run.horizon_s=600",),
-            "nodes.count",
-            "Nodes",
-            10,
+            "Thesis: 250 kbit/s to one sink",
+            "IEEE 802.15.4 at 250 kbit/s, as in the thesis: the images take minutes.",
+        ),
+        "greenhouse": Preset(
+            "Greenhouse: many hops, lossy radio",
+            "IEEE 802.15.4 that fades, radios that sleep three quarters of the time; what is not there after "
+            "five minutes is too late.",
         ),
         "street-grid": Preset(
             "Street grid: vehicles and access points",
             "Vehicles offer their images to four access points in passing; ten minutes are shown after a "
             "warm-up of ten.",
             ("run.horizon_s=1200", "run.warmup_s=600", "run.keep=all"),
-            "street.vehicles",
-            "Vehicles",
-            120,
-            schemes=True,
-        ),
-        "greenhouse": Preset(
-            "Greenhouse: many hops, lossy radio",
-            "Nodes in a grid hand small images on to the sink in a corner; half an hour is simulated.",
-            ("run.horizon_s=1800",),
-            "nodes.count",
-            "Nodes",
-            24,
-        ),
-        "office": Preset(
-            "Office: one access point, then the cloud",
-            "Nodes send colour and depth images every ten seconds; two minutes are simulated.",
-            ("run.horizon_s=120",),
-            "nodes.count",
-            "Nodes",
-            12,
+            street=True,
         ),
     }
 )
 """By the name of the preset."""
+
+CODINGS: Mapping[str, str] = MappingProxyType(
+    {
+        "raw": "Raw, depth first",
+        "raw-color-first": "Raw, colour first",
+        "raw-rows": "Raw, rows spread",
+        "raw-tiles": "Raw, 16 × 16 tiles",
+        "png": "PNG depth, PNG colour",
+        "jpeg": "RVL depth, JPEG colour",
+        "rvl": "RVL depth, PNG colour",
+        "tiles": "Tiles that stand alone",
+        "layered": "Coarse base, then tiles",
+    }
+)
+"""Titles of ``pipeline.delivery.CODINGS``, whose libraries the serving process does without."""
 
 SCHEMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -91,36 +88,6 @@ ACCESS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     }
 )
 
-CURVES: Mapping[Curve, tuple[str, str, float, str]] = MappingProxyType(
-    {
-        "delivery": (
-            "Delivery",
-            "delivered, %",
-            100.0,
-            "Of the image packets whose way ended in an interval, the share that had arrived.",
-        ),
-        "delay": (
-            "Delay",
-            "image delay, s",
-            0.0,
-            "Mean time from capture to completion of the images that were completed in an interval.",
-        ),
-        "throughput": (
-            "Throughput",
-            "kbit/s",
-            0.0,
-            "Bits of image packets that reached their last node in an interval, over its length.",
-        ),
-        "energy": (
-            "Energy",
-            "radio, J",
-            0.0,
-            "What the radios of all camera nodes have used since the end of the warm-up.",
-        ),
-    }
-)
-"""Title, quantity and unit, smallest height of the axis, and meaning of each curve."""
-
 PACKET_COLORS: Mapping[PacketKind, tuple[int, int, int]] = MappingProxyType(
     {
         PacketKind.IMAGE: TARGET,
@@ -137,8 +104,8 @@ PACKET_NAMES: Mapping[PacketKind, str] = MappingProxyType(
         PacketKind.STATUS: "status",
     }
 )
-ANSWER = NEUTRAL
-"""Colour of acknowledgements."""
+ANSWER = (70, 78, 86)
+"""Darker than nodes and lines. Colour of acknowledgements."""
 CAUSES: Mapping[Cause, str] = MappingProxyType(
     {
         Cause.NONE: "no cause given",
@@ -160,7 +127,7 @@ CAUSES: Mapping[Cause, str] = MappingProxyType(
 
 def ways(preset: str) -> dict[str, tuple[str, ...]]:
     """Schemes or ways of medium access that a preset can be run with; its own comes first."""
-    offered = SCHEMES if NETWORKS[preset].schemes else ACCESS
+    offered = SCHEMES if NETWORKS[preset].street else ACCESS
     own = PRESETS[preset]
     able = {name: settings for name, settings in offered.items() if _possible(own, settings)}
     first = sorted(able, key=lambda name: with_settings(own, able[name]) != own)

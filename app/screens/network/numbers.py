@@ -25,6 +25,20 @@ FIRST = (
     "energy_total",
 )
 """What the first table holds, as far as there is such a number; all others are in the second."""
+LOST_TO = "attempts_lost_"
+LOST_WORDS = {
+    "collision": "collisions",
+    "noise": "bit errors",
+    "range": "distance",
+    "channel": "a busy channel",
+    "ack_lost": "lost acknowledgements",
+    "link": "set or recorded losses",
+    "uplink": "the uplink",
+    "node_down": "nodes that were down",
+    "no_route": "missing routes",
+}
+TITLES = {"images_per_minute": "images that arrived", "images_taken_per_minute": "images that were taken"}
+"""Of numbers whose name says their unit."""
 SHARES = ("ratio", "share", "coverage", "redundancy")
 """Words in the names of numbers that are shown in per cent."""
 
@@ -48,7 +62,9 @@ def metric_tables(views: Sequence[NetworkView]) -> tuple[str, str]:
 
 def _row(name: str, metrics: Sequence[Metric | None]) -> Row:
     definition = next(metric.definition for metric in metrics if metric is not None)
-    title = name.replace("_", " ")
+    title = TITLES.get(name, name.replace("_", " "))
+    if name.startswith(LOST_TO):
+        title = f"attempts lost to {LOST_WORDS.get(cause := name.removeprefix(LOST_TO), cause)}"
     return (title[0].upper() + title[1:], f"{definition}.", *(value_text(name, metric) for metric in metrics))
 
 
@@ -57,13 +73,15 @@ def value_text(name: str, metric: Metric | None) -> str:
     if metric is None:
         return "–"
     if metric.unit == "1" and any(word in name for word in SHARES):
-        return f"{100.0 * metric.value:.4g} %"
+        return f"{100.0 * metric.value:.3g} %"
     value, unit = metric.value, metric.unit
     if unit == "s" and abs(value) < 0.1:
         value, unit = 1000.0 * value, "ms"
     if unit in ("bit/s", "B/min", "J") and abs(value) >= 1e4:
         value, unit = value / 1e3, f"k{unit}"
-    digits = f"{value:,.0f}" if abs(value) >= 1e4 or value == int(value) else f"{value:,.4g}"
+    digits = f"{value:,.0f}" if abs(value) >= 100 or value == int(value) else f"{value:,.3g}"
+    if unit == "1/min":
+        return f"{digits} images a minute"
     return digits if unit == "1" else f"{digits} {unit}"
 
 

@@ -1,114 +1,178 @@
-"""Network: nodes send their images by radio; who sends when, what is lost and what it costs."""
+"""Network: the room's cameras send their images; what is lost on the way, and what that costs the mesh."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
+from app.dock import Dock
+from app.drawing.cameras import turn
 from app.drawing.clouds import clear
-from app.screens.network.charts import NetworkCharts
+from app.drawing.colors import css
+from app.screens.network.delivery_draw import DeliveryDrawing, legend
+from app.screens.network.delivery_numbers import changes, difference, moment_table, more_rows, summary
+from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import NetworkDrawing, look_at_ground
 from app.screens.network.labels import NETWORKS
+from app.screens.network.lanes import frames_lane, growth_lane, run_curves, stops_ns
 from app.screens.network.numbers import metric_tables, runs_summary
-from app.screens.network.player import NetworkPlayer
+from app.screens.network.packets import Frames
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import NetworkView
 from app.state import Spec, Step
+from app.timeline import Lane
 from app.ui import Panel
 
-TEXT = """**What you see.** Camera nodes (blue) send their images by radio to a sink or to access points
-(green); circles show how far a frame can be received. Every moving point is a frame on the air; a red one
-was lost there. Press **Play**, slow down to see single frames, and rest the pointer on the timeline to read
-why."""
+TEXT = """The cameras of the room send their pictures and depth by radio, packet by packet; some are lost.
+**Play** below, and see what the mesh is made of what has arrived."""
+STREET_TEXT = """Vehicles with cameras drive on a grid of streets and offer images to access points (green).
+**Play** below: every moving point is a frame on the air, a red one was lost there."""
 ORIGIN = """The schemes are our reconstruction: of the paper they come from (Bruno & Nurchis, arXiv 1311.6013)
 only the abstract and the first lines could be read."""
 REST_S = 0.6
 """How long the settings have to rest before a run begins."""
-SHOWN_S = 0.4
-"""How long a packet is seen moving at least, and a loss stays, in seconds of the person who looks."""
-RUNNING = "Simulating; the bar at the top shows how far. *Cancel* ends it."
+HAND_S = 0.15
+"""How long the hand has to rest on a time before its moment is drawn."""
+MESH_S = 0.5
+"""While it plays, a moment is drawn at once if the one before is so old."""
+SHOWN = 10
+"""How many pictures of the player a packet is seen moving at least, and a loss stays."""
+RUNNING = "Sending; the bar at the top shows how far. *Cancel* ends it."
+PICK = "Click a frame on the timeline to see what it carried and how it fared."
 
 
 class NetworkPanel(Panel):
-    """Runs of the camera network on one timeline."""
+    """A delivery of the room, or runs of vehicles on streets, on one timeline."""
 
     title = "Network"
     step: ClassVar[Step | None] = "network"
     drawn_below: ClassVar[str] = "/network"
+    only_when_shown: ClassVar[bool] = True
 
     def build(self) -> None:
-        """Settings, player, curves, timeline, numbers."""
-        gui = self.gui
-        self._views: tuple[NetworkView, ...] = ()
+        """Controls, numbers, inspector; the dock."""
+        gui, ui = self.gui, self.ui
+        self._delivery: DeliveryView | None = None
+        self._before: DeliveryView | None = None
+        self._runs: tuple[NetworkView, ...] = ()
         self._labels: tuple[str, ...] = ()
-        self._drawing: NetworkDrawing | None = None
+        self._frames: list[Frames] = []
+        self._drawing: DeliveryDrawing | NetworkDrawing | None = None
         self._drawn = 0
         self._framed: tuple[float, ...] = ()
-        self._visited = False
-        self._resting = self.ui.debounce(REST_S, self._run)
-        gui.add_markdown(TEXT)
-        self._setup = NetworkSetup(self.ui, self._resting.restart)
-        self._about = gui.add_markdown(NETWORKS[self._setup.preset].sentence)
-        self._status = gui.add_markdown("Nothing is simulated yet.")
-        self._player = NetworkPlayer(self.ui, self._moved)
-        self._charts = NetworkCharts(self.ui, self._player)
+        self._visited = self._streaming = self._here = False
+        self._moment_s = 0.0
+        self._resting = ui.debounce(REST_S, self._run)
+        self._hand = ui.debounce(HAND_S, self._show_moment)
+        self._text = gui.add_markdown(TEXT)
+        self._setup = NetworkSetup(ui, self._resting.restart)
+        self._about = gui.add_markdown("")
+        self._status = gui.add_markdown("Nothing is sent yet.")
         self._table = gui.add_html("")
+        self._difference = gui.add_markdown("")
+        with gui.add_folder("What if"):
+            self._setup.add_what_if()
+        self._inspector = gui.add_folder("Packet")
+        with self._inspector:
+            self._packet = gui.add_markdown(PICK)
+        self._legend = gui.add_html("")
         with gui.add_folder("All other numbers", expand_by_default=False):
             self._others = gui.add_html("")
         with gui.add_folder("Advanced", expand_by_default=False):
             self._setup.add_advanced()
+        self._dock = Dock(ui, self._moved, self._picked)
 
     def on_show(self) -> None:
-        """Simulate at the first visit; turn the view to the network."""
-        self._framed = ()
+        """Send at the first visit; turn the view to the cameras."""
+        self._framed, self._here = (), True
+        self._dock.show(True)
         if not self._visited:
             self._visited = True
             self._run()
 
-    def on_spec(self, spec: Spec) -> None:
+    def on_hide(self) -> None:
+        """Stop the clock, and leave the lower edge to others."""
+        self._here = False
+        self._dock.show(False)
+
+    def on_action(self, action: str) -> None:
         """Go back to the settings of the start with the rest of the session."""
-        if self._visited and not spec.networks:
+        if action == "Reset" and self._visited:
             self._setup.reset()
             self.ui.post(self._run)
 
+    def on_spec(self, spec: Spec) -> None:
+        """What streams in from now on belongs to something else."""
+        if not self.session.results.fresh("network", spec):
+            self._streaming = False
+
+    def on_partial(self, view: Any) -> None:
+        """Show the frames at once, and every moment when it is there."""
+        if isinstance(view, DeliveryView):
+            self._streaming = view.sent == self.session.spec.sent
+            if self._streaming:
+                self._take_delivery(view)
+        elif isinstance(view, MomentView) and self._streaming and self._delivery is not None:
+            moments = sorted((*self._delivery.moments, view), key=lambda one: one.t_ns)
+            self._grow(replace(self._delivery, moments=tuple(moments)))
+
     def on_view(self, step: Step, view: Any) -> None:
-        """Draw the runs."""
-        if step == self.step and self.session.results.fresh("network", self.session.spec):
-            with self.ui.atomic():
-                self._take(
-                    tuple(replace(one, label=label) for one, label in zip(view, self._labels, strict=True))
-                )
-            self.session.frame_view()
+        """Draw the delivery, or the runs."""
+        if step != self.step or not self.session.results.fresh("network", self.session.spec):
+            return
+        with self.ui.atomic():
+            if not isinstance(view, DeliveryView):
+                labels = zip(view, self._labels, strict=True)
+                self._take_runs(tuple(replace(one, label=label) for one, label in labels))
+            elif self._streaming and self._delivery is not None:
+                self._grow(view)
+            else:
+                self._take_delivery(view)
+        self._streaming = False
+        self.session.frame_view()
 
     def on_failure(self, step: Step, sentence: str) -> None:
         """Show that there is nothing to show, and why."""
         if step == self.step:
             with self.ui.atomic():
                 self._forget()
-                self._status.content = f"**Not simulated**: {sentence} Change a setting or press *Retry*."
+                self._status.content = f"**Not sent**: {sentence} Change a setting or press *Retry*."
 
     def look(self) -> bool:
-        """Turn the view to the whole network, once for each shape of the window."""
-        if self._drawing is not None:
-            clients = list(self.session.clients())
-            shape = tuple(round(client.camera.aspect, 1) for client in clients)
-            if shape != self._framed:
-                look_at_ground(clients, self._drawing.ground)
-                self._framed = shape
+        """Turn the view to the cameras and the room, or the streets, once for each shape of the window."""
+        clients = list(self.session.clients())
+        shape = tuple(round(client.camera.aspect, 1) for client in clients)
+        if self._drawing is None or shape == self._framed:
+            return True
+        self._framed = shape
+        if isinstance(self._drawing, NetworkDrawing):
+            look_at_ground(clients, self._drawing.ground)
+        else:
+            for client in clients:
+                turn(client, *self._drawing.viewpoint(client.camera.fov, client.camera.aspect))
         return True
 
     @property
     def command(self) -> str:
-        """The command lines that simulate the same."""
-        return self._setup.command()
+        """The command lines that compute the same."""
+        return self._setup.command(self.session.spec)
+
+    # What is asked for, and what came.
 
     def _run(self) -> None:
         """Ask for what the controls say."""
-        preset = NETWORKS[self._setup.preset]
-        self._about.content = preset.sentence + (f" {ORIGIN}" if preset.schemes else "")
-        runs = self._setup.runs()
-        self._labels, session = tuple(runs), self.session
-        asked = replace(session.spec, networks=tuple(runs.values()))
+        setup, session = self._setup, self.session
+        preset = NETWORKS[setup.preset]
+        self._text.content = STREET_TEXT if preset.street else TEXT
+        self._about.content = preset.sentence + (f" {ORIGIN}" if preset.street else "")
+        if preset.street:
+            runs = setup.runs()
+            self._labels = tuple(runs)
+            asked = replace(session.spec, networks=tuple(runs.values()), sent=None)
+        else:
+            asked = replace(session.spec, networks=(), sent=setup.sent())
         there = session.results.fresh("network", asked)
         if not there:
             self._status.content = RUNNING
@@ -116,29 +180,146 @@ class NetworkPanel(Panel):
         if there:
             self.on_view("network", session.results.view("network"))
 
-    def _take(self, views: tuple[NetworkView, ...]) -> None:
-        self._views = views
-        self._status.content = runs_summary(views)
-        self._table.content, self._others.content = metric_tables(views)
+    def _take_delivery(self, view: DeliveryView) -> None:
+        """Another delivery: its frames, and as many moments as are there."""
+        now_ns = self._dock.now_ns if self._delivery is not None else None
+        if self._delivery is not None and self._delivery.moments and self._delivery.nodes:
+            same_room = [n.name for n in self._delivery.nodes] == [n.name for n in view.nodes]
+            ended = self._delivery.moments[-1].t_ns == self._delivery.times_ns[-1]
+            self._before = self._delivery if same_room and ended else None
+        self._delivery, self._runs = view, ()
+        self._frames = [Frames(view.run)]
+        self._setup.name_nodes([node.name for node in view.nodes])
+        self._drawing = DeliveryDrawing(self.scene, self._next_name(), view)
+        self._legend.content = _legend_html(legend(view))
+        self._packet.content = PICK
+        self._load(view.run.start_ns, view.run.end_ns, stops_ns(view.run))
+        self._dock.seek(view.run.end_ns if now_ns is None else now_ns)
+        self._grow(view)
+        self.session.frame_view()
+
+    def _grow(self, view: DeliveryView) -> None:
+        """The same delivery with more moments."""
+        self._delivery = view
+        self._status.content = summary(view)
+        self._dock.update(self._lanes())
+        if self._before is not None:
+            self._difference.content = difference(self._before, view, changes(self._before, view))
+        self._show_moment()
+
+    def _take_runs(self, runs: tuple[NetworkView, ...]) -> None:
+        self._runs, self._delivery, self._before = runs, None, None
+        self._frames = [Frames(run) for run in runs]
+        self._status.content = runs_summary(runs)
+        self._table.content, self._others.content = metric_tables(runs)
+        self._difference.content = self._legend.content = ""
+        self._packet.content = PICK
+        self._drawing = NetworkDrawing(self.scene, self._next_name(), runs)
+        start_ns, end_ns = min(run.start_ns for run in runs), max(run.end_ns for run in runs)
+        self._load(start_ns, end_ns, stops_ns(*runs))
+
+    def _load(self, start_ns: int, end_ns: int, stops: Any) -> None:
+        self._framed = ()
+        self._dock.load(start_ns, end_ns, stops, self._lanes())
+        self._dock.show(self._here)
+        self._moved(self._dock.now_ns)
+
+    def _lanes(self) -> list[Lane]:
+        if self._delivery is not None:
+            return [frames_lane(self._delivery.run, self._frames[0]), growth_lane(self._delivery)]
+        lanes: list[Lane] = [
+            frames_lane(run, frames) for run, frames in zip(self._runs, self._frames, strict=True)
+        ]
+        return [*lanes, run_curves(self._runs[0])] if len(self._runs) == 1 else lanes
+
+    def _next_name(self) -> str:
         self._drawn += 1
         clear(self.scene, f"{self.drawn_below}/runs")
-        self._drawing = NetworkDrawing(self.scene, f"{self.drawn_below}/runs/{self._drawn}", views)
-        self._framed = ()
-        self._charts.load(views)
-        self._player.load_runs(views)
+        return f"{self.drawn_below}/runs/{self._drawn}"
 
     def _forget(self) -> None:
         """Show nothing: what was there has other settings."""
-        self._views, self._drawing = (), None
-        self._player.pause()
-        self._charts.forget()
-        self._table.content = self._others.content = ""
+        self._runs, self._delivery, self._drawing, self._streaming = (), None, None, False
+        self._dock.show(False)
+        for html in (self._table, self._others, self._difference, self._legend):
+            html.content = ""
         clear(self.scene, f"{self.drawn_below}/runs")
 
-    def _moved(self) -> None:
+    # The clock.
+
+    def _moved(self, now_ns: int) -> None:
         if self._drawing is None:
             return
-        now_ns = self._player.now_ns
+        self._drawing.show(now_ns, SHOWN * self._dock.shown_ns)
+        if self._delivery is None:
+            return
+        if time.monotonic() - self._moment_s > MESH_S:
+            self._show_moment()
+        self._hand.restart()
+
+    def _show_moment(self) -> None:
+        """Pictures, clouds, mesh and numbers of the clock's time."""
+        view, drawing = self._delivery, self._drawing
+        if view is None or not isinstance(drawing, DeliveryDrawing):
+            return
+        self._moment_s = time.monotonic()
+        moment = view.moment_at(self._dock.now_ns)
         with self.ui.atomic():
-            self._drawing.show(now_ns, round(SHOWN_S * self._player.seconds_a_second * 1e9))
-            self._charts.mark(now_ns)
+            drawing.show_moment(moment)
+            self._table.content = moment_table(view, moment)
+            self._others.content = more_rows(view, moment) + metric_tables((view.run,))[1]
+
+    # The inspector.
+
+    def _picked(self, lane: int, item: int) -> None:
+        """Tell of a frame, and light up what it carried."""
+        if isinstance(self._drawing, DeliveryDrawing):
+            self._drawing.light(None)
+        if item < 0 or lane >= len(self._frames):
+            self._packet.content = PICK
+            return
+        frames, view = self._frames[lane], self._delivery
+        run = self._runs[lane] if view is None else view.run
+        header_bytes = run.config.nodes.header_bytes if view is not None else 0
+        story = frames.story(item, header_bytes)
+        self._packet.content = story
+        if view is None or not frames.carries_image(item):
+            return
+        source = next(
+            (row for row, node in enumerate(view.nodes) if node.row == frames.camera_of(item)), None
+        )
+        if source is not None:
+            first, count = frames.bytes_of(item, header_bytes)
+
+            def came(packet: PacketView | None) -> None:
+                self._light(story, packet)
+
+            self.session.quick_job("network.delivery_job:packet_job", source, first, count, on_end=came)
+
+    def _light(self, story: str, packet: PacketView | None) -> None:
+        if packet is None or not isinstance(self._drawing, DeliveryDrawing):
+            return
+        self._packet.content = f"{story}\n\n{told(packet)}"
+        with self.ui.atomic():
+            self._drawing.light(packet)
+
+
+def told(packet: PacketView) -> str:
+    """What a packet says of its image, in a sentence."""
+    parts = []
+    for what, pixels in (("depth", packet.depth), ("colour", packet.color)):
+        rows = pixels.any(axis=1).nonzero()[0]
+        if len(rows):
+            where = f"row {rows[0] + 1}" if rows[0] == rows[-1] else f"rows {rows[0] + 1} to {rows[-1] + 1}"
+            parts.append(f"{what} of {int(pixels.sum()):,} pixels in {where}")
+    if not parts:
+        return "By itself it tells no measured pixel: there is none in its rows, or it needs other packets."
+    return f"It tells the {' and the '.join(parts)} (yellow in the picture and the cloud)."
+
+
+def _legend_html(colors: Sequence[tuple[str, tuple[int, int, int]]]) -> str:
+    words = " &ensp; ".join(
+        f"<span style='white-space: nowrap'><b style='color: {css(color)}'>●</b> {name}</span>"
+        for name, color in colors
+    )
+    return f"<div style='padding: 0 0.8em 0.8em; font-size: 12px'>{words}</div>"

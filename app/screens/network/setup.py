@@ -1,126 +1,180 @@
-"""What is simulated: a preset, a few settings, free text for all others, and a second run beside."""
+"""What is sent, and how: a preset, a few controls, what might go wrong, and free text for the rest."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import viser
 
-from app.screens.network.labels import NETWORKS, ways
+from app.screens.network.labels import CODINGS, NETWORKS, ways
+from app.state import Sent, Spec
 from app.ui import Ui
 from network_sim.config import PRESETS, NetworkConfig
 from packetmesh.errors import InputError
 from packetmesh.settings import differences, settings, with_settings
+from pipeline.config import PRESETS as CHAINS
+from pipeline.config import PipelineConfig
 
 TITLES = {preset.title: name for name, preset in NETWORKS.items()}
-NOTHING = "nothing"
+CODING_NAMES = {title: name for name, title in CODINGS.items()}
+NOTHING, NOBODY = "nothing", "nobody"
 FIRST = next(iter(NETWORKS))
-WAY_HINTS = {
-    True: "Which images are asked for: all, what adds coverage, or each with a probability.",
-    False: "Who may send when.",
-}
+MOMENTS = 20
 FREE = """Any setting of `packetmesh simulate --describe`, several separated by spaces, for example
-`radio.capture_db=6 nodes.images=2`. Those for the second run apply to it alone."""
+`radio.capture_db=6 nodes.deadline_s=4`. Those for the second run apply to it alone."""
 
 
 class NetworkSetup:
-    """The controls of one run or two."""
+    """The controls of a delivery, or of one street run or two."""
 
-    def __init__(
-        self,
-        ui: Ui,
-        on_change: Callable[[], None],
-    ) -> None:
-        """Add the controls of the first screen.
-
-        Args:
-            ui: where to add them.
-            on_change: called when something else is wanted.
-        """
+    def __init__(self, ui: Ui, on_change: Callable[[], None]) -> None:
+        """Add the controls of the first screen; ``on_change`` is called when something else is wanted."""
         gui = ui.gui
         self._ui, self._on_change = ui, on_change
         self._extra: tuple[str, ...] = ()
         self._beside_extra: tuple[str, ...] = ()
         self._ways = ways(FIRST)
-        self._preset = gui.add_dropdown("Preset", list(TITLES), hint="Which network to begin with.")
-        self._count = gui.add_slider("Nodes", 1, 10, 1, 3, hint="How many nodes or vehicles have a camera.")
-        self._shadowing = gui.add_slider(
-            "Shadowing (dB)",
+        self._preset = gui.add_dropdown("Preset", list(TITLES), hint="Which network carries the images.")
+        self._coding = gui.add_dropdown(
+            "Coding", list(CODING_NAMES), hint="How images become bytes, and which bytes go first."
+        )
+        self._share = gui.add_slider(
+            "Lose packets (%)",
             0.0,
-            12.0,
+            50.0,
             0.5,
             0.0,
-            hint="Standard deviation of each link's own constant gain or loss.",
+            hint="Share of the frames that get lost on every link, besides collisions.",
         )
-        self._way = gui.add_dropdown("Medium access", list(self._ways), hint=WAY_HINTS[False])
+        self._burst = gui.add_slider(
+            "in bursts of", 1, 50, 1, 8, hint="Mean number of frames that get lost one after the other."
+        )
+        self._retransmit = gui.add_checkbox(
+            "Send lost packets again",
+            True,
+            hint="Packets that were given up are sent again. Each try of IEEE 802.11 has up to seven "
+            "attempts of its own: without this, bursts get through them, single losses do not.",
+        )
+        self._vehicles = gui.add_slider("Vehicles", 1, 120, 1, 60, hint="How many of them have a camera.")
+        self._scheme = gui.add_dropdown("Scheme", ["-"], hint="Which images are asked for.")
+        self._beside = gui.add_dropdown(
+            "Beside", [NOTHING], hint="A second run with the same settings but this scheme."
+        )
         self._seed = gui.add_slider(
             "Seed", 0, 50, 1, 0, hint="Everything that is drawn at random; the same seed gives the same run."
         )
-        self._beside = gui.add_dropdown(
-            "Beside", [NOTHING, *self._ways], hint="A second run with the same settings but this one."
-        )
         ui.when_changed(self._preset, self._picked)
-        for handle in (self._count, self._shadowing, self._way, self._seed, self._beside):
+        for handle in (
+            *(self._coding, self._share, self._burst, self._retransmit),
+            *(self._vehicles, self._scheme, self._beside, self._seed),
+        ):
             ui.when_changed(handle, on_change)
-        self.reset()
+
+    def add_what_if(self) -> None:
+        """What may happen to the nodes."""
+        self._down = self._ui.gui.add_dropdown(
+            "Switch off", [NOBODY], hint="This node has failed and sends nothing."
+        )
+        self._ui.when_changed(self._down, self._on_change)
 
     def add_advanced(self) -> None:
-        """Free text for every other setting."""
-        gui = self._ui.gui
+        """Medium access, moments, and free text for every other setting."""
+        gui, ui = self._ui.gui, self._ui
+        self._access = gui.add_dropdown("Medium access", list(self._ways), hint="Who may send when.")
+        self._shadowing = gui.add_slider(
+            "Shadowing (dB)", 0.0, 12.0, 0.5, 0.0, hint="Spread of each link's own constant gain or loss."
+        )
+        self._moments = gui.add_slider(
+            "Moments", 4, 40, 1, MOMENTS, hint="At so many times the surface is rebuilt: after equal shares."
+        )
+        for handle in (self._access, self._shadowing, self._moments):
+            ui.when_changed(handle, self._on_change)
         gui.add_markdown(FREE)
-        self._text = gui.add_text("Setting key=value", "", hint="For example nodes.images=2")
+        self._text = gui.add_text("Setting key=value", "", hint="For example nodes.deadline_s=4")
         self._beside_text = gui.add_text(
             "Second run", "", hint="Settings that only a second run has; it is added if there is none."
         )
-        gui.add_button("Use these settings", icon=viser.Icon.CHECK, hint="Simulates again.").on_click(
-            lambda _: self._ui.post(self._use_text)
+        gui.add_button("Use these settings", icon=viser.Icon.CHECK, hint="Sends again.").on_click(
+            lambda _: ui.post(self._use_text)
         )
+        self.reset()
 
     @property
     def preset(self) -> str:
         """Name of the preset."""
         return TITLES[self._preset.value]
 
+    @property
+    def street(self) -> bool:
+        """Whether vehicles send, instead of the scene's cameras."""
+        return NETWORKS[self.preset].street
+
     def reset(self) -> None:
         """Go back to the settings of the start."""
         self._preset.value = NETWORKS[FIRST].title
+        self._coding.value = next(iter(CODING_NAMES))
+        self._moments.value = MOMENTS
+        self._down.value = NOBODY
         self._load()
 
-    def runs(self) -> dict[str, NetworkConfig]:
-        """The runs that the controls ask for, each by what the screen calls it.
+    def name_nodes(self, names: Sequence[str]) -> None:
+        """Take the names of the cameras that can be switched off."""
+        options = (NOBODY, *names) if len(names) > 1 else (NOBODY,)
+        if tuple(self._down.options) != options:
+            chosen = self._down.value
+            self._down.options = options
+            self._down.value = chosen if chosen in options else NOBODY
+
+    def sent(self) -> Sent:
+        """The delivery that the controls ask for.
 
         Raises:
             InputError: settings that do not go together.
         """
-        way, beside = self._way.value, self._beside.value
-        runs = {way: self._config(way, self._extra)}
+        down = () if self._down.value == NOBODY else (self._down.value,)
+        changes = (
+            f"radio.shadowing_db={float(self._shadowing.value)}",
+            f"run.seed={int(self._seed.value)}",
+            f"loss.share={float(self._share.value) / 100.0:.4g}",
+            f"nodes.retransmit={str(bool(self._retransmit.value)).lower()}",
+            *((f"loss.burst_packets={float(self._burst.value)}",) if self._share.value else ()),
+            *self._ways[self._access.value],
+            *self._extra,
+        )
+        network = with_settings(PRESETS[self.preset], changes)
+        return Sent(network, CODING_NAMES[self._coding.value], int(self._moments.value), down)
+
+    def runs(self) -> dict[str, NetworkConfig]:
+        """The street runs that the controls ask for, each by what the screen calls it.
+
+        Raises:
+            InputError: settings that do not go together.
+        """
+        way, beside = self._scheme.value, self._beside.value
+        runs = {way: self._run(way, self._extra)}
         if beside != NOTHING or self._beside_extra:
             second_way = way if beside == NOTHING else beside
             label = " ".join((second_way, *self._beside_extra))
             label = label if label not in runs else f"{label} again"
-            runs[label] = self._config(second_way, (*self._extra, *self._beside_extra))
+            runs[label] = self._run(second_way, (*self._extra, *self._beside_extra))
         return runs
 
-    def command(self) -> str:
-        """The command lines that simulate the same."""
-        base = PRESETS[self.preset]
+    def command(self, spec: Spec) -> str:
+        """The command lines that compute the same."""
+        if not self.street:
+            return deliver_command(spec, self.preset, self.sent())
         lines = []
         for config in self.runs().values():
             words = ["packetmesh", "simulate", "--preset", self.preset]
-            if changed := differences(config, base):
+            if changed := differences(config, PRESETS[self.preset]):
                 words += ["--set", *changed]
             lines.append(shlex.join(words))
         return "\n".join(lines)
 
-    def _config(self, way: str, extra: tuple[str, ...]) -> NetworkConfig:
-        network = NETWORKS[self.preset]
-        config = with_settings(PRESETS[self.preset], network.settings)
-        shown = (
-            f"{network.count_key}={int(self._count.value)}",
-            f"radio.shadowing_db={float(self._shadowing.value)}",
-            f"run.seed={int(self._seed.value)}",
-        )
+    def _run(self, way: str, extra: tuple[str, ...]) -> NetworkConfig:
+        config = with_settings(PRESETS[self.preset], NETWORKS[self.preset].settings)
+        shown = (f"street.vehicles={int(self._vehicles.value)}", f"run.seed={int(self._seed.value)}")
         return with_settings(config, (*shown, *self._ways[way], *extra))
 
     def _picked(self) -> None:
@@ -128,34 +182,51 @@ class NetworkSetup:
         self._on_change()
 
     def _load(self) -> None:
-        """Show the preset's own values."""
-        network, own = NETWORKS[self.preset], settings(PRESETS[self.preset])
+        """Show the preset's own values, and the controls that it has."""
+        own, street = settings(PRESETS[self.preset]), self.street
         self._ways = ways(self.preset)
-        self._count.label = network.count_label
-        self._count.value = 1  # never beyond the ends while they move
-        self._count.max = max(network.most, int(own[network.count_key]))
-        self._count.value = int(own[network.count_key])
-        self._shadowing.value = float(own["radio.shadowing_db"])
         self._seed.value = int(own["run.seed"])
-        self._way.label = "Scheme" if network.schemes else "Medium access"
-        self._way.options = tuple(self._ways)
-        self._way.value = next(iter(self._ways))
-        self._beside.options = (NOTHING, *self._ways)
-        self._beside.value = NOTHING
+        self._share.value = 100.0 * float(own["loss.share"])
+        self._retransmit.value = own["nodes.retransmit"] == "true"
+        self._shadowing.value = float(own["radio.shadowing_db"])
+        self._vehicles.value = int(own["street.vehicles"])
+        if street:
+            self._scheme.options, self._beside.options = tuple(self._ways), (NOTHING, *self._ways)
+            self._scheme.value, self._beside.value = next(iter(self._ways)), NOTHING
+        else:
+            self._access.options = tuple(self._ways)
+            self._access.value = next(iter(self._ways))
+        for handle in (self._coding, self._share, self._burst, self._retransmit):
+            handle.visible = not street
+        for handle in (self._down, self._access, self._shadowing, self._moments):
+            handle.visible = not street
+        for handle in (self._vehicles, self._scheme, self._beside, self._beside_text):
+            handle.visible = street
         self._extra = self._beside_extra = ()
-        if hasattr(self, "_text"):
-            self._text.value = self._beside_text.value = ""
+        self._text.value = self._beside_text.value = ""
 
     def _use_text(self) -> None:
         """Take the free settings, unless they are wrong: then the ones before stay."""
         before = self._extra, self._beside_extra
-        self._extra, self._beside_extra = (
-            tuple(self._text.value.split()),
-            tuple(self._beside_text.value.split()),
-        )
+        self._extra = tuple(self._text.value.split())
+        self._beside_extra = tuple(self._beside_text.value.split()) if self.street else ()
         try:
-            self.runs()
+            self.runs() if self.street else self.sent()
         except InputError:
             self._extra, self._beside_extra = before
             raise
         self._on_change()
+
+
+def deliver_command(spec: Spec, preset: str, sent: Sent) -> str:
+    """The command line that delivers the same rig in the same way."""
+    words = ["packetmesh", "deliver", *spec.source.arguments(), "--preset", preset, "--coding", sent.coding]
+    words += ["--moments", str(sent.moments)]
+    if sent.down:
+        words += ["--down", *sent.down]
+    if spec.preset != "packetmesh":
+        words += ["--chain", spec.preset]
+    chain = CHAINS.get(spec.preset, PipelineConfig())
+    if changed := differences(sent.network, PRESETS[preset]) + differences(spec.config, chain):
+        words += ["--set", *changed]
+    return shlex.join([*words, "--out", "runs/delivery"])

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from app.levels import Levels
 from network_sim.config import NetworkConfig
 from network_sim.metrics import Metric
 from pipeline.types import FloatArray
@@ -98,6 +99,10 @@ class NetworkView:
     """End of the warm-up, where the timeline begins."""
     end_ns: int
     pieces: Pieces
+    lane_nodes: tuple[int, ...]
+    """Nodes that have a row on the timeline: cameras, and whoever else sends."""
+    levels: Levels
+    """Frames by their index in ``pieces``' own order among ``What.AIR``, for the rows of the timeline."""
     kept_until_ns: int
     """The pieces end here if the run had more of them than are kept; otherwise ``end_ns``."""
     series: dict[Curve, Series]

@@ -1,0 +1,295 @@
+"""A delivery in the room: cameras with what arrived of their pictures, frames on their way, the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+
+from app.drawing.clouds import clear
+from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, NEUTRAL
+from app.drawing.poses import place
+from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
+from app.screens.network.draw import MOST_PACKETS, ON_THE_WAY, Flights
+from app.screens.network.labels import CAUSES
+from app.screens.network.view import What
+from network_sim.types import Cause
+from pipeline.types import FloatArray
+
+FRUSTUM = 0.16
+"""Depth of a frustum over the distance from the cameras to what they see."""
+BESIDE = 0.5
+"""How far beside the cameras the sink is drawn, over the same distance: it may stand far outside."""
+ELEVATION_RAD = np.radians(40.0)
+FILLED = 0.8
+"""Share of the window that all of it takes."""
+PACKET_M, POINT_M = 0.011, 0.008
+"""Sizes over the same distance, and of a point."""
+LIT = (255, 230, 0)
+BUSY, DOWN = BRAND, LOSS
+Number = tuple[int, int, int]
+
+
+class DeliveryDrawing:
+    """Everything of one delivery below a scene node, at any time."""
+
+    def __init__(self, scene: viser.SceneApi, below: str, view: DeliveryView) -> None:
+        clear(scene, below)
+        self._scene, self._below, self._view = scene, below, view
+        stage = view.stage
+        cameras_m = np.array([node.T_world_camera[:3, 3] for node in view.nodes])
+        middle_m = cameras_m.mean(axis=0)
+        self._size_m = max(float(np.linalg.norm(stage.middle_m - middle_m)), 0.5)
+        self._places_m = self._places(cameras_m)
+        cloud_m = self._places_m[-1]
+        self._client_m = cloud_m + 0.4 * self._size_m * stage.right
+        self._flights = Flights.of(view.run.pieces)
+        self._frusta: list[viser.CameraFrustumHandle] = []
+        self._names: list[viser.LabelHandle] = []
+        self._clouds: list[viser.PointCloudHandle | None] = [None] * len(view.nodes)
+        self._meshes: list[viser.GlbHandle] = []
+        self._losses: dict[int, viser.LabelHandle] = {}
+        self._made = 0
+        self._shown: MomentView | None = None
+        self._add_nodes()
+        self._add_marks()
+        self._add_routes()
+        capacity = MOST_PACKETS + len(view.run.names)
+        self._packets = scene.add_point_cloud(
+            f"{below}/packets",
+            np.zeros((capacity, 3), np.float32),
+            np.zeros((capacity, 3), np.uint8),
+            point_size=PACKET_M * self._size_m,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
+
+    def viewpoint(self, fov_rad: float, aspect: float) -> tuple[FloatArray, FloatArray]:
+        """(3,) where to look and (3,) where to stand to see room, cameras, sink and client in a window."""
+        stage = self._view.stage
+        ends_m = 0.5 * stage.width_m * stage.right
+        seen_m = np.vstack(
+            [stage.middle_m - ends_m, stage.middle_m + ends_m, stage.top_m, self._places_m, self._client_m]
+        )
+        away = stage.viewpoint_m - stage.middle_m
+        away[2] = np.hypot(*away[:2]) * np.tan(ELEVATION_RAD)
+        away /= max(float(np.linalg.norm(away)), 1e-9)
+        middle_m = 0.5 * (seen_m.min(axis=0) + seen_m.max(axis=0))
+        up = np.cross(stage.right, -away)
+        from_middle_m = seen_m - middle_m
+        slope = np.tan(0.5 * fov_rad)
+        across = np.abs(from_middle_m @ stage.right) / (slope * aspect)
+        along = np.abs(from_middle_m @ up) / slope
+        distance_m = float((np.maximum(across, along) / FILLED + from_middle_m @ away).max())
+        return middle_m, middle_m + distance_m * away
+
+    # What is there at a time.
+
+    def show(self, now_ns: int, shown_ns: int) -> None:
+        """The frames at a time; they take at least ``shown_ns`` for their way, and losses stay so long."""
+        at = self._places_m
+        points, colors = self._flights.packets(now_ns, shown_ns, at)
+        lost_m, red = self._flights.losses(now_ns, shown_ns, at)
+        batch = np.tile(np.array((0.0, 0.0, -1000.0), np.float32), (len(self._packets.points), 1))
+        shade = np.tile(np.array(BACKGROUND, np.uint8), (len(batch), 1))
+        both = np.concatenate([points, lost_m])[: len(batch)]
+        batch[: len(both)], shade[: len(both)] = both, np.concatenate([colors, red])[: len(batch)]
+        self._packets.points, self._packets.colors = batch, shade
+        self._packets.visible = bool(len(both))
+        self._show_causes(now_ns, shown_ns)
+
+    def show_moment(self, moment: MomentView | None) -> None:
+        """Pictures, clouds and mesh of a moment; None is before anything has arrived."""
+        if moment is self._shown:
+            return
+        self._shown = moment
+        for row, node in enumerate(self._view.nodes):
+            now = None if moment is None else moment.nodes[row]
+            share = 0.0 if now is None else now.delivered_bytes / max(node.total_bytes, 1)
+            state = "off" if node.row < 0 else f"{100.0 * share:.0f} %"
+            self._names[row].text = f"{node.name} · {state}"
+            self._frusta[row].image = _dark(node.aspect) if now is None else now.picture
+            self._frusta[row].color = _state_color(node.row < 0, share)
+            self._show_cloud(row, None if now is None or not len(now.points_m) else now)
+        self._show_mesh(b"" if moment is None else moment.glb)
+
+    def light(self, packet: PacketView | None) -> None:
+        """Light up the pixels and points of a packet; None puts out what is lit."""
+        name = f"{self._below}/lit"
+        if self._scene.get_handle_by_name(name) is not None:
+            self._scene.remove_by_name(name)
+        shown, self._shown = self._shown, None
+        self.show_moment(shown)
+        if packet is None:
+            return
+        self._frusta[packet.row].image = packet.picture
+        if len(packet.points_m):
+            pose = self._pose(packet.row, shown)
+            cloud = self._scene.add_point_cloud(
+                name, packet.points_m, np.array(LIT, np.uint8), point_size=4 * POINT_M, precision="float32"
+            )
+            place(cloud, pose)
+
+    def _pose(self, row: int, moment: MomentView | None) -> FloatArray:
+        if moment is None:
+            return self._view.nodes[row].T_world_camera
+        return moment.nodes[row].T_world_camera
+
+    def _show_cloud(self, row: int, now: object) -> None:
+        old, self._clouds[row] = self._clouds[row], None
+        if old is not None:
+            old.remove()
+        if now is None:
+            return
+        self._made += 1
+        handle = self._scene.add_point_cloud(
+            f"{self._below}/cloud-{self._view.nodes[row].name}-{self._made}",
+            now.points_m,  # type: ignore[attr-defined]
+            now.colors,  # type: ignore[attr-defined]
+            point_size=POINT_M,
+            point_shape="rounded",
+            point_shading="flat",
+            precision="float32",
+        )
+        place(handle, now.T_world_camera)  # type: ignore[attr-defined]
+        self._clouds[row] = handle
+
+    def _show_mesh(self, glb: bytes) -> None:
+        """The one before stays until the browser has read this one."""
+        while len(self._meshes) > 1:
+            self._meshes.pop(0).remove()
+        if not glb:
+            while self._meshes:
+                self._meshes.pop().remove()
+            return
+        self._made += 1
+        self._meshes.append(self._scene.add_glb(f"{self._below}/mesh-{self._made}", glb, cast_shadow=False))
+
+    def drop_old(self) -> None:
+        """Take away the mesh that a newer one has replaced."""
+        while len(self._meshes) > 1:
+            self._meshes.pop(0).remove()
+
+    def _show_causes(self, now_ns: int, shown_ns: int) -> None:
+        """Why something was lost a moment ago, in words where it happened."""
+        failures, recent = self._flights.failures, {}
+        first, last = np.searchsorted(failures.start_ns, (now_ns - shown_ns, now_ns), side="right")
+        for index in range(max(first, last - 20), last):
+            lost = failures.what[index] == What.LOSS
+            there = lost and failures.cause[index] in ON_THE_WAY and failures.peer[index] >= 0
+            node = int(failures.peer[index] if there else failures.node[index])
+            recent[node] = CAUSES[Cause(int(failures.cause[index]))]
+        for node, handle in self._losses.items():
+            handle.visible = node in recent
+        for node, cause in recent.items():
+            text = f"lost: {cause}"
+            if node not in self._losses:
+                self._losses[node] = self._label(
+                    f"cause-{node}", text, self._places_m[node] - (0.0, 0.0, 0.12 * self._size_m), 0.8
+                )
+            elif self._losses[node].text != text:
+                self._losses[node].text = text
+
+    # What stays.
+
+    def _places(self, cameras_m: FloatArray) -> FloatArray:
+        """(N, 3) of everybody in the network; the sink and the cloud beside the cameras."""
+        run, left = self._view.run, -self._view.stage.right
+        sink_m = cameras_m.mean(axis=0) + (np.ptp(cameras_m @ left) / 2.0 + BESIDE * self._size_m) * left
+        places_m = np.tile(sink_m, (len(run.names), 1))
+        for node, camera_m in zip(self._view.nodes, cameras_m, strict=True):
+            if node.row >= 0:
+                places_m[node.row] = camera_m
+        for row, role in enumerate(run.roles):
+            if role == "cloud":
+                places_m[row] = sink_m + self._size_m * np.array([0.0, 0.0, 0.45])
+        return places_m
+
+    def _add_nodes(self) -> None:
+        for node in self._view.nodes:
+            name = f"{self._below}/{node.name}"
+            frustum = self._scene.add_camera_frustum(
+                name,
+                fov=node.fov_rad,
+                aspect=node.aspect,
+                scale=FRUSTUM * self._size_m,
+                thickness=0.004 * self._size_m,
+                color=BUSY,
+                image=_dark(node.aspect),
+            )
+            place(frustum, node.T_world_camera)
+            self._frusta.append(frustum)
+            above_m = node.T_world_camera[:3, 3] + (0.0, 0.0, 0.07 * self._size_m)
+            self._names.append(self._label(f"name-{node.name}", f"{node.name} · 0 %", above_m, 0.9))
+
+    def _add_marks(self) -> None:
+        view, roles = self._view.run, self._view.run.roles
+        positions_m = view.positions_m(view.start_ns)
+        cameras_m = positions_m[[role == "node" for role in roles]]
+        for row, role in enumerate(roles):
+            if role == "node":
+                continue
+            color = DELIVERED if role == "sink" else NEUTRAL
+            self._mark(role, self._places_m[row], color)
+            text = role
+            if role == "sink":
+                away_m = float(np.linalg.norm(positions_m[row] - cameras_m.mean(axis=0)))
+                text = f"sink, {away_m:.0f} m away"
+            self._label(f"name-{role}", text, self._places_m[row] + (0.0, 0.0, 0.05 * self._size_m), 0.9)
+        if "cloud" in roles:
+            cloud_m = self._places_m[roles.index("cloud")]
+            client_m = self._client_m
+            self._mark("client", client_m, NEUTRAL)
+            above_m = client_m + np.array([0.0, 0.0, 0.05 * self._size_m])
+            self._label("name-client", "client: you", above_m, 0.9)
+            sink_m = self._places_m[roles.index("sink")]
+            self._lines("to-client", np.array([[sink_m, cloud_m], [cloud_m, client_m]]))
+
+    def _add_routes(self) -> None:
+        """Who has sent to whom."""
+        frames = self._flights.frames
+        frames = frames.where(frames.what == What.AIR)
+        pairs = np.unique(np.column_stack([frames.node, frames.peer]), axis=0)
+        if len(pairs):
+            self._lines("routes", self._places_m[pairs])
+
+    def _mark(self, name: str, place_m: FloatArray, color: Number) -> None:
+        self._scene.add_icosphere(
+            f"{self._below}/{name}", radius=0.028 * self._size_m, color=color, position=place_m
+        )
+
+    def _label(self, name: str, text: str, place_m: FloatArray, size: float) -> viser.LabelHandle:
+        return self._scene.add_label(
+            f"{self._below}/{name}", text, position=place_m, font_screen_scale=size, anchor="bottom-center"
+        )
+
+    def _lines(self, name: str, ends_m: FloatArray) -> None:
+        self._scene.add_line_segments(
+            f"{self._below}/{name}",
+            ends_m.astype(np.float32),
+            np.array(NEUTRAL, np.uint8),
+            thickness=1.5,
+            thickness_units="screen",
+        )
+
+
+def _dark(aspect: float) -> np.ndarray:
+    return np.full((12, max(1, round(12 * aspect)), 3), 48, np.uint8)
+
+
+def _state_color(down: bool, share: float) -> Number:
+    if down:
+        return DOWN
+    start, end = np.array(BUSY, float), np.array(DELIVERED, float)
+    red, green, blue = np.rint(start + share * (end - start)).astype(int).tolist()
+    return red, green, blue
+
+
+def legend(view: DeliveryView) -> Sequence[tuple[str, Number]]:
+    """What the colours of the stage mean."""
+    some = [("camera, nothing arrived", BUSY), ("camera, all arrived", DELIVERED)]
+    if any(node.row < 0 for node in view.nodes):
+        some.append(("camera down", DOWN))
+    return [*some, ("lost here", LOSS)]

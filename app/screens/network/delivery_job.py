@@ -1,0 +1,239 @@
+"""The rig's own images through a network: the frames at once, then one moment after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import cv2
+import numpy as np
+
+from app.drawing.cameras import Stage, stage_around
+from app.drawing.colors import NEUTRAL
+from app.drawing.meshes import surface_glb
+from app.drawing.pictures import cividis, depth_range_m
+from app.records import sample
+from app.screens.network.delivery_view import (
+    PICTURE_PX,
+    CameraNode,
+    DeliveryView,
+    Lossless,
+    MomentView,
+    NodeMoment,
+    PacketView,
+)
+from app.screens.network.run_view import run_view
+from app.state import Sent, Spec
+from app.store import Store
+from packetmesh.errors import ReconstructionError
+from packetmesh.progress import Progress
+from pipeline.acquisition import back_project
+from pipeline.delivery.coding import Received
+from pipeline.delivery.moments import Moment, NodeArrival, Rebuilder
+from pipeline.delivery.sending import (
+    DeliverySpec,
+    Sending,
+    frames_at_sink,
+    received_at,
+    send,
+    senders_of,
+)
+from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, PointCloud, RgbdFrame, SurfaceResult
+
+NODE_POINTS = 6000
+"""Of the cloud of one node."""
+CURVE_POINTS = 400
+"""Of the curve of bytes."""
+NOTHING_YET = (48, 52, 58)
+"""Pixels of which nothing has arrived."""
+Steps = Generator[Progress | DeliveryView | MomentView, None, DeliveryView]
+
+
+def delivery_job(store: Store, spec: Spec) -> Steps:
+    """A delivery; yielded as soon as the frames are there, and then every moment.
+
+    The last moment comes first: it says what the losses cost.
+    """
+    return (yield from store.remember(("delivery", spec.key("network")), partial(_delivered, store, spec)))
+
+
+def packet_job(
+    store: Store, spec: Spec, row: int, first_byte: int, byte_count: int
+) -> Generator[Progress, None, PacketView]:
+    """What bytes [first_byte, first_byte + byte_count) of a node's images say by themselves.
+
+    Args:
+        store: where results are kept.
+        spec: whose delivery it is.
+        row: of the node in the rig.
+        first_byte: of the packet.
+        byte_count: of the packet.
+    """
+    sending = yield from _sending(store, spec)
+    frame, stream = sending.rig.frames[row], sending.streams[row]
+    there = np.zeros(len(stream), np.bool_)
+    there[first_byte : first_byte + byte_count] = True
+    got = sending.coding.decode(np.where(there, stream, 0), there, frame.rgb.shape[:2], sending.packet_bytes)
+    depth, color = (got.depth > 0) | (got.coarse > 0), got.rgb_known
+    cloud = _cloud(replace(frame, depth=DepthMap(np.where(depth, frame.depth.z_m, np.nan))))
+    return PacketView(row, depth, color, _lit(frame.rgb, depth | color), cloud.points_m.astype(np.float32))
+
+
+def _sending(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
+    return (yield from store.remember(("sending", spec.source, spec.sent), partial(_send, spec)))
+
+
+def _send(spec: Spec) -> Generator[Progress, None, Sending]:
+    yield Progress("sending the images", 0.02)
+    sent = _asked(spec)
+    return send(DeliverySpec(spec, sent.network, sent.coding, sent.moments, sent.down))
+
+
+def _delivered(store: Store, spec: Spec) -> Steps:
+    started = time.perf_counter()
+    sending = yield from _sending(store, spec)
+    view = _first_view(sending, _asked(spec), time.perf_counter() - started)
+    yield view
+    rebuilder, count = Rebuilder(sending), len(sending.times_ns)
+    moments: list[MomentView] = []
+    for index in (count - 1, *range(count - 1)):
+        yield Progress(f"moment {len(moments) + 1} of {count}", (len(moments) + 0.5) / (count + 1))
+        moments.append(_moment_view(sending, rebuilder.moment(index), int(sending.times_ns[index])))
+        yield moments[-1]
+    moments.sort(key=lambda one: one.t_ns)
+    return replace(view, moments=tuple(moments), lossless=(yield from _lossless(store, spec)))
+
+
+def _asked(spec: Spec) -> Sent:
+    assert spec.sent is not None
+    return spec.sent
+
+
+def _lossless(store: Store, spec: Spec) -> Generator[Progress, None, Lossless | None]:
+    try:
+        after, truth = yield from store.stages(spec, "after", "truth")
+    except ReconstructionError:
+        return None
+    score = None if truth[1] is None else truth[1]["f_score_5cm"]
+    return Lossless(after.quality.no_hit_ray_share, score)
+
+
+def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:
+    rig, down = sending.rig, sending.spec.down
+    senders = senders_of(rig, down)
+    names = tuple(rig.frames[node].name for node in senders) + sending.trace.names[len(senders) :]
+    run = replace(run_view(sending.trace, elapsed_s), names=names)
+    nodes = tuple(
+        CameraNode(
+            name=frame.name,
+            T_world_camera=frame.T_world_camera,
+            fov_rad=2.0 * float(np.arctan2(frame.intrinsics.height_px / 2, frame.intrinsics.fy_px)),
+            aspect=frame.intrinsics.width_px / frame.intrinsics.height_px,
+            total_bytes=len(stream),
+            row=senders.index(row) if row in senders else -1,
+        )
+        for row, (frame, stream) in enumerate(zip(rig.frames, sending.streams, strict=True))
+    )
+    came = sending.arrivals
+    total = np.cumsum(came.byte_count)
+    some = np.unique(np.linspace(0, len(total) - 1, min(len(total), CURVE_POINTS)).astype(int))
+    return DeliveryView(
+        sent, run, nodes, _stage(rig.frames), tuple(sending.times_ns.tolist()), came.t_ns[some], total[some]
+    )
+
+
+def _stage(frames: Sequence[RgbdFrame]) -> Stage:
+    clouds = [sample(back_project(frame).points_m, None, NODE_POINTS).points_m for frame in frames]
+    return stage_around([cloud.astype(float) for cloud in clouds], [f.T_world_camera for f in frames])
+
+
+def _moment_view(sending: Sending, moment: Moment, t_ns: int) -> MomentView:
+    received = received_at(sending, t_ns)
+    frames = frames_at_sink(sending, received)
+    surface, truth = moment.surface, moment.truth
+    return MomentView(
+        t_ns=t_ns,
+        sent_bytes=moment.sent_bytes,
+        delivered_bytes=moment.delivered_bytes,
+        packets_lost=moment.packets_lost,
+        radio_j=float(moment.radio_j),
+        energy_j=float(moment.energy_j),
+        nodes=tuple(
+            _node_moment(frame, got.rgb_known, node, moment.T_world_camera.get(frame.name), whole)
+            for frame, got, node, whole in zip(
+                frames, received, moment.nodes, sending.rig.frames, strict=True
+            )
+        ),
+        glb=b"" if surface is None else surface_glb(surface, _colors(surface, received), photographed=True),
+        triangles=0 if surface is None else len(surface.triangles),
+        no_hit_share=None if surface is None else surface.quality.no_hit_ray_share,
+        f_score=None if truth is None else truth["f_score_5cm"],
+    )
+
+
+def _colors(surface: SurfaceResult, received: Sequence[Received]) -> ByteArray | None:
+    """Of its vertices; none before any colour has arrived."""
+    return surface.colors if any(one.rgb_known.any() for one in received) else None
+
+
+def _node_moment(
+    frame: RgbdFrame,
+    known: BoolArray,
+    arrival: NodeArrival,
+    T_world_camera: FloatArray | None,
+    whole: RgbdFrame,
+) -> NodeMoment:
+    cloud = _cloud(frame)
+    thin = sample(cloud.points_m, cloud.colors, NODE_POINTS)
+    colors = thin.colors if thin.colors is not None else np.zeros((0, 3), np.uint8)
+    if not known.any():
+        colors = np.broadcast_to(np.array(NEUTRAL, np.uint8), colors.shape).copy()
+    return NodeMoment(
+        delivered_bytes=arrival.delivered_bytes,
+        color_share=arrival.color_share,
+        depth_share=arrival.depth_share,
+        coarse_share=arrival.coarse_share,
+        picture=_picture(frame, known, depth_range_m(whole.depth)),
+        points_m=thin.points_m,
+        colors=colors,
+        T_world_camera=whole.T_world_camera if T_world_camera is None else T_world_camera,
+    )
+
+
+def _cloud(frame: RgbdFrame) -> PointCloud:
+    """The frame's points, of which there may be none."""
+    if not frame.depth.valid.any():
+        return PointCloud(np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
+    return back_project(frame)
+
+
+def _picture(frame: RgbdFrame, known: BoolArray, range_m: tuple[float, float]) -> ByteArray:
+    """Colour where it has arrived, depth as brightness where only that has, dark where nothing has."""
+    near_m, far_m = range_m
+    z_m = frame.depth.z_m
+    if frame.coarse is not None:
+        z_m = np.where(np.isfinite(z_m), z_m, frame.coarse.z_m)
+    depth = np.isfinite(z_m)
+    level = np.clip((np.nan_to_num(z_m) - near_m) / (far_m - near_m), 0.0, 1.0)
+    rgb = cividis((255 * level).astype(np.uint8))
+    rgb[~depth] = NOTHING_YET
+    rgb[known] = frame.rgb[known]
+    return _small(rgb)
+
+
+def _small(rgb: ByteArray) -> ByteArray:
+    height, width = rgb.shape[:2]
+    size = (PICTURE_PX, max(1, round(PICTURE_PX * height / width)))
+    return cv2.resize(np.ascontiguousarray(rgb), size, interpolation=cv2.INTER_AREA)
+
+
+LIT = np.array((255, 230, 0), np.uint8)
+
+
+def _lit(rgb: ByteArray, pixels: BoolArray) -> ByteArray:
+    """The picture dimmed, with some pixels in a bright colour, and thick enough to be seen when small."""
+    shown = (0.45 * rgb).astype(np.uint8)
+    shown[cv2.dilate(pixels.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = LIT
+    return _small(shown)

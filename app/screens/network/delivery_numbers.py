@@ -1,0 +1,140 @@
+"""The numbers of a delivery: at the clock, in the end, and what another one would change."""
+
+from __future__ import annotations
+
+from app.dock import time_text
+from app.screens.network.delivery_view import DeliveryView, MomentView
+from app.tables import Row, number, table
+from packetmesh.settings import differences
+
+BYTES_MB = 1e-6
+
+
+def moment_table(view: DeliveryView, now: MomentView | None) -> str:
+    """HTML of what matters: at the clock, in the end, and where nothing is lost."""
+    end = view.moment_at(view.times_ns[-1])
+    done = end is not None and end.t_ns == view.times_ns[-1]
+    columns = (
+        "nothing yet" if now is None else f"at {time_text(now.t_ns)}",
+        f"end, {time_text(view.times_ns[-1])}",
+        "no loss",
+    )
+    last, best = end if done else None, view.lossless
+    rows: list[Row] = [
+        (
+            "Bytes at the sink",
+            "Of the encoded images of all cameras, each counted once.",
+            _megabytes(now and now.delivered_bytes),
+            _megabytes(last and last.delivered_bytes),
+            _megabytes(view.total_bytes),
+        ),
+        (
+            "Frames lost",
+            "Attempts that failed until then; most are sent again.",
+            _count(now and now.packets_lost),
+            _count(last and last.packets_lost),
+            "0",
+        ),
+        (
+            "Energy",
+            "Radios, computers and cameras of all nodes until then.",
+            number(now and now.energy_j, 1, "J"),
+            number(last and last.energy_j, 1, "J"),
+            "–",
+        ),
+        (
+            "Rays without surface",
+            "Of the rays through all cameras' pixels, those that meet no triangle: the holes.",
+            *_shares(now and now.no_hit_share, last and last.no_hit_share, best and best.no_hit_share),
+        ),
+    ]
+    if any(one.f_score is not None for one in view.moments) or (best and best.f_score is not None):
+        rows.append(
+            (
+                "F-score at 5 cm",
+                "Harmonic mean of how much of the surface is right and how much of the truth is there.",
+                *_shares(now and now.f_score, last and last.f_score, best and best.f_score),
+            )
+        )
+    return table(rows, columns)
+
+
+def more_rows(view: DeliveryView, now: MomentView | None) -> str:
+    """HTML of what the sink has of each camera."""
+    if now is None:
+        return ""
+    rows = [
+        (
+            node.name,
+            "Depth, of its measured pixels; colour and coarse depth, of all its pixels.",
+            _percent(one.depth_share),
+            _percent(one.color_share),
+            _percent(one.coarse_share),
+        )
+        for node, one in zip(view.nodes, now.nodes, strict=True)
+    ]
+    energy = ("Radios alone", "Of all nodes until then.", number(now.radio_j, 2, "J"), "", "")
+    sent = ("Sent on the air", "With headers and repeats.", _megabytes(now.sent_bytes), "", "")
+    return table([*rows, sent, energy], ("depth", "colour", "coarse"))
+
+
+def summary(view: DeliveryView) -> str:
+    """What is there so far."""
+    computed, planned = len(view.moments), len(view.times_ns)
+    sentence = (
+        f"{len([n for n in view.nodes if n.row >= 0])} cameras sent {view.total_bytes * BYTES_MB:.2f} MB in "
+        f"{view.run.packets:,} packets; simulated in {view.run.elapsed_s:.1f} s."
+    )
+    if not view.run.series or not len(view.run.pieces):
+        sentence += " Nothing happened in that time."
+    if computed < planned:
+        sentence += f" Rebuilding the room: {computed} of {planned} moments."
+    elif not any(one.triangles for one in view.moments):
+        sentence += " Too little arrived for a surface."
+    return sentence
+
+
+def difference(before: DeliveryView, after: DeliveryView, what: str) -> str:
+    """In a sentence what another setting changed, in the network and in the mesh; empty while unknown."""
+    one, two = (view.moment_at(view.times_ns[-1]) for view in (before, after))
+    if one is None or two is None or two.t_ns != after.times_ns[-1]:
+        return ""
+    network = [
+        f"the last byte came after {time_text(two.t_ns)} instead of {time_text(one.t_ns)}",
+        f"{_percent(two.delivered_bytes / after.total_bytes)} of the bytes arrived instead of "
+        f"{_percent(one.delivered_bytes / before.total_bytes)}",
+        f"{two.packets_lost:,} frames were lost instead of {one.packets_lost:,}",
+        f"it took {two.energy_j:.0f} J instead of {one.energy_j:.0f} J",
+    ]
+    mesh = [
+        f"{_percent(two.no_hit_share)} of the rays meet no surface instead of {_percent(one.no_hit_share)}"
+    ]
+    if one.f_score is not None and two.f_score is not None:
+        mesh.append(f"the F-score is {_percent(two.f_score)} instead of {_percent(one.f_score)}")
+    return f"**{what}**: {', '.join(network)}; in the mesh, {' and '.join(mesh)}."
+
+
+def changes(before: DeliveryView, after: DeliveryView) -> str:
+    """Which settings differ, in a few words."""
+    words = [f"{name} off" for name in after.sent.down if name not in before.sent.down]
+    if before.sent.coding != after.sent.coding:
+        words.append(f"coding {after.sent.coding} instead of {before.sent.coding}")
+    words += [f"{name} on again" for name in before.sent.down if name not in after.sent.down]
+    words += differences(after.sent.network, before.sent.network)[:4]
+    return ", ".join(words) or "Other settings of the reconstruction"
+
+
+def _shares(*shares: float | None) -> tuple[str, ...]:
+    return tuple(_percent(share) for share in shares)
+
+
+def _percent(share: float | None) -> str:
+    return number(share, 1, "%", 100.0)
+
+
+def _megabytes(count: int | None) -> str:
+    return number(count, 2, "MB", BYTES_MB)
+
+
+def _count(count: int | None) -> str:
+    return "–" if count is None else f"{count:,}"

@@ -1,0 +1,72 @@
+"""The rows of the dock: frames of each node, and what has become of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.drawing.colors import DELIVERED, INFERRED, LOSS, SOURCE
+from app.screens.network.delivery_view import DeliveryView
+from app.screens.network.labels import CAUSES
+from app.screens.network.packets import Frames
+from app.screens.network.view import NetworkView, What
+from app.timeline import Curve, CurvesLane, FramesLane
+from network_sim.types import Cause, to_ns
+from pipeline.types import FloatArray
+
+HALTS = (What.AIR, What.LOSS, What.DROP, What.ARRIVE, What.EXPIRE)
+"""What the step buttons halt at."""
+
+
+def frames_lane(view: NetworkView, frames: Frames) -> FramesLane:
+    """One row a node."""
+    names = [view.names[node] for node in view.lane_nodes]
+    lane = FramesLane(view.levels, names, frames.line, [CAUSES[cause] for cause in Cause])
+    if view.label:
+        lane.title = view.label
+    return lane
+
+
+def stops_ns(*views: NetworkView) -> NDArray[np.int64]:
+    """(S,) when anything begins that a step leads to."""
+    return np.unique(np.concatenate([one.pieces.start_ns[np.isin(one.pieces.what, HALTS)] for one in views]))
+
+
+def growth_lane(view: DeliveryView) -> CurvesLane:
+    """What has arrived, and what the surface of it is worth, by the moments that are computed."""
+    return CurvesLane("At the sink", _growth(view))
+
+
+def _growth(view: DeliveryView) -> list[Curve]:
+    t_ns = np.array(view.times_ns, np.int64)
+    by_time = {one.t_ns: one for one in view.moments}
+    moments = [by_time.get(t) for t in view.times_ns]
+
+    def percent(values: list[float | None]) -> FloatArray:
+        return np.array([np.nan if value is None else 100.0 * value for value in values])
+
+    score = percent([one and one.f_score for one in moments])
+    holes = percent([one and one.no_hit_share for one in moments])
+    arrived = 100.0 * view.arrived_bytes / max(view.total_bytes, 1)
+    curves = [
+        Curve("bytes", "%", DELIVERED, view.arrived_ns, arrived, 0.0, 100.0),
+        Curve("rays without surface", "%", LOSS, t_ns, holes, 0.0, 100.0),
+    ]
+    if np.isfinite(score).any() or not view.moments:
+        curves.insert(1, Curve("F-score", "%", INFERRED, t_ns, score, 0.0, 100.0))
+    return curves
+
+
+def run_curves(view: NetworkView) -> CurvesLane:
+    """How much of what was sent arrives, and how much a minute, over a run of its own."""
+    delivery, throughput = view.series["delivery"], view.series["throughput"]
+    most = float(np.nanmax(throughput.values, initial=1.0))
+    curves = [
+        Curve("delivered", "%", DELIVERED, _ns(delivery.t_s), delivery.values, 0.0, 100.0),
+        Curve("throughput", "kbit/s", SOURCE, _ns(throughput.t_s), throughput.values, 0.0, most),
+    ]
+    return CurvesLane("Of the packets", curves)
+
+
+def _ns(t_s: FloatArray) -> NDArray[np.int64]:
+    return np.array([to_ns(float(one)) for one in t_s], np.int64)

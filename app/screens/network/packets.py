@@ -1,0 +1,86 @@
+"""One frame of a run in words: whose bytes it carried, how it fared, and why."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.dock import time_text
+from app.screens.network.labels import CAUSES, PACKET_NAMES
+from app.screens.network.view import NetworkView, Pieces, What
+from network_sim.types import Cause, PacketKind
+
+ANSWER_WITHIN_NS = 2_000_000
+"""After the end of a frame an acknowledgement belongs to it."""
+
+
+class Frames:
+    """The frames of a run by their index on the timeline."""
+
+    def __init__(self, view: NetworkView) -> None:
+        self._view, pieces = view, view.pieces
+        self.pieces: Pieces = pieces.where(pieces.what == What.AIR)
+        self._waits = pieces.where(pieces.what == What.WAIT)
+        self._answers = pieces.where(pieces.what == What.ACK)
+        taken = pieces.where(pieces.what == What.CAPTURE)
+        self._cameras = dict(zip(taken.image.tolist(), taken.node.tolist(), strict=True))
+
+    def line(self, item: int) -> str:
+        """About one frame, for the pointer."""
+        one, names = self.pieces, self._view.names
+        return f"{names[one.node[item]]} → {names[one.peer[item]]}: {self._content(item)}; {self._fate(item)}"
+
+    def carries_image(self, item: int) -> bool:
+        """Whether it carries a piece of a camera's images."""
+        return self.pieces.carries[item] == PacketKind.IMAGE
+
+    def story(self, item: int, header_bytes: int) -> str:
+        """Markdown about one frame, for the inspector."""
+        one, names = self.pieces, self._view.names
+        tries = np.flatnonzero((one.packet == one.packet[item]) & (one.node == one.node[item]))
+        took_ns = int(one.end_ns[item] - one.start_ns[item])
+        size = int(one.size_bytes[item])
+        lines = [
+            f"**{names[one.node[item]]} → {names[one.peer[item]]}** at "
+            f"{time_text(int(one.start_ns[item]))}: {self._content(item)}",
+            f"{size:,} bytes, {header_bytes} of them headers; {time_text(took_ns)} on the air",
+            f"Attempt {1 + int(np.searchsorted(tries, item))} of {len(tries)}; "
+            f"waited {self._waited(item, int(tries[0]))} in the node",
+            f"**{self._fate(item)[0].upper()}{self._fate(item)[1:]}**",
+        ]
+        return "\n\n".join(lines)
+
+    def bytes_of(self, item: int, header_bytes: int) -> tuple[int, int]:
+        """First byte and number of bytes of its image that it carries."""
+        return int(self.pieces.first_byte[item]), int(self.pieces.size_bytes[item]) - header_bytes
+
+    def camera_of(self, item: int) -> int:
+        """Which node took the image of which it carries a piece."""
+        return int(self._cameras.get(int(self.pieces.image[item]), -1))
+
+    def _content(self, item: int) -> str:
+        one = self.pieces
+        kind = PacketKind(int(one.carries[item]))
+        if kind is not PacketKind.IMAGE:
+            return f"a {PACKET_NAMES[kind]}"
+        header_bytes = self._view.config.nodes.header_bytes
+        first, count = self.bytes_of(item, header_bytes)
+        return f"bytes {first:,} to {first + count - 1:,} of image {int(one.image[item]) + 1}"
+
+    def _waited(self, item: int, first_try: int) -> str:
+        waits, one = self._waits, self.pieces
+        mine = np.flatnonzero((waits.packet == one.packet[item]) & (waits.node == one.node[item]))
+        if not len(mine):
+            return "not at all"
+        return time_text(int(one.start_ns[first_try] - waits.start_ns[mine[0]]))
+
+    def _fate(self, item: int) -> str:
+        one, answers = self.pieces, self._answers
+        cause = Cause(int(one.cause[item]))
+        if cause is not Cause.NONE:
+            return f"lost: {CAUSES[cause]}"
+        end_ns = int(one.end_ns[item])
+        first, last = np.searchsorted(answers.start_ns, (end_ns, end_ns + ANSWER_WITHIN_NS))
+        back = answers.node[first:last] == one.peer[item]
+        if (back & (answers.peer[first:last] == one.node[item])).any():
+            return "arrived and was answered"
+        return "arrived"
