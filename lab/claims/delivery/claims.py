@@ -10,7 +10,7 @@ import numpy as np
 from lab.claims.claim import Claim, Outcome
 from lab.claims.delivery import tables
 from lab.claims.delivery.setup import HEADLINE, LARGE, RATE_SHARE, UNCORRECTED, UNCORRECTED_SHARE, lossless
-from lab.claims.delivery.statistics import Groups, grouped_mean, mean_slope, resampled_ci95
+from lab.claims.delivery.statistics import difference, estimate, mean_terms, slope_terms
 from lab.claims.delivery.study import Study, delivery_study, full_delivery_study
 from lab.claims.delivery.trials import LossTask
 from pipeline.types import FloatArray
@@ -25,20 +25,21 @@ def _d01(study: Study) -> Outcome:
     ours: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}
     for when, words in tables.WHEN.items():
+        terms = {coding: study.rate_terms(coding, when) for coding in HEADLINE}
         for coding in HEADLINE:
-            pairs, name = study.pairs(coding, when), f"points_per_percent_{coding}_{words.replace(' ', '_')}"
-            ours[name], ci95[name] = mean_slope(pairs), resampled_ci95(pairs, mean_slope)
+            name = _rate_name(coding, words)
+            ours[name], ci95[name] = estimate(terms[coding])
         for worse, better in pairwise(HEADLINE):
             name = f"{worse}_less_{better}_{words.replace(' ', '_')}"
-            both = _side_by_side(study.pairs(worse, when), study.pairs(better, when))
-            ours[name], ci95[name] = slope_difference(both), resampled_ci95(both, slope_difference)
+            both = [np.hstack(rig) for rig in zip(terms[worse], terms[better], strict=True)]
+            ours[name], ci95[name] = estimate(both, difference)
     ordered = all(ci95[f"{a}_less_{b}_fused"][0] > 0.0 for a, b in pairwise(HEADLINE))
     by_when = "; ".join(
         f"{words}: "
         + ", ".join(
             f"{tables.ranged(ours[name], ci95[name])} points {coding}"
             for coding in HEADLINE
-            for name in [f"points_per_percent_{coding}_{words.replace(' ', '_')}"]
+            for name in [_rate_name(coding, words)]
         )
         for words in tables.WHEN.values()
     )
@@ -56,19 +57,8 @@ def _d01(study: Study) -> Outcome:
     )
 
 
-Both = tuple[FloatArray, FloatArray]
-
-
-def _side_by_side(worse: Groups[FloatArray], better: Groups[FloatArray]) -> list[list[Both]]:
-    """Pairs of two codings by rig and seed, so that both are resampled alike."""
-    return [list(zip(*rig, strict=True)) for rig in zip(worse, better, strict=True)]
-
-
-def slope_difference(groups: Groups[Both]) -> float:
-    """By how much the mean slope of the first is steeper."""
-    return mean_slope([[a for a, _ in group] for group in groups]) - mean_slope(
-        [[b for _, b in group] for group in groups]
-    )
+def _rate_name(coding: str, words: str) -> str:
+    return f"points_per_percent_{coding}_{words.replace(' ', '_')}"
 
 
 def _d02(study: Study) -> Outcome:
@@ -85,7 +75,7 @@ def _d02(study: Study) -> Outcome:
             for rig in study.rigs
         ]
         name = f"kept_{coding}"
-        ours[name], ci95[name] = grouped_mean(kept[coding]), resampled_ci95(kept[coding], grouped_mean)
+        ours[name], ci95[name] = estimate([mean_terms(rig) for rig in kept[coding]])
     ratios = [
         study.value(lossless(rig, "layered"), "bytes_sent") / study.value(lossless(rig, "jpeg"), "bytes_sent")
         for rig in study.rigs
@@ -126,8 +116,11 @@ def _d04(study: Study) -> Outcome:
     ours: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}
     for coding in HEADLINE:
-        groups = [[_gained(study, task) for task in study.tasks(coding, rigs=(rig,))] for rig in study.rigs]
-        ours[coding], ci95[coding] = mean_slope(groups), resampled_ci95(groups, mean_slope)
+        groups = [
+            np.stack([_gained(study, task) for task in study.tasks(coding, rigs=(rig,))])
+            for rig in study.rigs
+        ]
+        ours[coding], ci95[coding] = estimate(groups)
     said = ", ".join(f"{coding} {tables.ranged(ours[coding], ci95[coding])}" for coding in HEADLINE)
     return Outcome(
         {f"gain_per_percent_{coding}": value for coding, value in ours.items()},
@@ -139,10 +132,10 @@ def _d04(study: Study) -> Outcome:
 
 
 def _gained(study: Study, task: LossTask) -> FloatArray:
-    """(1, 2) percent lost, and the points of coverage that fusion gains more than without losses."""
+    """(2,) terms of the points of coverage that fusion gains more than without losses, over packets lost."""
     reference = lossless(task.rig, task.coding)
     more = [study.value(t, "no_hit_before") - study.value(t, "no_hit_after") for t in (task, reference)]
-    return np.array([[study.lost_percent(task), 100.0 * (more[0] - more[1])]])
+    return slope_terms([study.lost_percent(task)], [100.0 * (more[0] - more[1])])
 
 
 def _d05(study: Study) -> Outcome:
@@ -152,8 +145,8 @@ def _d05(study: Study) -> Outcome:
         for share in (0.0, UNCORRECTED_SHARE):
             name = f"gain_{alignment}_{share:g}"
             tasks = [_raw_task(rig, alignment, share) for rig in study.rigs]
-            gains = [[100.0 * (study.value(t, "f_after") - study.value(t, "f_before"))] for t in tasks]
-            ours[name], ci95[name] = grouped_mean(gains), resampled_ci95(gains, grouped_mean)
+            gains = [100.0 * (study.value(t, "f_after") - study.value(t, "f_before")) for t in tasks]
+            ours[name], ci95[name] = estimate([mean_terms([gain]) for gain in gains])
     local, without = (
         [ours[f"gain_{alignment}_{share:g}"] for share in (0.0, UNCORRECTED_SHARE)]
         for alignment in ("local", UNCORRECTED)

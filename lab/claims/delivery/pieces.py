@@ -13,7 +13,7 @@ from scipy.stats import spearmanr
 from lab.claims.claim import Claim, Outcome
 from lab.claims.delivery.network import SendTask, send_trial
 from lab.claims.delivery.setup import RIGS, lossless
-from lab.claims.delivery.statistics import Groups, resampled_ci95
+from lab.claims.delivery.statistics import estimate, mean_terms
 from lab.claims.delivery.study import DATA
 from lab.claims.delivery.trials import (
     COUNT_OF_PIECES,
@@ -121,24 +121,20 @@ def _worth(whole: Values, without: Sequence[Values], name: str) -> FloatArray:
     return np.array([100.0 * (float(whole[name] or 0.0) - float(one[name] or 0.0)) for one in without])
 
 
-def mean_rank_correlation(groups: Groups[FloatArray]) -> float:
-    """Mean over rigs and nodes of Spearman's correlation of the two columns of (16, 2)."""
-    found = [float(spearmanr(*columns.T).statistic) for group in groups for columns in group]
-    return float(np.nanmean(found))
-
-
 def judge(pieces: Sequence[Pieces]) -> Outcome:
     """D07's numbers and verdict."""
     rigs = tuple(dict.fromkeys(one.rig for one in pieces))
     ours: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}
     for name in ("worth", "worth_sensor"):
-        groups = [
-            [np.column_stack([one.alone, getattr(one, name)]) for one in pieces if one.rig == rig]
-            for rig in rigs
-        ]
+        by_rig = [[one for one in pieces if one.rig == rig] for rig in rigs]
         key = f"rank_correlation_{name}_alone"
-        ours[key], ci95[key] = mean_rank_correlation(groups), resampled_ci95(groups, mean_rank_correlation)
+        ours[key], ci95[key] = estimate(
+            [
+                mean_terms(float(spearmanr(one.alone, getattr(one, name)).statistic) for one in nodes)
+                for nodes in by_rig
+            ]
+        )
     worth, joules = (np.concatenate([getattr(one, name) for one in pieces]) for name in ("worth", "joules"))
     order = np.argsort(-worth / joules)
     gained = np.cumsum(worth[order]) / worth.sum() if worth.sum() > 0.0 else np.full(len(worth), np.nan)

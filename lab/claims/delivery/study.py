@@ -11,6 +11,7 @@ import numpy as np
 
 from lab.claims.delivery.network import SendTask, send_trial
 from lab.claims.delivery.setup import LARGE, RATE_SHARE, RIGS, loss_tasks, lossless, send_tasks
+from lab.claims.delivery.statistics import slope_terms
 from lab.claims.delivery.trials import LossTask, Values, colorless_trial, loss_trial
 from lab.trials import iterate_trials
 from packetmesh.progress import Progress
@@ -64,17 +65,19 @@ class Study:
         name = f"f_{when}"
         return 100.0 * (self.value(lossless(task.rig, task.coding), name) - self.value(task, name))
 
-    def pairs(self, coding: str, when: str) -> list[list[FloatArray]]:
-        """By rig and seed, (N, 2) percent lost in bursts, up to a tenth, and points of F-score that it "
-        "cost."""
+    def rate_terms(self, coding: str, when: str) -> list[FloatArray]:
+        """By rig (S, 2), for each seed: points of F-score over packets lost in bursts, up to a tenth."""
         groups = []
         for rig in self.rigs:
-            by_seed: dict[int, list[tuple[float, float]]] = {}
+            by_seed: dict[int, list[LossTask]] = {}
             for task in self.tasks(coding, rigs=(rig,)):
                 if task.share <= RATE_SHARE:
-                    pair = self.lost_percent(task), self.cost(task, when)
-                    by_seed.setdefault(task.seed, []).append(pair)
-            groups.append([np.array(pairs) for _, pairs in sorted(by_seed.items())])
+                    by_seed.setdefault(task.seed, []).append(task)
+            terms = [
+                slope_terms(map(self.lost_percent, tasks), (self.cost(task, when) for task in tasks))
+                for _, tasks in sorted(by_seed.items())
+            ]
+            groups.append(np.stack(terms))
         return groups
 
 

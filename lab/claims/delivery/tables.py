@@ -8,7 +8,7 @@ import numpy as np
 
 from lab.claims.delivery.network import NETWORKS, SendTask
 from lab.claims.delivery.setup import CODINGS, HEADLINE, LARGE, RATE_SHARE, SMALL, lossless
-from lab.claims.delivery.statistics import grouped_mean, mean_slope, resampled_ci95
+from lab.claims.delivery.statistics import estimate, mean_terms
 from lab.claims.delivery.study import Study
 from lab.claims.delivery.trials import BURST_PACKETS, LossTask
 from lab.claims.exhibits import Chart, Curve, Table
@@ -31,10 +31,7 @@ def rate_table(study: Study) -> Table:
     """What one per cent of lost packets costs, and what one per cent of the packets costs to send."""
     rows = []
     for coding in CODINGS:
-        cells: list[str | float | None] = []
-        for when in WHEN:
-            pairs = study.pairs(coding, when)
-            cells.append(ranged(mean_slope(pairs), resampled_ci95(pairs, mean_slope)))
+        cells = [ranged(*estimate(study.rate_terms(coding, when))) for when in WHEN]
         rows.append((title(coding), *cells, *_sending_cells(study, coding)))
     sent_rig = next(iter(study.sent)).rig
     return Table(
@@ -151,22 +148,20 @@ def loss_chart(study: Study) -> Chart:
     curves = []
     for coding in HEADLINE:
         for when, words in WHEN.items():
-            points = [
-                (0.0, [[100.0 * study.value(lossless(rig, coding), f"f_{when}")] for rig in study.rigs])
-            ]
+            name = f"f_{when}"
+            points = [(0.0, [[study.value(lossless(rig, coding), name)] for rig in study.rigs])]
             for share in sorted({task.share for task in study.tasks(coding)}):
                 tasks = [task for task in study.tasks(coding) if task.share == share]
-                by_rig = [[t for t in tasks if t.rig == rig] for rig in study.rigs]
-                values = [[100.0 * study.value(task, f"f_{when}") for task in group] for group in by_rig]
-                points.append((100.0 * share, values))
-            bands = [resampled_ci95(groups, grouped_mean, resamples=500) for _, groups in points]
+                by_rig = [[study.value(t, name) for t in tasks if t.rig == rig] for rig in study.rigs]
+                points.append((share, by_rig))
+            estimates = [estimate([mean_terms(100.0 * f for f in rig) for rig in by]) for _, by in points]
             curves.append(
                 Curve(
                     f"{title(coding)}, {words}",
-                    tuple(x for x, _ in points),
-                    tuple(grouped_mean(groups) for _, groups in points),
-                    tuple(low for low, _ in bands),
-                    tuple(high for _, high in bands),
+                    tuple(100.0 * share for share, _ in points),
+                    tuple(value for value, _ in estimates),
+                    tuple(low for _, (low, _) in estimates),
+                    tuple(high for _, (_, high) in estimates),
                 )
             )
     return Chart(

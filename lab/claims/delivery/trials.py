@@ -156,10 +156,10 @@ def rebuilt(rig: Rig, frames: Sequence[RgbdFrame], alignment: AlignmentMode = "l
         alignment: how inferred depth is made metric.
 
     Returns:
-        For the surface ``before`` (of measured depth) and ``after`` fusion: ``f`` (F-score at 5 cm), ``no_hit``
-        (share of the rays of all cameras without a surface), ``hole_area_m2`` and ``median_depth_error_m``;
-        the number of nodes that were ``heard``; the seconds of a core that it took. Where nothing can be
-        rebuilt, F-scores are 0, all rays hit nothing, and the rest is None.
+        For the surface ``before`` (of measured depth) and ``after`` fusion: ``f`` (F-score at 5 cm),
+        ``no_hit`` (share of the rays of all cameras without a surface), ``hole_area_m2`` and
+        ``median_depth_error_m``; the number of nodes that were ``heard``; the seconds of a core that it took.
+        Where nothing can be rebuilt, F-scores are 0, all rays hit nothing, and the rest is None.
     """
     started = time.process_time()
     present = [index for index, frame in enumerate(frames) if heard(frame)]
