@@ -55,7 +55,7 @@ def deliver(
     """
     source = source_named(scene, rig, color, depth, intrinsics, depth_scale)
 
-    from app.reports.delivery import write_hand_out
+    from app.reports.hand_out_of import write_hand_out
     from packetmesh.files import writable_folder
     from pipeline.deliver import iterate_delivery
     from pipeline.delivery.folder import delivery_metrics, summary, write_delivery_folder
@@ -73,8 +73,8 @@ def deliver(
     delivery = drain(steps, _say_moment)
     metrics = delivery_metrics(delivery)
     write_delivery_folder(delivery, metrics, preset, out)
-    write_hand_out(delivery, out / "delivery.html")
-    say(f"100%  {summary(delivery)}; see {out / 'delivery.html'}")
+    page = write_hand_out(delivery, out)
+    say(f"100%  {summary(delivery)}; see {page}")
     if json:
         print_json(metrics)
 

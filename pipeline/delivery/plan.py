@@ -36,8 +36,8 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
     """
     if network.scenario != "collection":
         raise InputError(
-            f"A network of the scenario {network.scenario} has no cameras that stand still; try a preset such "
-            "as office, thesis-link or greenhouse"
+            f"A network of the scenario {network.scenario} has no cameras that stand still; try a preset "
+            "such as office, thesis-link or greenhouse"
         )
     nodes = replace(
         network.nodes,

@@ -18,6 +18,7 @@ from pipeline.types import BoolArray, ByteArray
 BASE_LOSS = 0.3
 """Share of its packets that a base survives (SPEC 6.5)."""
 _UNIT_BYTES = (64, 8192)
+_LEAST_CERTAIN = 6  # a loss of three in ten takes all of these once in a thousand times
 _NUMBER_BYTES = 2
 _LENGTH_BYTES = 3
 _HEADER_BYTES = _NUMBER_BYTES + _LENGTH_BYTES
@@ -115,8 +116,9 @@ def _symbol_bytes(unit_bytes: int) -> int:
 
 def _certainly_of_base(count: int, repair_every: int) -> BoolArray:
     """(count,) units that belong to the base however long it is: here a reader finds out its length."""
+    every = min(repair_every, -(-count // _LEAST_CERTAIN))
     certain = np.zeros(count, np.bool_)
-    certain[repair_every - 1 :: repair_every] = True
+    certain[every - 1 :: every] = True
     certain[[0, -1]] = True
     return certain
 

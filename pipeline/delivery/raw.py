@@ -89,9 +89,7 @@ def _pixels(
     """The (N, pixel_bytes) pixels of a file that arrived whole, and where in the raster they belong."""
     body = slice(header_bytes, header_bytes + pixel_bytes * order.size)
     parts = arrived[body].reshape(-1, pixel_bytes)
-    whole = np.logical_and.reduce(
-        [parts[:, part] for part in range(pixel_bytes)]
-    )  # faster than ``all``
+    whole = np.logical_and.reduce([parts[:, part] for part in range(pixel_bytes)])  # faster than ``all``
     return data[body].reshape(-1, pixel_bytes)[whole], order[whole]
 
 

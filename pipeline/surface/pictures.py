@@ -6,13 +6,13 @@ import numpy as np
 
 from pipeline.geometry import pixel_rays
 from pipeline.rays import Camera, camera_hits, triangle_scene
-from pipeline.types import ByteArray, SurfaceResult
+from pipeline.types import ByteArray, Surface
 
 MISSED = (255, 0, 255)
 """Magenta: a ray that hits nothing."""
 
 
-def mesh_picture(surface: SurfaceResult, camera: Camera, colored: bool = True) -> ByteArray:
+def mesh_picture(surface: Surface, camera: Camera, colored: bool = True) -> ByteArray:
     """(H, W, 3) picture of a mesh from a camera; rays that hit nothing show ``MISSED``.
 
     Args:

@@ -54,19 +54,22 @@ def test_a_steady_recording_is_an_ideal_link(link, rows):
 
 
 def test_the_next_packet_does_not_wait_for_the_answer_to_the_last(link):
-    """1,000 bytes at 8 Mbit/s take 1 ms, and 50 ms to travel."""
-    path = link("0 8 100 0\n")
+    """1,000 bytes at 8 Mbit/s take 1 ms, and 500 ms to travel: more are under way than a buffer holds."""
+    path = link("0 8 1000 0\n")
     trace = run(
         "nodes.count=1",
-        "nodes.image_bytes=10000",
+        "nodes.image_bytes=300000",
         "nodes.payload_bytes=1000",
         "mac.kind=replay",
         f"mac.trace={path}",
     )
     began_ns = trace.events.of(EventKind.CAPTURE).t_ns[0]
     ms = 1_000_000
-    assert (trace.events.of(EventKind.AIR).t_ns - began_ns).tolist() == [n * ms for n in range(10)]
-    assert (trace.events.of(EventKind.DELIVER).t_ns - began_ns).tolist() == [(51 + n) * ms for n in range(10)]
+    sent_ns, arrived_ns = (
+        trace.events.of(kind).t_ns - began_ns for kind in (EventKind.AIR, EventKind.DELIVER)
+    )
+    assert sent_ns.tolist() == [n * ms for n in range(300)]
+    assert arrived_ns.tolist() == [(501 + n) * ms for n in range(300)]
 
 
 @pytest.mark.parametrize(("ack", "known_ms"), [("true", 101), ("false", 2101)])

@@ -23,7 +23,7 @@ def moved(rig, eyes_m):
 
 
 def test_nodes_stand_under_their_cameras_and_the_sink_behind_them():
-    rig = moved(load_demo("office"), [(-1.0, 0.0, 1.0), (0.0, 0.0, 2.0), (1.0, 0.0, 1.5)])
+    rig = moved(load_demo("office"), [(-1.0, 0.0, 1.0), (0.0, 0.0, 2.0), (1.0, 0.0, 1.0)])
     places_m = np.reshape(places_of(rig, 8.0), (-1, 2))
     np.testing.assert_allclose(places_m[:3], [(-1, 0), (0, 0), (1, 0)], atol=1e-12)
     np.testing.assert_allclose(places_m[3], (0.0, -8.0), atol=1e-9)

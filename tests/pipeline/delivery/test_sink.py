@@ -30,7 +30,8 @@ def test_everything_that_arrived_is_the_frame_itself():
     there = frame_at_sink(FRAME, received())
     assert np.array_equal(there.rgb, FRAME.rgb)
     assert np.array_equal(there.depth.z_m, FRAME.depth.z_m, equal_nan=True)
-    assert there.rgb_known is None and there.coarse is None
+    assert there.rgb_known is None
+    assert there.coarse is None
 
 
 @pytest.mark.parametrize("units", [1000.0, 5000.0, 256.0])
@@ -47,7 +48,8 @@ def test_lost_depth_is_a_hole_and_lost_colour_is_remembered_as_lost():
     part = received(color=0.5, depth=0.5)
     there = frame_at_sink(FRAME, part)
     assert np.array_equal(there.depth.valid, part.depth > 0)
-    assert there.rgb_known is not None and np.array_equal(there.rgb_known, part.rgb_known)
+    assert there.rgb_known is not None
+    assert np.array_equal(there.rgb_known, part.rgb_known)
     assert np.array_equal(there.rgb[part.rgb_known], FRAME.rgb[part.rgb_known])
 
 

@@ -71,6 +71,23 @@ def test_a_lost_packet_leaves_all_but_the_tiles_in_it(name, room):
         np.testing.assert_array_equal(result.depth[~gone], room.depth[~gone])
 
 
+@pytest.mark.parametrize("name", ["tiles", "layered"])
+def test_every_color_tile_is_the_one_sent_or_the_base(name, room):
+    coding = CODINGS[name]
+    data = coding.encode(room, 108)
+    whole = received(coding, room, 108, lambda count: np.ones(count, bool), data)
+    stopped = received(coding, room, 108, lambda count: np.arange(count) < count / 20, data)
+    lost = np.random.default_rng(4)
+    result = received(coding, room, 108, lambda count: lost.random(count) >= 0.1, data)
+    fell_back = 0
+    for row, column in np.ndindex(15, 20):
+        tile = np.s_[32 * row : 32 * row + 32, 32 * column : 32 * column + 32]
+        if not np.array_equal(result.rgb[tile], whole.rgb[tile]):
+            np.testing.assert_array_equal(result.rgb[tile], stopped.rgb[tile])
+            fell_back += 1
+    assert 30 < fell_back < 200
+
+
 def test_what_has_arrived_replaces_the_base_holes_included():
     images = smooth_images(96, 96, seed=5, hole_share=0.5)
     result = received(CODINGS["layered"], images, 108, lambda count: np.arange(count) != count // 3)

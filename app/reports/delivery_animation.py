@@ -1,0 +1,167 @@
+"""A delivery as a moving picture for slides, made without a display: mesh, clock and numbers."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from itertools import pairwise
+
+import cv2
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from app.drawing.colors import BACKGROUND, DELIVERED, HOLE, LOSS, TARGET
+from app.reports.hand_out import ASPECT, FIELD_RAD, HandOut, HandOutMoment, viewpoint
+from pipeline.rays import Camera
+from pipeline.surface.pictures import mesh_picture
+from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
+
+SIZE_PX = (960, 540)
+PLAYS_S = 10.0
+"""All moments together, as long after each other as in the network."""
+LAST_S = 3.0
+"""How long the last one stays."""
+_SHORTEST_S = 0.06
+_HEAD_PX, _FOOT_PX, _EDGE_PX = 44, 16, 14
+_ROOM_PX = (640, 480)
+_COLORS = 256
+_INK, _SOFT, _PAPER = (20, 24, 28), (74, 84, 94), (255, 255, 255)
+
+
+def delivery_animation(hand_out: HandOut) -> bytes:
+    """An animated GIF, which slides of every make play, of ``SIZE_PX``; it repeats without end."""
+    camera = _camera(hand_out)
+    frames = [_frame(hand_out, moment, camera) for moment in hand_out.moments]
+    palette = frames[-1].quantize(_COLORS)
+    frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    file = io.BytesIO()
+    frames[0].save(
+        file,
+        "GIF",
+        save_all=True,
+        append_images=frames[1:],
+        duration=[round(1000 * stay_s) for stay_s in _stays_s(hand_out)],
+        loop=0,
+    )
+    return file.getvalue()
+
+
+def _stays_s(hand_out: HandOut) -> Iterator[float]:
+    """How long each moment is shown."""
+    t_s = [moment.t_s for moment in hand_out.moments]
+    for since_s, until_s in pairwise(t_s):
+        yield max(PLAYS_S * (until_s - since_s) / max(hand_out.end_s, 1e-9), _SHORTEST_S)
+    yield LAST_S
+
+
+def _camera(hand_out: HandOut) -> Camera:
+    """From where the page is looked at first, too."""
+    view = viewpoint(hand_out)
+    ahead = view.middle_m - view.eye_m
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, view.up)
+    right /= np.linalg.norm(right)
+    T_world_camera = np.eye(4)
+    T_world_camera[:3, :3] = np.column_stack([right, np.cross(ahead, right), ahead])
+    T_world_camera[:3, 3] = view.eye_m
+    width_px, height_px = _ROOM_PX
+    assert width_px == round(ASPECT * height_px)
+    focal_px = 0.5 * height_px / np.tan(0.5 * FIELD_RAD)
+    return Camera(
+        CameraIntrinsics.pinhole(
+            focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1), width_px, height_px
+        ),
+        T_world_camera,
+    )
+
+
+def _frame(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> Image.Image:
+    picture = Image.new("RGB", SIZE_PX, _PAPER)
+    pen = ImageDraw.Draw(picture)
+    pen.text((_EDGE_PX, _HEAD_PX // 2), hand_out.title, _INK, _font(24), anchor="lm")
+    picture.paste(Image.fromarray(_room(hand_out, moment, camera)), (0, _HEAD_PX))
+    left = _ROOM_PX[0] + _EDGE_PX
+    _thumbnails(picture, moment, left, _numbers(pen, hand_out, moment, left, _HEAD_PX))
+    top = SIZE_PX[1] - _FOOT_PX
+    pen.rectangle((0, top, SIZE_PX[0], SIZE_PX[1]), BACKGROUND)
+    share = min(moment.t_s / max(hand_out.end_s, 1e-9), 1.0)
+    pen.rectangle((0, top, round(share * SIZE_PX[0]), SIZE_PX[1]), DELIVERED)
+    return picture
+
+
+def _room(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> ByteArray:
+    """The mesh, and the cameras' frusta over it."""
+    rgb = np.empty((_ROOM_PX[1], _ROOM_PX[0], 3), np.uint8)
+    rgb[:] = BACKGROUND
+    if moment.surface is not None and len(moment.surface.triangles):
+        seen = mesh_picture(moment.surface, camera)
+        there = (seen != HOLE).any(axis=2)
+        rgb[there] = seen[there]
+    depth_m = 0.1 * float(np.linalg.norm(viewpoint(hand_out).middle_m - camera.T_world_camera[:3, 3]))
+    for node in hand_out.nodes:
+        K = node.intrinsics
+        corners = np.array([[0, 0], [K.width_px, 0], [K.width_px, K.height_px], [0, K.height_px]], float)
+        rays = (corners - (K.cx_px, K.cy_px)) / (K.fx_px, K.fy_px)
+        local_m = depth_m * np.vstack([np.zeros(3), np.column_stack([rays, np.ones(4)])])
+        world_m = local_m @ node.T_world_camera[:3, :3].T + node.T_world_camera[:3, 3]
+        at = _project(world_m, camera)
+        ways = [[at[0], at[i], at[j]] for i, j in ((1, 2), (2, 3), (3, 4), (4, 1))]
+        cv2.polylines(rgb, [np.rint(way).astype(np.int32) for way in ways], True, _INK, 2, cv2.LINE_AA)
+    return rgb
+
+
+def _project(points_m: FloatArray, camera: Camera) -> FloatArray:
+    """(N, 2) pixels of world points in front of an undistorted camera."""
+    T = camera.T_world_camera
+    seen = (points_m - T[:3, 3]) @ T[:3, :3] @ camera.intrinsics.matrix.T
+    return seen[:, :2] / seen[:, 2:]
+
+
+def _numbers(pen: ImageDraw.ImageDraw, hand_out: HandOut, moment: HandOutMoment, left: int, top: int) -> int:
+    """The live numbers below each other; where the column goes on."""
+    sent = _megabytes(moment.sent_bytes)
+    rows = [
+        ("network time", f"{moment.t_s:.3g} s", f"of {hand_out.end_s:.3g} s", _INK),
+        (
+            "delivered",
+            _megabytes(moment.delivered_bytes),
+            f"of {sent} sent",
+            DELIVERED,
+        ),
+        ("packets lost", f"{moment.packets_lost:,}", "", LOSS),
+        ("energy of all nodes", f"{moment.energy_j:,.3g} J", "", _INK),
+    ]
+    if any(each.f_score is not None for each in hand_out.moments):
+        rows.append(("F-score at 5 cm", _percent(moment.f_score), "", TARGET))
+    if any(each.no_hit_share is not None for each in hand_out.moments):
+        rows.append(("rays without surface", _percent(moment.no_hit_share), "", LOSS))
+    for label, value, beside, color in rows:
+        pen.text((left, top), label, _SOFT, _font(17))
+        pen.text((left, top + 19), value, color, _font(34))
+        pen.text((left + pen.textlength(value, _font(34)) + 8, top + 33), beside, _SOFT, _font(17))
+        top += 64
+    return top
+
+
+def _thumbnails(picture: Image.Image, moment: HandOutMoment, left: int, top: int) -> None:
+    """The nodes' pictures as received, in one row as wide as the column."""
+    room = SIZE_PX[0] - left - _EDGE_PX
+    width = min(room // len(moment.thumbnails) - 4, 120)
+    for row, jpeg in enumerate(moment.thumbnails):
+        if not jpeg:
+            continue
+        image = Image.open(io.BytesIO(jpeg))
+        small = image.resize((width, round(width * image.height / image.width)))
+        picture.paste(small, (left + row * (width + 4), top))
+
+
+def _megabytes(count: int) -> str:
+    return f"{count / 1e6:.2f} MB" if count >= 1e6 else f"{count / 1e3:.0f} kB"
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None or not np.isfinite(share) else f"{100 * share:.1f} %"
+
+
+def _font(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    return ImageFont.load_default(size_px)

@@ -1,0 +1,161 @@
+"""What a hand-out of a delivery shows: plain values, whoever computed them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.types import BoolArray, ByteArray, CameraIntrinsics, FloatArray, IntArray, Surface
+
+THUMBNAIL_PX = 192
+"""Width of a picture on a frustum."""
+FIELD_RAD = np.radians(45.0)
+"""Angle of view from top to bottom of a picture that is ``ASPECT`` times as wide as high."""
+ASPECT = 4 / 3
+TILT_RAD = np.radians(38.0)
+"""How far down one looks."""
+MARGIN = 1.16
+_LIGHT, _DARK, _SQUARE_PX = 150, 105, 6
+
+
+@dataclass(frozen=True, slots=True)
+class HandOutNode:
+    """A camera node where it stands."""
+
+    name: str
+    intrinsics: CameraIntrinsics
+    T_world_camera: FloatArray
+    """(4, 4)."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandOutMoment:
+    """What the sink has at one moment, and what it could make of that."""
+
+    t_s: float
+    sent_bytes: int
+    delivered_bytes: int
+    packets_lost: int
+    energy_j: float
+    surface: Surface | None
+    """World frame; None where there is none yet."""
+    thumbnails: tuple[bytes, ...]
+    """For each node its picture as received, as JPEG (``thumbnail``); empty before anything arrived."""
+    f_score: float | None = None
+    """At 5 cm against the truth, 0 to 1; None without truth or surface."""
+    no_hit_share: float | None = None
+    """Share of the cameras' rays without surface, 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class FramesOnAir:
+    """Columns (N,) of the frames that the nodes sent."""
+
+    node: IntArray
+    """Which of ``HandOut.nodes`` sent it."""
+    start_s: FloatArray
+    end_s: FloatArray
+    cause: IntArray
+    """Which of ``causes`` kept it from its receiver."""
+    causes: tuple[str, ...]
+    """In words; the first is that of frames that arrived, and is not shown. At most 256."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandOut:
+    """A delivery, as somebody without PacketMesh is to see it.
+
+    Raises:
+        InputError: there is no node or no moment, or a moment has not one picture for each node.
+    """
+
+    title: str
+    sentence: str
+    """What one sees."""
+    nodes: tuple[HandOutNode, ...]
+    moments: tuple[HandOutMoment, ...]
+    """By time."""
+    frames: FramesOnAir
+    end_s: float
+    """Of the network's clock, which starts at 0."""
+    lossless_f_score: float | None = None
+    """What it would be had everything arrived."""
+
+    def __post_init__(self) -> None:
+        if not self.nodes or not self.moments:
+            missing = "moment" if self.nodes else "node"
+            raise InputError(f"The hand-out {self.title!r} has no {missing}; give at least one")
+        for moment in self.moments:
+            if len(moment.thumbnails) != len(self.nodes):
+                raise InputError(
+                    f"The hand-out {self.title!r} has {len(moment.thumbnails)} pictures at {moment.t_s:g} s, "
+                    f"but {len(self.nodes)} nodes; give one for each, empty where nothing arrived"
+                )
+
+
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """From where a hand-out is looked at first."""
+
+    eye_m: FloatArray
+    """(3,)."""
+    middle_m: FloatArray
+    """(3,) what is looked at."""
+    up: FloatArray
+    """(3,) unit vector."""
+
+
+def thumbnail(rgb: ByteArray, known: BoolArray) -> bytes:
+    """A picture as received, as a small JPEG; what has not arrived is a grey chequered pattern.
+
+    Args:
+        rgb: (H, W, 3).
+        known: (H, W) where the colour has arrived.
+
+    Returns:
+        No bytes where nothing has arrived.
+    """
+    if not known.any():
+        return b""
+    size = (THUMBNAIL_PX, max(1, round(THUMBNAIL_PX * rgb.shape[0] / rgb.shape[1])))
+    share = cv2.resize(known.astype(np.float32), size, interpolation=cv2.INTER_AREA)[..., None]
+    seen = cv2.resize((rgb * known[..., None]).astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    row, column = np.indices(share.shape[:2]) // _SQUARE_PX
+    squares = np.where((row + column) % 2, np.float32(_DARK), np.float32(_LIGHT))[..., None]
+    picture = np.clip(seen + (1.0 - share) * squares, 0, 255).astype(np.uint8)
+    _, jpeg = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])
+    return jpeg.tobytes()
+
+
+def viewpoint(hand_out: HandOut) -> Viewpoint:
+    """Behind and above the first camera, so far away that the last surface and all cameras are in view."""
+    poses = [node.T_world_camera for node in hand_out.nodes]
+    up = _up(np.mean([-pose[:3, 1] for pose in poses], axis=0))
+    surfaces = [moment.surface for moment in hand_out.moments if moment.surface is not None]
+    seen_m = [surface.vertices_m for surface in surfaces if len(surface.triangles)]
+    first = poses[0]
+    points_m = seen_m[-1] if seen_m else first[None, :3, 3] + 2.0 * first[None, :3, 2]
+    level = first[:3, 3] - np.median(points_m, axis=0)
+    level -= (level @ up) * up
+    back = level / max(float(np.linalg.norm(level)), 1e-9) * np.cos(TILT_RAD) + up * np.sin(TILT_RAD)
+    back /= np.linalg.norm(back)
+    right = np.cross(up, back)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(back, right), back])
+    place_m = np.vstack([points_m, [pose[:3, 3] for pose in poses]]) @ axes.T
+    slope = np.tan(0.5 * FIELD_RAD) / MARGIN * np.array([ASPECT, 1.0])
+    # The four sides of the view as planes: each touches the outermost point on its side.
+    high_m, low_m = (sign * (sign * place_m[:, :2] + slope * place_m[:, 2:]).max(axis=0) for sign in (1, -1))
+    far_m = float(((high_m - low_m) / (2.0 * slope)).max())
+    eye_m = axes.T @ np.append(0.5 * (high_m + low_m), far_m)
+    middle_m = axes.T @ np.append(0.5 * (high_m + low_m), np.median(place_m[:, 2]))
+    return Viewpoint(eye_m, middle_m, up)
+
+
+def _up(direction: FloatArray) -> FloatArray:
+    """The axis of the world next to a direction: cameras look down or up a little."""
+    axis = int(np.argmax(np.abs(direction)))
+    return np.eye(3)[axis] * (1.0 if direction[axis] >= 0.0 else -1.0)

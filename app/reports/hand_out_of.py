@@ -1,0 +1,83 @@
+"""The hand-out of a delivery from its record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from app.reports.delivery import delivery_animation, delivery_page
+from app.reports.hand_out import FramesOnAir, HandOut, HandOutMoment, HandOutNode, thumbnail
+from network_sim.frames import fates
+from network_sim.trace import NetworkTrace
+from network_sim.types import NS_PER_S, Cause, EventKind, to_s
+from packetmesh.files import atomic_path
+from pipeline.deliver import Delivery
+from pipeline.delivery.folder import summary
+from pipeline.delivery.moments import Moment
+from pipeline.delivery.sending import Sending, received_at
+
+RECEIVED = "received"
+PAGE, ANIMATION = "delivery.html", "delivery.gif"
+
+
+def write_hand_out(delivery: Delivery, folder: Path) -> Path:
+    """Write the page that plays a delivery, and a moving picture of it for slides; returns the page.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    hand_out = hand_out_of(delivery)
+    with atomic_path(folder / PAGE) as sibling:
+        sibling.write_text(delivery_page(hand_out), encoding="utf-8")
+    with atomic_path(folder / ANIMATION) as sibling:
+        sibling.write_bytes(delivery_animation(hand_out))
+    return folder / PAGE
+
+
+def hand_out_of(delivery: Delivery) -> HandOut:
+    """What somebody without PacketMesh is to see of a delivery."""
+    sending, truth = delivery.sending, delivery.lossless.truth_after
+    rig, poses = sending.rig, delivery.lossless.placement.T_world_camera
+    return HandOut(
+        title=f"{rig.name}: from packets to a surface",
+        sentence=f"{len(rig.frames)} cameras send their colour and depth images ({sending.coding.title}); "
+        f"the surface is rebuilt from what has arrived. Here {summary(delivery)}.",
+        nodes=tuple(
+            HandOutNode(frame.name, frame.intrinsics, pose)
+            for frame, pose in zip(rig.frames, poses, strict=True)
+        ),
+        moments=tuple(_moment(sending, index, moment) for index, moment in enumerate(delivery.moments)),
+        frames=_frames(sending.trace, len(rig.frames)),
+        end_s=to_s(sending.trace.horizon_ns),
+        lossless_f_score=None if truth is None else truth["f_score_5cm"],
+    )
+
+
+def _moment(sending: Sending, index: int, moment: Moment) -> HandOutMoment:
+    received = received_at(sending, int(sending.times_ns[index]))
+    return HandOutMoment(
+        t_s=moment.t_s,
+        sent_bytes=moment.sent_bytes,
+        delivered_bytes=moment.delivered_bytes,
+        packets_lost=moment.packets_lost,
+        energy_j=moment.energy_j,
+        surface=moment.surface,
+        thumbnails=tuple(thumbnail(one.rgb, one.rgb_known) for one in received),
+        f_score=None if moment.truth is None else moment.truth["f_score_5cm"],
+        no_hit_share=None if moment.surface is None else moment.surface.quality.no_hit_ray_share,
+    )
+
+
+def _frames(trace: NetworkTrace, nodes: int) -> FramesOnAir:
+    """The frames of the cameras; those of the sink only ask for what is missing."""
+    frames = trace.events.of(EventKind.AIR)
+    frames = frames.where(frames.node < nodes)
+    words = (RECEIVED, *(cause.name.lower().replace("_", " ") for cause in Cause if cause))
+    return FramesOnAir(
+        node=frames.node,
+        start_s=frames.t_ns / NS_PER_S,
+        end_s=(frames.t_ns + frames.duration_ns) / NS_PER_S,
+        cause=fates(frames, trace.events.of(EventKind.LOSS)).astype(np.int64),
+        causes=words,
+    )
