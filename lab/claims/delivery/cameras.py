@@ -55,7 +55,9 @@ def choice(rig: Rig) -> Choice:
     coding = coding_named(CODING)
     costs = [float(len(coding.encode(images_of(frame), LARGE))) for frame in rig.frames]
     return Choice(
-        rig_quality(rig), np.linalg.norm(places_m[:-1] - places_m[-1], axis=1), np.array(costs, float)
+        rig_quality(rig).astype(np.float64),
+        np.linalg.norm(places_m[:-1] - places_m[-1], axis=1),
+        np.array(costs, float),
     )
 
 
@@ -98,7 +100,7 @@ def judge(found: Found) -> Outcome:
     """D08's numbers and verdict."""
     ours: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}
-    rows = []
+    rows: list[tuple[str | float, ...]] = []
     fewer = range(1, max(len(cameras.q) for cameras, _ in found.values()))
     leads, hits = [], 0
     for m in fewer:

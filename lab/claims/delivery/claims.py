@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,12 +14,15 @@ from lab.claims.delivery.setup import HEADLINE, LARGE, RATE_SHARE, UNCORRECTED, 
 from lab.claims.delivery.statistics import difference, estimate, mean_terms, slope_terms
 from lab.claims.delivery.study import Study, delivery_study, full_delivery_study
 from lab.claims.delivery.trials import LossTask
+from pipeline.config import AlignmentMode
 from pipeline.types import FloatArray
 
 OURS = "ours beyond the thesis"
 KEPT = 0.95
 MOST_BYTES = 1.3
 SAME = 1e-9
+ALIGNMENTS: tuple[AlignmentMode, ...] = ("local", UNCORRECTED)
+"""Inferred depth with the local correction, and without."""
 
 
 def _d01(study: Study) -> Outcome:
@@ -141,7 +145,7 @@ def _gained(study: Study, task: LossTask) -> FloatArray:
 def _d05(study: Study) -> Outcome:
     ours: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}
-    for alignment in ("local", UNCORRECTED):
+    for alignment in ALIGNMENTS:
         for share in (0.0, UNCORRECTED_SHARE):
             name = f"gain_{alignment}_{share:g}"
             tasks = [_raw_task(rig, alignment, share) for rig in study.rigs]
@@ -149,7 +153,7 @@ def _d05(study: Study) -> Outcome:
             ours[name], ci95[name] = estimate([mean_terms([gain]) for gain in gains])
     local, without = (
         [ours[f"gain_{alignment}_{share:g}"] for share in (0.0, UNCORRECTED_SHARE)]
-        for alignment in ("local", UNCORRECTED)
+        for alignment in ALIGNMENTS
     )
     return Outcome(
         ours,
@@ -161,9 +165,10 @@ def _d05(study: Study) -> Outcome:
     )
 
 
-def _raw_task(rig: str, alignment: str, share: float) -> LossTask:
-    loss = "burst" if share else "random"
-    return LossTask(rig, "raw", LARGE, loss, share, 0, alignment)  # type: ignore[arg-type]
+def _raw_task(rig: str, alignment: AlignmentMode, share: float) -> LossTask:
+    if not share:
+        return replace(lossless(rig, "raw"), alignment=alignment)
+    return LossTask(rig, "raw", LARGE, "burst", share, 0, alignment)
 
 
 def _d06(study: Study) -> Outcome:

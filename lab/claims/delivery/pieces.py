@@ -31,7 +31,7 @@ from packetmesh.progress import Progress
 from pipeline.delivery import rvl
 from pipeline.delivery.sink import images_of
 from pipeline.io.demos import load_demo
-from pipeline.types import FloatArray, Rig
+from pipeline.types import FloatArray, IntArray, Rig
 
 NETWORK = "office"
 CODING = "tiles"
@@ -162,7 +162,7 @@ def judge(pieces: Sequence[Pieces]) -> Outcome:
     )
 
 
-def _per_joule(worth: FloatArray, joules: FloatArray, rows: FloatArray) -> float:
+def _per_joule(worth: FloatArray, joules: FloatArray, rows: IntArray) -> float:
     return float(worth[rows].sum() / joules[rows].sum())
 
 

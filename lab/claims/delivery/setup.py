@@ -8,6 +8,7 @@ from dataclasses import replace
 from lab.claims.delivery.network import NETWORKS, SendTask
 from lab.claims.delivery.trials import Loss, LossTask
 from network_sim.config import PRESETS
+from pipeline.config import AlignmentMode
 from pipeline.delivery.sending import packet_bytes_of
 from pipeline.io.demos import DEMO_SCENES
 
@@ -25,7 +26,7 @@ LARGE, SMALL = (packet_bytes_of(PRESETS[name]) for name in ("office", "thesis-li
 SEEDS = 5
 FEW_SEEDS = 3
 """Of the default's headline; its other trials have one."""
-UNCORRECTED = "affine_depth"
+UNCORRECTED: AlignmentMode = "affine_depth"
 """The best alignment without the local correction (SPEC 3.5)."""
 UNCORRECTED_SHARE = 0.25
 

@@ -24,6 +24,9 @@ from pipeline.stages import compared, run, with_rays
 from pipeline.types import BoolArray, DepthMap, RgbdFrame, Rig
 
 Loss = Literal["random", "burst"]
+When = Literal["before", "after"]
+"""Fusion: of measured depth alone, or with what is inferred."""
+WHENS: tuple[When, ...] = ("before", "after")
 BURST_PACKETS = 8.0
 """Mean length of a burst (SPEC 6.5)."""
 PIECES = 4
@@ -164,7 +167,7 @@ def rebuilt(rig: Rig, frames: Sequence[RgbdFrame], alignment: AlignmentMode = "l
     started = time.process_time()
     present = [index for index, frame in enumerate(frames) if heard(frame)]
     values: Values = {"heard": len(present)}
-    for when in ("before", "after"):
+    for when in WHENS:
         values |= {f"f_{when}": 0.0, f"no_hit_{when}": 1.0}
         values |= {f"hole_area_m2_{when}": None, f"median_depth_error_m_{when}": None}
     arrived = Rig(rig.name, tuple(frames[index] for index in present))
@@ -175,7 +178,7 @@ def rebuilt(rig: Rig, frames: Sequence[RgbdFrame], alignment: AlignmentMode = "l
         results = {}
     if results:
         placement = whole_placement(rig, present, results["placement"].value)
-        for when in ("before", "after"):
+        for when in WHENS:
             surface = results[when].value
             if len(present) < len(frames):
                 surface = with_rays(surface, rig, placement)
