@@ -37,6 +37,7 @@ def _d01(study: Study) -> Outcome:
             name = f"{worse}_less_{better}_{words.replace(' ', '_')}"
             both = [np.hstack(rig) for rig in zip(terms[worse], terms[better], strict=True)]
             ours[name], ci95[name] = estimate(both, difference)
+    ours["core_s_a_trial"] = float(np.mean([study.value(task, "core_s") for task in study.losses]))
     ordered = all(ci95[f"{a}_less_{b}_fused"][0] > 0.0 for a, b in pairwise(HEADLINE))
     by_when = "; ".join(
         f"{words}: "

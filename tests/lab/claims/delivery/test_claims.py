@@ -10,6 +10,8 @@ from lab.claims.delivery import cameras, pieces
 from lab.claims.delivery.claims import CLAIMS
 from lab.claims.delivery.setup import loss_tasks, send_tasks
 from lab.claims.delivery.study import Study
+from lab.results.pages import readme_results, results_page
+from lab.results.record import Record, rounded
 from packetmesh.files import finite
 
 RATES = {"raw": 0.3, "tiles": 0.2, "layered": 0.1}
@@ -130,10 +132,24 @@ SCORES = {(0,): 0.7, (1,): 0.4, (2,): 0.4, (0, 1): 0.7, (0, 2): 0.9, (1, 2): 0.5
 def test_each_program_is_worth_what_its_cameras_gave():
     one, two = (cameras.chosen(choice(SEES_MOST_FIRST), SCORES, m) for m in (1, 2))
     assert one == pytest.approx(
-        {"greedy": 0.7, "greedy by bytes": 0.7, "nearest": 0.4, "random": 0.5, "best": 0.7}
+        {
+            "greedy": 0.7,
+            "greedy by sight": 0.7,
+            "greedy by bytes": 0.7,
+            "nearest": 0.4,
+            "random": 0.5,
+            "best": 0.7,
+        }
     )
     assert two == pytest.approx(
-        {"greedy": 0.9, "greedy by bytes": 0.9, "nearest": 0.5, "random": 0.7, "best": 0.9}
+        {
+            "greedy": 0.9,
+            "greedy by sight": 0.9,
+            "greedy by bytes": 0.9,
+            "nearest": 0.5,
+            "random": 0.7,
+            "best": 0.9,
+        }
     )
 
 
@@ -166,3 +182,25 @@ def test_d07_follows_how_worth_and_sight_go_together():
     found = pieces.judge(up).ours
     assert found["points_per_joule_all"] == pytest.approx(2.0 * 0.45 / 0.1)
     assert found["points_per_joule_best_quarter"] > found["points_per_joule_all"]
+
+
+def test_the_page_and_the_readme_state_the_exchange_rate():
+    verdicts = judged(made_up())
+    found = {rig: (choice(SEES_MOST_FIRST), SCORES) for rig in RIG_LEVELS}
+    verdicts["D08"] = cameras.D08.judge(found)
+    verdicts["D07"] = pieces.D07.judge(some_pieces(lambda alone: alone))
+    numbers = {}
+    for name, verdict in verdicts.items():
+        record = finite(verdict.record())
+        numbers[name] = record | {"tables": [e for e in record["exhibits"] if "header" in e]}
+    record = Record("delivery_claims", "packetmesh", "abc1234", "2026-01-01", {}, "2 cores", rounded(numbers))
+    (sentence,) = (line for line in readme_results({record.name: record}) if "lost packet" in line)
+    assert "0.300 [0.300, 0.300] points of F-score at 5 cm with raster" in sentence
+    assert "0.100 [0.100, 0.100] layered" in sentence
+    page = results_page({record.name: record})
+    for title in (
+        "One per cent of lost packets",
+        "What is left after losses",
+        "F-score of some of the cameras",
+    ):
+        assert f"**{title}**" in page
