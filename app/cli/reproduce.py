@@ -8,14 +8,19 @@ from app.cli.text import print_json, say, say_progress
 
 
 def reproduce(
-    out: Path, only: tuple[str, ...] = (), scheduler: str | None = None, json: bool = False
+    out: Path,
+    only: tuple[str, ...] = (),
+    scheduler: str | None = None,
+    full: bool = False,
+    json: bool = False,
 ) -> None:
-    """Compute the thesis's claims and set ours beside its own numbers.
+    """Compute the thesis's claims and set ours beside its own numbers; then ours beyond the thesis.
 
     Args:
         out: Folder for reproduce.html and reproduce.json; keeps the trials: an interrupted run resumes.
         only: Claims to compute (`--only C10 C16` or `--only C10,C16`); all without it.
         scheduler: Address of a Dask scheduler that runs the trials; without it, this machine's cores do.
+        full: Also the trials that the claims about delivery (D01 to D07) leave out by default; takes hours.
         json: Print the verdicts as one JSON object.
     """
     from app.reports.reproduction import write_reproduction_report
@@ -26,7 +31,7 @@ def reproduce(
     writable_folder(out)
     verdicts = {}
     names = [name for names in only for name in names.split(",")]
-    for event in run_claims(names, out / "trials", scheduler):
+    for event in run_claims(names, out / "trials", scheduler, full):
         if isinstance(event, Progress):
             say_progress(event)
             continue

@@ -1,4 +1,4 @@
-"""The report of the thesis's claims beside our own numbers."""
+"""The report of the thesis's claims beside our own numbers, and of ours beyond the thesis."""
 
 from __future__ import annotations
 
@@ -13,27 +13,43 @@ from lab.claims.claim import Verdict
 
 def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
     """Write one self-contained HTML page with every claim, its verdict and the numbers behind it."""
-    reproduced = sum(verdict.verdict == "reproduced" for verdict in verdicts)
+    ours = [verdict for verdict in verdicts if verdict.beyond]
     body = (
         "<h1>The thesis, computed again</h1>"
-        f'<p class="lead">{reproduced} of {len(verdicts)} claims reproduced.</p>'
+        f'<p class="lead">{_counted([verdict for verdict in verdicts if not verdict.beyond])}</p>'
         '<p class="note">Shares run from 0 to 1, lengths are in metres; intervals are 95 %: by '
         "bootstrap, of the mean over frames or of the median over rooms, and by Student's t over independent "
         "runs of the network.</p>"
     )
-    write_page(path, "PacketMesh: the thesis, computed again", body + "".join(map(_section, verdicts)))
+    body += "".join(_section(verdict) for verdict in verdicts if not verdict.beyond)
+    if ours:
+        body += f'<h1>Ours, beyond the thesis</h1><p class="lead">{_counted(ours)}</p>'
+        body += "".join(map(_section, ours))
+    write_page(path, "PacketMesh: the thesis, computed again", body)
+
+
+def _counted(verdicts: Sequence[Verdict]) -> str:
+    agreed = sum(_agrees(verdict) for verdict in verdicts)
+    return (
+        f"{agreed} of {len(verdicts)} claims {'hold' if verdicts and verdicts[0].beyond else 'reproduced'}."
+    )
+
+
+def _agrees(verdict: Verdict) -> bool:
+    return verdict.verdict in ("reproduced", "holds")
 
 
 def _section(verdict: Verdict) -> str:
-    mark = verdict.verdict.replace(" ", "-")
+    mark = "reproduced" if _agrees(verdict) else "not-reproduced"
+    judged = "It holds if" if verdict.beyond else f"The thesis: {verdict.thesis}. Counts as reproduced"
     rows = []
     for name, value in verdict.ours.items():
         low, high = verdict.ci95.get(name, (None, None))
         rows.append((name.replace("_", " "), value, "" if low is None else f"{low:.4g} to {high:.4g}"))
     return (
         f'<h2>{escape(verdict.id)} <span class="{mark}">{escape(verdict.verdict)}</span></h2>'
-        f"<p>{escape(verdict.claim)}. The thesis: {escape(verdict.thesis)}. "
-        f"Counts as reproduced: {escape(verdict.tolerance)}.</p><p><b>Ours:</b> {escape(verdict.why)}.</p>"
+        f"<p>{escape(verdict.claim)}. {escape(judged)}: {escape(verdict.tolerance)}.</p>"
+        f"<p><b>Ours:</b> {escape(verdict.why)}.</p>"
         + table(("measured", "value", "95 % interval"), rows)
         + "".join(map(exhibit_html, verdict.exhibits))
     )

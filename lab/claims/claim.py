@@ -1,4 +1,4 @@
-"""A claim of the thesis, and the verdict on it."""
+"""A claim, the thesis's or ours, and the verdict on it."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ class Outcome:
     ci95: dict[str, tuple[float, float]]
     """95 % intervals of those values that vary from case to case."""
     reproduced: bool
+    """Of ours: whether it holds."""
     why: str
     """One sentence that a reader can check against ``ours``."""
     exhibits: tuple[Exhibit, ...] = ()
@@ -40,9 +41,14 @@ class Verdict:
     ours: dict[str, float]
     ci95: dict[str, tuple[float, float]]
     verdict: str
-    """``reproduced`` or ``not reproduced``."""
+    """``reproduced`` or ``not reproduced``; of ours ``holds`` or ``does not hold``."""
     why: str
     exhibits: tuple[Exhibit, ...] = ()
+
+    @property
+    def beyond(self) -> bool:
+        """Whether it is ours, and the thesis does not say it."""
+        return is_beyond(self.id)
 
     def record(self) -> dict[str, Any]:
         """The verdict as plain values."""
@@ -52,13 +58,13 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """Something the thesis says that can be computed."""
+    """Something that can be computed."""
 
     id: str
-    """Its number in SPEC 8."""
+    """Its number in SPEC 8: C and two digits for what the thesis says, D for ours beyond it."""
     claim: str
     thesis: str
-    """The thesis's own value."""
+    """The thesis's own value, or that it has none."""
     tolerance: str
     """What counts as reproduced."""
     experiment: Callable[..., Outcome]
@@ -66,11 +72,14 @@ class Claim:
     prepare: Callable[[Path, str | None], Generator[Progress, None, Any]] | None = None
     """Its trials, by the folder that keeps them and the address of a Dask scheduler; claims with the same
     function share one call of it."""
+    prepare_full: Callable[[Path, str | None], Generator[Progress, None, Any]] | None = None
+    """Where ``prepare`` runs a subset of the trials: all of them."""
 
     def judge(self, *prepared: Any) -> Verdict:
         """Run the experiment and compare."""
         outcome = self.experiment(*prepared)
-        verdict = "reproduced" if outcome.reproduced else "not reproduced"
+        words = ("does not hold", "holds") if is_beyond(self.id) else ("not reproduced", "reproduced")
+        verdict = words[outcome.reproduced]
         return Verdict(
             self.id,
             self.claim,
@@ -82,6 +91,11 @@ class Claim:
             outcome.why,
             outcome.exhibits,
         )
+
+
+def is_beyond(name: str) -> bool:
+    """Whether a claim of that name is ours, and the thesis does not say it."""
+    return name.startswith("D")
 
 
 def bootstrap_ci95(

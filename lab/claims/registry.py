@@ -1,4 +1,4 @@
-"""All claims of the thesis, and how to compute them.
+"""All claims, the thesis's and ours beyond it, and how to compute them.
 
 A claim that does not come out is reported as not reproduced; that is a result, not an error.
 """
@@ -12,6 +12,8 @@ from typing import Any
 
 from lab.claims import outliers
 from lab.claims.claim import Claim, Verdict
+from lab.claims.delivery import cameras, pieces
+from lab.claims.delivery.claims import CLAIMS as DELIVERY
 from lab.claims.depth.claims import CLAIMS as DEPTH
 from lab.claims.network import link, radio, selection, street
 from lab.claims.registration.claims import CLAIMS as REGISTRATION
@@ -25,13 +27,14 @@ _ALL: tuple[Claim, ...] = (
     *REGISTRATION,
     *(rule.C21, holes.C22, detail.C23, growth.C24),
     *(*link.CLAIMS, *street.CLAIMS, *radio.CLAIMS, *selection.CLAIMS),
+    *(*DELIVERY, pieces.D07, cameras.D08),
 )
 CLAIMS = {claim.id: claim for claim in sorted(_ALL, key=lambda claim: claim.id)}
 """By number in SPEC 8, in its order."""
 
 
 def run_claims(
-    only: Iterable[str] = (), folder: Path | None = None, scheduler: str | None = None
+    only: Iterable[str] = (), folder: Path | None = None, scheduler: str | None = None, full: bool = False
 ) -> Iterator[Progress | Verdict]:
     """Compute the claims named, or all of them, with progress in between.
 
@@ -39,6 +42,7 @@ def run_claims(
         only: names of claims; empty for all.
         folder: keeps the trials, so that an interrupted run resumes; None keeps nothing.
         scheduler: address of a Dask scheduler for the trials; None takes this machine's cores.
+        full: also the trials that claims leave out by default, for hours.
 
     Raises:
         InputError: a name is not a claim, the folder cannot be written, or there is no such scheduler.
@@ -51,10 +55,11 @@ def run_claims(
         prepared: dict[Any, Any] = {}
         for name in wanted:
             claim = CLAIMS[name]
-            if claim.prepare is None:
+            prepare = (full and claim.prepare_full) or claim.prepare
+            if prepare is None:
                 yield Progress(name, 0.0)
                 yield claim.judge()
                 continue
-            if claim.prepare not in prepared:
-                prepared[claim.prepare] = yield from claim.prepare(folder or Path(temporary), scheduler)
-            yield claim.judge(prepared[claim.prepare])
+            if prepare not in prepared:
+                prepared[prepare] = yield from prepare(folder or Path(temporary), scheduler)
+            yield claim.judge(prepared[prepare])

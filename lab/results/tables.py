@@ -27,6 +27,11 @@ SHOWN = (
     ("C34", "Figure 4.10 in numbers"),
     ("C35", "GREEDY"),
     ("C36", "F(S)"),
+    ("D01", "One per cent of lost packets"),
+    ("D01", "Until everything has arrived"),
+    ("D01", "What is left after losses"),
+    ("D07", "What each sixteenth"),
+    ("D08", "F-score of some"),
 )
 """Claims, and how the titles begin of those of their tables that the page shows."""
 
@@ -85,8 +90,22 @@ def claims(numbers: Row, *between: str) -> str:
         for name, claim in numbers.items()
     ]
     verdicts = table(("", "claim", "the thesis", "verdict", "ours"), rows)
-    exhibits = [exhibit(numbers[name], title) for name, title in SHOWN if name in numbers]
-    return "\n\n".join((verdicts, *between, *exhibits))
+    return "\n\n".join((verdicts, *between, *_shown(numbers)))
+
+
+def our_claims(numbers: Row) -> str:
+    """As ``claims``, of what the thesis does not say."""
+    rows = [
+        (name, claim["claim"], claim["tolerance"], claim["verdict"], claim["why"])
+        for name, claim in numbers.items()
+    ]
+    verdicts = table(("", "claim", "it holds if", "verdict", "ours"), rows)
+    return "\n\n".join((verdicts, *_shown(numbers)))
+
+
+def _shown(numbers: Row) -> list[str]:
+    """The claims' tables in ``SHOWN``."""
+    return [exhibit(numbers[name], title) for name, title in SHOWN if name in numbers]
 
 
 def filling(numbers: Row) -> str:

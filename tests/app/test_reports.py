@@ -54,3 +54,17 @@ def test_the_reproduction_report_counts_what_was_reproduced(tmp_path):
     text = (tmp_path / "r.html").read_text()
     assert "1 of 2 claims reproduced" in text
     assert "0.4 to 0.6" in text
+    assert "beyond the thesis" not in text
+
+
+def test_claims_of_ours_stand_apart_from_the_thesis_s(tmp_path):
+    verdicts = [
+        Verdict(id_, f"claim {id_}", "thesis", "tolerance", {}, {}, verdict, "why")
+        for id_, verdict in (("C1", "reproduced"), ("D1", "does not hold"), ("D2", "holds"))
+    ]
+    write_reproduction_report(verdicts, tmp_path / "r.html")
+    text = (tmp_path / "r.html").read_text()
+    places = [text.index(words) for words in ("claim C1", "Ours, beyond the thesis", "claim D1", "claim D2")]
+    assert places == sorted(places)
+    assert "1 of 1 claims reproduced" in text
+    assert "1 of 2 claims hold" in text

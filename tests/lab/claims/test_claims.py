@@ -12,6 +12,7 @@ from lab.claims.outliers import brute_force_keep, with_gross_outliers
 from lab.claims.registry import CLAIMS, run_claims
 from lab.claims.surface.clouds import single_node
 from packetmesh.errors import InputError
+from packetmesh.progress import Progress
 from pipeline.acquisition import filter_outliers
 from pipeline.config import AcquisitionConfig
 from pipeline.io.demos import load_demo
@@ -24,6 +25,32 @@ def test_a_claim_is_reproduced_only_if_its_experiment_says_so():
     for reproduced, verdict in ((True, "reproduced"), (False, "not reproduced")):
         outcome = Outcome({"x": 1.0}, {}, reproduced, "because")
         assert Claim("C0", "claim", "1", "exact", lambda outcome=outcome: outcome).judge().verdict == verdict
+
+
+def test_a_claim_of_ours_holds_or_does_not():
+    for holds, verdict in ((True, "holds"), (False, "does not hold")):
+        outcome = Outcome({"x": 1.0}, {}, holds, "because")
+        assert (
+            Claim("D00", "claim", "ours", "exact", lambda outcome=outcome: outcome).judge().verdict == verdict
+        )
+
+
+def test_all_trials_are_run_only_where_they_are_asked_for(monkeypatch, tmp_path):
+    def trials(count):
+        def prepare(folder, scheduler):
+            yield Progress("trials", 1.0)
+            return count
+
+        return prepare
+
+    claim = Claim("D00", "c", "t", "tol", _counts, trials(3), trials(50))
+    monkeypatch.setitem(CLAIMS, "D00", claim)
+    for full, count in ((False, 3.0), (True, 50.0)):
+        assert list(run_claims(["D00"], tmp_path, full=full))[-1].ours == {"trials": count}
+
+
+def _counts(count):
+    return Outcome({"trials": float(count)}, {}, True, "counted")
 
 
 def test_the_record_holds_what_the_report_promises():
@@ -80,9 +107,10 @@ def test_an_unknown_name_is_refused_with_the_known_ones():
 
 
 def test_the_claims_are_rows_of_the_specification_s_table():
-    rows = dict(re.findall(r"^\| (C\d+) \| (.*)$", SPEC.read_text("utf-8"), re.MULTILINE))
+    rows = dict(re.findall(r"^\| ([CD]\d+) \| (.*)$", SPEC.read_text("utf-8"), re.MULTILINE))
     assert list(CLAIMS) == sorted(set(CLAIMS) & set(rows))
-    assert {*(f"C{n}" for n in (10, *range(12, 15), *range(16, 25), *range(26, 37)))} == set(CLAIMS)
+    thesis = {f"C{n}" for n in (10, *range(12, 15), *range(16, 25), *range(26, 37))}
+    assert thesis | {f"D0{n}" for n in range(1, 9)} == set(CLAIMS)
     for name, claim in CLAIMS.items():
         assert claim.id == name
         assert all(len(text) > 3 for text in (claim.claim, claim.thesis, claim.tolerance))

@@ -1,0 +1,87 @@
+"""Which trials there are: the stated subset that is run by default, and all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from lab.claims.delivery.network import NETWORKS, SendTask
+from lab.claims.delivery.trials import Loss, LossTask
+from network_sim.config import PRESETS
+from pipeline.config import AlignmentMode
+from pipeline.delivery.sending import packet_bytes_of
+from pipeline.io.demos import DEMO_SCENES
+
+RIGS = tuple(DEMO_SCENES)
+CODINGS = ("raw", "raw-rows", "raw-tiles", "png", "jpeg", "tiles", "layered")
+EXACT = ("raw", "raw-rows", "raw-tiles", "png")
+"""Those that give the very images back: without losses all of them are one trial."""
+HEADLINE = ("raw", "tiles", "layered")
+"""Whose exchange rates are compared."""
+SHARES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 0.5)
+RATE_SHARE = 0.1
+"""Up to which share the exchange rate is the slope (SPEC 6.5)."""
+LARGE, SMALL = (packet_bytes_of(PRESETS[name]) for name in ("office", "thesis-link"))
+"""Bytes of an image in a packet of 802.11b and of 802.15.4."""
+SEEDS = 5
+FEW_SEEDS = 3
+"""Of the default's headline at a tenth, which weighs most in its slope; its other trials have one."""
+UNCORRECTED: AlignmentMode = "affine_depth"
+"""The best alignment without the local correction (SPEC 3.5)."""
+UNCORRECTED_SHARE = 0.25
+
+
+def lossless(rig: str, coding: str) -> LossTask:
+    """The trial in which nothing is lost, to which others of a rig and coding are compared."""
+    return LossTask(rig, "raw" if coding in EXACT else coding, LARGE, "random", 0.0, 0)
+
+
+def loss_tasks(full: bool = False, rigs: Sequence[str] = RIGS) -> list[LossTask]:
+    """Every trial once, the lossless ones first.
+
+    Args:
+        full: every coding with every share of both kinds and five seeds, and small packets; hours.
+        rigs: demo scenes.
+    """
+    tasks = [lossless(rig, coding) for rig in rigs for coding in CODINGS]
+    for rig in rigs:
+        tasks += _few(rig)
+        tasks += _uncorrected(rig)
+        tasks += _all(rig) if full else ()
+    return list(dict.fromkeys(tasks))
+
+
+def send_tasks(rig: str = RIGS[0]) -> list[SendTask]:
+    """Every coding through each network."""
+    return [SendTask(rig, coding, network) for network in NETWORKS for coding in CODINGS]
+
+
+def _few(rig: str) -> Iterator[LossTask]:
+    for coding in HEADLINE:
+        for seed in range(FEW_SEEDS):
+            yield LossTask(rig, coding, LARGE, "burst", RATE_SHARE, seed)
+        for share in (0.02, 0.25):
+            yield LossTask(rig, coding, LARGE, "burst", share, 0)
+        yield LossTask(rig, coding, LARGE, "random", RATE_SHARE, 0)
+    for coding in CODINGS:
+        yield LossTask(rig, coding, LARGE, "burst", RATE_SHARE, 0)
+    for coding in ("png", "jpeg"):
+        yield LossTask(rig, coding, LARGE, "burst", 0.02, 0)
+
+
+def _uncorrected(rig: str) -> Iterator[LossTask]:
+    """The chain without the local correction, without and with losses."""
+    yield replace(lossless(rig, "raw"), alignment=UNCORRECTED)
+    yield LossTask(rig, "raw", LARGE, "burst", UNCORRECTED_SHARE, 0, UNCORRECTED)
+
+
+def _all(rig: str) -> Iterator[LossTask]:
+    losses: tuple[Loss, ...] = ("random", "burst")
+    for coding in CODINGS:
+        for loss in losses:
+            for share in SHARES:
+                for seed in range(SEEDS):
+                    yield LossTask(rig, coding, LARGE, loss, share, seed)
+    for coding in HEADLINE:
+        for seed in range(SEEDS):
+            yield LossTask(rig, coding, SMALL, "burst", RATE_SHARE, seed)

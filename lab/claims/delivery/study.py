@@ -1,0 +1,102 @@
+"""The trials of D01 to D06 and what is asked of them."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from lab.claims.delivery.network import SendTask, send_trial
+from lab.claims.delivery.setup import LARGE, RATE_SHARE, RIGS, loss_tasks, lossless, send_tasks
+from lab.claims.delivery.statistics import slope_terms
+from lab.claims.delivery.trials import LossTask, Values, colorless_trial, loss_trial
+from lab.trials import iterate_trials
+from packetmesh.progress import Progress
+from pipeline.depth.inference import SHIPPED_MODEL
+from pipeline.io.demos import SCENES
+from pipeline.types import FloatArray
+
+DATA = (SHIPPED_MODEL, SCENES)
+"""What every trial depends on beside the code."""
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """Every trial's task with its values."""
+
+    losses: dict[LossTask, Values]
+    colorless: dict[str, Values]
+    """By rig: all depth has arrived, and no colour."""
+    sent: dict[SendTask, Values]
+
+    @property
+    def rigs(self) -> tuple[str, ...]:
+        """In the order of the trials."""
+        return tuple(dict.fromkeys(task.rig for task in self.losses))
+
+    def tasks(
+        self, coding: str, loss: str = "burst", packet_bytes: int = LARGE, rigs: Iterable[str] = ()
+    ) -> list[LossTask]:
+        """Those with losses of a coding by the usual chain."""
+        wanted = tuple(rigs) or self.rigs
+        return [
+            task
+            for task in self.losses
+            if (task.coding, task.loss, task.packet_bytes) == (coding, loss, packet_bytes)
+            and task.share > 0.0
+            and task.alignment == "local"
+            and task.rig in wanted
+        ]
+
+    def value(self, task: LossTask, name: str) -> float:
+        """One value of a trial; NaN where it gave none."""
+        value = self.losses[task][name]
+        return float("nan") if value is None else float(value)
+
+    def lost_percent(self, task: LossTask) -> float:
+        """Of the packets of all nodes, how many were really lost."""
+        return 100.0 * self.value(task, "packets_lost") / self.value(task, "packets")
+
+    def cost(self, task: LossTask, when: str) -> float:
+        """Points of F-score that a trial has less than its rig and coding without losses."""
+        name = f"f_{when}"
+        return 100.0 * (self.value(lossless(task.rig, task.coding), name) - self.value(task, name))
+
+    def rate_terms(self, coding: str, when: str) -> list[FloatArray]:
+        """By rig (S, 2), for each seed: points of F-score over packets lost in bursts, up to a tenth."""
+        groups = []
+        for rig in self.rigs:
+            by_seed: dict[int, list[LossTask]] = {}
+            for task in self.tasks(coding, rigs=(rig,)):
+                if task.share <= RATE_SHARE:
+                    by_seed.setdefault(task.seed, []).append(task)
+            terms = [
+                slope_terms(map(self.lost_percent, tasks), (self.cost(task, when) for task in tasks))
+                for _, tasks in sorted(by_seed.items())
+            ]
+            groups.append(np.stack(terms))
+        return groups
+
+
+def delivery_study(
+    folder: Path, scheduler: str | None, full: bool = False
+) -> Generator[Progress, None, Study]:
+    """The trials of D01 to D06: the stated subset, or all of them."""
+    run = partial(iterate_trials, folder=folder, scheduler=scheduler, data=DATA)
+    tasks, sending = loss_tasks(full), send_tasks()
+    losses = yield from run("D01 to D06, lost packets", loss_trial, tasks)
+    colorless = yield from run("D06, no colour", colorless_trial, RIGS)
+    sent = yield from run("D01, on the air", send_trial, sending)
+    return Study(
+        dict(zip(tasks, losses, strict=True)),
+        dict(zip(RIGS, colorless, strict=True)),
+        dict(zip(sending, sent, strict=True)),
+    )
+
+
+def full_delivery_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Study]:
+    """All trials of D01 to D06."""
+    return (yield from delivery_study(folder, scheduler, full=True))

@@ -1,0 +1,191 @@
+"""The trials: what a rig's surface is worth when some of its images' packets or pixels are missing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from network_sim.losses import LinkLosses, LossConfig
+from packetmesh.errors import ReconstructionError
+from packetmesh.progress import drain
+from pipeline.config import AlignmentMode, DepthConfig, PipelineConfig
+from pipeline.delivery import coding_named
+from pipeline.delivery.coding import Received
+from pipeline.delivery.moments import whole_placement
+from pipeline.delivery.sink import frame_at_sink, heard, images_of
+from pipeline.io.demos import load_demo
+from pipeline.sources import LoadedRig
+from pipeline.spec import Spec
+from pipeline.stages import compared, run, with_rays
+from pipeline.types import BoolArray, DepthMap, RgbdFrame, Rig
+
+Loss = Literal["random", "burst"]
+When = Literal["before", "after"]
+"""Fusion: of measured depth alone, or with what is inferred."""
+WHENS: tuple[When, ...] = ("before", "after")
+BURST_PACKETS = 8.0
+"""Mean length of a burst (SPEC 6.5)."""
+PIECES = 4
+"""Pieces along each side of a frame."""
+COUNT_OF_PIECES = PIECES * PIECES
+
+Values = dict[str, float | None]
+"""What a trial gives, by name; None where it gives none."""
+
+
+@dataclass(frozen=True, slots=True)
+class LossTask:
+    """A rig's images, coded and sent once, of whose packets a share is lost and none is sent again."""
+
+    rig: str
+    """A demo scene."""
+    coding: str
+    packet_bytes: int
+    """Bytes of the images in a packet."""
+    loss: Loss
+    share: float
+    seed: int
+    alignment: AlignmentMode = "local"
+    """How inferred depth is made metric."""
+
+
+@dataclass(frozen=True, slots=True)
+class PieceTask:
+    """A rig of one node's depth image a piece is missing."""
+
+    rig: str
+    node: int
+    piece: int
+    """Row after row."""
+
+
+@dataclass(frozen=True, slots=True)
+class SubsetTask:
+    """A rig of which only some nodes send."""
+
+    rig: str
+    nodes: tuple[int, ...]
+
+
+def loss_trial(task: LossTask) -> Values:
+    """Code, lose packets, decode what is left and run the chain on it once."""
+    rig = load_demo(task.rig)
+    frames, traffic = frames_left(rig, task)
+    return rebuilt(rig, frames, task.alignment) | traffic
+
+
+def frames_left(rig: Rig, task: LossTask) -> tuple[list[RgbdFrame], Values]:
+    """The frames as the sink has them after the task's losses, and what was sent, delivered and lost."""
+    coding = coding_named(task.coding)
+    streams = [np.frombuffer(coding.encode(images_of(f), task.packet_bytes), np.uint8) for f in rig.frames]
+    counts = [-(-stream.size // task.packet_bytes) for stream in streams]
+    losses = LossConfig(task.share, BURST_PACKETS if task.loss == "burst" else 1.0)
+    lost = packets_lost(counts, losses, task.seed)
+    frames, delivered = [], 0
+    for frame, stream, gone in zip(rig.frames, streams, lost, strict=True):
+        there = np.repeat(~gone, task.packet_bytes)[: stream.size]
+        delivered += int(there.sum())
+        left = np.where(there, stream, 0)
+        received = coding.decode(left, there, frame.rgb.shape[:2], task.packet_bytes)
+        frames.append(frame_at_sink(frame, received))
+    return frames, {
+        "bytes_sent": sum(stream.size for stream in streams),
+        "bytes_delivered": delivered,
+        "packets": sum(counts),
+        "packets_lost": int(sum(gone.sum() for gone in lost)),
+    }
+
+
+def packets_lost(counts: Sequence[int], losses: LossConfig, seed: int) -> list[BoolArray]:
+    """Which packets of each node are lost on its own link to the sink, as ``network_sim`` loses them.
+
+    Args:
+        counts: packets of each node.
+        losses: share and length of bursts.
+        seed: of the links.
+    """
+    links, sink = LinkLosses(losses, seed), len(counts)
+    return [
+        np.array([links.lost(node, sink) for _ in range(count)], bool) for node, count in enumerate(counts)
+    ]
+
+
+def colorless_trial(rig_name: str) -> Values:
+    """All depth of a rig arrives, and no colour."""
+    rig = load_demo(rig_name)
+    depth_only = [
+        replace(Received.nothing(frame.rgb.shape[:2]), depth=images_of(frame).depth) for frame in rig.frames
+    ]
+    return rebuilt(rig, [frame_at_sink(*both) for both in zip(rig.frames, depth_only, strict=True)])
+
+
+def piece_trial(task: PieceTask) -> Values:
+    """One piece of one node's depth is missing; its colour is there."""
+    rig = load_demo(task.rig)
+    frames = list(rig.frames)
+    z_m = frames[task.node].depth.z_m.copy()
+    z_m[piece_area(z_m.shape, task.piece)] = np.nan
+    frames[task.node] = replace(frames[task.node], depth=DepthMap(z_m))
+    return rebuilt(rig, frames)
+
+
+def piece_area(shape: tuple[int, ...], piece: int) -> tuple[slice, slice]:
+    """Where a piece lies in an image of (H, W) pixels."""
+    row, column = divmod(piece, PIECES)
+    rows, columns = (np.linspace(0, size, PIECES + 1).astype(int) for size in shape)
+    return slice(rows[row], rows[row + 1]), slice(columns[column], columns[column + 1])
+
+
+def subset_trial(task: SubsetTask) -> Values:
+    """Only some nodes' images are there."""
+    rig = load_demo(task.rig)
+    nothing = [
+        frame_at_sink(frame, Received.nothing(frame.rgb.shape[:2])) if i not in task.nodes else frame
+        for i, frame in enumerate(rig.frames)
+    ]
+    return rebuilt(rig, nothing)
+
+
+def rebuilt(rig: Rig, frames: Sequence[RgbdFrame], alignment: AlignmentMode = "local") -> Values:
+    """What the chain makes of the frames at the sink, compared with the rig's truth.
+
+    Args:
+        rig: as it was taken, with its truth.
+        frames: of every node, as far as they have arrived.
+        alignment: how inferred depth is made metric.
+
+    Returns:
+        For the surface ``before`` (of measured depth) and ``after`` fusion: ``f`` (F-score at 5 cm),
+        ``no_hit`` (share of the rays of all cameras without a surface), ``hole_area_m2`` and
+        ``median_depth_error_m``; the number of nodes that were ``heard``; the seconds of a core that it took.
+        Where nothing can be rebuilt, F-scores are 0, all rays hit nothing, and the rest is None.
+    """
+    started = time.process_time()
+    present = [index for index, frame in enumerate(frames) if heard(frame)]
+    values: Values = {"heard": len(present)}
+    for when in WHENS:
+        values |= {f"f_{when}": 0.0, f"no_hit_{when}": 1.0}
+        values |= {f"hole_area_m2_{when}": None, f"median_depth_error_m_{when}": None}
+    arrived = Rig(rig.name, tuple(frames[index] for index in present))
+    spec = Spec(LoadedRig(arrived), config=PipelineConfig(depth=DepthConfig(alignment=alignment)))
+    try:
+        results = drain(run(spec, stages=("placement", "before", "after"))) if present else {}
+    except ReconstructionError:  # a handful of points has no surface
+        results = {}
+    if results:
+        placement = whole_placement(rig, present, results["placement"].value)
+        for when in WHENS:
+            surface = results[when].value
+            if len(present) < len(frames):
+                surface = with_rays(surface, rig, placement)
+            truth = compared(rig, placement, surface)
+            if truth is not None:
+                values[f"f_{when}"] = truth["f_score_5cm"]
+                values[f"no_hit_{when}"] = surface.quality.no_hit_ray_share
+                values[f"hole_area_m2_{when}"] = surface.quality.hole_area_m2
+                values[f"median_depth_error_m_{when}"] = truth["median_depth_error_m"]
+    return values | {"core_s": time.process_time() - started}
