@@ -1,9 +1,9 @@
 """The dock at the lower edge of the window: one clock, its buttons, and a timeline of anything in lanes.
 
 The page's side is ``dock.js``, and ``dock_view.js`` for what it looks like. What the page is to know is in
-three hidden pieces of HTML, each of which says all of its part, so that a page that comes later knows as much.
-What a hand does there comes back through a hidden text field, as the list of all that the server has not yet
-said to have heard: of many changes within 50 ms viser sends only the last.
+three hidden pieces of HTML, each of which says all of its part, so that a page that comes later knows as
+much. What a hand does there comes back through a hidden text field, as the list of all that the server has
+not yet said to have heard: of many changes within 50 ms viser sends only the last.
 """
 
 from __future__ import annotations
@@ -204,14 +204,13 @@ class Dock:
             page, actions = str(said["page"]), list(said["actions"])
         except (ValueError, KeyError, TypeError):
             return
-        heard = self._heard.pop(page, 0)
-        for number, name, *arguments in actions:
-            if number > heard and name in ACTIONS:
-                ACTIONS[name](self, *arguments)
-                heard = number
-        self._heard[page] = heard
+        self._heard[page] = self._heard.pop(page, 0)
         while len(self._heard) > PAGES:
             del self._heard[next(iter(self._heard))]
+        for number, name, *arguments in actions:
+            if number > self._heard[page] and name in ACTIONS:
+                self._heard[page] = number
+                ACTIONS[name](self, *arguments)
         self._send_state()
         self._ui.flush()
 
@@ -286,7 +285,7 @@ class Dock:
             picture = np.empty((lane.height_px, self._width_px, 3), np.uint8)
             lane.draw(picture, *self._window_ns)
             encoded = cv2.imencode(".png", picture[..., ::-1], (cv2.IMWRITE_PNG_COMPRESSION, 1))[1]
-            pictures.append(f"data:image/png;base64,{base64.b64encode(encoded).decode()}")
+            pictures.append(f"data:image/png;base64,{base64.b64encode(encoded.tobytes()).decode()}")
             words.append([astuple(word) for word in lane.words(*self._window_ns, self._width_px)])
         self._tell(
             self._picture,
