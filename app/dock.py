@@ -1,9 +1,9 @@
 """The dock at the lower edge of the window: one clock, its buttons, and a timeline of anything in lanes.
 
-The page's side is ``dock.js``. What the page is to know is in three hidden pieces of HTML, each of which says
-all of its part, so that a page that comes later knows as much. What a hand does there comes back through a
-hidden text field, as the list of all that the server has not yet said to have heard: of many changes within
-50 ms viser sends only the last.
+The page's side is ``dock.js``, and ``dock_view.js`` for what it looks like. What the page is to know is in
+three hidden pieces of HTML, each of which says all of its part, so that a page that comes later knows as
+much. What a hand does there comes back through a hidden text field, as the list of all that the server has
+not yet said to have heard: of many changes within 50 ms viser sends only the last.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ WIDTH_PX = (200, 2400)
 """Of a picture, at least and at most."""
 LEAST_SPAN_NS = 1000
 """Of a window."""
-MARK = """<span class="packetmesh-dock" data-dock="{name}"></span>
-<style>[data-floating-window]:has(.packetmesh-dock) {{ display: none !important; }}</style>"""
-"""By which the page finds the panel."""
 PAGES = 50
 """As many pages are known apart."""
 
-_SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
+_VIEW, _SCRIPT, _STYLE = (
+    Path(__file__).with_name(name).read_text(encoding="utf-8")
+    for name in ("dock_view.js", "dock.js", "dock.css")
+)
 
 
 class Dock:
@@ -80,7 +80,8 @@ class Dock:
         panel.float(x=0, y=0)
         panel.expand()
         with panel.add_tab("Dock"):
-            ui.gui.add_html(MARK.format(name=self._name) + running(_SCRIPT))
+            mark = f'<span class="packetmesh-dock" data-dock="{self._name}"></span>'
+            ui.gui.add_html(f"{mark}<style>{_STYLE}</style>{running(_VIEW + _SCRIPT)}")
             self._field = ui.when_changed(ui.gui.add_text("Dock", ""), self._hear)
             self._setup, self._picture, self._state = (ui.gui.add_html("") for _ in range(3))
         self._ticker = Ticker(lambda: ui.post(self._tick), PICTURE_S)
@@ -203,14 +204,13 @@ class Dock:
             page, actions = str(said["page"]), list(said["actions"])
         except (ValueError, KeyError, TypeError):
             return
-        heard = self._heard.pop(page, 0)
-        for number, name, *arguments in actions:
-            if number > heard and name in ACTIONS:
-                ACTIONS[name](self, *arguments)
-                heard = number
-        self._heard[page] = heard
+        self._heard[page] = self._heard.pop(page, 0)
         while len(self._heard) > PAGES:
             del self._heard[next(iter(self._heard))]
+        for number, name, *arguments in actions:
+            if number > self._heard[page] and name in ACTIONS:
+                self._heard[page] = number
+                ACTIONS[name](self, *arguments)
         self._send_state()
         self._ui.flush()
 
@@ -285,9 +285,16 @@ class Dock:
             picture = np.empty((lane.height_px, self._width_px, 3), np.uint8)
             lane.draw(picture, *self._window_ns)
             encoded = cv2.imencode(".png", picture[..., ::-1], (cv2.IMWRITE_PNG_COMPRESSION, 1))[1]
-            pictures.append(f"data:image/png;base64,{base64.b64encode(encoded).decode()}")
+            pictures.append(f"data:image/png;base64,{base64.b64encode(encoded.tobytes()).decode()}")
             words.append([astuple(word) for word in lane.words(*self._window_ns, self._width_px)])
-        self._tell(self._picture, kind="picture", window=self._window_ns, pictures=pictures, words=words)
+        self._tell(
+            self._picture,
+            kind="picture",
+            window=self._window_ns,
+            pictures=pictures,
+            words=words,
+            heard=self._heard,
+        )
 
 
 def _looks(lane: Lane) -> dict[str, Any]:

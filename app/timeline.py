@@ -88,7 +88,10 @@ class FramesLane:
 
     title = "Frames"
     grows = False
-    legend = (("frames on the air", TARGET), ("lost; from afar, the share lost", LOSS))
+    legend: Sequence[tuple[str, Color]] = (
+        ("frames on the air", TARGET),
+        ("lost; from afar, the share lost", LOSS),
+    )
 
     def __init__(
         self, levels: Levels, names: Sequence[str], about: Callable[[int], str], causes: Sequence[str]
@@ -172,7 +175,7 @@ class FramesLane:
         if end - begin < 3:
             return self._about(item)
         by_cause = np.bincount(self._levels.cause[begin:end], minlength=1).tolist()
-        why = ", ".join(f"{n:,} {self._causes[cause]}" for cause, n in enumerate(by_cause) if cause and n)
+        why = ", ".join(f"{self._causes[cause]} {n:,}" for cause, n in enumerate(by_cause) if cause and n)
         lost = f"{end - begin - by_cause[0]:,} of them lost ({why})" if why else "none of them lost"
         return f"{self._names[row]}: {end - begin:,} frames within a few pixels, {lost}"
 
@@ -244,7 +247,7 @@ class CurvesLane:
     def __init__(self, title: str, curves: Sequence[Curve], height_px: int = 60) -> None:
         """Show curves in so many pixels."""
         self.title, self.height_px, self._curves = title, height_px, tuple(curves)
-        self.legend = tuple((curve.name, curve.color) for curve in curves)
+        self.legend: Sequence[tuple[str, Color]] = tuple((curve.name, curve.color) for curve in curves)
 
     def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
         """Paint the curves in the window."""

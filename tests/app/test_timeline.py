@@ -159,7 +159,7 @@ def test_pointing_from_afar_says_how_many_were_lost_and_why():
     lane = lane_of((start, start + 6, np.zeros(1000, int), cause), 1)
     text = lane.tell(5100, 3, 300)
     assert "60 frames" in text
-    assert "23 of them lost (20 collision, 3 bit errors)" in text
+    assert "23 of them lost (collision 20, bit errors 3)" in text
     assert lane.tell(5005, 3, 4) == "frame 500"
     assert lane.tell(50_000, 3, 4) == ""
 
