@@ -88,7 +88,10 @@ class FramesLane:
 
     title = "Frames"
     grows = False
-    legend = (("frames on the air", TARGET), ("lost; from afar, the share lost", LOSS))
+    legend: Sequence[tuple[str, Color]] = (
+        ("frames on the air", TARGET),
+        ("lost; from afar, the share lost", LOSS),
+    )
 
     def __init__(
         self, levels: Levels, names: Sequence[str], about: Callable[[int], str], causes: Sequence[str]
@@ -244,7 +247,7 @@ class CurvesLane:
     def __init__(self, title: str, curves: Sequence[Curve], height_px: int = 60) -> None:
         """Show curves in so many pixels."""
         self.title, self.height_px, self._curves = title, height_px, tuple(curves)
-        self.legend = tuple((curve.name, curve.color) for curve in curves)
+        self.legend: Sequence[tuple[str, Color]] = tuple((curve.name, curve.color) for curve in curves)
 
     def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
         """Paint the curves in the window."""

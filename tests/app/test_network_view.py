@@ -115,7 +115,7 @@ def test_numbers_have_units_and_definitions(view):
     assert first.count("by hand</th>") == 2
     assert "Packet delivery ratio" in first
     assert 'title="' in first
-    assert "Attempts lost channel" in others
+    assert "Attempts lost to a busy channel" in others
     assert value_text("packet_delay_mean", None) == "–"
     assert value_text("packet_delay_mean", Metric(0.00137, "s", "")) == "1.37 ms"
     assert "0.0 s of the network's time" in runs_summary([view])

@@ -40,6 +40,7 @@ from pipeline.delivery.sending import (
     send,
     senders_of,
 )
+from pipeline.spec import key as spec_key
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, PointCloud, RgbdFrame, SurfaceResult
 
 NODE_POINTS = 6000
@@ -82,7 +83,8 @@ def packet_job(
 
 
 def _sending(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
-    return (yield from store.remember(("sending", spec.source, spec.sent), partial(_send, spec)))
+    key = ("sending", spec_key(spec, "rig"), spec.sent)
+    return (yield from store.remember(key, partial(_send, spec)))
 
 
 def _send(spec: Spec) -> Generator[Progress, None, Sending]:

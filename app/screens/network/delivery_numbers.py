@@ -24,36 +24,46 @@ def moment_table(view: DeliveryView, now: MomentView | None) -> str:
         (
             "Bytes at the sink",
             "Of the encoded images of all cameras, each counted once.",
-            _megabytes(now and now.delivered_bytes),
-            _megabytes(last and last.delivered_bytes),
+            _megabytes(None if now is None else now.delivered_bytes),
+            _megabytes(None if last is None else last.delivered_bytes),
             _megabytes(view.total_bytes),
         ),
         (
             "Frames lost",
             "Attempts that failed until then; most are sent again.",
-            _count(now and now.packets_lost),
-            _count(last and last.packets_lost),
+            _count(None if now is None else now.packets_lost),
+            _count(None if last is None else last.packets_lost),
             "0",
         ),
         (
             "Energy",
             "Radios, computers and cameras of all nodes until then.",
-            number(now and now.energy_j, 1, "J"),
-            number(last and last.energy_j, 1, "J"),
+            number(None if now is None else now.energy_j, 1, "J"),
+            number(None if last is None else last.energy_j, 1, "J"),
             "–",
         ),
         (
             "Rays without surface",
             "Of the rays through all cameras' pixels, those that meet no triangle: the holes.",
-            *_shares(now and now.no_hit_share, last and last.no_hit_share, best and best.no_hit_share),
+            *_shares(
+                None if now is None else now.no_hit_share,
+                None if last is None else last.no_hit_share,
+                None if best is None else best.no_hit_share,
+            ),
         ),
     ]
-    if any(one.f_score is not None for one in view.moments) or (best and best.f_score is not None):
+    if any(one.f_score is not None for one in view.moments) or (
+        None if best is None else best.f_score is not None
+    ):
         rows.append(
             (
                 "F-score at 5 cm",
                 "Harmonic mean of how much of the surface is right and how much of the truth is there.",
-                *_shares(now and now.f_score, last and last.f_score, best and best.f_score),
+                *_shares(
+                    None if now is None else now.f_score,
+                    None if last is None else last.f_score,
+                    None if best is None else best.f_score,
+                ),
             )
         )
     return table(rows, columns)

@@ -45,8 +45,8 @@ def _growth(view: DeliveryView) -> list[Curve]:
     def percent(values: list[float | None]) -> FloatArray:
         return np.array([np.nan if value is None else 100.0 * value for value in values])
 
-    score = percent([one and one.f_score for one in moments])
-    holes = percent([one and one.no_hit_share for one in moments])
+    score = percent([None if one is None else one.f_score for one in moments])
+    holes = percent([None if one is None else one.no_hit_share for one in moments])
     arrived = 100.0 * view.arrived_bytes / max(view.total_bytes, 1)
     curves = [
         Curve("bytes", "%", DELIVERED, view.arrived_ns, arrived, 0.0, 100.0),

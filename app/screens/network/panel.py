@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from app.dock import Dock
 from app.drawing.cameras import turn
 from app.drawing.clouds import clear
@@ -308,7 +310,7 @@ def told(packet: PacketView) -> str:
     """What a packet says of its image, in a sentence."""
     parts = []
     for what, pixels in (("depth", packet.depth), ("colour", packet.color)):
-        rows = pixels.any(axis=1).nonzero()[0]
+        rows = np.flatnonzero(pixels.any(axis=1))
         if len(rows):
             where = f"row {rows[0] + 1}" if rows[0] == rows[-1] else f"rows {rows[0] + 1} to {rows[-1] + 1}"
             parts.append(f"{what} of {int(pixels.sum()):,} pixels in {where}")
