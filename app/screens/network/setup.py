@@ -53,7 +53,7 @@ class NetworkSetup:
             50,
             1,
             8,
-            hint="Mean number of frames that get lost one after the other.",
+            hint="How many get lost one after the other, on average.",
         )
         self._retransmit = gui.add_checkbox(
             "Send lost packets again",
