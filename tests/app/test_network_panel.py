@@ -160,7 +160,7 @@ def test_a_node_switched_off_is_not_heard_and_the_difference_is_told(screen):
 def test_losses_that_nobody_repairs_cost_bytes(screen):
     gui = screen.gui
     gui.set("Send lost packets again", False)
-    gui.set("in bursts of", 40)
+    gui.set("in bursts of (frames)", 40)
     gui.set("Lose packets (%)", 40.0)
     last = screen.view.moments[-1]
     assert last.delivered_bytes < screen.view.total_bytes

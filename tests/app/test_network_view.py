@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import pipeline.delivery
 from app.drawing.curves import polyline
 from app.screens.network.draw import Flights, ground_of
 from app.screens.network.job import network_job
-from app.screens.network.labels import ACCESS, NETWORKS, SCHEMES, ways
+from app.screens.network.labels import ACCESS, CODINGS, NETWORKS, SCHEMES, ways
 from app.screens.network.numbers import metric_tables, runs_summary, value_text
 from app.screens.network.run_view import run_view
 from app.screens.network.view import What
@@ -129,6 +130,10 @@ def test_every_preset_can_be_run_in_every_way_that_is_offered(preset):
     assert set(offered) <= set(SCHEMES if NETWORKS[preset].street else ACCESS)
     assert with_settings(config, next(iter(offered.values()))) == config
     assert len({with_settings(config, settings) for settings in offered.values()}) == len(offered)
+
+
+def test_the_codings_offered_are_those_that_there_are():
+    assert {name: coding.title for name, coding in pipeline.delivery.CODINGS.items()} == dict(CODINGS)
 
 
 def test_two_runs_are_simulated_with_progress_and_remembered(store):

@@ -28,7 +28,7 @@ from app.timeline import Lane
 from app.ui import Panel
 
 TEXT = """The cameras of the room send their pictures and depth by radio, packet by packet; some are lost.
-**Play** below, and see what the mesh is made of what has arrived."""
+**Play** below, and watch the mesh grow from what has arrived."""
 STREET_TEXT = """Vehicles with cameras drive on a grid of streets and offer images to access points (green).
 **Play** below: every moving point is a frame on the air, a red one was lost there."""
 ORIGIN = """The schemes are our reconstruction: of the paper they come from (Bruno & Nurchis, arXiv 1311.6013)

@@ -48,7 +48,12 @@ class NetworkSetup:
             hint="Share of the frames that get lost on every link, besides collisions.",
         )
         self._burst = gui.add_slider(
-            "in bursts of", 1, 50, 1, 8, hint="Mean number of frames that get lost one after the other."
+            "in bursts of (frames)",
+            1,
+            50,
+            1,
+            8,
+            hint="How many get lost one after the other, on average.",
         )
         self._retransmit = gui.add_checkbox(
             "Send lost packets again",
