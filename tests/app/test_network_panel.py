@@ -178,10 +178,10 @@ def test_a_wrong_key_names_the_nearest_and_keeps_what_was(screen):
     assert screen.panel.command == before
 
 
-@pytest.mark.parametrize("sentence", ["There is no memory left.", "Cancelled."])
-def test_a_failed_or_cancelled_delivery_says_why_and_retry_runs_it(screen, sentence):
+@pytest.mark.parametrize(("seed", "sentence"), [(7, "There is no memory left."), (8, "Cancelled.")])
+def test_a_failed_or_cancelled_delivery_says_why_and_another_runs(screen, seed, sentence):
     screen.refuse = sentence
-    screen.gui.set("Seed", 7)
+    screen.gui.set("Seed", seed)
     assert sentence in screen.gui.text()
     assert screen.names() == []
     screen.refuse = ""
