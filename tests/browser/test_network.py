@@ -18,7 +18,7 @@ ALL = re.compile(r"^\d cameras sent [\d.]+ MB in [\d,]+ packets; simulated in [\
 def few():
     """Few moments, so that they are soon there."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(setup, "MOMENTS", 3)
+        patch.setattr(setup, "MOMENTS", 4)
         yield
 
 
@@ -80,7 +80,7 @@ def test_the_command_is_that_of_the_delivery(network):
     press(network, "Copy as command")
     text = network.locator("pre").first.inner_text()
     press(network, "Close")
-    assert text.startswith("packetmesh deliver --scene box-on-table --preset office --coding raw --moments 3")
+    assert text.startswith("packetmesh deliver --scene box-on-table --preset office --coding raw --moments 4")
 
 
 def test_a_coding_that_needs_fewer_bytes_is_compared_with_the_one_before(network):
