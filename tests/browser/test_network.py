@@ -35,11 +35,9 @@ def network(few, tab):
 
 
 def seek(page, share):
-    """Click into the rows of the timeline."""
-    rows = page.locator(".packetmesh-dock-row")
-    box = rows.bounding_box()
-    left = box["x"] + 165
-    page.mouse.click(left + share * (box["x"] + box["width"] - 12 - left), box["y"] + 42)
+    """Click into the rows of the timeline, at a share of the whole time."""
+    field = page.locator(".packetmesh-dock-field").bounding_box()
+    page.mouse.click(field["x"] + share * field["width"], field["y"] + 8)
 
 
 def delivered_mb(page):
