@@ -225,12 +225,21 @@ class Dock:
         self._pace(SPEEDS[min(max(at, 0), len(SPEEDS) - 1)])
 
     def _look(self, start_ns: float, end_ns: float, width_px: float) -> None:
-        """Show another window."""
+        """Show another window, of a page so wide."""
+        self._width_px = min(max(round(width_px), WIDTH_PX[0]), WIDTH_PX[1])
+        self._window(start_ns, end_ns)
+        self._draw()
+
+    def look(self, start_ns: float, end_ns: float) -> None:
+        """Show another window, whatever the page shows."""
+        self._window(start_ns, end_ns)
+        self._send_setup()
+        self._draw()
+
+    def _window(self, start_ns: float, end_ns: float) -> None:
         span = min(max(round(end_ns - start_ns), LEAST_SPAN_NS), self._end_ns - self._start_ns)
         start = min(max(round(start_ns), self._start_ns), self._end_ns - span)
         self._window_ns = (start, start + span)
-        self._width_px = min(max(round(width_px), WIDTH_PX[0]), WIDTH_PX[1])
-        self._draw()
 
     def _point(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> None:
         """Say what is under the pointer."""

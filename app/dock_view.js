@@ -59,7 +59,9 @@ window.packetmeshDockView ??= (() => {
         return made;
       });
       this.field.style.height = this.names.style.height = `${top + AXIS_PX}px`;
-      const legend = lanes.filter(lane => !lane.grows).flatMap(lane => lane.legend);
+      // Lanes of one kind say the same.
+      const entries = lanes.filter(lane => !lane.grows).flatMap(lane => lane.legend);
+      const legend = [...new Map(entries.map(entry => [entry.join(), entry])).values()];
       this.legend.replaceChildren(...legend.map(([text, color]) => {
         const word = make("span", "", null, {textContent: text});
         const box = make("i", "");

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 LESSONS = Path(__file__).resolve().parents[1] / "assets" / "lessons"
 NUMBER = r"(\d+(?:\.\d+)?)"
 OFF, BEGIN = "not now", "Choose a stop, or press **Next**."
+ANSWER, THINK = "*Answer:*", "*Answer:* think first, then press **Answer**."
 Value = TypeVar("Value")
 Look = TypeVar("Look", bound="DataclassInstance")
 """What a screen is to show: a frozen record of all that a stop may set."""
@@ -123,7 +124,7 @@ def short(label: str) -> str:
 
 
 class LessonFolder(Generic[Look]):
-    """Leads through a lesson stop by stop; every stop sets the screen's controls."""
+    """Leads through a lesson stop by stop; every stop sets the screen's controls and asks before it tells."""
 
     def __init__(self, ui: Ui, lesson: Lesson[Look], on_stop: Callable[[Look], None]) -> None:
         """Add the folder; ``on_stop`` is called with what the stop shows."""
@@ -137,7 +138,9 @@ class LessonFolder(Generic[Look]):
             )
             ui.when_changed(self._stop, self._picked)
             keys = {"Back": lambda: self._go(-1), "Next": lambda: self._go(1)}
-            ui.buttons("Go", keys, "To the stop before or after.")
+            if any(ANSWER in stop.text for stop in lesson.stops):
+                keys["Answer"] = self._answer
+            ui.buttons("Go", keys, "To the stop before or after, or to the answer of this one.")
             self._text = ui.gui.add_markdown(BEGIN)
 
     def _go(self, count: int) -> None:
@@ -155,5 +158,15 @@ class LessonFolder(Generic[Look]):
             self._text.content = BEGIN
             return
         stop = self._lesson.stops[index]
-        self._text.content = f"**{stop.title}** ({index + 1} of {len(self._names)})\n\n{stop.text}"
+        asked, answer, _ = stop.text.partition(ANSWER)
+        self._write(asked + THINK if answer else asked)
         self._on_stop(stop.look)
+
+    def _answer(self) -> None:
+        if self._index() >= 0:
+            self._write(self._lesson.stops[self._index()].text)
+
+    def _write(self, text: str) -> None:
+        index = self._index()
+        title = self._lesson.stops[index].title
+        self._text.content = f"**{title}** ({index + 1} of {len(self._names)})\n\n{text}"

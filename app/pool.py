@@ -337,6 +337,13 @@ class LatestWins:
             self._start_waiting, running = start, self._running
         self.pool.stop(running)
 
+    def stop(self) -> None:
+        """Forget the waiting job and ask the running one to stop at its next report."""
+        with self._lock:
+            self._start_waiting, running = None, self._running
+        if running is not None:
+            self.pool.stop(running)
+
     def cancel(self) -> None:
         """Forget the waiting job and end the running one now."""
         with self._lock:

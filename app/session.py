@@ -293,7 +293,15 @@ class Session:
                     frame.visible = name == self._current.drawn_below
         self._current.on_show()
         self.frame_view()
+        self._pause_unseen()
         self.advance()
+
+    def _pause_unseen(self) -> None:
+        """Stop what is computed only while somebody looks; it goes on from there when it is shown again."""
+        for track in self._tracks:
+            if track.running is not None and self._waits(track.running):
+                track.running = track.submitted = None
+                track.lane.stop()
 
     def frame_view(self, anew: bool = False) -> None:
         """Turn the view to the scene: a new one, two instead of one, or another shape of the window."""

@@ -97,9 +97,10 @@ def iterate_delivery(spec: DeliverySpec, processes: int = 1) -> Generator[Moment
 def _moments(sending: Sending, processes: int) -> Iterator[Moment]:
     here = Rebuilder(sending)
     first, *others = range(len(sending.times_ns))
-    yield here.moment(first)
+    yield drain(here.moment(first))
     if processes < 2 or len(others) < 2:
-        yield from map(here.moment, others)
+        for index in others:
+            yield drain(here.moment(index))
         return
     pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _start, (sending,))
     try:
@@ -118,7 +119,7 @@ def _start(sending: Sending) -> None:
 
 
 def _moment_there(index: int) -> Moment:
-    return _there.moment(index)
+    return drain(_there.moment(index))
 
 
 def _last(sending: Sending, lossless: Reconstruction) -> Reconstruction | None:

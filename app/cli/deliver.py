@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.cli.options import PresetName, Settings
-from app.cli.reconstruct import source_named
+from app.cli.options import Images, PresetName, Settings
 from app.cli.text import print_json, say
 from packetmesh.progress import drain
 
@@ -19,13 +18,8 @@ if TYPE_CHECKING:
 
 
 def deliver(
+    images: Images,
     out: Path,
-    scene: str | None = None,
-    rig: Path | None = None,
-    color: Path | None = None,
-    depth: Path | None = None,
-    intrinsics: Path | None = None,
-    depth_scale: float = 1000.0,
     preset: str = "office",
     coding: str = "raw",
     moments: int = 40,
@@ -38,15 +32,11 @@ def deliver(
     """Send a rig's images through a network and rebuild the scene from what has arrived by each moment.
 
     Args:
+        images: What the nodes send.
         out: Folder for what arrived in the end (as `reconstruct` writes it), moments.csv and delivery.html.
-        scene: A demo scene (see `packetmesh scenes`).
-        rig: A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/...
-        color: Colour image of a single RGB-D pair.
-        depth: Its registered 16-bit depth image.
-        intrinsics: Its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info.
-        depth_scale: Depth units per metre in the depth image.
         preset: The network: thesis-link, greenhouse, office, or the config.json of a finished simulation.
-        coding: How images become bytes: raw, raw-rows, raw-tiles, png, jpeg, rvl, tiles, layered, ...
+        coding: How images become bytes: raw, raw-color-first, raw-rows, raw-tiles, png, jpeg, rvl, tiles or
+            layered.
         moments: How many times, after equal shares of the bytes, the scene is rebuilt.
         link_trace: A recorded link (s, Mbit/s, round trip ms, share lost) over which every node sends.
         down: Names of nodes that have failed and send nothing, for example node_02.
@@ -55,7 +45,7 @@ def deliver(
             `--set nodes.retransmit=false loss.share=0.1 loss.burst_packets=8`.
         json: Print the moments as one JSON object.
     """
-    source = source_named(scene, rig, color, depth, intrinsics, depth_scale)
+    source = images.source()
 
     from app.reports.hand_out_of import write_hand_out
     from packetmesh.files import writable_folder

@@ -128,7 +128,7 @@ def _numbers(pen: ImageDraw.ImageDraw, hand_out: HandOut, moment: HandOutMoment,
             f"of {sent} sent",
             DELIVERED,
         ),
-        ("packets lost", f"{moment.packets_lost:,}", "", LOSS),
+        ("frames lost", f"{moment.packets_lost:,}", "", LOSS),
         ("energy of all nodes", f"{moment.energy_j:,.3g} J", "", _INK),
     ]
     if any(each.f_score is not None for each in hand_out.moments):

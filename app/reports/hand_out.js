@@ -81,7 +81,7 @@ const TILES = [
   {name: "Network time", now: (record, moment, t) => clock(t, record.end_s), of: record => `of ${clock(record.end_s, record.end_s)}`},
   {name: "Bytes delivered", color: "curve delivered", now: (record, moment) => bytesText(moment?.delivered_bytes ?? 0, allBytes(record)),
     of: (record, moment) => `of ${bytesText(moment?.sent_bytes ?? 0, allBytes(record))} sent`},
-  {name: "Packets lost", color: "lost", now: (record, moment) => whole(moment?.packets_lost ?? 0), of: () => "so far"},
+  {name: "Frames lost", color: "lost", now: (record, moment) => whole(moment?.packets_lost ?? 0), of: () => "so far"},
   {name: "Energy", now: (record, moment) => `${energy(moment?.energy_j ?? 0)} J`, of: () => "of all nodes"},
   {name: "F-score at 5 cm", color: "curve target", known: CURVES[0].known, now: (record, moment) => shareText(moment?.f_score),
     of: record => record.lossless_f_score === null ? "against the truth" : `of ${shareText(record.lossless_f_score)} without loss`},

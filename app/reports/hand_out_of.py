@@ -41,7 +41,7 @@ def hand_out_of(delivery: Delivery) -> HandOut:
     rig, poses = sending.rig, delivery.lossless.placement.T_world_camera
     return HandOut(
         title=f"{rig.name}: from packets to a surface",
-        sentence=f"{len(rig.frames)} cameras send their colour and depth images ({sending.coding.title}); "
+        sentence=f"{_cameras(len(rig.frames))} colour and depth images ({sending.coding.title}); "
         f"the surface is rebuilt from what has arrived. Here {summary(delivery)}.",
         nodes=tuple(
             HandOutNode(frame.name, frame.intrinsics, pose)
@@ -81,3 +81,7 @@ def _frames(trace: NetworkTrace, nodes: int) -> FramesOnAir:
         cause=fates(frames, trace.events.of(EventKind.LOSS)).astype(np.int64),
         causes=words,
     )
+
+
+def _cameras(count: int) -> str:
+    return "One camera sends its" if count == 1 else f"{count} cameras send their"

@@ -7,12 +7,20 @@ from typing import Any, Protocol
 
 import simpy
 
+from network_sim.config import MacKind
+from network_sim.mac import dcf, ieee802154
 from network_sim.mac.context import MacContext
 from network_sim.mac.dcf import Dcf
 from network_sim.mac.ieee802154 import Ieee802154
 from network_sim.mac.replay import RecordedLink
 from network_sim.mac.simple import OwnLink
 from network_sim.types import Delivery, Packet
+
+FRAME_HEADER_BYTES: dict[MacKind, int] = {
+    "ieee80211b": dcf.HEADER_BYTES,
+    "ieee802154": ieee802154.PHY_BYTES + ieee802154.HEADER_BYTES,
+}
+"""What a medium access adds to a packet to make a frame of it; the others add nothing."""
 
 
 class Mac(Protocol):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 from network_sim.types import to_s
 from packetmesh.errors import ReconstructionError
-from packetmesh.progress import drain
+from packetmesh.progress import Progress
 from pipeline import geometry
 from pipeline.delivery.coding import Received
 from pipeline.delivery.memory import Memory
@@ -76,12 +76,12 @@ class Rebuilder:
         self._memory = Memory(sending.spec.spec.config.fusion.align_nodes_with == "sensor")
         self._rebuilt = NOTHING
 
-    def moment(self, index: int) -> Moment:
+    def moment(self, index: int) -> Generator[Progress, None, Moment]:
         """What there is at one of ``sending.times_ns``."""
         received = received_at(self.sending, int(self.sending.times_ns[index]))
         frames = frames_at_sink(self.sending, received)
         if self._memory.look_at([frame for frame in frames if heard(frame)]):
-            self._rebuilt = _rebuilt(self.sending, frames, self._memory)
+            self._rebuilt = yield from _rebuilt(self.sending, frames, self._memory)
         return _moment(self.sending, index, received, self._rebuilt)
 
 
@@ -120,13 +120,15 @@ def _arrival(frame: RgbdFrame, stream: ByteArray, there: BoolArray, received: Re
     )
 
 
-def _rebuilt(sending: Sending, frames: Sequence[RgbdFrame], memory: Memory) -> Rebuilt:
+def _rebuilt(
+    sending: Sending, frames: Sequence[RgbdFrame], memory: Memory
+) -> Generator[Progress, None, Rebuilt]:
     present = [index for index, frame in enumerate(frames) if heard(frame)]
     if not present:
         return NOTHING
     spec = spec_of(sending, frames, present)
     try:
-        results = drain(run(spec, memory, REBUILT))
+        results = yield from run(spec, memory, REBUILT)
     except ReconstructionError:  # a handful of points has no surface yet
         return NOTHING
     placement, surface = results["placement"].value, results["after"].value

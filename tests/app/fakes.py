@@ -181,13 +181,16 @@ class Impatient(Ui):
         return SimpleNamespace(restart=action, cancel=lambda: None, pending=False)
 
 
+START = Spec(Demo("box-on-table"))
+
+
 class Bench:
     """Stands for a session with one panel: computes at once and in this process what the panel asks for."""
 
-    def __init__(self, panel, ui, store, folder=None, steps=CHAIN):
+    def __init__(self, panel, ui, store, folder=None, steps=CHAIN, spec=START):
         self.ui = ui
         self.store, self.folder, self.steps = store, folder, steps
-        self.spec = Spec(Demo("box-on-table"))
+        self.spec = spec
         self.results, self.notices = Results(), []
         self.refuse = ""
         """Why nothing can be computed now."""

@@ -2,11 +2,12 @@
 
 import pytest
 
-from app.lesson import BEGIN, OFF, LessonFolder, read_lesson
+from app.lesson import ANSWER, BEGIN, OFF, LessonFolder, read_lesson
 from app.screens.depth import lesson as depth
 from app.screens.fuse.labels import STARTS
 from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.view import Race, Start
+from app.screens.network import lesson as network
 from app.screens.surface import lesson as surface
 from packetmesh.errors import InputError
 from tests.app.fakes import ui_of
@@ -26,9 +27,18 @@ def test_the_stops_of_the_lesson_that_ships_have_different_titles_and_text():
     assert any(stop.look.in_ms for stop in shipped.stops)
 
 
-@pytest.mark.parametrize(("screen", "look"), [(depth, depth.DepthLook()), (surface, surface.SurfaceLook())])
-def test_the_stops_of_lessons_that_ask_differ_and_answer(screen, look):
-    shipped = read_lesson(screen.SHIPPED, screen.SETTINGS, look)
+@pytest.mark.parametrize(
+    ("path", "settings", "look"),
+    [
+        (depth.SHIPPED, depth.SETTINGS, depth.DepthLook()),
+        (surface.SHIPPED, surface.SETTINGS, surface.SurfaceLook()),
+        (network.CROSSING, network.SETTINGS, network.NetworkLook()),
+        (network.LOST_PACKET, network.SETTINGS, network.NetworkLook()),
+    ],
+    ids=lambda value: getattr(value, "stem", ""),
+)
+def test_the_stops_of_lessons_that_ask_differ_and_answer(path, settings, look):
+    shipped = read_lesson(path, settings, look)
     assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) > 1
     assert len({stop.look for stop in shipped.stops}) == len(shipped.stops)
     for stop in shipped.stops:
@@ -82,6 +92,12 @@ def test_a_bad_lesson_is_one_sentence(tmp_path, text, sentence):
     assert "\n" not in str(error.value)
 
 
+def test_a_lesson_that_asks_nothing_has_no_answers():
+    ui = ui_of()
+    LessonFolder(ui, read_lesson(SHIPPED, SETTINGS, RaceLook()), lambda look: None)
+    assert ui.gui.find("Go").options == ("Back", "Next")
+
+
 def test_a_missing_or_binary_lesson_is_one_sentence(tmp_path):
     (tmp_path / "binary.md").write_bytes(b"\xff\xfe\x00")
     for name in ("none.md", "binary.md"):
@@ -90,7 +106,8 @@ def test_a_missing_or_binary_lesson_is_one_sentence(tmp_path):
 
 
 def test_the_folder_begins_with_how_to_begin_and_goes_from_stop_to_stop():
-    ui, shown, shipped = ui_of(), [], read_lesson(SHIPPED, SETTINGS, RaceLook())
+    ui, shown = ui_of(), []
+    shipped = read_lesson(surface.SHIPPED, surface.SETTINGS, surface.SurfaceLook())
     LessonFolder(ui, shipped, shown.append)
     stops, gui = shipped.stops, ui.gui
     assert gui.text() == BEGIN
@@ -102,7 +119,12 @@ def test_the_folder_begins_with_how_to_begin_and_goes_from_stop_to_stop():
     gui.press("Go", "Back")
     assert shown[-1] == stops[-2].look
     assert stops[-2].title in gui.text()
+    asked, answer = stops[-2].text.split(ANSWER)
+    assert asked in gui.text()
+    assert answer not in gui.text()
+    gui.press("Go", "Answer")
     assert stops[-2].text in gui.text()
+    assert shown[-1] == stops[-2].look
     gui.set("Stop", gui.find("Stop").options[1])
     assert shown[-1] == stops[0].look
     gui.set("Stop", OFF)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from itertools import pairwise
 
@@ -9,25 +10,33 @@ import numpy as np
 import pytest
 import viser
 
+from app.lesson import read_lesson
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.draw import ground_of
 from app.screens.network.labels import NETWORKS
+from app.screens.network.lesson import CROSSING, LOST_PACKET, SETTINGS, NetworkLook
 from app.screens.network.panel import ORIGIN, PICK, NetworkPanel
+from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import What
+from app.state import Spec
 from network_sim.config import PRESETS
 from network_sim.types import Cause
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
+from pipeline.io.rigs import save_rig
+from pipeline.sources import RigFolder
 from tests.app.fakes import Bench, Impatient, ui_of
+from tests.pipeline.delivery.small import CONFIG, small_rig
 
+CROSSING_FOLDER = "Lesson: How images cross a sensor network"
 pytestmark = pytest.mark.xdist_group("network panel")
 
 
 class Screen(Bench):
     """The screen with its clock; does not wait for a hand to rest."""
 
-    def __init__(self, scene, store):
-        super().__init__(NetworkPanel, ui_of(scene, kind=Impatient), store, steps=("network",))
+    def __init__(self, scene, store, spec):
+        super().__init__(NetworkPanel, ui_of(scene, kind=Impatient), store, steps=("network",), spec=spec)
         self.gui.find("Moments").value = 4
         self.panel.on_show()
 
@@ -65,9 +74,17 @@ class Screen(Bench):
 
 
 @pytest.fixture(scope="module")
-def screen(store):
+def spec(tmp_path_factory):
+    """A room whose images are small, so that a moment is soon rebuilt."""
+    folder = tmp_path_factory.mktemp("rigs") / "small room"
+    save_rig(folder, small_rig(nodes=3, scene="box-on-table"))
+    return Spec(RigFolder(str(folder)), config=CONFIG)
+
+
+@pytest.fixture(scope="module")
+def screen(store, spec):
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    screen = Screen(server.scene, store)
+    screen = Screen(server.scene, store, spec)
     yield screen
     screen.ui.close()
     server.stop()
@@ -121,13 +138,16 @@ def test_packets_move_and_losses_name_their_cause(screen):
 def test_picking_a_frame_tells_of_it_and_lights_its_pixels(screen):
     pieces = screen.view.run.pieces
     frames = pieces.where(pieces.what == What.AIR)
-    item = int(np.flatnonzero((frames.peer == 3) & (frames.first_byte > 300_000))[0])
+    item = int(np.flatnonzero((frames.peer == 3) & (frames.first_byte > 20_000))[0])
     screen.dock.seek(screen.view.moments[-1].t_ns)
     screen.panel._picked(0, item)
     text = screen.gui.text("Packet")
     assert "→ sink" in text
     assert "Attempt" in text
     assert "It tells the depth of" in text
+    first, last = (int(n.replace(",", "")) for n in re.search(r"bytes ([\d,]+) to ([\d,]+)", text).groups())
+    nodes = screen.spec.sent.network.nodes
+    assert (last - first + 1, first % (last - first + 1)) == (nodes.payload_bytes - nodes.header_bytes, 0)
     assert "lit" in screen.names()
     screen.panel._picked(0, -1)
     assert PICK in screen.gui.text("Packet")
@@ -136,7 +156,7 @@ def test_picking_a_frame_tells_of_it_and_lights_its_pixels(screen):
 
 def test_the_command_delivers_the_same(screen):
     words = shlex.split(screen.panel.command)
-    assert words[:6] == ["packetmesh", "deliver", "--scene", "box-on-table", "--preset", "office"]
+    assert words[:6] == ["packetmesh", "deliver", *screen.spec.source.arguments(), "--preset", "office"]
     assert words[words.index("--moments") + 1] == "4"
     assert words[words.index("--coding") + 1] == screen.spec.sent.coding
 
@@ -158,17 +178,51 @@ def test_a_node_switched_off_is_not_heard_and_the_difference_is_told(screen):
 
 
 def test_losses_that_nobody_repairs_cost_bytes(screen):
-    gui = screen.gui
+    gui, screen.refuse = screen.gui, "not yet"
     gui.set("Send lost packets again", False)
     gui.set("in bursts of (frames)", 40)
+    screen.refuse = ""
     gui.set("Lose packets (%)", 40.0)
     last = screen.view.moments[-1]
     assert last.delivered_bytes < screen.view.total_bytes
     words = shlex.split(screen.panel.command)
-    changed = words[words.index("--set") + 1 : words.index("--out")]
+    changed = [
+        word for word in words[words.index("--set") + 1 : words.index("--out")] if "surface." not in word
+    ]
     assert with_settings(PRESETS["office"], changed) == screen.spec.sent.network
+    screen.refuse = "not yet"
     gui.set("Lose packets (%)", 0.0)
+    screen.refuse = ""
     gui.set("Send lost packets again", True)
+
+
+def test_a_stop_of_the_lesson_sends_and_looks_at_one_frame(screen):
+    screen.gui.press("Go", "Next", CROSSING_FOLDER)
+    assert "(1 of 10)" in screen.gui.text()
+    assert "bytes 0 to 1,463 of image" in screen.gui.text("Packet")
+    assert len(screen.packets) == 1
+    screen.gui.press("Go", "Next", CROSSING_FOLDER)
+    answers = screen.view.run.pieces
+    began = answers.start_ns[answers.what == What.ACK][0]
+    assert began < screen.dock.now_ns < answers.end_ns[answers.what == What.ACK][0]
+    screen.gui.press("Go", "Next", CROSSING_FOLDER)
+    assert "Lost: collision" in screen.gui.text("Packet")
+    screen.panel.on_action("Reset")
+
+
+@pytest.mark.parametrize("path", [CROSSING, LOST_PACKET], ids=lambda path: path.stem)
+def test_every_stop_of_the_lessons_asks_for_a_network_that_there_is(path):
+    setup = NetworkSetup(ui_of(), lambda: None)
+    setup.add_what_if()
+    setup.add_advanced()
+    setup.name_nodes(["node_00", "node_01", "node_02"])
+    asked = []
+    for stop in read_lesson(path, SETTINGS, NetworkLook()).stops:
+        setup.take(stop.look)
+        asked.append(tuple(setup.runs().values()) if setup.street else setup.sent())
+        if stop.look.off:
+            assert asked[-1].down == (stop.look.off,)
+    assert len(set(asked)) >= 7
 
 
 def test_a_wrong_key_names_the_nearest_and_keeps_what_was(screen):
@@ -208,6 +262,9 @@ def test_vehicles_move_and_two_schemes_stand_beside_each_other(screen):
     gui.set("Beside", "PDC: by chance, as offered")
     assert len(screen.results.view("network")) == 2
     assert ">PDC: by chance, as offered</th>" in gui.text()
+    assert re.search(
+        r"PDC brings \d+% of the images that .+ brings, and keeps \d+% of what is seen", gui.text()
+    )
     lines = screen.panel.command.splitlines()
     assert len(lines) == 2
     screen.refuse = "enough seen"

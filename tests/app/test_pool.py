@@ -86,6 +86,18 @@ def test_a_superseded_job_that_never_reports_loses_its_process(pool, tmp_path):
     assert second.end() == Outcome("result", 1)
 
 
+def test_a_lane_that_is_stopped_forgets_what_waits_and_its_job_ends_at_its_next_report(pool, tmp_path):
+    lane, first, second = LatestWins(pool, "stop"), Inbox(), Inbox()
+    lane.submit(jobs.count_forever, str(tmp_path), **first.callbacks())
+    wait_for(tmp_path / "began")
+    lane.submit(jobs.count, 1, **second.callbacks())
+    lane.stop()
+    assert first.end().kind == "stopped"
+    assert (tmp_path / "tidied").exists()
+    assert not lane.busy
+    assert second.ends.empty()
+
+
 def test_cancel_ends_the_process_and_the_pool_recovers(pool, tmp_path):
     lane, inbox, after = LatestWins(pool, "cancel"), Inbox(), Inbox()
     lane.submit(jobs.deaf, str(tmp_path), **inbox.callbacks())

@@ -92,9 +92,6 @@ def page(tab):
 
 def dismiss_notifications(page) -> None:
     """Close viser's notice about software rendering and anything else in the corner."""
-    for _ in range(5):
-        buttons = page.locator(".mantine-Notification-closeButton")
-        if not buttons.count():
-            return
-        buttons.first.click()
-        page.wait_for_timeout(400)
+    close = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(one => one.click())"
+    page.evaluate(close)  # one that goes by itself meanwhile is no longer there to be clicked
+    page.wait_for_timeout(400)

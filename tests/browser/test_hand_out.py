@@ -71,12 +71,12 @@ def test_stepping_shows_more_of_the_wall_and_larger_numbers(page):
     assert np.all(np.diff(seen) > 50)
     assert number(page, "Network time") == END_S
     assert number(page, "Bytes delivered") == 1.5
-    assert number(page, "Packets lost") == 30
+    assert number(page, "Frames lost") == 30
     assert number(page, "F-score") == 90
     assert page.locator("#about").inner_text().endswith("288 triangles")
     page.keyboard.press("ArrowLeft")
     shown(page, 2)
-    assert number(page, "Packets lost") == 20
+    assert number(page, "Frames lost") == 20
 
 
 def test_playing_moves_the_clock_until_it_is_paused(page):
@@ -89,7 +89,7 @@ def test_playing_moves_the_clock_until_it_is_paused(page):
     page.locator("#play", has_text="Play").wait_for()
     stopped = number(page, "Network time")
     assert stopped >= 0.5 * END_S
-    assert number(page, "Packets lost") in (10, 20, 30)
+    assert number(page, "Frames lost") in (10, 20, 30)
     page.wait_for_timeout(500)
     assert number(page, "Network time") == stopped
 

@@ -87,6 +87,16 @@ def test_a_coding_that_needs_fewer_bytes_is_compared_with_the_one_before(network
     expect(network.get_by_text(re.compile("the last byte came after"))).to_be_visible()
 
 
+def test_a_delivery_rests_while_nobody_looks_and_goes_on_from_there(network):
+    pick(network, "Coding", "Tiles that stand alone")
+    network.get_by_text(re.compile("moment 3 of")).wait_for()
+    go(network, "Scene")
+    network.get_by_text("Up to date").wait_for()
+    go(network, "Network")
+    network.get_by_text(re.compile("moment [234] of")).first.wait_for()
+    network.get_by_text("Up to date").wait_for()
+
+
 def test_the_dock_is_there_on_this_screen_only(network):
     go(network, "Scene")
     expect(network.locator(".packetmesh-dock-row")).to_be_hidden()

@@ -28,7 +28,7 @@ from app.screens.network.run_view import run_view
 from app.state import Sent, Spec
 from app.store import Store
 from packetmesh.errors import ReconstructionError
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, part
 from pipeline.acquisition import back_project
 from pipeline.delivery.coding import Received
 from pipeline.delivery.moments import Moment, NodeArrival, Rebuilder
@@ -100,9 +100,16 @@ def _delivered(store: Store, spec: Spec) -> Steps:
     yield view
     rebuilder, count = Rebuilder(sending), len(sending.times_ns)
     moments: list[MomentView] = []
-    for index in (count - 1, *range(count - 1)):
-        yield Progress(f"moment {len(moments) + 1} of {count}", (len(moments) + 0.5) / (count + 1))
-        moments.append(_moment_view(sending, rebuilder.moment(index), int(sending.times_ns[index])))
+    for done, index in enumerate((count - 1, *range(count - 1))):
+        key = ("moment", spec.key("network"), index)
+        compute = partial(
+            part,
+            _moment(rebuilder, index),
+            f"moment {done + 1} of {count}",
+            (done + 0.5) / (count + 1),
+            (done + 1.5) / (count + 1),
+        )
+        moments.append((yield from store.remember(key, compute)))
         yield moments[-1]
     moments.sort(key=lambda one: one.t_ns)
     return replace(view, moments=tuple(moments), lossless=(yield from _lossless(store, spec)))
@@ -149,6 +156,11 @@ def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:
 def _stage(frames: Sequence[RgbdFrame]) -> Stage:
     clouds = [sample(back_project(frame).points_m, None, NODE_POINTS).points_m for frame in frames]
     return stage_around([cloud.astype(float) for cloud in clouds], [f.T_world_camera for f in frames])
+
+
+def _moment(rebuilder: Rebuilder, index: int) -> Generator[Progress, None, MomentView]:
+    moment = yield from rebuilder.moment(index)
+    return _moment_view(rebuilder.sending, moment, int(rebuilder.sending.times_ns[index]))
 
 
 def _moment_view(sending: Sending, moment: Moment, t_ns: int) -> MomentView:

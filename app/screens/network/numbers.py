@@ -60,6 +60,22 @@ def metric_tables(views: Sequence[NetworkView]) -> tuple[str, str]:
     return one, other
 
 
+def verdict(views: Sequence[NetworkView]) -> str:
+    """What the second of two runs brings and keeps, in a sentence; empty where there is nothing to weigh."""
+    if len(views) != 2:
+        return ""
+    one, two = ({name: metric.value for name, metric in view.metrics.items()} for view in views)
+    images, coverage = "images_per_minute", "coverage"
+    if not all(run.get(name) for run in (one, two) for name in (images, coverage)):
+        return ""
+    first, second = (view.label.partition(":")[0] for view in views)
+    return (
+        f"**{second} brings {two[images] / one[images]:.0%} of the images that {first} brings, and keeps "
+        f"{two[coverage] / one[coverage]:.0%} of what is seen**: {two[coverage]:.1%} of what the cameras saw "
+        f"instead of {one[coverage]:.1%}."
+    )
+
+
 def _row(name: str, metrics: Sequence[Metric | None]) -> Row:
     definition = next(metric.definition for metric in metrics if metric is not None)
     title = TITLES.get(name, name.replace("_", " "))

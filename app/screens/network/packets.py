@@ -33,25 +33,26 @@ class Frames:
         """Whether it carries a piece of a camera's images."""
         return self.pieces.carries[item] == PacketKind.IMAGE
 
-    def story(self, item: int, header_bytes: int) -> str:
+    def story(self, item: int) -> str:
         """Markdown about one frame, for the inspector."""
         one, names = self.pieces, self._view.names
         tries = np.flatnonzero((one.packet == one.packet[item]) & (one.node == one.node[item]))
         took_ns = int(one.end_ns[item] - one.start_ns[item])
         size = int(one.size_bytes[item])
+        headers = f", {self._view.header_bytes} of them headers" if self.carries_image(item) else ""
         lines = [
             f"**{names[one.node[item]]} → {names[one.peer[item]]}** at "
             f"{time_text(int(one.start_ns[item]))}: {self._content(item)}",
-            f"{size:,} bytes, {header_bytes} of them headers; {time_text(took_ns)} on the air",
+            f"{size:,} bytes{headers}; {time_text(took_ns)} on the air",
             f"Attempt {1 + int(np.searchsorted(tries, item))} of {len(tries)}; "
             f"waited {self._waited(item, int(tries[0]))} in the node",
             f"**{self._fate(item)[0].upper()}{self._fate(item)[1:]}**",
         ]
         return "\n\n".join(lines)
 
-    def bytes_of(self, item: int, header_bytes: int) -> tuple[int, int]:
+    def bytes_of(self, item: int) -> tuple[int, int]:
         """First byte and number of bytes of its image that it carries."""
-        return int(self.pieces.first_byte[item]), int(self.pieces.size_bytes[item]) - header_bytes
+        return int(self.pieces.first_byte[item]), int(self.pieces.size_bytes[item]) - self._view.header_bytes
 
     def camera_of(self, item: int) -> int:
         """Which node took the image of which it carries a piece."""
@@ -62,8 +63,7 @@ class Frames:
         kind = PacketKind(int(one.carries[item]))
         if kind is not PacketKind.IMAGE:
             return f"a {PACKET_NAMES[kind]}"
-        header_bytes = self._view.config.nodes.header_bytes
-        first, count = self.bytes_of(item, header_bytes)
+        first, count = self.bytes_of(item)
         return f"bytes {first:,} to {first + count - 1:,} of image {int(one.image[item]) + 1}"
 
     def _waited(self, item: int, first_try: int) -> str:

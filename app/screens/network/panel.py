@@ -13,13 +13,15 @@ from app.dock import Dock
 from app.drawing.cameras import turn
 from app.drawing.clouds import clear
 from app.drawing.colors import css
+from app.lesson import LessonFolder, read_lesson
 from app.screens.network.delivery_draw import DeliveryDrawing, legend
 from app.screens.network.delivery_numbers import changes, difference, moment_table, more_rows, summary
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import NetworkDrawing, look_at_ground
 from app.screens.network.labels import NETWORKS
 from app.screens.network.lanes import frames_lane, growth_lane, run_curves, stops_ns
-from app.screens.network.numbers import metric_tables, runs_summary
+from app.screens.network.lesson import CROSSING, LOST_PACKET, SETTINGS, NetworkLook, find
+from app.screens.network.numbers import metric_tables, runs_summary, verdict
 from app.screens.network.packets import Frames
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import NetworkView
@@ -68,7 +70,10 @@ class NetworkPanel(Panel):
         self._moment_s = 0.0
         self._resting = ui.debounce(REST_S, self._run)
         self._hand = ui.debounce(HAND_S, self._show_moment)
+        self._look: NetworkLook | None = None
         self._text = gui.add_markdown(TEXT)
+        for path in (CROSSING, LOST_PACKET):
+            LessonFolder(ui, read_lesson(path, SETTINGS, NetworkLook()), self._take_look)
         self._setup = NetworkSetup(ui, self._resting.restart)
         self._about = gui.add_markdown("")
         self._status = gui.add_markdown("Nothing is sent yet.")
@@ -198,6 +203,7 @@ class NetworkPanel(Panel):
         self._load(view.run.start_ns, view.run.end_ns, stops_ns(view.run))
         self._dock.seek(view.run.end_ns if now_ns is None else now_ns)
         self._grow(view)
+        self._aim(view.run)
         self.session.frame_view()
 
     def _grow(self, view: DeliveryView) -> None:
@@ -214,11 +220,32 @@ class NetworkPanel(Panel):
         self._frames = [Frames(run) for run in runs]
         self._status.content = runs_summary(runs)
         self._table.content, self._others.content = metric_tables(runs)
-        self._difference.content = self._legend.content = ""
+        self._difference.content, self._legend.content = verdict(runs), ""
         self._packet.content = PICK
         self._drawing = NetworkDrawing(self.scene, self._next_name(), runs)
         start_ns, end_ns = min(run.start_ns for run in runs), max(run.end_ns for run in runs)
         self._load(start_ns, end_ns, stops_ns(*runs))
+        self._aim(runs[0])
+
+    def _take_look(self, look: NetworkLook) -> None:
+        """Send as a stop of a lesson says; where it looks is seen when the frames are there."""
+        with self.ui.atomic():
+            self._setup.take(look)
+        self._look = look
+        self._run()
+        if self._delivery is not None and self._delivery.sent == self.session.spec.sent:
+            self._aim(self._delivery.run)  # it is being computed already
+
+    def _aim(self, run: NetworkView) -> None:
+        """Go where the stop of a lesson looks, and tell of the frame there."""
+        look, self._look = self._look, None
+        if look is None:
+            return
+        t_ns, item = find(look.at, run, self._frames[0])
+        span_ns = run.end_ns - run.start_ns if look.window_s is None else round(1e9 * look.window_s)
+        self._dock.look(t_ns - span_ns // 2, t_ns + span_ns // 2)
+        self._dock.seek(t_ns)
+        self._picked(0, item)
 
     def _load(self, start_ns: int, end_ns: int, stops: Any) -> None:
         self._framed = ()
@@ -281,9 +308,7 @@ class NetworkPanel(Panel):
             self._packet.content = PICK
             return
         frames, view = self._frames[lane], self._delivery
-        run = self._runs[lane] if view is None else view.run
-        header_bytes = run.config.nodes.header_bytes if view is not None else 0
-        story = frames.story(item, header_bytes)
+        story = frames.story(item)
         self._packet.content = story
         if view is None or not frames.carries_image(item):
             return
@@ -291,7 +316,7 @@ class NetworkPanel(Panel):
             (row for row, node in enumerate(view.nodes) if node.row == frames.camera_of(item)), None
         )
         if source is not None:
-            first, count = frames.bytes_of(item, header_bytes)
+            first, count = frames.bytes_of(item)
 
             def came(packet: PacketView | None) -> None:
                 self._light(story, packet)

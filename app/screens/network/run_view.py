@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from app.levels import Levels, levels_of
 from app.screens.network.view import Curve, NetworkView, Pieces, Series, What
+from network_sim.config import NetworkConfig
 from network_sim.energy import cumulative_radio_j
 from network_sim.frames import fates
+from network_sim.mac import FRAME_HEADER_BYTES
 from network_sim.metrics import camera_nodes, metrics
 from network_sim.street import street_of
 from network_sim.trace import Events, NetworkTrace
@@ -56,7 +58,13 @@ def run_view(trace: NetworkTrace, elapsed_s: float) -> NetworkView:
         metrics=metrics(trace),
         elapsed_s=elapsed_s,
         packets=trace.counters.created,
+        header_bytes=_header_bytes(trace.config),
     )
+
+
+def _header_bytes(config: NetworkConfig) -> int:
+    above = config.nodes.header_bytes if config.scenario == "collection" else 0
+    return above + FRAME_HEADER_BYTES.get(config.mac.kind, 0)
 
 
 # The timeline.

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import viser
 
 from app.screens.network.labels import CODINGS, NETWORKS, ways
+from app.screens.network.lesson import NetworkLook
 from app.state import Sent, Spec
 from app.ui import Ui
 from network_sim.config import PRESETS, NetworkConfig
@@ -122,6 +123,22 @@ class NetworkSetup:
         self._moments.value = MOMENTS
         self._down.value = NOBODY
         self._load()
+
+    def take(self, look: NetworkLook) -> None:
+        """Set the controls as a stop of a lesson says."""
+        self._preset.value = NETWORKS[look.preset].title
+        self._load()
+        if look.way:
+            (self._scheme if self.street else self._access).value = look.way
+        if look.beside:
+            self._beside.value = look.beside
+        self._coding.value = CODINGS[look.coding]
+        self._share.value, self._burst.value = look.lose_percent, look.burst_frames
+        self._retransmit.value = look.again and self._retransmit.value
+        self._moments.value = MOMENTS
+        self._down.value = look.off if look.off in self._down.options else NOBODY
+        self._extra = look.settings
+        self._text.value = " ".join(look.settings)
 
     def name_nodes(self, names: Sequence[str]) -> None:
         """Take the names of the cameras that can be switched off."""

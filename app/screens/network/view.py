@@ -112,6 +112,8 @@ class NetworkView:
     """Time that the simulation took on this machine."""
     packets: int
     """That were created in all."""
+    header_bytes: int
+    """Of a frame with image bytes: those of the medium access and of all above it."""
     label: str = ""
     """What the screen calls it where two are compared."""
 

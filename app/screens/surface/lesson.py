@@ -39,6 +39,12 @@ class SurfaceLook:
     """Whether the largest hole is chosen and explained."""
 
 
+def surface_of(look: SurfaceLook, config: SurfaceConfig) -> SurfaceConfig:
+    """The settings a stop wants; a ball in units of r_F is set when the cloud's spacing is known."""
+    config = replace(config, max_points=look.max_points, smoothing_passes=look.smoothing_passes)
+    return config if look.rule == "manual" else replace(config, radius_rule=look.rule, radii_m=())
+
+
 def _radii(look: SurfaceLook, text: str) -> SurfaceLook:
     if text in _RULES:
         return replace(look, rule=_RULES[text], radius_in_r_F=None)

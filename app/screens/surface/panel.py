@@ -15,7 +15,7 @@ from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.holes import HolesFolder
 from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN
 from app.screens.surface.legend import legend_html
-from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook
+from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook, surface_of
 from app.screens.surface.numbers import WAIT, note_html, quality_table, quick_line
 from app.screens.surface.quick import QuickLook
 from app.screens.surface.rolling import RollingFolder
@@ -35,7 +35,6 @@ from app.screens.surface.view import (
 from app.screens.surface.walk_view import WalkRequest, WalkView
 from app.state import Spec, Step
 from app.ui import Panel
-from pipeline.config import RadiusRule
 from pipeline.types import FloatArray
 
 TEXT = """**What you see.** A ball rolls over the points and leaves a triangle wherever it rests on three.
@@ -368,16 +367,7 @@ class SurfacePanel(Panel):
             self._close_walk()
             self._picked_coloring()
         self._look = look
-        rule: RadiusRule = "thesis+" if look.rule == "manual" else look.rule
-        wanted = replace(
-            session.spec.config.surface,
-            max_points=look.max_points,
-            smoothing_passes=look.smoothing_passes,
-        )
-        if look.rule != "manual" or wanted != session.spec.config.surface:
-            session.edit(
-                lambda config: replace(config, surface=replace(wanted, radius_rule=rule, radii_m=()))
-            )
+        session.edit(lambda config: replace(config, surface=surface_of(look, config.surface)))
         if self._view is not None and session.results.fresh("surface", session.spec):
             self._take(self._view)
 

@@ -1,0 +1,121 @@
+"""The lessons of the network: what a stop can set, and the files that ship."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from app.lesson import LESSONS, NUMBER, Setting, choice, quantity, sets
+from app.screens.network.labels import ACCESS, CAUSES, CODINGS, NETWORKS, SCHEMES
+from app.screens.network.packets import Frames
+from app.screens.network.view import FAILURES, NetworkView, What
+
+CROSSING, LOST_PACKET = LESSONS / "how-images-cross-a-network.md", LESSONS / "what-one-lost-packet-costs.md"
+_ON_OFF = {"on": True, "off": False}
+_CAUSES = {words: cause for cause, words in CAUSES.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where on the timeline a stop looks."""
+
+    kind: Literal["share", "frame", "answer", "cause"] = "share"
+    """A share of the run, the N-th frame with image bytes or its acknowledgement, or the first loss by a
+    cause."""
+    value: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkLook:
+    """What a stop sends through which network, and where it looks; by default what the screen shows first."""
+
+    preset: str = "office"
+    way: str = ""
+    """Medium access or scheme by its title; empty is the preset's own."""
+    beside: str = ""
+    """Scheme of a second run; empty is none."""
+    coding: str = "raw"
+    lose_percent: float = 0.0
+    burst_frames: int = 8
+    again: bool = True
+    """Whether lost packets are sent again."""
+    off: str = ""
+    """Name of the camera that has failed."""
+    settings: tuple[str, ...] = ()
+    """Of anything that has no control, ``key=value``."""
+    at: Place = Place()
+    window_s: float | None = None
+    """How much of the timeline is shown around it; None is all."""
+
+
+def find(place: Place, run: NetworkView, frames: Frames) -> tuple[int, int]:
+    """The time in ns where a stop looks, and the frame there, or -1; the end where there is no such thing."""
+    air, pieces, value = frames.pieces, run.pieces, int(place.value)
+    if place.kind == "share":
+        return run.start_ns + round(place.value * (run.end_ns - run.start_ns)), -1
+    if place.kind == "cause":
+        lost = np.flatnonzero(air.cause == value)
+        if len(lost):
+            return int(air.end_ns[lost[0]]), int(lost[0])
+        failed = np.flatnonzero(np.isin(pieces.what, FAILURES) & (pieces.cause == value))
+        return (int(pieces.start_ns[failed[0]]), -1) if len(failed) else (run.end_ns, -1)
+    images = [item for item in range(min(len(air.node), 50 * value)) if frames.carries_image(item)]
+    if len(images) < value:
+        return run.end_ns, -1
+    item = images[value - 1]
+    if place.kind == "frame":
+        return int(air.start_ns[item] + air.end_ns[item]) // 2, item
+    answers = pieces.where(pieces.what == What.ACK)
+    after = np.flatnonzero((answers.start_ns >= air.end_ns[item]) & (answers.peer == air.node[item]))
+    if not len(after):
+        return int(air.end_ns[item]), item
+    return int(answers.start_ns[after[0]] + answers.end_ns[after[0]]) // 2, item
+
+
+def _place(text: str) -> Place:
+    if text in ("start", "end"):
+        return Place("share", 0.0 if text == "start" else 1.0)
+    if text in _CAUSES:
+        return Place("cause", float(_CAUSES[text]))
+    share = re.fullmatch(rf"{NUMBER} ?%", text)
+    if share is not None and float(share[1]) <= 100.0:
+        return Place("share", float(share[1]) / 100.0)
+    kind, _, number = text.partition(" ")
+    if kind not in ("frame", "answer") or not number.isdecimal() or int(number) < 1:
+        raise ValueError(
+            f"try start, end, such as '40 %', 'frame 1' or 'answer 1', or a cause: {', '.join(_CAUSES)}"
+        )
+    return Place("frame" if kind == "frame" else "answer", float(number))
+
+
+def _burst(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 50:
+        raise ValueError("try a whole number of frames from 1 to 50")
+    return int(text)
+
+
+def _setting(look: NetworkLook, text: str) -> NetworkLook:
+    if "=" not in text:
+        raise ValueError("try key=value")
+    return replace(look, settings=(*look.settings, text))
+
+
+_WAYS = {way: way for way in (*ACCESS, *SCHEMES)}
+SETTINGS: dict[str, Setting[NetworkLook]] = {
+    "preset": sets("preset", choice({name: name for name in NETWORKS})),
+    "access": sets("way", choice(_WAYS)),
+    "scheme": sets("way", choice(_WAYS)),
+    "beside": sets("beside", choice(_WAYS)),
+    "coding": sets("coding", choice({name: name for name in CODINGS})),
+    "lose": sets("lose_percent", quantity("%", 50.0)),
+    "bursts": sets("burst_frames", _burst),
+    "again": sets("again", choice(_ON_OFF)),
+    "off": sets("off", str),
+    "setting": _setting,
+    "at": sets("at", _place),
+    "window": sets("window_s", quantity("ms", 60_000.0, per_unit=1000.0, above_zero=True)),
+}
+"""What a stop can set, by its name in the file."""
