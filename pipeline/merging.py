@@ -16,8 +16,21 @@ from pipeline.types import FloatArray, PointCloud, PointSource, RgbdFrame
 
 
 @dataclass(frozen=True, slots=True)
+class FusedCloud:
+    """All nodes' fused clouds in the world frame, thinned, with normals."""
+
+    fused: PointCloud
+    voxel_m: float
+    """Edge of the voxels it was averaged over."""
+    r_F_m: float
+    """Mean nearest-neighbour distance."""
+    sigma_D_m: float
+    """Its standard deviation."""
+
+
+@dataclass(frozen=True, slots=True)
 class MergedClouds:
-    """All nodes' clouds in the world frame, thinned alike, with normals."""
+    """The fused cloud and, thinned alike, what the sensors alone measured."""
 
     sensor: PointCloud
     fused: PointCloud
@@ -27,22 +40,22 @@ class MergedClouds:
     """Its standard deviation."""
 
 
-def merge_clouds(
+def merge_fused(
     frames: Sequence[RgbdFrame],
     nodes: Sequence[NodeClouds],
     T_world_camera: Sequence[FloatArray],
     mode: FusionMode,
     max_points: int,
     smoothing_passes: int,
-) -> MergedClouds:
-    """The sensor cloud and the fused cloud of all nodes.
+) -> FusedCloud:
+    """The fused cloud of all nodes.
 
     Args:
         frames: the nodes' images.
         nodes: their clouds.
         T_world_camera: (4, 4) registered pose of each node.
         mode: ``fill`` drops inferred points that another node's sensor can judge.
-        max_points: both clouds are averaged over the voxels that leave the fused one about so many points.
+        max_points: it is averaged over the voxels that leave about so many points.
         smoothing_passes: how often every point is moved onto the plane of its neighbours.
     """
     joint = [node.fused for node in nodes]
@@ -50,18 +63,20 @@ def merge_clouds(
         joint = without_guesses_in_view(frames, nodes, T_world_camera)
     everything = PointCloud.concatenate(_placed(joint, T_world_camera))
     voxel_m = voxel_for_count(everything.points_m, max_points)
+    fused = merge(joint, T_world_camera, voxel_m, smoothing_passes)
+    return FusedCloud(fused, voxel_m, *spacing(fused.points_m))
 
-    def merged(clouds: Sequence[PointCloud]) -> PointCloud:
-        thin = [
-            replace(estimate_normals(voxel_average(cloud, voxel_m), np.zeros(3)), pixels=None)
-            for cloud in clouds
-        ]
-        placed = _placed(thin, T_world_camera)
-        whole = placed[0] if len(placed) == 1 else voxel_average(PointCloud.concatenate(placed), voxel_m)
-        return smooth(whole, smoothing_passes)
 
-    fused = merged(joint)
-    return MergedClouds(merged([node.sensor for node in nodes]), fused, *spacing(fused.points_m))
+def merge(
+    clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], voxel_m: float, smoothing_passes: int
+) -> PointCloud:
+    """Clouds in their nodes' frames as one in the world frame: averaged, with normals, smoothed."""
+    thin = [
+        replace(estimate_normals(voxel_average(cloud, voxel_m), np.zeros(3)), pixels=None) for cloud in clouds
+    ]
+    placed = _placed(thin, T_world_camera)
+    whole = placed[0] if len(placed) == 1 else voxel_average(PointCloud.concatenate(placed), voxel_m)
+    return smooth(whole, smoothing_passes)
 
 
 def without_guesses_in_view(

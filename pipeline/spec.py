@@ -15,7 +15,7 @@ from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Source
 
 StageName = Literal[
-    "rig", "inferred", "nodes", "placement", "clouds", "after", "before", "truth", "poisson", "alpha"
+    "rig", "inferred", "nodes", "placement", "fused", "clouds", "after", "before", "truth", "poisson", "alpha"
 ]
 
 
@@ -66,7 +66,7 @@ NEEDS: dict[StageName, Needs] = {
     "placement": Needs(
         lambda spec: (spec.config.node_registration, spec.config.fusion.align_nodes_with), ("rig", "nodes")
     ),
-    "clouds": Needs(
+    "fused": Needs(
         lambda spec: (
             spec.config.fusion.mode,
             spec.config.surface.max_points,
@@ -74,15 +74,19 @@ NEEDS: dict[StageName, Needs] = {
         ),
         ("rig", "nodes", "placement"),
     ),
-    "after": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "clouds")),
+    "clouds": Needs(lambda spec: (spec.config.surface.smoothing_passes,), ("nodes", "placement", "fused")),
+    "after": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "fused")),
     "before": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "clouds")),
     "truth": Needs(lambda spec: (), ("rig", "placement", "after", "before")),
-    "poisson": Needs(lambda spec: (), ("rig", "placement", "clouds")),
-    "alpha": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "clouds")),
+    "poisson": Needs(lambda spec: (), ("rig", "placement", "fused")),
+    "alpha": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "fused")),
 }
 """All stages; ``pipeline.stages`` has what they do."""
-CHAIN: tuple[StageName, ...] = ("rig", "inferred", "nodes", "placement", "clouds", "after", "before", "truth")
-"""The stages of a reconstruction, in their order; the others are baselines beside it."""
+REBUILD: tuple[StageName, ...] = ("rig", "inferred", "nodes", "placement", "fused", "after")
+"""The stages from the images to the surface, in their order."""
+CHAIN: tuple[StageName, ...] = (*REBUILD, "clouds", "before", "truth")
+"""The stages of a reconstruction, which compares it with what was measured and true; the others are baselines
+beside it."""
 
 
 def key(spec: Spec, stage: StageName) -> tuple[Hashable, ...]:

@@ -23,7 +23,7 @@ from pipeline.config import (
     SurfaceConfig,
 )
 from pipeline.depth import DepthNetwork
-from pipeline.merging import MergedClouds, merge_clouds
+from pipeline.merging import FusedCloud, MergedClouds, merge, merge_fused
 from pipeline.nodes import (
     InferredDepth,
     NodeClouds,
@@ -149,17 +149,26 @@ def register_nodes(
     return place_nodes(rig.frames, nodes, config, align_with)
 
 
-def merge(
+def fused_cloud(
     mode: FusionMode,
     max_points: int,
     smoothing_passes: int,
     rig: Rig,
     nodes: tuple[NodeClouds, ...],
     placement: Placement,
-) -> Steps[MergedClouds]:
-    """The clouds that the ball rolls over."""
+) -> Steps[FusedCloud]:
+    """The cloud that the ball rolls over."""
     yield Progress("merging the clouds", 0.6)
-    return merge_clouds(rig.frames, nodes, placement.T_world_camera, mode, max_points, smoothing_passes)
+    return merge_fused(rig.frames, nodes, placement.T_world_camera, mode, max_points, smoothing_passes)
+
+
+def both_clouds(
+    smoothing_passes: int, nodes: tuple[NodeClouds, ...], placement: Placement, fused: FusedCloud
+) -> Steps[MergedClouds]:
+    """The same beside the sensors' own points, thinned alike."""
+    yield Progress("merging the sensors' clouds", 0.75)
+    sensor = merge([node.sensor for node in nodes], placement.T_world_camera, fused.voxel_m, smoothing_passes)
+    return MergedClouds(sensor, fused.fused, fused.r_F_m, fused.sigma_D_m)
 
 
 def roll_over(
@@ -168,7 +177,7 @@ def roll_over(
     config: SurfaceConfig,
     rig: Rig,
     placement: Placement,
-    clouds: MergedClouds,
+    clouds: FusedCloud | MergedClouds,
 ) -> Steps[SurfaceResult]:
     """The surface of one of the clouds; without a triangle where the ball falls through everywhere."""
     yield Progress(f"rolling the ball over the {name} cloud", fraction)
@@ -189,15 +198,13 @@ def compare(rig: Rig, placement: Placement, after: SurfaceResult, before: Surfac
     return compared(rig, placement, before), compared(rig, placement, after)
 
 
-def poisson(rig: Rig, placement: Placement, clouds: MergedClouds) -> Steps[SurfaceResult]:
+def poisson(rig: Rig, placement: Placement, clouds: FusedCloud) -> Steps[SurfaceResult]:
     """Screened Poisson reconstruction of the fused cloud, a baseline beside the ball."""
     yield Progress("Poisson reconstruction", 0.7)
     return with_rays(poisson_surface(clouds.fused, clouds.r_F_m), rig, placement)
 
 
-def alpha(
-    config: SurfaceConfig, rig: Rig, placement: Placement, clouds: MergedClouds
-) -> Steps[SurfaceResult]:
+def alpha(config: SurfaceConfig, rig: Rig, placement: Placement, clouds: FusedCloud) -> Steps[SurfaceResult]:
     """The alpha shape of the fused cloud with the radius of the largest ball, a baseline beside the ball."""
     yield Progress("the alpha shape", 0.7)
     largest_m = radii(config, clouds.r_F_m, clouds.sigma_D_m)[-1]
@@ -232,7 +239,8 @@ STAGES: dict[StageName, Callable[..., Steps[Any]]] = {
     "inferred": infer_depths,
     "nodes": prepare_nodes,
     "placement": register_nodes,
-    "clouds": merge,
+    "fused": fused_cloud,
+    "clouds": both_clouds,
     "after": partial(roll_over, "fused", 0.7),
     "before": partial(roll_over, "sensor", 0.8),
     "truth": compare,

@@ -19,7 +19,7 @@ from packetmesh.memory import peak_memory_bytes
 from packetmesh.progress import drain
 from pipeline.config import PRESETS
 from pipeline.io.demos import load_demo
-from pipeline.merging import merge_clouds
+from pipeline.merging import merge_fused
 from pipeline.open3d_runtime import o3d
 from pipeline.rays import tensor, triangle_scene
 from pipeline.sources import LoadedRig
@@ -142,7 +142,7 @@ def room_cloud(points: int, smoothed: bool = True) -> PointCloud:
     spec = Spec(LoadedRig(rig), config=fine)
     nodes = drain(run(spec, stages=("nodes",)))["nodes"].value
     surface = fine.surface
-    fused = merge_clouds(
+    fused = merge_fused(
         rig.frames, nodes, rig.truth.T_world_camera, "fill", surface.max_points, surface.smoothing_passes
     ).fused
     thin = voxel_average(fused, voxel_for_count(fused.points_m, points))

@@ -15,12 +15,9 @@ from pipeline.delivery.sending import Sending, arrived_bytes, frames_at_sink, re
 from pipeline.delivery.sink import heard
 from pipeline.nodes import Placement
 from pipeline.sources import LoadedRig
-from pipeline.spec import Spec, StageName
+from pipeline.spec import REBUILD, Spec
 from pipeline.stages import compared, run, with_rays
 from pipeline.types import BoolArray, ByteArray, FloatArray, RgbdFrame, Rig, SurfaceResult
-
-REBUILT: tuple[StageName, ...] = ("rig", "inferred", "nodes", "placement", "clouds", "after")
-"""The stages of a moment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +125,7 @@ def _rebuilt(
         return NOTHING
     spec = spec_of(sending, frames, present)
     try:
-        results = yield from run(spec, memory, REBUILT)
+        results = yield from run(spec, memory, REBUILD)
     except ReconstructionError:  # a handful of points has no surface yet
         return NOTHING
     placement, surface = results["placement"].value, results["after"].value

@@ -12,7 +12,7 @@ from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from pipeline.config import PRESETS, SurfaceConfig
-from pipeline.merging import merge_clouds
+from pipeline.merging import merge, merge_fused
 from pipeline.nodes import NodeClouds
 from pipeline.sources import Demo
 from pipeline.spec import Spec
@@ -117,8 +117,9 @@ class Room:
 
 
 def clouds(rig, nodes, poses, passes):
-    merged = merge_clouds(rig.frames, nodes, poses, CONFIG.fusion.mode, CONFIG.surface.max_points, passes)
-    return Room(rig, nodes, poses, merged.sensor, merged.fused, merged.r_F_m, merged.sigma_D_m)
+    merged = merge_fused(rig.frames, nodes, poses, CONFIG.fusion.mode, CONFIG.surface.max_points, passes)
+    sensor = merge([node.sensor for node in nodes], poses, merged.voxel_m, passes)
+    return Room(rig, nodes, poses, sensor, merged.fused, merged.r_F_m, merged.sigma_D_m)
 
 
 @pytest.fixture(scope="module")
