@@ -26,11 +26,21 @@ def fates(frames: Events, losses: Events) -> NDArray[np.int8]:
     unheard = losses.where(np.isin(losses.cause, np.array(NOT_HEARD, np.int8)))
     if not len(frames) or not len(unheard):
         return cause
-    order = np.lexsort((frames.t_ns, frames.node))
-    span_ns = int(max(frames.t_ns.max(), unheard.t_ns.max())) + 1
-    begun = (frames.node.astype(np.int64) * span_ns + frames.t_ns)[order]
-    at = np.searchsorted(begun, unheard.node.astype(np.int64) * span_ns + unheard.t_ns, side="right") - 1
+    sent, lost = _place(frames, unheard)
+    order = np.argsort(sent)
+    at = np.searchsorted(sent[order], lost, side="right") - 1
     frame = order[np.maximum(at, 0)]
     same = (at >= 0) & (frames.node[frame] == unheard.node) & (frames.packet[frame] == unheard.packet)
     cause[frame[same]] = unheard.cause[same]
     return cause
+
+
+def _place(frames: Events, losses: Events) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(F,) and (L,) places of events in the order of node, packet and time; a link may carry many packets."""
+    count = len(frames)
+    node = np.append(frames.node, losses.node).astype(np.int64)
+    packet = np.append(frames.packet, losses.packet).astype(np.int64)
+    _, pair = np.unique(node * (packet.max() + 1) + packet, return_inverse=True)
+    times, rank = np.unique(np.append(frames.t_ns, losses.t_ns), return_inverse=True)
+    place = pair * len(times) + rank
+    return place[:count], place[count:]

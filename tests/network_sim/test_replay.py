@@ -6,6 +6,7 @@ from scipy import stats
 
 from network_sim.config import NetworkConfig
 from network_sim.conservation import balance, image_balance
+from network_sim.frames import fates
 from network_sim.link_trace import read_link_trace
 from network_sim.simulate import simulate
 from network_sim.trace import NetworkTrace
@@ -109,6 +110,17 @@ def test_without_retransmission_a_link_loses_its_share(link):
     assert sums.created == 3 * -(-100_000 // 116)
     assert stats.binomtest(sums.dropped[Cause.LINK], sums.created, 0.2).pvalue > 1e-3
     assert image_balance(trace).dropped == {Cause.LINK: 3}
+
+
+def test_each_loss_marks_the_frame_that_was_lost_though_others_left_since(link):
+    path = link("0 8 100 0.2\n")
+    trace = run("nodes.retransmit=false", "nodes.image_bytes=20000", "mac.kind=replay", f"mac.trace={path}")
+    sent, lost = trace.events.of(EventKind.AIR), trace.events.of(EventKind.LOSS)
+    marked = sent.where(fates(sent, lost) == Cause.LINK)
+    assert sorted(zip(marked.node, marked.packet, strict=True)) == sorted(
+        zip(lost.node, lost.packet, strict=True)
+    )
+    assert len(lost) > 10
 
 
 def test_nodes_play_the_recording_from_places_of_their_own(link):
