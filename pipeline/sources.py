@@ -93,7 +93,7 @@ class ImagePair:
         from pipeline.io.rigs import load_frame
 
         frame = load_frame(self.color, self.depth, self.intrinsics, self.depth_scale)
-        return Rig(Path(self.color).stem, (frame,))
+        return Rig(self.title, (frame,))
 
     def arguments(self) -> list[str]:
         files = ["--color", self.color, "--depth", self.depth, "--intrinsics", self.intrinsics]
