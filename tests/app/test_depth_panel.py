@@ -115,6 +115,20 @@ def test_clicks_paint_what_is_hidden_and_filled(session):
     assert marked(session) is None
 
 
+def test_what_was_filled_stays_when_another_step_gets_other_settings(session):
+    session.gui.press("Discs", "Add")
+    session.gui.press(BUTTON)
+    filled = session.gui.text(HIDE)
+    assert "measured pixels of node_00 hidden" in filled
+    config, spec = session.spec.config, session.spec
+    session.panel.on_spec(
+        replace(spec, config=replace(config, surface=replace(config.surface, smoothing_passes=0)))
+    )
+    assert session.gui.text(HIDE) == filled
+    session.panel.on_spec(spec)
+    session.gui.press("Discs", "Clear")
+
+
 def test_discs_of_another_scene_are_cleared_and_those_of_other_settings_stay(session):
     panel, spec = session.panel, session.spec
     session.gui.press("Discs", "Add")

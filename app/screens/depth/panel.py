@@ -44,7 +44,7 @@ class DepthPanel(Panel):
         """Two pictures to compare, alignment, what to draw; numbers of one node; the rest in folders."""
         gui, session = self.gui, self.session
         self._look: DepthLook | None = None
-        self._source = session.spec.source
+        self._source, self._key = session.spec.source, session.spec.key("depth")
         gui.add_markdown(TEXT)
         self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, DepthLook()), self._take_look)
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images and numbers are shown below.")
@@ -94,7 +94,9 @@ class DepthPanel(Panel):
         if spec.source != self._source:
             self._source = spec.source
             self._hide.clear()
-        self._hide.forget()
+        if spec.key("depth") != self._key:
+            self._key = spec.key("depth")
+            self._hide.forget()
 
     def on_view(self, step: Step, view: Any) -> None:
         """Draw new clouds."""
