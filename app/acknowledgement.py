@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from app.page import running
 from app.ui import Ui
 
-TIMEOUT_S = 1.5
+TIMEOUT_S = 4.0
 """Without an answer for so long, perhaps as there is no browser, it is taken as given. A page that draws
-answers within a second (page.js)."""
+answers within three seconds (page.js)."""
 
 
 class DrawAcknowledgement:
@@ -34,7 +34,7 @@ class DrawAcknowledgement:
         self._timeout = ui.debounce(TIMEOUT_S, self._answered)
 
     def hold(self) -> None:
-        """Have only new meshes drawn, until ``ask`` ends that, a hand turns the view, or 3 s have passed."""
+        """Have only new meshes drawn, until ``ask`` ends that, a hand turns the view, or 6 s have passed."""
         self._run_script("packetmesh.hold()")
 
     def ask(self, vertices: Sequence[int] = (), hold: bool = False) -> None:

@@ -5,8 +5,8 @@
   // While anything new arrives, viser draws one frame after another, most of them alike. Without a
   // graphics card that takes the time in which the next mesh is made. A view that is held draws only frames
   // in which a mesh is new. And while a mesh is awaited, its place may be empty: then nothing is drawn.
-  const HELD_MS = 3000; // at most, since the last call
-  const AWAITED_MS = 1000; // at most, before the answer is given without
+  const HELD_MS = 6000; // at most, since the last call
+  const AWAITED_MS = 3000; // at most, before the answer is given without
   const POLL_MS = 4;
   const KEY = {key: "Insert", ctrlKey: true, altKey: true, shiftKey: true};
 
@@ -98,15 +98,15 @@
       until = performance.now() + HELD_MS;
     },
 
-    // Press a key once meshes of so many vertices are drawn; without any, when the next frame is drawn if the
-    // view is held, as it goes on to be or not, and else two frames later.
+    // Press a key once meshes of so many vertices are drawn, and those that are awaited still; without any,
+    // when the next frame is drawn if the view is held, as it goes on to be or not, and else two frames later.
     ask(vertices, hold) {
       watch();
       const question = ++asked;
       held = hold;
       until = performance.now() + HELD_MS;
-      awaited = vertices.filter(count => !arrived.includes(count));
-      const nothing = !hold && vertices.length === 0;
+      if (vertices.length > 0) awaited = vertices.filter(count => !arrived.includes(count));
+      const nothing = !hold && vertices.length === 0 && awaited.length === 0;
       whole = !nothing && awaited.length === 0;
       if (gl === null || nothing)
         requestAnimationFrame(() => requestAnimationFrame(() => answer(question)));

@@ -117,3 +117,11 @@ def test_of_two_questions_only_the_last_is_answered(page):
     page.wait_for_function("watched.answers === 1")
     page.wait_for_timeout(1500)
     assert page.evaluate("watched.answers") == 1
+
+
+def test_a_mesh_that_is_awaited_still_keeps_the_view_until_it_comes(page):
+    begin_to_count(page)
+    page.evaluate("packetmesh.ask([123456789], true); packetmesh.ask([], false)")
+    page.wait_for_timeout(500)
+    assert page.evaluate("[watched.answers, watched.drawn]") == [0, 0]
+    page.wait_for_function("watched.answers === 1")
