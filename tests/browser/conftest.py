@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Error
 
 ARGUMENTS = [
     "--no-sandbox",
@@ -34,6 +36,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if Path(__file__).parent in item.path.parents:
             item.add_marker(pytest.mark.browser)
             item.add_marker(pytest.mark.xdist_group("browser"))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item):
+    """Say in the report of a failed test what its page said."""
+    report = yield
+    if report.when == "call" and report.failed:
+        for name, page in item.funcargs.items():
+            if hasattr(page, "inner_text"):
+                with contextlib.suppress(Error):  # of a page that is closed
+                    report.sections.append((f"text of {name}", page.inner_text("body", timeout=5000)))
+    return report
 
 
 @pytest.fixture(scope="session")
