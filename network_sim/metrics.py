@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from network_sim import energy
+from network_sim.coverage import NEVER_NS, road_coverage
 from network_sim.ledger import Outcomes
 from network_sim.states import State
 from network_sim.trace import NetworkTrace
@@ -184,18 +185,15 @@ def _overheads(trace: NetworkTrace) -> Rows:
 
 def _coverage(trace: NetworkTrace) -> Rows:
     """Which pieces of road were seen when; needs the images' events and cells."""
-    taken = trace.events.of(EventKind.CAPTURE)
-    taken = taken.where((taken.peer >= 0) & (taken.t_ns >= to_ns(trace.config.run.warmup_s)))
-    if not len(taken):
+    sights = road_coverage(trace)
+    if sights is None:
         return
-    window = taken.t_ns // to_ns(trace.config.scheme.validity_s)
-    seen = np.unique(np.stack((taken.peer, window)), axis=1).shape[1]
-    arrived = np.isin(taken.image, trace.events.of(EventKind.ARRIVE).image)
-    covered = np.unique(np.stack((taken.peer, window))[:, arrived], axis=1).shape[1]
+    covered = int((sights.covered_ns != NEVER_NS).sum())
     windows = f"Pairs of a road cell and a span of {trace.config.scheme.validity_s:g} s"
-    yield "coverage", covered / seen, "1", f"{windows} of which an image arrived, of all that cameras saw"
-    if arrived.any():
-        share = 1.0 - covered / arrived.sum()
+    share = covered / len(sights.cell)
+    yield "coverage", share, "1", f"{windows} of which an image arrived, of all that cameras saw"
+    if sights.arrived:
+        share = 1.0 - covered / sights.arrived
         yield "redundancy", share, "1", f"Arrived images beyond the first of its kind. {windows} are a kind"
 
 

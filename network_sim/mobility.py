@@ -142,6 +142,15 @@ def cell_numbers(config: StreetConfig, cell_m: float) -> int:
     return numbers
 
 
+def cells_m(config: StreetConfig, cell_m: float) -> np.ndarray:
+    """(C, 2, 2) both ends of every cell, in the order of their numbers and the direction of driving."""
+    pieces = _pieces(config, cell_m)
+    ends_m = np.minimum(np.arange(pieces + 1) * cell_m, config.block_m)
+    into_m = np.stack((ends_m[:-1], ends_m[1:]), axis=1)
+    ways_m = STEPS[:, None, None] * into_m[..., None]
+    return (crossings_m(config)[:, None, None, None] + ways_m).reshape(-1, 2, 2)
+
+
 def drive(config: StreetConfig, horizon_s: float, rng: np.random.Generator) -> Routes:
     """Routes that last until the horizon.
 

@@ -1,5 +1,13 @@
 """The app's fixed colours, told apart by colour-blind people too (after Okabe and Ito)."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipeline.types import ByteArray, FloatArray
+
 SOURCE = (230, 159, 0)
 """Orange: the cloud that moves."""
 TARGET = (0, 114, 178)
@@ -19,6 +27,8 @@ DISTANCE_STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (25
 MOST_DISTANCE_M = 0.1
 CONFIDENCE_STOPS = DISTANCE_STOPS
 """Confidence from 0 to 100 %: the surer, the brighter."""
+COVERAGE_STOPS = DISTANCE_STOPS
+"""Coverage of a road from 0 to 100 %: the more, the brighter."""
 BRAND = (0, 90, 140)
 """The theme's colour."""
 
@@ -30,3 +40,10 @@ def css(color: tuple[int, int, int]) -> str:
 
 BACKGROUND = (214, 219, 224)
 """Behind the scene: white walls and dark furniture both stand out."""
+
+
+def ramp(values: FloatArray, most: float, stops: Sequence[tuple[int, int, int]]) -> ByteArray:
+    """RGB, with a last axis of 3, of values from 0 to ``most`` and beyond, between evenly placed colours."""
+    at = np.linspace(0.0, most, len(stops))
+    channels = [np.interp(values, at, channel) for channel in zip(*stops, strict=True)]
+    return np.rint(np.stack(channels, axis=-1)).astype(np.uint8)

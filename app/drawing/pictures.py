@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 
-from app.drawing.colors import CONFIDENCE_STOPS, HOLE
+from app.drawing.colors import CONFIDENCE_STOPS, HOLE, ramp
 from app.records import ColorBar, Picture
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
@@ -79,13 +77,6 @@ def confidence_picture(confidence: FloatArray, flying: BoolArray, out_of_reach: 
 def confidence_colors(confidence: FloatArray) -> ByteArray:
     """RGB of confidences from 0 to 1, with a last axis of 3; the darkest colour for NaN."""
     return ramp(np.nan_to_num(confidence), 1.0, CONFIDENCE_STOPS)
-
-
-def ramp(values: FloatArray, most: float, stops: Sequence[tuple[int, int, int]]) -> ByteArray:
-    """RGB, with a last axis of 3, of values from 0 to ``most`` and beyond, between evenly placed colours."""
-    at = np.linspace(0.0, most, len(stops))
-    channels = [np.interp(values, at, channel) for channel in zip(*stops, strict=True)]
-    return np.rint(np.stack(channels, axis=-1)).astype(np.uint8)
 
 
 def cividis(level: ByteArray) -> ByteArray:

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from network_sim.config import Keep
+from network_sim.coverage import road_coverage
 from network_sim.ledger import BINS_PER_DECADE, delays_of
 from network_sim.metrics import metrics
 from network_sim.trace import Recorder
@@ -137,6 +138,15 @@ def test_redundancy_counts_images_of_what_was_shown_already() -> None:
     found = metrics(trace_of(story))
     assert found["coverage"].value == 3 / 4
     assert found["redundancy"].value == 1 / 4
+    sights = road_coverage(trace_of(story))
+    for t_s, seen, covered in (
+        (71, [0, 1, 0], [0, 0, 0]),
+        (99, [0, 2, 1], [0, 0, 0]),
+        (100, [0, 2, 1], [0, 2, 1]),
+    ):
+        for found, wanted in zip(sights.counts(to_ns(t_s), 6), (seen, covered), strict=True):
+            assert found[:3].tolist() == wanted
+    assert sights.counts(to_ns(100), 6)[0][5] == 1  # seen, and none of its images came
 
 
 def test_a_run_within_its_warm_up_has_no_metrics() -> None:

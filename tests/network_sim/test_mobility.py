@@ -13,6 +13,7 @@ from network_sim.mobility import (
     StreetPlaces,
     access_points_m,
     cell_numbers,
+    cells_m,
     contacts,
     crossings_m,
     drive,
@@ -53,6 +54,21 @@ def test_a_vehicle_moves_at_its_speed() -> None:
     path_m = np.array([places.position_m(3, t_ns) for t_ns in times_ns])
     steps_m = np.abs(np.diff(path_m, axis=0)).sum(axis=1)
     assert steps_m == pytest.approx(np.full(len(steps_m), 5.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("directed", [True, False])
+def test_a_vehicle_is_between_the_ends_of_its_cell(directed: bool) -> None:
+    routes = _routes()
+    places, ends_m = StreetPlaces(routes, access_points_m(CONFIG)), cells_m(CONFIG, 70.0)
+    times_ns = np.arange(0, to_ns(HORIZON_S), to_ns(7.3))
+    for vehicle in range(3):
+        cells = routes.cells(vehicle, times_ns, 70.0, directed)
+        for t_ns, cell in zip(times_ns.tolist(), cells.tolist(), strict=True):
+            at_m = np.array(places.position_m(vehicle, t_ns))
+            low_m, high_m = np.sort(ends_m[cell], axis=0)
+            assert (at_m > low_m - 1e-6).all()
+            assert (at_m < high_m + 1e-6).all()
+    assert len(ends_m) == cell_numbers(CONFIG, 70.0)
 
 
 def test_distances_are_those_of_the_positions() -> None:

@@ -10,9 +10,11 @@ import viser
 
 from app.drawing.cameras import turn
 from app.drawing.clouds import clear
-from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, NEUTRAL
+from app.drawing.colors import BACKGROUND, BRAND, COVERAGE_STOPS, DELIVERED, LOSS, NEUTRAL, css, ramp
 from app.screens.network.labels import ANSWER, PACKET_COLORS
 from app.screens.network.view import NetworkView, Pieces, What
+from network_sim.coverage import RoadCoverage
+from network_sim.mobility import cells_m
 from network_sim.types import Cause
 from pipeline.types import ByteArray, FloatArray
 
@@ -41,6 +43,9 @@ ON_THE_WAY = (Cause.COLLISION, Cause.NOISE, Cause.RANGE, Cause.UPLINK, Cause.LIN
 CIRCLE = np.linspace(0.0, 2.0 * np.pi, 73)
 STREET, RANGE, NODE_RANGE = (170, 176, 182), (0, 158, 115), (150, 170, 190)
 ELEVATION_RAD = np.radians(52.0)
+LANE = 0.05
+"""From the middle of a street to the line of one direction, in units of the scene."""
+ROAD_WIDTH = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +107,7 @@ class NetworkDrawing:
         self._scene, self._below, self._views = scene, below, views
         self.ground = ground_of(views)
         self._flights = [Flights.of(view.pieces) for view in views]
+        self._roads: list[Roads | None] = []
         self._nodes: list[dict[str, viser.PointCloudHandle]] = []
         for index, view in enumerate(views):
             self._add_ground(index, view)
@@ -131,6 +137,9 @@ class NetworkDrawing:
         for index, (view, flights) in enumerate(zip(self._views, self._flights, strict=True)):
             at = self._places(index, view, view.positions_m(now_ns))
             self._move(index, view, at)
+            roads = self._roads[index]
+            if roads is not None:
+                roads.show(now_ns)
             for one, color in (flights.packets(now_ns, shown_ns, at), flights.losses(now_ns, shown_ns, at)):
                 points.append(one)
                 colors.append(color)
@@ -184,10 +193,24 @@ class NetworkDrawing:
             ends_m = [((x, 0.0), (x, far_m)) for x in along_m] + [((0.0, y), (far_m, y)) for y in along_m]
             flat = self.ground.place(np.array(ends_m).reshape(-1, 2), index, -0.02)
             self._lines(f"{index}/streets", flat.reshape(-1, 2, 3), STREET, 6.0)
+        self._roads.append(None if view.roads is None else self._add_roads(index, view, view.roads))
         for roles, color, width in ((("node",), NODE_RANGE, 1.0), (("sink", "access-point"), RANGE, 2.5)):
             centers_m = view.tracks_m[0][[role in roles for role in view.roles]].astype(float)
             if len(centers_m):
                 self._lines(f"{index}/range-{roles[0]}", self._circles(centers_m, view, index), color, width)
+
+    def _add_roads(self, index: int, view: NetworkView, sights: RoadCoverage) -> Roads:
+        """A line for every cell that was seen, at the right where each direction has its own."""
+        street, scheme = view.config.street, view.config.scheme
+        cells = np.unique(sights.cell)
+        ends = self.ground.place(cells_m(street, scheme.cell_m)[cells].reshape(-1, 2), index, -0.015)
+        ends = ends.reshape(-1, 2, 3)
+        if scheme.directed_cells:
+            ahead = ends[:, 1] - ends[:, 0]
+            right = np.column_stack([ahead[:, 1], -ahead[:, 0], ahead[:, 2]])
+            ends += LANE * (right / np.linalg.norm(right, axis=1)[:, None])[:, None]
+        lines = self._lines(f"{index}/roads", ends, STREET, ROAD_WIDTH)
+        return Roads(lines, sights, cells)
 
     def _circles(self, centers_m: FloatArray, view: NetworkView, index: int) -> FloatArray:
         """(S, 2, 3) segments of the receive range around each centre."""
@@ -216,14 +239,47 @@ class NetworkDrawing:
             anchor="bottom-center",
         )
 
-    def _lines(self, name: str, ends: FloatArray, color: tuple[int, int, int], width: float) -> None:
-        self._scene.add_line_segments(
+    def _lines(
+        self, name: str, ends: FloatArray, color: tuple[int, int, int], width: float
+    ) -> viser.LineSegmentsHandle:
+        return self._scene.add_line_segments(
             f"{self._below}/{name}",
             ends.astype(np.float32),
             np.array(color, np.uint8),
             thickness=width,
             thickness_units="screen",
         )
+
+
+class Roads:
+    """The roads in the colours of their coverage until a time; grey while nobody was there."""
+
+    def __init__(self, lines: viser.LineSegmentsHandle, sights: RoadCoverage, cells: np.ndarray) -> None:
+        """``lines`` has one for each of ``cells`` (C,), all that were ever seen."""
+        self._lines, self._sights, self._cells = lines, sights, cells
+        self._shown = np.zeros(0, np.uint8)
+
+    def show(self, now_ns: int) -> None:
+        """Paint them as of a time."""
+        seen, covered = (one[self._cells] for one in self._sights.counts(now_ns, int(self._cells.max()) + 1))
+        colors = ramp(covered / np.maximum(seen, 1), 1.0, COVERAGE_STOPS)
+        colors[seen == 0] = STREET
+        if not np.array_equal(colors, self._shown):
+            self._shown = colors
+            self._lines.colors = np.repeat(colors[:, None], 2, axis=1)
+
+
+def road_legend(view: NetworkView) -> str:
+    """HTML: what the colours of the roads mean; empty without roads."""
+    if view.roads is None:
+        return ""
+    stops = ", ".join(css((int(r), int(g), int(b))) for r, g, b in COVERAGE_STOPS)
+    return (
+        "<div style='padding: 0 0.8em 0.8em; font-size: 12px'>Roads, each way: of the spans of "
+        f"{view.config.scheme.validity_s:g} s in which a camera saw them so far, an image has arrived of 0 % "
+        f"<span style='display: inline-block; width: 7em; height: 0.8em; "
+        f"background: linear-gradient(to right, {stops})'></span> 100 %</div>"
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from app.lesson import LessonFolder, read_lesson
 from app.screens.network.delivery_draw import DeliveryDrawing, legend
 from app.screens.network.delivery_numbers import changes, difference, moment_table, more_rows, summary
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
-from app.screens.network.draw import NetworkDrawing, look_at_ground
+from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
 from app.screens.network.labels import NETWORKS
 from app.screens.network.lanes import frames_lane, growth_lane, run_curves, stops_ns
 from app.screens.network.lesson import CROSSING, LOST_PACKET, SETTINGS, NetworkLook, find
@@ -220,7 +220,7 @@ class NetworkPanel(Panel):
         self._frames = [Frames(run) for run in runs]
         self._status.content = runs_summary(runs)
         self._table.content, self._others.content = metric_tables(runs)
-        self._difference.content, self._legend.content = verdict(runs), ""
+        self._difference.content, self._legend.content = verdict(runs), road_legend(runs[0])
         self._packet.content = PICK
         self._drawing = NetworkDrawing(self.scene, self._next_name(), runs)
         start_ns, end_ns = min(run.start_ns for run in runs), max(run.end_ns for run in runs)

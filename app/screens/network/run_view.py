@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from app.levels import Levels, levels_of
 from app.screens.network.view import Curve, NetworkView, Pieces, Series, What
 from network_sim.config import NetworkConfig
+from network_sim.coverage import road_coverage
 from network_sim.energy import cumulative_radio_j
 from network_sim.frames import fates
 from network_sim.mac import FRAME_HEADER_BYTES
@@ -58,6 +59,7 @@ def run_view(trace: NetworkTrace, elapsed_s: float) -> NetworkView:
         metrics=metrics(trace),
         elapsed_s=elapsed_s,
         packets=trace.counters.created,
+        roads=road_coverage(trace),
         header_bytes=_header_bytes(trace.config),
     )
 

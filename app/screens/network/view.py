@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from app.levels import Levels
 from network_sim.config import NetworkConfig
+from network_sim.coverage import RoadCoverage
 from network_sim.metrics import Metric
 from pipeline.types import FloatArray
 
@@ -112,6 +113,8 @@ class NetworkView:
     """Time that the simulation took on this machine."""
     packets: int
     """That were created in all."""
+    roads: RoadCoverage | None
+    """What of the streets the images show; None without streets."""
     header_bytes: int
     """Of a frame with image bytes: those of the medium access and of all above it."""
     label: str = ""

@@ -7,10 +7,9 @@ from collections.abc import Generator
 
 import numpy as np
 
-from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET
+from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET, ramp
 from app.drawing.glb import lines_glb
 from app.drawing.meshes import rim_segments_m, surface_glb
-from app.drawing.pictures import ramp
 from app.screens.surface.view import Coloring, PaintedMesh, PaintedView, PaintRequest, Which
 from app.state import Spec
 from app.store import Store
