@@ -10,8 +10,8 @@ import numpy as np
 
 from packetmesh.errors import ReconstructionError
 from pipeline import geometry
-from pipeline.acquisition import FilterResult, back_project, filter_outliers
-from pipeline.config import AcquisitionConfig, DepthConfig, FusionMode, NodePoints, RegistrationConfig
+from pipeline.acquisition import FilterResult, Outliers, back_project, split
+from pipeline.config import DepthConfig, FusionMode, NodePoints, RegistrationConfig
 from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, judge
 from pipeline.pixels import near
 from pipeline.registration import fuse, register
@@ -94,7 +94,7 @@ def nothing_inferred(frame: RgbdFrame) -> InferredDepth:
 def prepare_node(
     frame: RgbdFrame,
     inferred: InferredDepth,
-    acquisition: AcquisitionConfig,
+    outliers: Outliers,
     depth: DepthConfig,
     mode: FusionMode,
     registration: RegistrationConfig | None = None,
@@ -104,13 +104,13 @@ def prepare_node(
     Args:
         frame: the node's images.
         inferred: what the depth network gives for its colour image.
-        acquisition: which sensor points are outliers.
+        outliers: which of its sensor points are outliers.
         depth: how inferred depth is made metric, and how much of it is believed.
         mode: ``fill`` lets inferred points in only at pixels that the sensor has not measured.
         registration: moves the inferred cloud rigidly onto the sensor cloud, as the thesis does; None
             leaves its points where their pixels are.
     """
-    filtered = filter_outliers(back_project(frame), acquisition, frame.intrinsics.fx_px)
+    filtered = split(back_project(frame), outliers)
     sensor = filtered.kept
     alignment = _aligned(frame, inferred, depth)
     judged = judge(alignment, frame.depth, frame.rgb, depth.reach, depth.least_confidence)

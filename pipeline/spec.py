@@ -15,7 +15,18 @@ from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Source
 
 StageName = Literal[
-    "rig", "inferred", "nodes", "placement", "fused", "clouds", "after", "before", "truth", "poisson", "alpha"
+    "rig",
+    "inferred",
+    "outliers",
+    "nodes",
+    "placement",
+    "fused",
+    "clouds",
+    "after",
+    "before",
+    "truth",
+    "poisson",
+    "alpha",
 ]
 
 
@@ -54,14 +65,14 @@ class Needs:
 NEEDS: dict[StageName, Needs] = {
     "rig": Needs(lambda spec: (spec.source,)),
     "inferred": Needs(lambda spec: (spec.config.depth.of_network(),), ("rig",)),
+    "outliers": Needs(lambda spec: (spec.config.acquisition,), ("rig",)),
     "nodes": Needs(
         lambda spec: (
-            spec.config.acquisition,
             spec.config.depth,
             spec.config.fusion.mode,
             spec.config.inferred_registration if spec.config.fusion.register_inferred else None,
         ),
-        ("rig", "inferred"),
+        ("rig", "inferred", "outliers"),
     ),
     "placement": Needs(
         lambda spec: (spec.config.node_registration, spec.config.fusion.align_nodes_with), ("rig", "nodes")
@@ -82,7 +93,7 @@ NEEDS: dict[StageName, Needs] = {
     "alpha": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "fused")),
 }
 """All stages; ``pipeline.stages`` has what they do."""
-REBUILD: tuple[StageName, ...] = ("rig", "inferred", "nodes", "placement", "fused", "after")
+REBUILD: tuple[StageName, ...] = ("rig", "inferred", "outliers", "nodes", "placement", "fused", "after")
 """The stages from the images to the surface, in their order."""
 CHAIN: tuple[StageName, ...] = (*REBUILD, "clouds", "before", "truth")
 """The stages of a reconstruction, which compares it with what was measured and true; the others are baselines

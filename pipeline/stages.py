@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any, Literal, Protocol, TypeVar
 
 from packetmesh.progress import Progress
+from pipeline.acquisition import Outliers, back_project, find_outliers
 from pipeline.config import (
     AcquisitionConfig,
     DepthConfig,
@@ -125,19 +126,28 @@ def infer_depths(depth: DepthConfig, rig: Rig) -> Steps[tuple[InferredDepth, ...
     return tuple(inferred)
 
 
+def measured_outliers(acquisition: AcquisitionConfig, rig: Rig) -> Steps[tuple[Outliers, ...]]:
+    """The outliers of every node's measured points; colour has no say in it."""
+    found = []
+    for index, frame in enumerate(rig.frames):
+        yield Progress(f"outliers of {frame.name}", 0.2 + 0.1 * index / len(rig.frames))
+        found.append(find_outliers(back_project(frame), acquisition, frame.intrinsics.fx_px))
+    return tuple(found)
+
+
 def prepare_nodes(
-    acquisition: AcquisitionConfig,
     depth: DepthConfig,
     mode: FusionMode,
     registration: RegistrationConfig | None,
     rig: Rig,
     inferred: tuple[InferredDepth, ...],
+    outliers: tuple[Outliers, ...],
 ) -> Steps[tuple[NodeClouds, ...]]:
     """The clouds of every node."""
     nodes = []
-    for index, (frame, answer) in enumerate(zip(rig.frames, inferred, strict=True)):
-        yield Progress(f"clouds of {frame.name}", 0.2 + 0.25 * index / len(rig.frames))
-        nodes.append(prepare_node(frame, answer, acquisition, depth, mode, registration))
+    for index, (frame, answer, found) in enumerate(zip(rig.frames, inferred, outliers, strict=True)):
+        yield Progress(f"clouds of {frame.name}", 0.3 + 0.15 * index / len(rig.frames))
+        nodes.append(prepare_node(frame, answer, found, depth, mode, registration))
     return tuple(nodes)
 
 
@@ -237,6 +247,7 @@ def cameras_of(rig: Rig, placement: Placement) -> list[Camera]:
 STAGES: dict[StageName, Callable[..., Steps[Any]]] = {
     "rig": open_rig,
     "inferred": infer_depths,
+    "outliers": measured_outliers,
     "nodes": prepare_nodes,
     "placement": register_nodes,
     "fused": fused_cloud,

@@ -1,6 +1,14 @@
 """Depth image to filtered point cloud (SPEC 2)."""
 
 from pipeline.acquisition.back_project import back_project, depth_sigma_m
-from pipeline.acquisition.outliers import FilterResult, filter_outliers
+from pipeline.acquisition.outliers import FilterResult, Outliers, filter_outliers, find_outliers, split
 
-__all__ = ["FilterResult", "back_project", "depth_sigma_m", "filter_outliers"]
+__all__ = [
+    "FilterResult",
+    "Outliers",
+    "back_project",
+    "depth_sigma_m",
+    "filter_outliers",
+    "find_outliers",
+    "split",
+]

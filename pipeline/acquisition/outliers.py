@@ -18,21 +18,44 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class FilterResult:
-    """A cloud split into kept points and outliers, with the score that decided."""
+class Outliers:
+    """Which points of a cloud are outliers, with the score that decided."""
 
-    kept: PointCloud
-    outliers: PointCloud
     keep: BoolArray
-    """(N,) True for the kept points of the cloud that was filtered."""
+    """(N,) False for the outliers."""
     score: FloatArray
     """(N,) mean distance to the neighbours: metres in mode ``thesis``, else pixels (d f / z)."""
     threshold: float
     """Largest score that is kept, in the unit of ``score``."""
 
 
+@dataclass(frozen=True, slots=True)
+class FilterResult:
+    """A cloud split into kept points and outliers."""
+
+    kept: PointCloud
+    outliers: PointCloud
+    keep: BoolArray
+    """(N,) True for the kept points of the cloud that was filtered."""
+    score: FloatArray
+    """(N,) as in ``Outliers``."""
+    threshold: float
+    """As in ``Outliers``."""
+
+
 def filter_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: float) -> FilterResult:
-    """Split off the points whose mean distance to their N nearest neighbours is unusual.
+    """Split off the points that ``find_outliers`` finds."""
+    return split(cloud, find_outliers(cloud, config, focal_px))
+
+
+def split(cloud: PointCloud, found: Outliers) -> FilterResult:
+    """The kept points and the outliers of a cloud."""
+    keep = found.keep
+    return FilterResult(cloud.select(keep), cloud.select(~keep), keep, found.score, found.threshold)
+
+
+def find_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: float) -> Outliers:
+    """The points whose mean distance to their N nearest neighbours is unusual.
 
     Args:
         cloud: camera frame, because the spacing of a back-projected depth map grows as z / f.
@@ -61,5 +84,4 @@ def filter_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: floa
         threshold = median + _ROBUST_SIGMAS * _MAD_TO_SIGMA * np.median(np.abs(score - median))
     else:
         threshold = score.mean() + config.outlier_t * score.std()
-    keep = score <= threshold * (1.0 + _ROUNDING)
-    return FilterResult(cloud.select(keep), cloud.select(~keep), keep, score, float(threshold))
+    return Outliers(score <= threshold * (1.0 + _ROUNDING), score, float(threshold))

