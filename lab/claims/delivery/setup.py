@@ -40,7 +40,7 @@ def loss_tasks(full: bool = False, rigs: Sequence[str] = RIGS) -> list[LossTask]
     """Every trial once, the lossless ones first.
 
     Args:
-        full: every coding with every share of both kinds and five seeds, and small packets; hours.
+        full: every coding with every share of every kind and five seeds, and small packets; hours.
         rigs: demo scenes.
     """
     tasks = [lossless(rig, coding) for rig in rigs for coding in CODINGS]
@@ -63,6 +63,8 @@ def _few(rig: str) -> Iterator[LossTask]:
         for share in (0.02, 0.25):
             yield LossTask(rig, coding, LARGE, "burst", share, 0)
         yield LossTask(rig, coding, LARGE, "random", RATE_SHARE, 0)
+        for share in (0.25, 0.5):
+            yield LossTask(rig, coding, LARGE, "deadline", share, 0)
     for coding in CODINGS:
         yield LossTask(rig, coding, LARGE, "burst", RATE_SHARE, 0)
     for coding in ("png", "jpeg"):
@@ -82,6 +84,8 @@ def _all(rig: str) -> Iterator[LossTask]:
             for share in SHARES:
                 for seed in range(SEEDS):
                     yield LossTask(rig, coding, LARGE, loss, share, seed)
+        for share in SHARES:
+            yield LossTask(rig, coding, LARGE, "deadline", share, 0)
     for coding in HEADLINE:
         for seed in range(SEEDS):
             yield LossTask(rig, coding, SMALL, "burst", RATE_SHARE, seed)

@@ -23,7 +23,8 @@ from pipeline.spec import Spec
 from pipeline.stages import compared, run, with_rays
 from pipeline.types import BoolArray, DepthMap, RgbdFrame, Rig
 
-Loss = Literal["random", "burst"]
+Loss = Literal["random", "burst", "deadline"]
+"""Single packets, bursts of them, or the last of each node's, which come too late."""
 When = Literal["before", "after"]
 """Fusion: of measured depth alone, or with what is inferred."""
 WHENS: tuple[When, ...] = ("before", "after")
@@ -83,8 +84,11 @@ def frames_left(rig: Rig, task: LossTask) -> tuple[list[RgbdFrame], Values]:
     coding = coding_named(task.coding)
     streams = [np.frombuffer(coding.encode(images_of(f), task.packet_bytes), np.uint8) for f in rig.frames]
     counts = [-(-stream.size // task.packet_bytes) for stream in streams]
-    losses = LossConfig(task.share, BURST_PACKETS if task.loss == "burst" else 1.0)
-    lost = packets_lost(counts, losses, task.seed)
+    if task.loss == "deadline":
+        lost = [np.arange(count) >= round((1.0 - task.share) * count) for count in counts]
+    else:
+        losses = LossConfig(task.share, BURST_PACKETS if task.loss == "burst" else 1.0)
+        lost = packets_lost(counts, losses, task.seed)
     frames, delivered = [], 0
     for frame, stream, gone in zip(rig.frames, streams, lost, strict=True):
         there = np.repeat(~gone, task.packet_bytes)[: stream.size]

@@ -75,6 +75,15 @@ def test_a_lossless_coding_without_losses_gives_the_very_images(rig, coding, pac
     assert traffic["packets_lost"] == 0
 
 
+def test_a_deadline_leaves_what_was_sent_first(rig):
+    frames, traffic = frames_left(rig, LossTask("small", "raw", LARGE, "deadline", 0.5, 0))
+    np.testing.assert_array_equal(frames[0].depth.z_m, rig.frames[0].depth.z_m)  # raw sends depth first
+    known = frames[0].rgb_known
+    assert 0.0 < known.mean() < 0.5
+    assert not (np.diff(known.ravel().astype(int)) > 0).any()
+    assert traffic["packets_lost"] == pytest.approx(0.5 * traffic["packets"], abs=len(rig.frames))
+
+
 def test_without_losses_the_score_is_the_lossless_one_and_a_trial_repeats(rig, monkeypatch):
     monkeypatch.setattr(trials, "load_demo", lambda name: rig)
     result = reconstruct(rig)
