@@ -27,8 +27,8 @@ DISTANCE_STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (25
 MOST_DISTANCE_M = 0.1
 CONFIDENCE_STOPS = DISTANCE_STOPS
 """Confidence from 0 to 100 %: the surer, the brighter."""
-COVERAGE_STOPS = DISTANCE_STOPS
-"""Coverage of a road from 0 to 100 %: the more, the brighter."""
+COVERAGE_STOPS = ((94, 23, 110), (70, 90, 150), (40, 150, 150), DELIVERED)
+"""Coverage of a road from 0 to 100 %: from violet to green."""
 BRAND = (0, 90, 140)
 """The theme's colour."""
 
@@ -47,3 +47,10 @@ def ramp(values: FloatArray, most: float, stops: Sequence[tuple[int, int, int]])
     at = np.linspace(0.0, most, len(stops))
     channels = [np.interp(values, at, channel) for channel in zip(*stops, strict=True)]
     return np.rint(np.stack(channels, axis=-1)).astype(np.uint8)
+
+
+def linear(colors: ByteArray) -> ByteArray:
+    """RGB as viser takes it for the ends of lines of several colours: in linear light, not sRGB."""
+    share = colors / 255.0
+    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.rint(255.0 * light).astype(np.uint8)

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import viser
 
+from app.drawing.colors import COVERAGE_STOPS, linear
 from app.lesson import read_lesson
 from app.screens.network.delivery_view import DeliveryView
-from app.screens.network.draw import ground_of
+from app.screens.network.draw import STREET, ground_of
 from app.screens.network.labels import NETWORKS
 from app.screens.network.lesson import CROSSING, LOST_PACKET, SETTINGS, NetworkLook
 from app.screens.network.panel import ORIGIN, PICK, NetworkPanel
@@ -259,8 +260,23 @@ def test_vehicles_move_and_two_schemes_stand_beside_each_other(screen):
     moved = np.linalg.norm(screen.handle("vehicle").points - start, axis=1)
     assert moved.min() > 0.0
     assert moved.max() <= 1.001 * 100.0 * ground_of([run]).scale
+    screen.dock.seek(run.end_ns)
+    cells = np.unique(run.roads.cell)
+    seen, covered = (counts[cells] for counts in run.roads.counts(run.end_ns, cells.max() + 1))
+    roads = screen.handle("roads").colors[:, 0]
+    assert 0 < covered.sum() < seen.sum()
+    assert (roads[covered == seen] == linear(np.array(COVERAGE_STOPS[-1]))).all()
+    assert (roads[covered == 0] == linear(np.array(COVERAGE_STOPS[0]))).all()
+    screen.dock.seek(run.start_ns)
+    assert (screen.handle("roads").colors == linear(np.array(STREET))).mean() > 0.8
+    assert "Roads, each way" in gui.text()
+    assert screen.panel._lanes()[0].labels(0)[0].text == "vehicle 1"
     gui.set("Beside", "PDC: by chance, as offered")
     assert len(screen.results.view("network")) == 2
+    assert [lane.labels(0)[0].text for lane in screen.panel._lanes()] == [
+        "BASELINE · vehicle 1",
+        "PDC · vehicle 1",
+    ]
     assert ">PDC: by chance, as offered</th>" in gui.text()
     assert re.search(
         r"PDC brings \d+% of the images that .+ brings, and keeps \d+% of what is seen", gui.text()

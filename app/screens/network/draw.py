@@ -10,7 +10,7 @@ import viser
 
 from app.drawing.cameras import turn
 from app.drawing.clouds import clear
-from app.drawing.colors import BACKGROUND, BRAND, COVERAGE_STOPS, DELIVERED, LOSS, NEUTRAL, css, ramp
+from app.drawing.colors import BACKGROUND, BRAND, COVERAGE_STOPS, DELIVERED, LOSS, NEUTRAL, css, linear, ramp
 from app.screens.network.labels import ANSWER, PACKET_COLORS
 from app.screens.network.view import NetworkView, Pieces, What
 from network_sim.coverage import RoadCoverage
@@ -45,7 +45,7 @@ STREET, RANGE, NODE_RANGE = (170, 176, 182), (0, 158, 115), (150, 170, 190)
 ELEVATION_RAD = np.radians(52.0)
 LANE = 0.05
 """From the middle of a street to the line of one direction, in units of the scene."""
-ROAD_WIDTH = 4.0
+ROAD_WIDTH = 4.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +192,7 @@ class NetworkDrawing:
             far_m = along_m[-1]
             ends_m = [((x, 0.0), (x, far_m)) for x in along_m] + [((0.0, y), (far_m, y)) for y in along_m]
             flat = self.ground.place(np.array(ends_m).reshape(-1, 2), index, -0.02)
-            self._lines(f"{index}/streets", flat.reshape(-1, 2, 3), STREET, 6.0)
+            self._lines(f"{index}/streets", flat.reshape(-1, 2, 3), STREET, 1.5)
         self._roads.append(None if view.roads is None else self._add_roads(index, view, view.roads))
         for roles, color, width in ((("node",), NODE_RANGE, 1.0), (("sink", "access-point"), RANGE, 2.5)):
             centers_m = view.tracks_m[0][[role in roles for role in view.roles]].astype(float)
@@ -203,7 +203,7 @@ class NetworkDrawing:
         """A line for every cell that was seen, at the right where each direction has its own."""
         street, scheme = view.config.street, view.config.scheme
         cells = np.unique(sights.cell)
-        ends = self.ground.place(cells_m(street, scheme.cell_m)[cells].reshape(-1, 2), index, -0.015)
+        ends = self.ground.place(cells_m(street, scheme.cell_m)[cells].reshape(-1, 2), index, 0.01)
         ends = ends.reshape(-1, 2, 3)
         if scheme.directed_cells:
             ahead = ends[:, 1] - ends[:, 0]
@@ -266,7 +266,7 @@ class Roads:
         colors[seen == 0] = STREET
         if not np.array_equal(colors, self._shown):
             self._shown = colors
-            self._lines.colors = np.repeat(colors[:, None], 2, axis=1)
+            self._lines.colors = np.repeat(linear(colors)[:, None], 2, axis=1)
 
 
 def road_legend(view: NetworkView) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,13 +20,18 @@ HALTS = (What.AIR, What.LOSS, What.DROP, What.ARRIVE, What.EXPIRE)
 """What the step buttons halt at."""
 
 
-def frames_lane(view: NetworkView, frames: Frames) -> FramesLane:
-    """One row a node."""
-    names = [view.names[node] for node in view.lane_nodes]
-    lane = FramesLane(view.levels, names, frames.line, [CAUSES[cause] for cause in Cause])
-    if view.label:
-        lane.title = view.label
-    return lane
+def frames_lane(view: NetworkView, frames: Frames, run: str = "") -> FramesLane:
+    """One row a node; the name of its run stands before it where two are compared."""
+    names = [f"{run} · {view.names[node]}" if run else view.names[node] for node in view.lane_nodes]
+    return FramesLane(view.levels, names, frames.line, [CAUSES[cause] for cause in Cause])
+
+
+def run_names(runs: Sequence[NetworkView]) -> list[str]:
+    """Short names of runs that are compared; nothing for a single one."""
+    if len(runs) < 2:
+        return [""] * len(runs)
+    schemes = [run.label.split(":")[0] for run in runs]
+    return schemes if len({*schemes}) == len(runs) else [f"run {index + 1}" for index in range(len(runs))]
 
 
 def stops_ns(*views: NetworkView) -> NDArray[np.int64]:

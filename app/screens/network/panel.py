@@ -19,7 +19,7 @@ from app.screens.network.delivery_numbers import changes, difference, moment_tab
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
 from app.screens.network.labels import NETWORKS
-from app.screens.network.lanes import frames_lane, growth_lane, run_curves, stops_ns
+from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_names, stops_ns
 from app.screens.network.lesson import CROSSING, LOST_PACKET, SETTINGS, NetworkLook, find
 from app.screens.network.numbers import metric_tables, runs_summary, verdict
 from app.screens.network.packets import Frames
@@ -72,13 +72,13 @@ class NetworkPanel(Panel):
         self._hand = ui.debounce(HAND_S, self._show_moment)
         self._look: NetworkLook | None = None
         self._text = gui.add_markdown(TEXT)
+        self._difference = gui.add_markdown("")
         for path in (CROSSING, LOST_PACKET):
             LessonFolder(ui, read_lesson(path, SETTINGS, NetworkLook()), self._take_look)
         self._setup = NetworkSetup(ui, self._resting.restart)
         self._about = gui.add_markdown("")
         self._status = gui.add_markdown("Nothing is sent yet.")
         self._table = gui.add_html("")
-        self._difference = gui.add_markdown("")
         with gui.add_folder("What if"):
             self._setup.add_what_if()
         self._inspector = gui.add_folder("Packet")
@@ -256,9 +256,8 @@ class NetworkPanel(Panel):
     def _lanes(self) -> list[Lane]:
         if self._delivery is not None:
             return [frames_lane(self._delivery.run, self._frames[0]), growth_lane(self._delivery)]
-        lanes: list[Lane] = [
-            frames_lane(run, frames) for run, frames in zip(self._runs, self._frames, strict=True)
-        ]
+        named = zip(self._runs, self._frames, run_names(self._runs), strict=True)
+        lanes: list[Lane] = [frames_lane(*one) for one in named]
         return [*lanes, run_curves(self._runs[0])] if len(self._runs) == 1 else lanes
 
     def _next_name(self) -> str:
