@@ -54,6 +54,10 @@ class RadioConfig:
     """How much stronger than all others together a frame has to be to survive their overlap."""
     noise_dbm: float | None = None
     """Power of the noise; None receives everything above the threshold without bit errors."""
+    walls_m: tuple[float, ...] = ()
+    """x and y of one end and of the other of each wall, in a row."""
+    wall_db: float = 10.0
+    """What a wall takes of the power over every link that crosses it."""
 
     def __post_init__(self) -> None:
         for key in ("frequency_hz", "antenna_gain", "antenna_height_m", "path_loss_exponent", "range_m"):
@@ -64,6 +68,11 @@ class RadioConfig:
         at_least("radio.nakagami_m", self.nakagami_m, 0.5)
         at_least("radio.sense_range_m", self.sense_range_m, self.range_m)
         at_least("radio.capture_db", self.capture_db, 0.0)
+        at_least("radio.wall_db", self.wall_db, 0.0)
+        if len(self.walls_m) % 4:
+            raise InputError(f"radio.walls_m has {len(self.walls_m)} numbers; try four for each wall")
+        if not all(map(math.isfinite, self.walls_m)):
+            raise InputError(f"radio.walls_m holds {self.walls_m}; try metres")
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,9 @@ class Places(Protocol):
     def count(self) -> int:
         """Nodes, sinks and access points together."""
 
+    def position_m(self, node: int, now_ns: int) -> tuple[float, float]:
+        """Where a node is, in metres east and north."""
+
     def distance_m(self, a: int, b: int, now_ns: int) -> float:
         """Distance of two nodes."""
 
@@ -38,6 +41,11 @@ class FixedPlaces:
     def count(self) -> int:
         """Nodes and sink together."""
         return len(self._distances_m)
+
+    def position_m(self, node: int, now_ns: int) -> tuple[float, float]:
+        """Where a node is, the same at any time."""
+        x_m, y_m = self.positions_m[node].tolist()
+        return x_m, y_m
 
     def distance_m(self, a: int, b: int, now_ns: int) -> float:
         """Distance of two nodes, the same at any time."""

@@ -11,8 +11,10 @@ from functools import cache
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from network_sim.config import RadioConfig
+from network_sim.places import Places
 
 Modulation = Literal["cck", "oqpsk"]
 """How bytes are sent: IEEE 802.11b at 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
@@ -154,6 +156,18 @@ def oqpsk_bit_error_rate(sinr: float) -> float:
     return min(0.5, max(0.0, sum(factor * math.exp(power * sinr) for factor, power in _OQPSK_TERMS)))
 
 
+def walls_crossed(walls_m: NDArray[np.float64], a_m: tuple[float, float], b_m: tuple[float, float]) -> int:
+    """How many walls (W, 2, 2), of two ends each, the straight line from ``a_m`` to ``b_m`` crosses."""
+    link_m, walls = np.subtract(b_m, a_m), walls_m[:, 1] - walls_m[:, 0]
+
+    def side(of: NDArray[np.float64], point_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.sign(of[..., 0] * point_m[..., 1] - of[..., 1] * point_m[..., 0])
+
+    apart = side(link_m, walls_m[:, 0] - a_m) * side(link_m, walls_m[:, 1] - a_m) < 0
+    between = side(walls, a_m - walls_m[:, 0]) * side(walls, b_m - walls_m[:, 0]) < 0
+    return int((apart & between).sum())
+
+
 class Radio:
     """The radio that every node has: thresholds, the power over each link, errors."""
 
@@ -176,6 +190,8 @@ class Radio:
         self._shadowing_seed = int(rng.integers(2**63))
         self._shadowing: dict[tuple[int, int], float] = {}
         self._nakagami_m = config.nakagami_m
+        self._walls_m = np.reshape(config.walls_m, (-1, 2, 2))
+        self._wall_gain = ratio(-config.wall_db)
         self._rng = rng
         self._fading: list[float] = []
 
@@ -190,6 +206,14 @@ class Radio:
             draw = np.random.default_rng((self._shadowing_seed, *pair)).standard_normal()
             gain = self._shadowing[pair] = ratio(self._shadowing_db * float(draw))
         return power_w * gain
+
+    def between_w(self, places: Places, sender: int, receiver: int, now_ns: int) -> float:
+        """Mean power over the link of two nodes where they are at a time, through the walls in between."""
+        power_w = self.link_power_w(sender, receiver, places.distance_m(sender, receiver, now_ns))
+        if not len(self._walls_m):
+            return power_w
+        ends_m = places.position_m(sender, now_ns), places.position_m(receiver, now_ns)
+        return power_w * self._wall_gain ** walls_crossed(self._walls_m, *ends_m)
 
     def faded_w(self, power_w: float) -> float:
         """The power of one frame: Nakagami-m fading makes it gamma distributed with mean ``power_w``."""

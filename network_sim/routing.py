@@ -98,7 +98,7 @@ def link_success(config: NetworkConfig, radio: Radio, places: Places) -> NDArray
     success = np.zeros((count, count))
     for a in range(count):
         for b in range(a):
-            power_w = radio.link_power_w(a, b, places.distance_m(a, b, 0))
+            power_w = radio.between_w(places, a, b, 0)
             if power_w >= radio.rx_threshold_w:
                 success[a, b] = success[b, a] = _frame_success(config, radio, power_w)
     return success

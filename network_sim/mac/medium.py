@@ -128,8 +128,8 @@ class Medium:
         return row_w
 
     def _link_power_w(self, sender: int, receiver: int) -> float:
-        distance_m = self.places.distance_m(sender, receiver, int(self.env.now))
-        power_w = self._rows_w[sender][receiver] = self.radio.link_power_w(sender, receiver, distance_m)
+        power_w = self.radio.between_w(self.places, sender, receiver, int(self.env.now))
+        self._rows_w[sender][receiver] = power_w
         return power_w
 
     def start(

@@ -23,8 +23,9 @@ def poses_known(rig: Rig) -> bool:
 def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> NetworkConfig:
     """The network with the rig's cameras as its nodes, each with one image of its own to send.
 
-    Seen from above, nodes stand where their cameras do, and the sink behind them,
-    ``nodes.spacing_m`` from their middle. Where the poses are unknown, they stand as ``nodes.layout`` has it.
+    Where ``nodes.places_m`` says nothing, nodes stand where their cameras do, seen from above, and the sink
+    behind them, ``nodes.spacing_m`` from their middle. Where the poses are unknown, too, they stand as
+    ``nodes.layout`` has it.
 
     Args:
         rig: one to six nodes; the world's third axis points up.
@@ -39,13 +40,14 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
             f"A network of the scenario {network.scenario} has no cameras that stand still; try a preset "
             "such as office, thesis-link or greenhouse"
         )
+    believed_places_m = places_of(rig, network.nodes.spacing_m) if poses_known(rig) else ()
     nodes = replace(
         network.nodes,
         count=len(rig.frames),
         images=1,
         interval_s=0.0,
         bytes_by_node=tuple(sizes_bytes),
-        places_m=places_of(rig, network.nodes.spacing_m) if poses_known(rig) else (),
+        places_m=network.nodes.places_m or believed_places_m,
     )
     return replace(network, nodes=nodes, run=replace(network.run, keep="all", warmup_s=0.0))
 
@@ -58,3 +60,21 @@ def places_of(rig: Rig, spacing_m: float) -> tuple[float, ...]:
     behind = -ahead / length if length > 0.0 else np.array([0.0, -1.0])
     sink_m = cameras_m.mean(axis=0) + spacing_m * behind
     return tuple(np.vstack([cameras_m, sink_m]).ravel().tolist())
+
+
+def places_of_senders(network: NetworkConfig, nodes: int, senders: Sequence[int]) -> NetworkConfig:
+    """The network with the places of some of a rig's nodes only, if it has any.
+
+    Raises:
+        InputError: it places another number of nodes than the rig has.
+    """
+    places_m = np.reshape(network.nodes.places_m, (-1, 2))
+    if not len(places_m):
+        return network
+    if len(places_m) != nodes + 1:
+        raise InputError(
+            f"nodes.places_m places {len(places_m) - 1} nodes and the sink, and there are {nodes} nodes; "
+            f"try {2 * (nodes + 1)} numbers and nodes.count={nodes}"
+        )
+    some_m = tuple(places_m[[*senders, nodes]].ravel().tolist())
+    return replace(network, nodes=replace(network.nodes, count=len(senders), places_m=some_m))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -68,6 +69,13 @@ class Screen(Bench):
     def clouds(self):
         """Which nodes have a cloud."""
         return {name.rsplit("-", 1)[0] for name in self.names() if name.startswith("cloud-")}
+
+    def drag(self, name, by_m):
+        """Drag arrows and let them go."""
+        arrows = self.drawn(name)
+        arrows.position = np.array(arrows.position) + by_m
+        for ended in arrows._impl_aux.update_cb:
+            ended(SimpleNamespace(phase="end"))
 
     def use(self, text):
         self.gui.set("Setting key=value", text)
@@ -211,12 +219,44 @@ def test_a_stop_of_the_lesson_sends_and_looks_at_one_frame(screen):
     screen.panel.on_action("Reset")
 
 
+def test_frames_go_round_a_wall_over_another_camera_until_it_is_gone(screen):
+    def heard_by():
+        run, node = screen.view.run, screen.view.nodes[1].row
+        sent = run.pieces.where((run.pieces.what == What.AIR) & (run.pieces.node == node))
+        return {run.roles[peer] for peer in sent.peer.tolist()}
+
+    gui = screen.gui
+    assert heard_by() == {"sink"}
+    gui.set("Wall takes (dB)", 80.0)
+    gui.set("Wall before", "node_01")
+    assert heard_by() == {"node"}
+    assert "a wall of 80 dB" in gui.text()
+    assert "radio.walls_m=" in screen.panel.command
+    assert screen.drawn("/network/what-if/wall") is not None
+    gui.set("Wall before", "nobody")
+    assert heard_by() == {"sink"}
+    assert screen.drawn("/network/what-if/wall") is None
+
+
+def test_a_radio_that_is_dragged_out_of_range_is_not_heard_and_comes_back(screen):
+    gui, view = screen.gui, screen.view
+    gui.set("Move radio of", "node_02")
+    assert screen.drawn("/network/what-if/arrows") is not None
+    screen.drag("/network/what-if/arrows", (1e5, 0.0, 0.0))
+    assert screen.view.moments[-1].nodes[2].delivered_bytes == 0
+    assert "radios moved" in gui.text()
+    assert screen.handle("radio-node_02").position[0] > 9e4
+    gui.set("Move radio of", "nobody")
+    assert screen.view.moments[-1].delivered_bytes == view.total_bytes
+    assert screen.drawn("/network/what-if/arrows") is None
+
+
 @pytest.mark.parametrize("path", [CROSSING, LOST_PACKET], ids=lambda path: path.stem)
 def test_every_stop_of_the_lessons_asks_for_a_network_that_there_is(path):
     setup = NetworkSetup(ui_of(), lambda: None)
-    setup.add_what_if()
+    setup.add_what_if("/what-if")
     setup.add_advanced()
-    setup.name_nodes(["node_00", "node_01", "node_02"])
+    setup.what_if.offer(["node_00", "node_01", "node_02"])
     asked = []
     for stop in read_lesson(path, SETTINGS, NetworkLook()).stops:
         setup.take(stop.look)

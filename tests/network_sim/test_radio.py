@@ -12,6 +12,8 @@ from scipy import integrate, stats
 
 from network_sim import radio as r
 from network_sim.config import RadioConfig
+from network_sim.places import FixedPlaces
+from packetmesh.errors import InputError
 
 # The ns-2 simulator's WaveLAN card; ns-2 rounds the speed of light.
 NS2_TX_W = 0.28183815
@@ -193,3 +195,43 @@ def test_frame_errors_are_independent_per_bit_or_symbol() -> None:
         1.0 - (1.0 - r.oqpsk_bit_error_rate(0.3)) ** 400
     )
     assert here.error_rate(3.0, 50, "cck") == pytest.approx(1.0 - (1.0 - r.cck_symbol_error_rate(3.0)) ** 50)
+
+
+WALL_M = np.array([[[1.0, -1.0], [1.0, 1.0]]])
+
+
+@pytest.mark.parametrize(
+    ("a_m", "b_m", "crossed"),
+    [
+        ((0.0, 0.0), (2.0, 0.0), 1),
+        ((2.0, 0.0), (0.0, 0.5), 1),
+        ((0.0, 0.0), (2.0, 2.5), 0),  # past its end
+        ((0.0, 0.0), (0.9, 0.0), 0),  # ends before it
+        ((0.0, 3.0), (0.0, -3.0), 0),  # along it
+    ],
+)
+def test_a_link_crosses_a_wall_between_its_ends_only(a_m, b_m, crossed) -> None:
+    assert r.walls_crossed(WALL_M, a_m, b_m) == crossed
+    assert r.walls_crossed(np.concatenate([WALL_M, WALL_M + 0.01]), a_m, b_m) == 2 * crossed
+
+
+def test_each_wall_takes_its_decibels_both_ways() -> None:
+    places = FixedPlaces(np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]]))
+    walls = (1.0, -1.0, 1.0, 1.0, 1.5, -1.0, 1.5, 1.0)
+    open_air, walled = radio(), radio(walls_m=walls, wall_db=6.0)
+    for a, b, decibels in ((0, 1, 12.0), (1, 0, 12.0), (0, 2, 0.0)):
+        lost = open_air.between_w(places, a, b, 0) / walled.between_w(places, a, b, 0)
+        assert 10.0 * math.log10(lost) == pytest.approx(decibels)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"walls_m": (0.0, 0.0, 1.0)}, "four for each wall"),
+        ({"walls_m": (0.0, 0.0, 1.0, math.inf)}, "try metres"),
+        ({"wall_db": -1.0}, "radio.wall_db"),
+    ],
+)
+def test_walls_that_cannot_be_are_refused(changes, sentence) -> None:
+    with pytest.raises(InputError, match=sentence):
+        RadioConfig(**changes)

@@ -87,3 +87,15 @@ def test_who_cannot_reach_the_sink_is_named():
     assert disconnected(near) == ()
     routes = shortest_paths(line_success(near, 80.0, 160.0, 240.0, 0.0), 3)
     assert [routes.hops(node) for node in range(3)] == [1, 2, 3]
+
+
+def test_frames_go_round_a_wall_over_another_node():
+    places = FixedPlaces(np.array([[0.0, 0.0], [20.0, 20.0], [40.0, 0.0]]))
+    radio = RadioConfig(range_m=50.0, sense_range_m=100.0)
+    walled = replace(radio, walls_m=(20.0, -5.0, 20.0, 5.0), wall_db=30.0)
+    parents = []
+    for one in (radio, walled):
+        config = NetworkConfig(radio=one)
+        success = link_success(config, Radio(one, np.random.default_rng(0)), places)
+        parents.append(shortest_paths(success, 2).parents)
+    assert parents == [(2, 2, -1), (1, 2, -1)]

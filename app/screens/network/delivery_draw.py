@@ -53,6 +53,7 @@ class DeliveryDrawing:
         self._made = 0
         self._shown: MomentView | None = None
         self._add_nodes()
+        self._add_moved(cameras_m)
         self._add_marks()
         self._add_routes()
         capacity = MOST_PACKETS + len(view.run.names)
@@ -84,6 +85,14 @@ class DeliveryDrawing:
         along = np.abs(from_middle_m @ up) / slope
         distance_m = float((np.maximum(across, along) / FILLED + from_middle_m @ away).max())
         return middle_m, middle_m + distance_m * away
+
+    def place_m(self, name: str) -> FloatArray:
+        """(3,) where a node's radio is drawn, or the sink."""
+        run = self._view.run
+        if name == "sink":
+            return self._places_m[run.roles.index(name)]
+        node = next(one for one in self._view.nodes if one.name == name)
+        return self._places_m[node.row] if node.row >= 0 else node.T_world_camera[:3, 3]
 
     # What is there at a time.
 
@@ -195,13 +204,18 @@ class DeliveryDrawing:
     # What stays.
 
     def _places(self, cameras_m: FloatArray) -> FloatArray:
-        """(N, 3) of everybody in the network; the sink and the cloud beside the cameras."""
+        """(N, 3) of everybody in the network: nodes at their cameras, unless somebody has moved their radios;
+        the sink and the cloud beside them.
+        """
         run, left = self._view.run, -self._view.stage.right
         sink_m = cameras_m.mean(axis=0) + (np.ptp(cameras_m @ left) / 2.0 + BESIDE * self._size_m) * left
         places_m = np.tile(sink_m, (len(run.names), 1))
+        moved = self._view.sent.network.nodes.places_m
         for node, camera_m in zip(self._view.nodes, cameras_m, strict=True):
             if node.row >= 0:
                 places_m[node.row] = camera_m
+                if moved:
+                    places_m[node.row, :2] = run.positions_m(run.start_ns)[node.row]
         for row, role in enumerate(run.roles):
             if role == "cloud":
                 places_m[row] = sink_m + self._size_m * np.array([0.0, 0.0, 0.45])
@@ -223,6 +237,14 @@ class DeliveryDrawing:
             self._frusta.append(frustum)
             above_m = node.T_world_camera[:3, 3] + (0.0, 0.0, 0.07 * self._size_m)
             self._names.append(self._label(f"name-{node.name}", f"{node.name} · 0 %", above_m, 0.9))
+
+    def _add_moved(self, cameras_m: FloatArray) -> None:
+        """Radios that do not stand at their cameras."""
+        for node, camera_m in zip(self._view.nodes, cameras_m, strict=True):
+            radio_m = self.place_m(node.name)
+            if np.linalg.norm(radio_m - camera_m) > 1e-3:
+                self._mark(f"radio-{node.name}", radio_m, BRAND)
+                self._lines(f"moved-{node.name}", np.array([[camera_m, radio_m]]))
 
     def _add_marks(self) -> None:
         view, roles = self._view.run, self._view.run.roles

@@ -5,6 +5,7 @@ from __future__ import annotations
 from app.dock import time_text
 from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.tables import Row, number, table
+from network_sim.config import NetworkConfig
 from packetmesh.settings import differences
 
 BYTES_MB = 1e-6
@@ -130,8 +131,21 @@ def changes(before: DeliveryView, after: DeliveryView) -> str:
     if before.sent.coding != after.sent.coding:
         words.append(f"coding {after.sent.coding} instead of {before.sent.coding}")
     words += [f"{name} on again" for name in before.sent.down if name not in after.sent.down]
-    words += differences(after.sent.network, before.sent.network)[:4]
+    words += _network_changes(before.sent.network, after.sent.network)[:4]
     return ", ".join(words) or "Other settings of the reconstruction"
+
+
+def _network_changes(before: NetworkConfig, after: NetworkConfig) -> list[str]:
+    """Places and walls in words, other settings as they are written."""
+    words, told = [], {"nodes.count", "nodes.places_m", "radio.walls_m", "radio.wall_db"}
+    if before.nodes.places_m != after.nodes.places_m:
+        words.append("radios moved" if after.nodes.places_m else "radios at their cameras again")
+    walls = [
+        (radio.walls_m, radio.wall_db if radio.walls_m else 0.0) for radio in (before.radio, after.radio)
+    ]
+    if walls[0] != walls[1]:
+        words.append(f"a wall of {after.radio.wall_db:g} dB" if after.radio.walls_m else "no wall")
+    return words + [word for word in differences(after, before) if word.partition("=")[0] not in told]
 
 
 def _shares(*shares: float | None) -> tuple[str, ...]:

@@ -58,6 +58,7 @@ class NetworkPanel(Panel):
     def build(self) -> None:
         """Controls, numbers, inspector; the dock."""
         gui, ui = self.gui, self.ui
+        self._source = self.session.spec.source
         self._delivery: DeliveryView | None = None
         self._before: DeliveryView | None = None
         self._runs: tuple[NetworkView, ...] = ()
@@ -80,7 +81,7 @@ class NetworkPanel(Panel):
         self._status = gui.add_markdown("Nothing is sent yet.")
         self._table = gui.add_html("")
         with gui.add_folder("What if"):
-            self._setup.add_what_if()
+            self._setup.add_what_if(f"{self.drawn_below}/what-if")
         self._inspector = gui.add_folder("Packet")
         with self._inspector:
             self._packet = gui.add_markdown(PICK)
@@ -111,7 +112,11 @@ class NetworkPanel(Panel):
             self.ui.post(self._run)
 
     def on_spec(self, spec: Spec) -> None:
-        """What streams in from now on belongs to something else."""
+        """What streams in from now on belongs to something else; in another room nothing has happened yet."""
+        if spec.source != self._source:
+            self._source = spec.source
+            if self._setup.what_if.leave_room() and self._visited:
+                self.ui.post(self._run)
         if not self.session.results.fresh("network", spec):
             self._streaming = False
 
@@ -196,8 +201,8 @@ class NetworkPanel(Panel):
             self._before = self._delivery if same_room and ended else None
         self._delivery, self._runs = view, ()
         self._frames = [Frames(view.run)]
-        self._setup.name_nodes([node.name for node in view.nodes])
-        self._drawing = DeliveryDrawing(self.scene, self._next_name(), view)
+        drawing = self._drawing = DeliveryDrawing(self.scene, self._next_name(), view)
+        self._setup.what_if.load(view, drawing.place_m)
         self._legend.content = _legend_html(legend(view))
         self._packet.content = PICK
         self._load(view.run.start_ns, view.run.end_ns, stops_ns(view.run))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import viser
 
 from app.screens.network.labels import CODINGS, NETWORKS, ways
 from app.screens.network.lesson import NetworkLook
+from app.screens.network.what_if import WhatIf
 from app.state import Sent, Spec
 from app.ui import Ui
 from network_sim.config import PRESETS, NetworkConfig
@@ -19,7 +20,7 @@ from pipeline.config import PipelineConfig
 
 TITLES = {preset.title: name for name, preset in NETWORKS.items()}
 CODING_NAMES = {title: name for name, title in CODINGS.items()}
-NOTHING, NOBODY = "nothing", "nobody"
+NOTHING = "nothing"
 FIRST = next(iter(NETWORKS))
 MOMENTS = 20
 FREE = """Any setting of `packetmesh simulate --describe`, several separated by spaces, for example
@@ -77,12 +78,9 @@ class NetworkSetup:
         ):
             ui.when_changed(handle, on_change)
 
-    def add_what_if(self) -> None:
-        """What may happen to the nodes."""
-        self._down = self._ui.gui.add_dropdown(
-            "Switch off", [NOBODY], hint="This node has failed and sends nothing."
-        )
-        self._ui.when_changed(self._down, self._on_change)
+    def add_what_if(self, below: str) -> None:
+        """What may happen to the nodes; drawn below that scene node."""
+        self.what_if = WhatIf(self._ui, below, self._on_change)
 
     def add_advanced(self) -> None:
         """Medium access, moments, and free text for every other setting."""
@@ -121,7 +119,7 @@ class NetworkSetup:
         self._preset.value = NETWORKS[FIRST].title
         self._coding.value = next(iter(CODING_NAMES))
         self._moments.value = MOMENTS
-        self._down.value = NOBODY
+        self.what_if.forget()
         self._load()
 
     def take(self, look: NetworkLook) -> None:
@@ -136,17 +134,10 @@ class NetworkSetup:
         self._share.value, self._burst.value = look.lose_percent, look.burst_frames
         self._retransmit.value = look.again and self._retransmit.value
         self._moments.value = MOMENTS
-        self._down.value = look.off if look.off in self._down.options else NOBODY
+        self.what_if.forget()
+        self.what_if.switch_off(look.off)
         self._extra = look.settings
         self._text.value = " ".join(look.settings)
-
-    def name_nodes(self, names: Sequence[str]) -> None:
-        """Take the names of the cameras that can be switched off."""
-        options = (NOBODY, *names) if len(names) > 1 else (NOBODY,)
-        if tuple(self._down.options) != options:
-            chosen = self._down.value
-            self._down.options = options
-            self._down.value = chosen if chosen in options else NOBODY
 
     def sent(self) -> Sent:
         """The delivery that the controls ask for.
@@ -154,7 +145,6 @@ class NetworkSetup:
         Raises:
             InputError: settings that do not go together.
         """
-        down = () if self._down.value == NOBODY else (self._down.value,)
         changes = (
             f"radio.shadowing_db={float(self._shadowing.value)}",
             f"run.seed={int(self._seed.value)}",
@@ -162,10 +152,12 @@ class NetworkSetup:
             f"nodes.retransmit={str(bool(self._retransmit.value)).lower()}",
             *((f"loss.burst_packets={float(self._burst.value)}",) if self._share.value else ()),
             *self._ways[self._access.value],
+            *self.what_if.settings(),
             *self._extra,
         )
         network = with_settings(PRESETS[self.preset], changes)
-        return Sent(network, CODING_NAMES[self._coding.value], int(self._moments.value), down)
+        coding, moments = CODING_NAMES[self._coding.value], int(self._moments.value)
+        return Sent(network, coding, moments, self.what_if.off)
 
     def runs(self) -> dict[str, NetworkConfig]:
         """The street runs that the controls ask for, each by what the screen calls it.
@@ -220,8 +212,9 @@ class NetworkSetup:
             self._access.value = next(iter(self._ways))
         for handle in (self._coding, self._share, self._burst, self._retransmit):
             handle.visible = not street
-        for handle in (self._down, self._access, self._shadowing, self._moments):
+        for handle in (self._access, self._shadowing, self._moments):
             handle.visible = not street
+        self.what_if.show(not street)
         for handle in (self._vehicles, self._scheme, self._beside, self._beside_text):
             handle.visible = street
         self._extra = self._beside_extra = ()

@@ -7,7 +7,8 @@ import pytest
 
 from network_sim.config import PRESETS
 from packetmesh.errors import InputError
-from pipeline.delivery.plan import network_of, places_of, poses_known
+from packetmesh.settings import with_settings
+from pipeline.delivery.plan import network_of, places_of, places_of_senders, poses_known
 from pipeline.geometry import look_at
 from pipeline.io.demos import load_demo
 from pipeline.types import Rig
@@ -41,6 +42,18 @@ def test_without_poses_the_preset_says_where_nodes_stand():
     heap = Rig("heap", tuple(replace(frame, T_world_camera=pose) for frame in rig.frames))
     assert not poses_known(heap)
     assert network_of(heap, (1, 1, 1), PRESETS["office"]).nodes.places_m == ()
+
+
+def test_places_that_are_given_go_before_the_cameras_own_and_follow_who_sends():
+    given = (0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 9.0, 9.0)
+    network = with_settings(PRESETS["office"], ["nodes.count=3", f"nodes.places_m={str(given)[1:-1]}"])
+    rig = load_demo("office")
+    assert network_of(rig, (1, 1, 1), network).nodes.places_m == given
+    some = places_of_senders(network, 3, [0, 2]).nodes
+    assert (some.count, some.places_m) == (2, (0.0, 0.0, 2.0, 0.0, 9.0, 9.0))
+    assert places_of_senders(PRESETS["office"], 3, [0, 2]) == PRESETS["office"]
+    with pytest.raises(InputError, match="places 3 nodes and the sink, and there are 2 nodes"):
+        places_of_senders(network, 2, [0, 1])
 
 
 def test_vehicles_are_no_cameras_of_a_room():

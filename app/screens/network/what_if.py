@@ -1,0 +1,207 @@
+"""What may happen to the nodes of a delivery: one fails, a wall goes up before it, its radio moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from app.drawing.colors import NEUTRAL
+from app.drawing.poses import place
+from app.screens.network.delivery_view import DeliveryView
+from app.ui import Ui
+from pipeline.geometry import rigid, rotation_exp
+from pipeline.types import FloatArray
+
+NOBODY = "nobody"
+SINK = "sink"
+WALL_AWAY, WALL_HALF = 0.2, 0.25
+"""How far the wall is from its node on the way to the sink, and half its length, over that way."""
+MOST_AWAY_M, MOST_HALF_M = 1.0, 1.0
+APART = 0.4
+"""Half the length of the wall over the distance to the nearest other node, at most: it stands before one."""
+MOVED_TEXT = "Drag the arrows: the radio moves and frames are sent from there; its camera stays."
+
+
+class WhatIf:
+    """The controls, and what they change of a network."""
+
+    def __init__(self, ui: Ui, below: str, on_change: Callable[[], None]) -> None:
+        """Add the controls.
+
+        Args:
+            ui: their panel and scene.
+            below: where walls and arrows are drawn.
+            on_change: called when something else is wanted.
+        """
+        gui = ui.gui
+        self._ui, self._below, self._on_change = ui, below, on_change
+        self._places_m: dict[str, FloatArray] = {}
+        """(2,) of every node and of the sink, as long as nobody moves them."""
+        self._moved_m: dict[str, FloatArray] = {}
+        self._drawn: list[Any] = []
+        self._off = gui.add_dropdown("Switch off", [NOBODY], hint="This node has failed and sends nothing.")
+        self._walled = gui.add_dropdown(
+            "Wall before", [NOBODY], hint="A wall stands between this node and the sink."
+        )
+        self._wall_db = gui.add_slider(
+            "Wall takes (dB)", 0.0, 80.0, 1.0, 30.0, hint="Of the power of every frame that crosses it."
+        )
+        self._mover = gui.add_dropdown(
+            "Move radio of", [NOBODY], hint="Arrows appear at this node; its camera stays where it is."
+        )
+        self._text = gui.add_markdown("")
+        for handle in (self._off, self._walled, self._wall_db):
+            ui.when_changed(handle, on_change)
+        ui.when_changed(self._mover, self._put_back_or_show)
+        self._at_m: Callable[[str], FloatArray] | None = None
+
+    @property
+    def off(self) -> tuple[str, ...]:
+        """The node that has failed."""
+        return () if self._off.value == NOBODY else (self._off.value,)
+
+    def settings(self) -> tuple[str, ...]:
+        """What is changed of the network, as ``key=value``."""
+        changes = []
+        places_m = self._places_m | self._moved_m
+        if self._moved_m:
+            flat = np.concatenate([places_m[name] for name in self._places_m])
+            changes.append(f"nodes.count={len(self._places_m) - 1}")
+            changes.append("nodes.places_m=" + _text(flat))
+        if self._walled.value in places_m:
+            changes.append("radio.walls_m=" + _text(wall_m(places_m, self._walled.value)))
+            changes.append(f"radio.wall_db={float(self._wall_db.value):g}")
+        return tuple(changes)
+
+    def forget(self) -> None:
+        """Nothing has happened."""
+        for handle in (self._off, self._walled, self._mover):
+            handle.value = NOBODY
+        self._moved_m.clear()
+        self._text.content = ""
+        self._clear()
+
+    def leave_room(self) -> bool:
+        """Forget the room, whose nodes stand elsewhere than the next one's; whether anything had happened."""
+        happened = bool(self.off or self.settings())
+        self.forget()
+        self._places_m, self._at_m = {}, None
+        return happened
+
+    def switch_off(self, name: str) -> None:
+        """Have a node fail, if it is there."""
+        self._off.value = name if name in self._off.options else NOBODY
+
+    def show(self, visible: bool) -> None:
+        """Show the controls or hide them; without them, what they have drawn goes, too."""
+        for handle in (self._off, self._walled, self._wall_db, self._mover, self._text):
+            handle.visible = visible
+        if not visible:
+            self._clear()
+
+    def load(self, view: DeliveryView, at_m: Callable[[str], FloatArray]) -> None:
+        """Take a delivery: its nodes can be chosen, and what has happened to them is drawn.
+
+        Args:
+            view: the delivery.
+            at_m: where a node, or the sink, is drawn: (3,) by its name.
+        """
+        if not self._places_m:
+            self._places_m = places_of(view)
+        self.offer([node.name for node in view.nodes])
+        self._at_m = at_m
+        self._draw()
+
+    def offer(self, names: Sequence[str]) -> None:
+        """Have these nodes to choose from; a single one cannot be switched off."""
+        for handle in (self._off, self._walled, self._mover):
+            options = (NOBODY, *names) if handle is not self._off or len(names) > 1 else (NOBODY,)
+            if tuple(handle.options) != options:
+                chosen = handle.value
+                handle.options = options
+                handle.value = chosen if chosen in options else NOBODY
+
+    def _put_back_or_show(self) -> None:
+        """Arrows at another node; with nobody chosen, all radios go back to their cameras."""
+        self._text.content = "" if self._mover.value == NOBODY else MOVED_TEXT
+        self._draw()
+        if self._mover.value == NOBODY and self._moved_m:
+            self._moved_m.clear()
+            self._on_change()
+
+    def _clear(self) -> None:
+        while self._drawn:
+            self._drawn.pop().remove()
+
+    def _draw(self) -> None:
+        self._clear()
+        if self._at_m is None:
+            return
+        if self._walled.value in self._places_m:
+            self._draw_wall(self._at_m(self._walled.value), self._at_m(SINK))
+        if self._mover.value in self._places_m:
+            self._draw_arrows(self._mover.value, self._at_m(self._mover.value))
+
+    def _draw_wall(self, node_m: FloatArray, sink_m: FloatArray) -> None:
+        """Where it crosses the way that frames are drawn on; the sink may be drawn nearer than it is."""
+        way_m = sink_m - node_m
+        length_m = float(np.linalg.norm(way_m))
+        size_m = 0.35 * length_m
+        wall = self._ui.scene.add_box(
+            f"{self._below}/wall", NEUTRAL, (0.04 * length_m, size_m, size_m), opacity=0.7, cast_shadow=False
+        )
+        turn = rotation_exp(np.array([0.0, 0.0, np.arctan2(way_m[1], way_m[0])]))
+        place(wall, rigid(turn, node_m + WALL_AWAY * way_m))
+        self._drawn.append(wall)
+
+    def _draw_arrows(self, name: str, at_m: FloatArray) -> None:
+        scale = 0.35 * float(np.linalg.norm(np.subtract(at_m, self._at_m(SINK)))) if self._at_m else 1.0
+        arrows = self._ui.scene.add_transform_controls(
+            f"{self._below}/arrows",
+            scale=max(scale, 0.3),
+            active_axes=(True, True, False),
+            disable_rotations=True,
+            depth_test=False,
+        )
+        place(arrows, rigid(np.eye(3), at_m))
+
+        def dragged(event: Any) -> None:
+            if event.phase == "end":
+                self._ui.post(partial(self.move, name, np.array(arrows.position) - at_m))
+
+        arrows.on_update(dragged)
+        self._drawn.append(arrows)
+
+    def move(self, name: str, by_m: FloatArray) -> None:
+        """Have the radio of a node stand so much farther; the third axis does not count."""
+        self._moved_m[name] = (self._places_m | self._moved_m)[name] + by_m[:2]
+        self._on_change()
+
+
+def places_of(view: DeliveryView) -> dict[str, FloatArray]:
+    """(2,) of every node of a delivery and, last, of its sink; of a node that is down, its camera's."""
+    positions_m = view.run.positions_m(view.run.start_ns)
+    places_m = {
+        node.name: positions_m[node.row] if node.row >= 0 else node.T_world_camera[:2, 3]
+        for node in view.nodes
+    }
+    return places_m | {SINK: positions_m[view.run.roles.index(SINK)]}
+
+
+def wall_m(places_m: dict[str, FloatArray], name: str) -> FloatArray:
+    """(4,) both ends of a wall across the way from a node to the sink, which leaves the others' ways free."""
+    way_m = places_m[SINK] - places_m[name]
+    length_m = max(float(np.linalg.norm(way_m)), 1e-6)
+    others_m = [place_m for other, place_m in places_m.items() if other not in (name, SINK)]
+    free_m = min((float(np.linalg.norm(one - places_m[name])) for one in others_m), default=np.inf)
+    half_m = min(WALL_HALF * length_m, APART * free_m, MOST_HALF_M)
+    middle_m = places_m[name] + way_m / length_m * min(WALL_AWAY * length_m, MOST_AWAY_M)
+    across_m = half_m / length_m * np.array([-way_m[1], way_m[0]])
+    return np.concatenate([middle_m - across_m, middle_m + across_m])
+
+
+def _text(values: FloatArray) -> str:
+    return ",".join(f"{value:.3f}" for value in values)
