@@ -86,6 +86,23 @@ def arrivals(trace: NetworkTrace, at: Place = "sink") -> Arrivals:
     )
 
 
+def energy_by_node_j(trace: NetworkTrace, t_ns: ArrayLike) -> FloatArray:
+    """(M, N) joules of each node, radio and platform, from the start of the run until each of M moments.
+
+    Those of sinks, access points and the cloud are 0: they have mains.
+
+    Raises:
+        InputError: the run kept no log of its packets.
+    """
+    log, moments = _log(trace), np.clip(np.asarray(t_ns, np.int64), 0, trace.horizon_ns)
+    spent_j = np.zeros((len(moments), len(trace.names)))
+    for node in np.flatnonzero(camera_nodes(trace)):
+        alone = np.arange(len(trace.names)) == node
+        times = _radio_times(trace, log, moments, alone)
+        spent_j[:, node] = energy.joules(times, trace.config.energy).total_j
+    return spent_j
+
+
 def until(trace: NetworkTrace, t_ns: ArrayLike) -> Spent:
     """What was spent from the start of the run, its warm-up included, until each of some moments.
 
@@ -101,7 +118,8 @@ def until(trace: NetworkTrace, t_ns: ArrayLike) -> Spent:
     log, moments = _log(trace), np.clip(np.ravel(np.asarray(t_ns, np.int64)), 0, trace.horizon_ns)
     frames, lost = log.of(EventKind.AIR), log.of(EventKind.LOSS)
     sent_bytes = np.append(0, np.cumsum(frames.size_bytes, dtype=np.int64))
-    spent = energy.joules(_radio_times(trace, log, moments), trace.config.energy)
+    times = _radio_times(trace, log, moments, camera_nodes(trace))
+    spent = energy.joules(times, trace.config.energy)
     shape = np.shape(t_ns)
     return Spent(
         sent_bytes=sent_bytes[np.searchsorted(frames.t_ns, moments, side="right")].reshape(shape)[()],
@@ -117,11 +135,12 @@ def _log(trace: NetworkTrace) -> Events:
     return trace.events
 
 
-def _radio_times(trace: NetworkTrace, log: Events, moments: IntArray) -> energy.RadioTimes:
-    """Time of all camera nodes together in each state until each moment; sending comes before sleeping, and
+def _radio_times(
+    trace: NetworkTrace, log: Events, moments: IntArray, camera: NDArray[np.bool_]
+) -> energy.RadioTimes:
+    """Time of some nodes (N,) together in each state until each moment; sending comes before sleeping, and
     both before receiving, as in ``network_sim.states``.
     """
-    camera = camera_nodes(trace)
     on_air = log.of(EventKind.AIR, EventKind.ACK)
     spans = {
         State.SENDING: np.column_stack((on_air.node, on_air.t_ns, on_air.t_ns + on_air.duration_ns)),

@@ -13,6 +13,7 @@ import viser
 
 from app.drawing.colors import COVERAGE_STOPS, linear
 from app.lesson import read_lesson
+from app.screens.network.delivery_draw import EMPTY, FULL
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.draw import STREET, ground_of
 from app.screens.network.labels import NETWORKS
@@ -128,9 +129,22 @@ def test_more_and_more_arrives(screen):
         assert one.t_ns < two.t_ns
         assert one.delivered_bytes < two.delivered_bytes
         assert one.energy_j < two.energy_j
+        assert sum(node.energy_j for node in two.nodes) == pytest.approx(two.energy_j)
         for before, after in zip(one.nodes, two.nodes, strict=True):
             assert before.depth_share <= after.depth_share
     assert moments[-1].no_hit_share < moments[0].no_hit_share
+
+
+def test_the_more_a_node_has_used_the_nearer_is_its_ball_to_orange(screen):
+    moments = screen.view.moments
+    greens = []
+    for t_ns in (moments[0].t_ns - 1, moments[0].t_ns, moments[-1].t_ns):
+        screen.dock.seek(t_ns)
+        greens.append([screen.handle(f"battery-{node.name}").color for node in screen.view.nodes])
+    assert greens[0] == [FULL] * 3
+    used_j = [node.energy_j for node in moments[-1].nodes]
+    assert greens[2][int(np.argmax(used_j))] == EMPTY
+    assert f"{used_j[0]:.3g} J" in screen.handle("name-node_00").text
 
 
 def test_packets_move_and_losses_name_their_cause(screen):
@@ -245,7 +259,7 @@ def test_a_radio_that_is_dragged_out_of_range_is_not_heard_and_comes_back(screen
     screen.drag("/network/what-if/arrows", (1e5, 0.0, 0.0))
     assert screen.view.moments[-1].nodes[2].delivered_bytes == 0
     assert "radios moved" in gui.text()
-    assert screen.handle("radio-node_02").position[0] > 9e4
+    assert screen.handle("battery-node_02").position[0] > 9e4
     gui.set("Move radio of", "nobody")
     assert screen.view.moments[-1].delivered_bytes == view.total_bytes
     assert screen.drawn("/network/what-if/arrows") is None

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from network_sim.arrivals import arrivals, until
+from network_sim.arrivals import arrivals, energy_by_node_j, until
 from network_sim.config import PRESETS, NetworkConfig
-from network_sim.metrics import metrics
+from network_sim.metrics import camera_nodes, metrics
 from network_sim.simulate import simulate
 from network_sim.states import State
 from network_sim.types import NS_PER_S, EventKind, to_ns
@@ -90,6 +90,16 @@ def test_all_that_was_spent_is_what_the_metrics_say(preset):
     assert spent.radio_j + spent.platform_j == pytest.approx(known["energy_total"].value, rel=1e-9)
     assert spent.lost == known["attempts_lost"].value
     assert spent.sent_bytes == trace.counters.size_bytes[:, EventKind.AIR].sum()
+
+
+@pytest.mark.parametrize("preset", ["office", "greenhouse"])
+def test_the_nodes_energies_add_up_to_that_of_all(preset):
+    trace = run(preset)
+    times_ns = [0, trace.horizon_ns // 3, trace.horizon_ns]
+    spent, by_node_j = until(trace, times_ns), energy_by_node_j(trace, times_ns)
+    np.testing.assert_allclose(by_node_j.sum(axis=1), spent.radio_j + spent.platform_j, rtol=1e-9)
+    assert (np.diff(by_node_j, axis=0)[:, camera_nodes(trace)] > 0.0).all()
+    assert not by_node_j[:, ~camera_nodes(trace)].any()
 
 
 @pytest.mark.parametrize("preset", ["thesis-link", "greenhouse"])

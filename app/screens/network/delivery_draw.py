@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from app.drawing.clouds import clear
-from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, NEUTRAL
+from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, NEUTRAL, SOURCE
 from app.drawing.poses import place
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import MOST_PACKETS, ON_THE_WAY, Flights
@@ -28,6 +28,7 @@ PACKET_M, POINT_M = 0.011, 0.008
 """Sizes over the same distance, and of a point."""
 LIT = (255, 230, 0)
 BUSY, DOWN = BRAND, LOSS
+FULL, EMPTY = DELIVERED, SOURCE
 Number = tuple[int, int, int]
 
 
@@ -47,6 +48,7 @@ class DeliveryDrawing:
         self._flights = Flights.of(view.run.pieces)
         self._frusta: list[viser.CameraFrustumHandle] = []
         self._names: list[viser.LabelHandle] = []
+        self._batteries: list[viser.IcosphereHandle] = []
         self._clouds: list[viser.PointCloudHandle | None] = [None] * len(view.nodes)
         self._meshes: list[viser.GlbHandle] = []
         self._losses: dict[int, viser.LabelHandle] = {}
@@ -109,20 +111,36 @@ class DeliveryDrawing:
         self._packets.visible = bool(len(both))
         self._show_causes(now_ns, shown_ns)
 
-    def show_moment(self, moment: MomentView | None) -> None:
-        """Pictures, clouds and mesh of a moment; None is before anything has arrived."""
-        if moment is self._shown:
-            return
+    def show_moment(self, moment: MomentView | None, most_j: float = 0.0) -> None:
+        """Pictures, clouds and mesh of a moment; None is before anything has arrived.
+
+        Args:
+            moment: which one.
+            most_j: energy at which a node's battery has the colour of an empty one.
+        """
+        self._show_batteries(moment, most_j)
+        if moment is not self._shown:
+            self._show_pictures(moment)
+
+    def _show_pictures(self, moment: MomentView | None) -> None:
         self._shown = moment
         for row, node in enumerate(self._view.nodes):
             now = None if moment is None else moment.nodes[row]
             share = 0.0 if now is None else now.delivered_bytes / max(node.total_bytes, 1)
-            state = "off" if node.row < 0 else f"{100.0 * share:.0f} %"
+            used = "" if now is None else f" · {now.energy_j:.3g} J"
+            state = "off" if node.row < 0 else f"{100.0 * share:.0f} %{used}"
             self._names[row].text = f"{node.name} · {state}"
             self._frusta[row].image = _dark(node.aspect) if now is None else now.picture
             self._frusta[row].color = _state_color(node.row < 0, share)
             self._show_cloud(row, None if now is None or not len(now.points_m) else now)
         self._show_mesh(b"" if moment is None else moment.glb)
+
+    def _show_batteries(self, moment: MomentView | None, most_j: float) -> None:
+        for row, battery in enumerate(self._batteries):
+            used_j = 0.0 if moment is None else moment.nodes[row].energy_j
+            color = _between(FULL, EMPTY, min(used_j / most_j, 1.0) if most_j > 0.0 else 0.0)
+            if battery.color != color:
+                battery.color = color
 
     def light(self, packet: PacketView | None) -> None:
         """Light up the pixels and points of a packet; None puts out what is lit."""
@@ -130,7 +148,7 @@ class DeliveryDrawing:
         if self._scene.get_handle_by_name(name) is not None:
             self._scene.remove_by_name(name)
         shown, self._shown = self._shown, None
-        self.show_moment(shown)
+        self._show_pictures(shown)
         if packet is None:
             return
         self._frusta[packet.row].image = packet.picture
@@ -236,6 +254,8 @@ class DeliveryDrawing:
             place(frustum, node.T_world_camera)
             self._frusta.append(frustum)
             above_m = node.T_world_camera[:3, 3] + (0.0, 0.0, 0.07 * self._size_m)
+            battery = f"battery-{node.name}"
+            self._batteries.append(self._mark(battery, self.place_m(node.name), FULL, 0.5))
             self._names.append(self._label(f"name-{node.name}", f"{node.name} · 0 %", above_m, 0.9))
 
     def _add_moved(self, cameras_m: FloatArray) -> None:
@@ -243,7 +263,6 @@ class DeliveryDrawing:
         for node, camera_m in zip(self._view.nodes, cameras_m, strict=True):
             radio_m = self.place_m(node.name)
             if np.linalg.norm(radio_m - camera_m) > 1e-3:
-                self._mark(f"radio-{node.name}", radio_m, BRAND)
                 self._lines(f"moved-{node.name}", np.array([[camera_m, radio_m]]))
 
     def _add_marks(self) -> None:
@@ -277,9 +296,12 @@ class DeliveryDrawing:
         if len(pairs):
             self._lines("routes", self._places_m[pairs])
 
-    def _mark(self, name: str, place_m: FloatArray, color: Number) -> None:
-        self._scene.add_icosphere(
-            f"{self._below}/{name}", radius=0.028 * self._size_m, color=color, position=place_m
+    def _mark(
+        self, name: str, place_m: FloatArray, color: Number, size: float = 1.0
+    ) -> viser.IcosphereHandle:
+        radius_m = 0.028 * size * self._size_m
+        return self._scene.add_icosphere(
+            f"{self._below}/{name}", radius=radius_m, color=color, position=place_m
         )
 
     def _label(self, name: str, text: str, place_m: FloatArray, size: float) -> viser.LabelHandle:
@@ -304,7 +326,12 @@ def _dark(aspect: float) -> np.ndarray:
 def _state_color(down: bool, share: float) -> Number:
     if down:
         return DOWN
-    start, end = np.array(BUSY, float), np.array(DELIVERED, float)
+    return _between(BUSY, DELIVERED, share)
+
+
+def _between(first: Number, second: Number, share: float) -> Number:
+    """A colour on the way from one to another."""
+    start, end = np.array(first, float), np.array(second, float)
     red, green, blue = np.rint(start + share * (end - start)).astype(int).tolist()
     return red, green, blue
 
@@ -314,4 +341,12 @@ def legend(view: DeliveryView) -> Sequence[tuple[str, Number]]:
     some = [("camera, nothing arrived", BUSY), ("camera, all arrived", DELIVERED)]
     if any(node.row < 0 for node in view.nodes):
         some.append(("camera down", DOWN))
-    return [*some, ("lost here", LOSS)]
+    most = "empty battery" if view.sent.network.energy.battery_j else "most energy used here"
+    return [*some, ("lost here", LOSS), (f"ball: from little to {most}", EMPTY)]
+
+
+def most_j(view: DeliveryView) -> float:
+    """What a node's battery holds; without one, the most that any node uses until the last moment."""
+    battery_j = view.sent.network.energy.battery_j
+    used_j = [node.energy_j for moment in view.moments for node in moment.nodes]
+    return max(used_j, default=0.0) if battery_j is None else battery_j

@@ -27,6 +27,7 @@ from app.screens.network.delivery_view import (
 from app.screens.network.run_view import run_view
 from app.state import Sent, Spec
 from app.store import Store
+from network_sim.arrivals import energy_by_node_j
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import Progress, part
 from pipeline.acquisition import back_project
@@ -167,6 +168,9 @@ def _moment_view(sending: Sending, moment: Moment, t_ns: int) -> MomentView:
     received = received_at(sending, t_ns)
     frames = frames_at_sink(sending, received)
     surface, truth = moment.surface, moment.truth
+    used_j = energy_by_node_j(sending.trace, [t_ns])[0]
+    senders = senders_of(sending.rig, sending.spec.down)
+    energy_j = [used_j[senders.index(row)] if row in senders else 0.0 for row in range(len(frames))]
     return MomentView(
         t_ns=t_ns,
         sent_bytes=moment.sent_bytes,
@@ -175,9 +179,11 @@ def _moment_view(sending: Sending, moment: Moment, t_ns: int) -> MomentView:
         radio_j=float(moment.radio_j),
         energy_j=float(moment.energy_j),
         nodes=tuple(
-            _node_moment(frame, got.rgb_known, node, moment.T_world_camera.get(frame.name), whole)
-            for frame, got, node, whole in zip(
-                frames, received, moment.nodes, sending.rig.frames, strict=True
+            _node_moment(
+                frame, got.rgb_known, node, moment.T_world_camera.get(frame.name), whole, float(used)
+            )
+            for frame, got, node, whole, used in zip(
+                frames, received, moment.nodes, sending.rig.frames, energy_j, strict=True
             )
         ),
         glb=b"" if surface is None else surface_glb(surface, _colors(surface, received), photographed=True),
@@ -198,6 +204,7 @@ def _node_moment(
     arrival: NodeArrival,
     T_world_camera: FloatArray | None,
     whole: RgbdFrame,
+    energy_j: float,
 ) -> NodeMoment:
     cloud = _cloud(frame)
     thin = sample(cloud.points_m, cloud.colors, NODE_POINTS)
@@ -213,6 +220,7 @@ def _node_moment(
         points_m=thin.points_m,
         colors=colors,
         T_world_camera=whole.T_world_camera if T_world_camera is None else T_world_camera,
+        energy_j=energy_j,
     )
 
 

@@ -52,6 +52,8 @@ class NodeMoment:
     """(N, 3)."""
     T_world_camera: FloatArray
     """(4, 4) registered, or as believed."""
+    energy_j: float
+    """That its radio and the computer that carries it have used; 0 if it is down."""
 
 
 @dataclass(frozen=True, slots=True)

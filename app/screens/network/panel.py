@@ -14,7 +14,7 @@ from app.drawing.cameras import turn
 from app.drawing.clouds import clear
 from app.drawing.colors import css
 from app.lesson import LessonFolder, read_lesson
-from app.screens.network.delivery_draw import DeliveryDrawing, legend
+from app.screens.network.delivery_draw import DeliveryDrawing, legend, most_j
 from app.screens.network.delivery_numbers import changes, difference, moment_table, more_rows, summary
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
@@ -298,7 +298,7 @@ class NetworkPanel(Panel):
         self._moment_s = time.monotonic()
         moment = view.moment_at(self._dock.now_ns)
         with self.ui.atomic():
-            drawing.show_moment(moment)
+            drawing.show_moment(moment, most_j(view))
             self._table.content = moment_table(view, moment)
             self._others.content = more_rows(view, moment) + metric_tables((view.run,))[1]
 
