@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 
 import pytest
 from playwright.sync_api import expect
 
 from app.screens.network import setup
+from pipeline.delivery.sending import DeliverySpec, received_at, send
+from pipeline.sources import Demo
+from pipeline.spec import Spec
 from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import canvas, changed_from, differing, go, pick, press
+from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, pick, press
 
 ALL = re.compile(r"^\d cameras sent [\d.]+ MB in [\d,]+ packets; simulated in [\d.]+ s\.$")
 
@@ -45,6 +49,13 @@ def delivered_mb(page):
     text = page.get_by_role("row", name="Bytes at the sink").inner_text()
     first = re.split(r"\s{2,}|\t|\n", text.strip())[1]
     return 0.0 if first == "–" else float(first.split()[0])
+
+
+def drawn_clouds(session, page):
+    """The nodes that have a cloud in the session's scene a moment from now."""
+    page.wait_for_timeout(100)
+    names = list(session.scene._handle_from_node_name)
+    return {name.split("/cloud-")[1].rsplit("-", 1)[0] for name in names if "/cloud-" in name}
 
 
 def test_the_room_fills_in_as_its_bytes_arrive(network):
@@ -85,6 +96,26 @@ def test_a_coding_that_needs_fewer_bytes_is_compared_with_the_one_before(network
     pick(network, "Coding", "RVL depth, JPEG colour")
     network.get_by_text("coding jpeg instead of raw").wait_for()
     expect(network.get_by_text(re.compile("the last byte came after"))).to_be_visible()
+
+
+def test_clouds_appear_in_the_order_in_which_their_images_were_delivered(network, app):
+    """The sink's own account of the same sending says which nodes have depth at each moment."""
+    (session,) = (one for one in app.sessions.values() if one.spec.sent and one.spec.sent.coding == "jpeg")
+    sent = session.spec.sent
+    sending = send(DeliverySpec(Spec(Demo("box-on-table")), sent.network, sent.coding, sent.moments))
+    network.get_by_text("Up to date").wait_for()
+    pictures, orders = [], []
+    for t_ns in sending.times_ns.tolist():
+        seek(network, (t_ns + 2_000_000) / sending.trace.horizon_ns)
+        with_depth = [bool((got.depth > 0).any()) for got in received_at(sending, t_ns)]
+        wanted = {frame.name for frame, there in zip(sending.rig.frames, with_depth, strict=True) if there}
+        assert any(drawn_clouds(session, network) == wanted for _ in range(50))
+        if not orders or wanted != orders[-1]:
+            pictures.append(canvas(network))
+            orders.append(wanted)
+    assert len(orders) >= 3
+    assert all(one < other for one, other in pairwise(orders))
+    assert all(differing(one, other) > ALIKE for one, other in pairwise(pictures))
 
 
 def test_a_delivery_rests_while_nobody_looks_and_goes_on_from_there(network):
