@@ -23,6 +23,7 @@ from typing import Any, Literal
 
 import psutil
 
+from packetmesh.batch import THREAD_LIMITS
 from packetmesh.errors import PacketMeshError
 
 logger = logging.getLogger(__name__)
@@ -253,7 +254,7 @@ def _memory_bytes(process: BaseProcess | None) -> int:
 def _child(connection: Connection, warm_up: Callable[[], None] | None, threads: int) -> None:
     """Main function of a computing process: take a job, report, repeat until the server is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    for name in THREAD_LIMITS:
         os.environ.setdefault(name, str(threads))
     try:
         if warm_up is not None:

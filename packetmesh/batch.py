@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
@@ -12,6 +13,9 @@ from itertools import islice
 from typing import Any, TypeVar
 
 from packetmesh.errors import InputError, PacketMeshError
+
+THREAD_LIMITS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+"""What libraries read when they are imported."""
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -45,14 +49,7 @@ def run_batch(
     if processes <= 1:
         yield from ((index, function(task)) for index, task in enumerate(tasks))
         return
-    # The workers end silently at an interrupt, unless this process ignores interrupts (nohup): they do, too.
-    heeded = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
-    pool = ProcessPoolExecutor(
-        processes,
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_DFL if heeded else signal.SIG_IGN),
-    )
+    pool = process_pool(processes)
     try:
         yield from _completed(pool, function, tasks, lambda: processes + 1)
     except BrokenProcessPool:
@@ -62,6 +59,36 @@ def run_batch(
         ) from None
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def process_pool(processes: int, begin: Callable[..., None] | None = None, *given: Any) -> Executor:
+    """New processes that share the cores; libraries whose threads wait for work by spinning get no more.
+
+    They end silently at an interrupt, unless this process ignores interrupts (nohup): then they do, too.
+
+    Args:
+        processes: how many.
+        begin: importable by its name; called with ``given`` when a process starts.
+        given: its arguments.
+    """
+    heeded = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+    threads = max(1, (os.cpu_count() or 1) // processes)
+    return ProcessPoolExecutor(
+        processes,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_begin,
+        initargs=(heeded, threads, pickle.dumps((begin, given))),
+    )
+
+
+def _begin(heeded: bool, threads: int, pickled: bytes) -> None:
+    """What is pickled imports the libraries that look at the number of threads, so it waits for it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL if heeded else signal.SIG_IGN)
+    for name in THREAD_LIMITS:
+        os.environ.setdefault(name, str(threads))
+    begin, given = pickle.loads(pickled)
+    if begin is not None:
+        begin(*given)
 
 
 def _completed(

@@ -6,15 +6,14 @@ the bytes that have arrived by then, and the usual chain makes of them what it c
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Generator, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from network_sim.config import PRESETS as NETWORKS
 from network_sim.config import NetworkConfig
+from packetmesh.batch import process_pool
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
@@ -102,7 +101,7 @@ def _moments(sending: Sending, processes: int) -> Iterator[Moment]:
         for index in others:
             yield drain(here.moment(index))
         return
-    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _start, (sending,))
+    pool = process_pool(processes, _start, sending)
     try:
         yield from pool.map(_moment_there, others)
     finally:

@@ -86,14 +86,23 @@ def test_a_superseded_job_that_never_reports_loses_its_process(pool, tmp_path):
     assert second.end() == Outcome("result", 1)
 
 
-def test_a_lane_that_is_stopped_forgets_what_waits_and_its_job_ends_at_its_next_report(pool, tmp_path):
-    lane, first, second = LatestWins(pool, "stop"), Inbox(), Inbox()
-    lane.submit(jobs.count_forever, str(tmp_path), **first.callbacks())
+def test_the_job_of_a_lane_that_is_stopped_ends_at_its_next_report(pool, tmp_path):
+    lane, inbox = LatestWins(pool, "stop"), Inbox()
+    lane.submit(jobs.count_forever, str(tmp_path), **inbox.callbacks())
+    wait_for(tmp_path / "began")
+    lane.stop()
+    assert inbox.end().kind == "stopped"
+    assert (tmp_path / "tidied").exists()
+    assert not lane.busy
+
+
+def test_a_lane_that_is_stopped_forgets_what_waits(pool, tmp_path):
+    lane, first, second = LatestWins(pool, "forget"), Inbox(), Inbox()
+    lane.submit(jobs.deaf, str(tmp_path), **first.callbacks())
     wait_for(tmp_path / "began")
     lane.submit(jobs.count, 1, **second.callbacks())
     lane.stop()
     assert first.end().kind == "stopped"
-    assert (tmp_path / "tidied").exists()
     assert not lane.busy
     assert second.ends.empty()
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from packetmesh.batch import run_batch
+from packetmesh.batch import process_pool, run_batch
 from packetmesh.errors import InputError, PacketMeshError
 
 PROCESS = "__import__('os').getpid()"
@@ -43,6 +43,22 @@ def test_several_tasks_go_to_as_many_other_processes_as_are_allowed():
     workers = set(dict(run_batch(eval, [PROCESS] * 12, processes=2)).values())
     assert os.getpid() not in workers
     assert 1 <= len(workers) <= 2
+
+
+def test_processes_share_the_cores_unless_the_environment_says_otherwise(monkeypatch):
+    asked = "__import__('os').environ['OMP_NUM_THREADS']"
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    share = str(max(1, (os.cpu_count() or 1) // 2))
+    assert set(dict(run_batch(eval, [asked] * 4, processes=2)).values()) == {share}
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    assert set(dict(run_batch(eval, [asked] * 4, processes=2)).values()) == {"7"}
+
+
+def test_a_new_process_begins_with_what_it_is_given():
+    with process_pool(1, os.putenv, "PACKETMESH_TOLD", "yes") as pool:
+        assert (
+            pool.submit(eval, "__import__('subprocess').getoutput('echo $PACKETMESH_TOLD')").result() == "yes"
+        )
 
 
 def test_answers_come_in_the_order_of_completion(tmp_path):
