@@ -86,6 +86,9 @@ class MacConfig:
     """Ask for the channel before every packet (RTS/CTS); only IEEE 802.11b can."""
     ack: bool = True
     """Acknowledge frames and send lost ones again; IEEE 802.11b always does."""
+    retries: int | None = None
+    """How often a frame that was not acknowledged is sent again; None is as the standards have it: 3 times
+    in IEEE 802.15.4, 6 in IEEE 802.11b. The other links never do."""
     link_bps: float = 250e3
     """Rate of the ideal link or the serial line."""
     trace: str | None = None
@@ -93,6 +96,7 @@ class MacConfig:
 
     def __post_init__(self) -> None:
         above("mac.link_bps", self.link_bps, 0.0)
+        at_least("mac.retries", self.retries, 0)
         if self.kind == "replay" and not self.trace:
             raise InputError("mac.kind is replay, but of which recorded link? Try mac.trace=FILE")
 

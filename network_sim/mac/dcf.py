@@ -44,7 +44,7 @@ REPLY_WAIT_NS = GAP_NS + SLOT_NS + PLCP_NS
 MIN_WINDOW = 32
 MAX_WINDOW = 1024
 ATTEMPTS = 7
-"""Frames, or RTS, for a packet before it is dropped."""
+"""Frames, or RTS, for a packet before it is dropped, if ``mac.retries`` says nothing."""
 
 _NEVER = 2**62
 _AIR, _ACK, _DELIVER, _NONE = EventKind.AIR, EventKind.ACK, EventKind.DELIVER, Cause.NONE
@@ -150,6 +150,8 @@ class Dcf:
         self._env = context.env
         self._medium = context.medium
         self._rts = context.config.mac.rts
+        retries = context.config.mac.retries
+        self._attempts = ATTEMPTS if retries is None else 1 + retries
         self._record = context.recorder.add_packet
         self._up = context.up
         self._receive = context.receive
@@ -176,7 +178,7 @@ class Dcf:
             )
         station.arrived = False
         window = MIN_WINDOW
-        for attempt in range(1, ATTEMPTS + 1):
+        for attempt in range(1, self._attempts + 1):
             turn = self._contend(station, packet.size_bytes)
             if turn is not None:
                 yield turn
@@ -185,13 +187,13 @@ class Dcf:
                 self._schedule()
                 return Delivery(False, Cause.ACK_LOST if station.arrived else Cause.NODE_DOWN, attempt - 1)
             cause = yield from self._exchange(packet, station, receiver)
-            over = not cause or attempt == ATTEMPTS
+            over = not cause or attempt == self._attempts
             window = MIN_WINDOW if over else min(2 * window, MAX_WINDOW)
             self._begin_backoff(station, window)
             if not cause:
                 return _FIRST_ATTEMPT if attempt == 1 else Delivery(True, _NONE, attempt)
         yield self._env.timeout(station.own_free_ns - DIFS_NS - self._env.now)
-        return Delivery(False, Cause.ACK_LOST if station.arrived else Cause.RETRIES, ATTEMPTS)
+        return Delivery(False, Cause.ACK_LOST if station.arrived else Cause.RETRIES, self._attempts)
 
     def _contend(self, station: _Station, size_bytes: int) -> simpy.Event | None:
         """Event that the station may send; None if nothing can happen before its frame is over."""

@@ -51,6 +51,8 @@ class Ieee802154:
         self._env = context.env
         self._medium = context.medium
         self._ack = context.config.mac.ack
+        retries = context.config.mac.retries
+        self._attempts = 1 + (MAX_FRAME_RETRIES if retries is None else retries) if self._ack else 1
         self._recorder = context.recorder
         self._up = context.up
         self._receive = context.receive
@@ -68,7 +70,7 @@ class Ieee802154:
             did not arrive is ``ok`` with a cause; one that was dropped although it arrived has ``ACK_LOST``.
         """
         arrived = False
-        for attempt in range(1 + (MAX_FRAME_RETRIES if self._ack else 0)):
+        for attempt in range(self._attempts):
             refusal = yield from self._access(packet, sender, receiver)
             if refusal:
                 return Delivery(False, Cause.ACK_LOST if arrived else refusal, attempt)
@@ -84,7 +86,7 @@ class Ieee802154:
             if acknowledged:
                 self._begin_interframe_space(packet, sender)
                 return Delivery(True, Cause.NONE, attempt + 1)
-        return Delivery(False, Cause.ACK_LOST if arrived else Cause.RETRIES, 1 + MAX_FRAME_RETRIES)
+        return Delivery(False, Cause.ACK_LOST if arrived else Cause.RETRIES, self._attempts)
 
     def _access(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Cause]:
         """CSMA/CA: wait for an idle channel; returns why the sender may not send now, ``NONE`` if it may."""

@@ -147,3 +147,18 @@ def test_drawing_losses_changes_nothing_else_that_is_drawn(preset, changes):
     assert len(without.events) > 500
     for one, other in zip(without.events.columns(), drawn.events.columns(), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("kind", "retries", "frames"),
+    [("ieee802154", None, 4), ("ieee802154", 0, 1), ("ieee80211b", None, 7), ("ieee80211b", 2, 3)],
+)
+def test_a_packet_is_given_up_after_as_many_retries_as_are_set(kind, retries, frames):
+    changes = () if retries is None else (f"mac.retries={retries}",)
+    trace = run(*ONE_NODE, "nodes.retransmit=false", f"mac.kind={kind}", "loss.share=0.6", *changes)
+    dropped = trace.events.of(EventKind.DROP)
+    dropped = dropped.where(np.isin(dropped.cause, (Cause.RETRIES, Cause.ACK_LOST)))
+    sent = np.bincount(trace.events.of(EventKind.AIR).packet)
+    assert len(dropped) > 20
+    assert (sent[dropped.packet] == frames).all()
+    assert sent.max() == frames

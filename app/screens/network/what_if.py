@@ -17,6 +17,10 @@ from pipeline.types import FloatArray
 
 NOBODY = "nobody"
 SINK = "sink"
+RETRIES: dict[str, tuple[str, ...]] = {
+    "as the standard has it": (),
+    **{str(count): (f"mac.retries={count}",) for count in (0, 1, 2, 5, 10)},
+}
 WALL_AWAY, WALL_HALF = 0.2, 0.25
 """How far the wall is from its node on the way to the sink, and half its length, over that way."""
 MOST_AWAY_M, MOST_HALF_M = 1.0, 1.0
@@ -49,11 +53,14 @@ class WhatIf:
         self._wall_db = gui.add_slider(
             "Wall takes (dB)", 0.0, 80.0, 1.0, 30.0, hint="Of the power of every frame that crosses it."
         )
+        self._retries = gui.add_dropdown(
+            "Retries", list(RETRIES), hint="How often a frame that is not acknowledged is sent again."
+        )
         self._mover = gui.add_dropdown(
             "Move radio of", [NOBODY], hint="Arrows appear at this node; its camera stays where it is."
         )
         self._text = gui.add_markdown("")
-        for handle in (self._off, self._walled, self._wall_db):
+        for handle in (self._off, self._walled, self._wall_db, self._retries):
             ui.when_changed(handle, on_change)
         ui.when_changed(self._mover, self._put_back_or_show)
         self._at_m: Callable[[str], FloatArray] | None = None
@@ -74,12 +81,13 @@ class WhatIf:
         if self._walled.value in places_m:
             changes.append("radio.walls_m=" + _text(wall_m(places_m, self._walled.value)))
             changes.append(f"radio.wall_db={float(self._wall_db.value):g}")
-        return tuple(changes)
+        return (*changes, *RETRIES[self._retries.value])
 
     def forget(self) -> None:
         """Nothing has happened."""
         for handle in (self._off, self._walled, self._mover):
             handle.value = NOBODY
+        self._retries.value = next(iter(RETRIES))
         self._moved_m.clear()
         self._text.content = ""
         self._clear()
@@ -97,7 +105,7 @@ class WhatIf:
 
     def show(self, visible: bool) -> None:
         """Show the controls or hide them; without them, what they have drawn goes, too."""
-        for handle in (self._off, self._walled, self._wall_db, self._mover, self._text):
+        for handle in (self._off, self._walled, self._wall_db, self._retries, self._mover, self._text):
             handle.visible = visible
         if not visible:
             self._clear()
