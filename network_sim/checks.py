@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sized
+from collections.abc import Iterable, Sized
 
 from packetmesh.errors import InputError
 
@@ -30,3 +30,15 @@ def one_each(key: str, values: Sized, wanted: int, what: str) -> None:
     """Refuses values that are neither none nor as many as wanted; ``what`` says which these are."""
     if len(values) not in (0, wanted):
         raise InputError(f"{key} has {len(values)} numbers; try {wanted}: {what}")
+
+
+def several(key: str, values: Sized, each: int, what: str) -> None:
+    """Refuses values that are not so many for each of some things; ``what`` says which these are."""
+    if len(values) % each:
+        raise InputError(f"{key} has {len(values)} numbers; try {each} for each {what}")
+
+
+def finite(key: str, values: Iterable[float], unit: str) -> None:
+    """Refuses values of which one is no number."""
+    if not all(map(math.isfinite, values)):
+        raise InputError(f"{key} holds {values}; try {unit}")

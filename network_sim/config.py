@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from network_sim.checks import above, at_least, one_each, share
+from network_sim.checks import above, at_least, finite, one_each, several, share
 from network_sim.losses import LossConfig
 from packetmesh.errors import InputError
 
@@ -60,19 +59,16 @@ class RadioConfig:
     """What a wall takes of the power over every link that crosses it."""
 
     def __post_init__(self) -> None:
-        for key in ("frequency_hz", "antenna_gain", "antenna_height_m", "path_loss_exponent", "range_m"):
+        lengths = ("antenna_height_m", "range_m", "reference_m")
+        for key in (*lengths, "frequency_hz", "antenna_gain", "path_loss_exponent"):
             above(f"radio.{key}", getattr(self, key), 0.0)
-        above("radio.reference_m", self.reference_m, 0.0)
+        for key in ("shadowing_db", "capture_db", "wall_db"):
+            at_least(f"radio.{key}", getattr(self, key), 0.0)
         at_least("radio.system_loss", self.system_loss, 1.0)
-        at_least("radio.shadowing_db", self.shadowing_db, 0.0)
         at_least("radio.nakagami_m", self.nakagami_m, 0.5)
         at_least("radio.sense_range_m", self.sense_range_m, self.range_m)
-        at_least("radio.capture_db", self.capture_db, 0.0)
-        at_least("radio.wall_db", self.wall_db, 0.0)
-        if len(self.walls_m) % 4:
-            raise InputError(f"radio.walls_m has {len(self.walls_m)} numbers; try four for each wall")
-        if not all(map(math.isfinite, self.walls_m)):
-            raise InputError(f"radio.walls_m holds {self.walls_m}; try metres")
+        several("radio.walls_m", self.walls_m, 4, "wall")
+        finite("radio.walls_m", self.walls_m, "metres")
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +83,7 @@ class MacConfig:
     ack: bool = True
     """Acknowledge frames and send lost ones again; IEEE 802.11b always does."""
     retries: int | None = None
-    """How often a frame that was not acknowledged is sent again; None is as the standards have it: 3 times
-    in IEEE 802.15.4, 6 in IEEE 802.11b. The other links never do."""
+    """How often an unanswered frame is sent again; None is 3 times in IEEE 802.15.4, 6 in IEEE 802.11b."""
     link_bps: float = 250e3
     """Rate of the ideal link or the serial line."""
     trace: str | None = None
@@ -157,8 +152,7 @@ class NodesConfig:
         places = f"x and y of each node and of the sink ({nodes})"
         one_each("nodes.places_m", self.places_m, 2 * (self.count + 1), places)
         one_each("nodes.bytes_by_node", self.bytes_by_node, self.count, f"one size for each node ({nodes})")
-        if not all(map(math.isfinite, self.places_m)):
-            raise InputError(f"nodes.places_m holds {self.places_m}; try metres")
+        finite("nodes.places_m", self.places_m, "metres")
         for size_bytes in self.bytes_by_node:
             at_least("nodes.bytes_by_node", size_bytes, 1)
         if self.header_bytes >= self.payload_bytes:
@@ -353,8 +347,7 @@ class NetworkConfig:
 
 
 WAVELAN = EnergyConfig(tx_w=1.346, rx_w=0.901, idle_w=0.739, sleep_w=0.0474)
-"""An IEEE 802.11b card, Lucent's WaveLAN "Silver" at 11 Mb/s: 284, 190, 156 and 10 mA at 4.74 V as measured
-by Feeney and Nilsson (INFOCOM 2001); from memory."""
+"""Lucent's WaveLAN at 11 Mb/s: 284, 190, 156, 10 mA at 4.74 V (Feeney and Nilsson 2001, from memory)."""
 
 PRESETS: dict[str, NetworkConfig] = {
     "thesis-link": NetworkConfig(),

@@ -227,7 +227,7 @@ def test_each_wall_takes_its_decibels_both_ways() -> None:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"walls_m": (0.0, 0.0, 1.0)}, "four for each wall"),
+        ({"walls_m": (0.0, 0.0, 1.0)}, "4 for each wall"),
         ({"walls_m": (0.0, 0.0, 1.0, math.inf)}, "try metres"),
         ({"wall_db": -1.0}, "radio.wall_db"),
     ],

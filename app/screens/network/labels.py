@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from app.drawing.colors import INFERRED, SOURCE, TARGET
-from network_sim.config import PRESETS, NetworkConfig
+from network_sim.config import PRESETS, WAVELAN, EnergyConfig, NetworkConfig
 from network_sim.types import Cause, PacketKind
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
@@ -77,12 +77,20 @@ SCHEMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "PDC: by chance, as received": ("scheme.name=pdc-received",),
     }
 )
+
+
+def _power(of: EnergyConfig) -> tuple[str, ...]:
+    """The power of a radio as settings."""
+    return tuple(f"energy.{state}_w={getattr(of, f'{state}_w')}" for state in ("tx", "rx", "idle", "sleep"))
+
+
+CC2420_POWER, WAVELAN_POWER = _power(EnergyConfig()), _power(WAVELAN)
 ACCESS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "IEEE 802.15.4": ("mac.kind=ieee802154",),
-        "IEEE 802.15.4 without ACK": ("mac.kind=ieee802154", "mac.ack=false"),
-        "IEEE 802.11b": ("mac.kind=ieee80211b",),
-        "IEEE 802.11b with RTS/CTS": ("mac.kind=ieee80211b", "mac.rts=true"),
+        "IEEE 802.15.4": ("mac.kind=ieee802154", *CC2420_POWER),
+        "IEEE 802.15.4 without ACK": ("mac.kind=ieee802154", "mac.ack=false", *CC2420_POWER),
+        "IEEE 802.11b": ("mac.kind=ieee80211b", *WAVELAN_POWER),
+        "IEEE 802.11b with RTS/CTS": ("mac.kind=ieee80211b", "mac.rts=true", *WAVELAN_POWER),
         "a link of its own for each": ("mac.kind=ideal",),
         "serial line, 57,600 baud": ("mac.kind=serial", "mac.link_bps=57600"),
     }
