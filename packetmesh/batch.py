@@ -62,7 +62,8 @@ def run_batch(
 
 
 def process_pool(processes: int, begin: Callable[..., None] | None = None, *given: Any) -> Executor:
-    """New processes that share the cores; libraries whose threads wait for work by spinning get no more.
+    """New processes that share the cores; libraries whose threads wait for work by spinning get no more, if
+    the program's own file does not import them: a new process imports that first.
 
     They end silently at an interrupt, unless this process ignores interrupts (nohup): then they do, too.
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from network_sim.config import NetworkConfig
+from network_sim.places import place_nodes
 from packetmesh.errors import InputError
 from pipeline.types import FloatArray, Rig
 
@@ -25,7 +26,7 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
 
     Where ``nodes.places_m`` says nothing, nodes stand where their cameras do, seen from above, and the sink
     behind them, ``nodes.spacing_m`` from their middle. Where the poses are unknown, too, they stand as
-    ``nodes.layout`` has it.
+    ``nodes.layout`` has it. Of a rig some of whose nodes are down, ``placed`` says where the others stand.
 
     Args:
         rig: one to six nodes; the world's third axis points up.
@@ -62,19 +63,26 @@ def places_of(rig: Rig, spacing_m: float) -> tuple[float, ...]:
     return tuple(np.vstack([cameras_m, sink_m]).ravel().tolist())
 
 
-def places_of_senders(network: NetworkConfig, nodes: int, senders: Sequence[int]) -> NetworkConfig:
-    """The network with the places of some of a rig's nodes only, if it has any.
+def placed(rig: Rig, network: NetworkConfig, senders: Sequence[int]) -> NetworkConfig:
+    """The network with a place for each of a rig's nodes that sends; whoever is down moves nobody else.
 
     Raises:
-        InputError: it places another number of nodes than the rig has.
+        InputError: ``nodes.places_m`` places another number of nodes than the rig has.
     """
-    places_m = np.reshape(network.nodes.places_m, (-1, 2))
-    if not len(places_m):
+    nodes, count = network.nodes, len(rig.frames)
+    if nodes.places_m:
+        places_m = np.reshape(nodes.places_m, (-1, 2))
+        if len(places_m) != count + 1:
+            raise InputError(
+                f"nodes.places_m places {len(places_m) - 1} nodes and the sink, and there are {count} nodes; "
+                f"try {2 * (count + 1)} numbers and nodes.count={count}"
+            )
+    elif poses_known(rig):
+        places_m = np.reshape(places_of(rig, nodes.spacing_m), (-1, 2))
+    elif len(senders) < count:
+        whole = replace(nodes, count=count, bytes_by_node=())
+        places_m = place_nodes(whole, np.random.default_rng(network.run.seed)).positions_m
+    else:
         return network
-    if len(places_m) != nodes + 1:
-        raise InputError(
-            f"nodes.places_m places {len(places_m) - 1} nodes and the sink, and there are {nodes} nodes; "
-            f"try {2 * (nodes + 1)} numbers and nodes.count={nodes}"
-        )
-    some_m = tuple(places_m[[*senders, nodes]].ravel().tolist())
-    return replace(network, nodes=replace(network.nodes, count=len(senders), places_m=some_m))
+    some_m = tuple(places_m[[*senders, count]].ravel().tolist())
+    return replace(network, nodes=replace(nodes, count=len(senders), bytes_by_node=(), places_m=some_m))

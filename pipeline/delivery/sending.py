@@ -15,7 +15,7 @@ from network_sim.trace import NetworkTrace
 from packetmesh.errors import InputError
 from pipeline.delivery import coding_named
 from pipeline.delivery.coding import Coding, Received
-from pipeline.delivery.plan import network_of, places_of_senders
+from pipeline.delivery.plan import network_of, placed
 from pipeline.delivery.sink import frame_at_sink, images_of
 from pipeline.spec import Spec
 from pipeline.types import BoolArray, ByteArray, RgbdFrame, Rig
@@ -74,7 +74,7 @@ def send(spec: DeliverySpec) -> Sending:
     encoded = [coding.encode(images_of(frame), packet_bytes) for frame in rig.frames]
     senders = senders_of(rig, spec.down)
     part = Rig(rig.name, tuple(rig.frames[node] for node in senders))
-    network = places_of_senders(spec.network, len(rig.frames), senders)
+    network = placed(rig, spec.network, senders)
     trace = simulate(network_of(part, [len(encoded[node]) for node in senders], network))
     streams = tuple(np.frombuffer(data, np.uint8) for data in encoded)
     came = arrivals(trace)

@@ -71,9 +71,8 @@ class Screen(Bench):
         """Which nodes have a cloud."""
         return {name.rsplit("-", 1)[0] for name in self.names() if name.startswith("cloud-")}
 
-    def drag(self, name, by_m):
+    def drag(self, arrows, by_m):
         """Drag arrows and let them go."""
-        arrows = self.drawn(name)
         arrows.position = np.array(arrows.position) + by_m
         for ended in arrows._impl_aux.update_cb:
             ended(SimpleNamespace(phase="end"))
@@ -252,11 +251,23 @@ def test_frames_go_round_a_wall_over_another_camera_until_it_is_gone(screen):
     assert screen.drawn("/network/what-if/wall") is None
 
 
+def test_a_second_drag_goes_on_from_the_first(screen):
+    gui = screen.gui
+    gui.set("Move radio of", "node_00")
+    start_m = screen.handle("battery-node_00").position[:2]
+    arrows = screen.drawn("/network/what-if/arrows")
+    for by_m in ((0.4, 0.0, 0.0), (0.0, 0.3, 0.0)):  # the second before the first is answered
+        screen.drag(arrows, by_m)
+    moved_m = screen.handle("battery-node_00").position[:2]
+    assert moved_m - start_m == pytest.approx((0.4, 0.3), abs=2e-3)
+    gui.set("Move radio of", "nobody")
+
+
 def test_a_radio_that_is_dragged_out_of_range_is_not_heard_and_comes_back(screen):
     gui, view = screen.gui, screen.view
     gui.set("Move radio of", "node_02")
     assert screen.drawn("/network/what-if/arrows") is not None
-    screen.drag("/network/what-if/arrows", (1e5, 0.0, 0.0))
+    screen.drag(screen.drawn("/network/what-if/arrows"), (1e5, 0.0, 0.0))
     assert screen.view.moments[-1].nodes[2].delivered_bytes == 0
     assert "radios moved" in gui.text()
     assert screen.handle("battery-node_02").position[0] > 9e4

@@ -9,6 +9,8 @@ from network_sim.config import NetworkConfig
 from packetmesh.settings import differences
 
 BYTES_MB = 1e-6
+MOST_CHANGES = 4
+"""That are told one by one."""
 
 
 def moment_table(view: DeliveryView, now: MomentView | None) -> str:
@@ -131,13 +133,16 @@ def changes(before: DeliveryView, after: DeliveryView) -> str:
     if before.sent.coding != after.sent.coding:
         words.append(f"coding {after.sent.coding} instead of {before.sent.coding}")
     words += [f"{name} on again" for name in before.sent.down if name not in after.sent.down]
-    words += _network_changes(before.sent.network, after.sent.network)[:4]
+    changed = _network_changes(before.sent.network, after.sent.network)
+    words += changed[:MOST_CHANGES] + (["and more"] if len(changed) > MOST_CHANGES else [])
     return ", ".join(words) or "Other settings of the reconstruction"
 
 
 def _network_changes(before: NetworkConfig, after: NetworkConfig) -> list[str]:
     """Places and walls in words, other settings as they are written."""
     words, told = [], {"nodes.count", "nodes.places_m", "radio.walls_m", "radio.wall_db"}
+    if before.mac.kind != after.mac.kind:  # which brings its radio's power
+        told |= {f"energy.{state}_w" for state in ("tx", "rx", "idle", "sleep")}
     if before.nodes.places_m != after.nodes.places_m:
         words.append("radios moved" if after.nodes.places_m else "radios at their cameras again")
     walls = [

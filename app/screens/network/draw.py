@@ -269,16 +269,19 @@ class Roads:
             self._lines.colors = np.repeat(linear(colors)[:, None], 2, axis=1)
 
 
-def road_legend(view: NetworkView) -> str:
+def road_legend(views: Sequence[NetworkView]) -> str:
     """HTML: what the colours of the roads mean; empty without roads."""
-    if view.roads is None:
+    schemes = [view.config.scheme for view in views if view.roads is not None]
+    if not schemes:
         return ""
     stops = ", ".join(css((int(r), int(g), int(b))) for r, g, b in COVERAGE_STOPS)
+    roads = "Roads, each way" if all(scheme.directed_cells for scheme in schemes) else "Roads"
+    spans = " and ".join(dict.fromkeys(f"{scheme.validity_s:g}" for scheme in schemes))
     return (
-        "<div style='padding: 0 0.8em 0.8em; font-size: 12px'>Roads, each way: of the spans of "
-        f"{view.config.scheme.validity_s:g} s in which a camera saw them so far, an image has arrived of 0 % "
-        f"<span style='display: inline-block; width: 7em; height: 0.8em; "
-        f"background: linear-gradient(to right, {stops})'></span> 100 %</div>"
+        f"<div style='padding: 0 0.8em 0.8em; font-size: 12px'>{roads}: of the spans of {spans} s in which a "
+        "camera saw them so far, an image has arrived of 0 % <span style='display: inline-block; width: 7em; "
+        f"height: 0.8em; background: linear-gradient(to right, {stops})'></span> 100 %; grey: not seen yet"
+        "</div>"
     )
 
 

@@ -58,7 +58,7 @@ class NetworkPanel(Panel):
     def build(self) -> None:
         """Controls, numbers, inspector; the dock."""
         gui, ui = self.gui, self.ui
-        self._source = self.session.spec.source
+        self._source, self._other_room = self.session.spec.source, False
         self._delivery: DeliveryView | None = None
         self._before: DeliveryView | None = None
         self._runs: tuple[NetworkView, ...] = ()
@@ -115,6 +115,7 @@ class NetworkPanel(Panel):
         """What streams in from now on belongs to something else; in another room nothing has happened yet."""
         if spec.source != self._source:
             self._source = spec.source
+            self._before, self._other_room, self._difference.content = None, True, ""
             if self._setup.what_if.leave_room() and self._visited:
                 self.ui.post(self._run)
         if not self.session.results.fresh("network", spec):
@@ -196,10 +197,10 @@ class NetworkPanel(Panel):
         """Another delivery: its frames, and as many moments as are there."""
         now_ns = self._dock.now_ns if self._delivery is not None else None
         if self._delivery is not None and self._delivery.moments and self._delivery.nodes:
-            same_room = [n.name for n in self._delivery.nodes] == [n.name for n in view.nodes]
+            same_room = not self._other_room
             ended = self._delivery.moments[-1].t_ns == self._delivery.times_ns[-1]
             self._before = self._delivery if same_room and ended else None
-        self._delivery, self._runs = view, ()
+        self._delivery, self._runs, self._other_room = view, (), False
         self._frames = [Frames(view.run)]
         drawing = self._drawing = DeliveryDrawing(self.scene, self._next_name(), view)
         self._setup.what_if.load(view, drawing.place_m)
@@ -222,10 +223,11 @@ class NetworkPanel(Panel):
 
     def _take_runs(self, runs: tuple[NetworkView, ...]) -> None:
         self._runs, self._delivery, self._before = runs, None, None
+        self._setup.what_if.clear()
         self._frames = [Frames(run) for run in runs]
         self._status.content = runs_summary(runs)
         self._table.content, self._others.content = metric_tables(runs)
-        self._difference.content, self._legend.content = verdict(runs), road_legend(runs[0])
+        self._difference.content, self._legend.content = verdict(runs), road_legend(runs)
         self._packet.content = PICK
         self._drawing = NetworkDrawing(self.scene, self._next_name(), runs)
         start_ns, end_ns = min(run.start_ns for run in runs), max(run.end_ns for run in runs)
@@ -273,6 +275,8 @@ class NetworkPanel(Panel):
     def _forget(self) -> None:
         """Show nothing: what was there has other settings."""
         self._runs, self._delivery, self._drawing, self._streaming = (), None, None, False
+        self._before = None
+        self._setup.what_if.clear()
         self._dock.show(False)
         for html in (self._table, self._others, self._difference, self._legend):
             html.content = ""

@@ -192,6 +192,7 @@ class NetworkSetup:
         return with_settings(config, (*shown, *self._ways[way], *extra))
 
     def _picked(self) -> None:
+        self.what_if.put_back()  # the sink of another preset stands elsewhere
         self._load()
         self._on_change()
 

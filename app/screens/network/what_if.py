@@ -26,7 +26,11 @@ WALL_AWAY, WALL_HALF = 0.2, 0.25
 MOST_AWAY_M, MOST_HALF_M = 1.0, 1.0
 APART = 0.4
 """Half the length of the wall over the distance to the nearest other node, at most: it stands before one."""
-MOVED_TEXT = "Drag the arrows: the radio moves and frames are sent from there; its camera stays."
+MOVED_TEXT = (
+    "Drag the arrows: the radio moves and frames are sent from there; its camera stays. Choose *nobody* to "
+    "put all radios back."
+)
+WALL_DB = 30.0
 
 
 class WhatIf:
@@ -48,18 +52,24 @@ class WhatIf:
         self._drawn: list[Any] = []
         self._off = gui.add_dropdown("Switch off", [NOBODY], hint="This node has failed and sends nothing.")
         self._walled = gui.add_dropdown(
-            "Wall before", [NOBODY], hint="A wall stands between this node and the sink."
+            "Wall before",
+            [NOBODY],
+            hint="A wall stands between this node and the sink; serial lines and recorded links do not mind.",
         )
         self._wall_db = gui.add_slider(
-            "Wall takes (dB)", 0.0, 80.0, 1.0, 30.0, hint="Of the power of every frame that crosses it."
+            "Wall takes (dB)", 0.0, 80.0, 1.0, WALL_DB, hint="Of the power of every frame that crosses it."
         )
         self._retries = gui.add_dropdown(
-            "Retries", list(RETRIES), hint="How often a frame that is not acknowledged is sent again."
+            "Retries",
+            list(RETRIES),
+            hint="How often a frame that is not acknowledged is sent again; only IEEE 802.15.4 with ACK and "
+            "802.11b do.",
         )
         self._mover = gui.add_dropdown(
             "Move radio of", [NOBODY], hint="Arrows appear at this node; its camera stays where it is."
         )
         self._text = gui.add_markdown("")
+        self._visible = True
         for handle in (self._off, self._walled, self._wall_db, self._retries):
             ui.when_changed(handle, on_change)
         ui.when_changed(self._mover, self._put_back_or_show)
@@ -85,18 +95,25 @@ class WhatIf:
 
     def forget(self) -> None:
         """Nothing has happened."""
-        for handle in (self._off, self._walled, self._mover):
+        for handle in (self._off, self._walled):
             handle.value = NOBODY
+        self._wall_db.value = WALL_DB
         self._retries.value = next(iter(RETRIES))
+        self.put_back()
+
+    def put_back(self) -> None:
+        """Have all radios at their cameras, without arrows; what is drawn goes."""
+        self._mover.value = NOBODY
         self._moved_m.clear()
         self._text.content = ""
-        self._clear()
+        self.clear()
 
     def leave_room(self) -> bool:
         """Forget the room, whose nodes stand elsewhere than the next one's; whether anything had happened."""
         happened = bool(self.off or self.settings())
         self.forget()
         self._places_m, self._at_m = {}, None
+        self.offer([])
         return happened
 
     def switch_off(self, name: str) -> None:
@@ -107,8 +124,9 @@ class WhatIf:
         """Show the controls or hide them; without them, what they have drawn goes, too."""
         for handle in (self._off, self._walled, self._wall_db, self._retries, self._mover, self._text):
             handle.visible = visible
+        self._visible = visible
         if not visible:
-            self._clear()
+            self.clear()
 
     def load(self, view: DeliveryView, at_m: Callable[[str], FloatArray]) -> None:
         """Take a delivery: its nodes can be chosen, and what has happened to them is drawn.
@@ -117,16 +135,22 @@ class WhatIf:
             view: the delivery.
             at_m: where a node, or the sink, is drawn: (3,) by its name.
         """
-        if not self._places_m:
+        if not view.sent.network.nodes.places_m:
             self._places_m = places_of(view)
-        self.offer([node.name for node in view.nodes])
+        self.offer([node.name for node in view.nodes], apart=_apart(view))
         self._at_m = at_m
         self._draw()
 
-    def offer(self, names: Sequence[str]) -> None:
-        """Have these nodes to choose from; a single one cannot be switched off."""
+    def offer(self, names: Sequence[str], apart: bool = True) -> None:
+        """Have these nodes to choose from; a single one cannot be switched off.
+
+        Args:
+            names: of the nodes.
+            apart: whether it is known where they stand; only then their radios can be moved.
+        """
         for handle in (self._off, self._walled, self._mover):
-            options = (NOBODY, *names) if handle is not self._off or len(names) > 1 else (NOBODY,)
+            able = apart if handle is self._mover else handle is self._walled or len(names) > 1
+            options = (NOBODY, *names) if able else (NOBODY,)
             if tuple(handle.options) != options:
                 chosen = handle.value
                 handle.options = options
@@ -140,13 +164,14 @@ class WhatIf:
             self._moved_m.clear()
             self._on_change()
 
-    def _clear(self) -> None:
+    def clear(self) -> None:
+        """Take away what is drawn."""
         while self._drawn:
             self._drawn.pop().remove()
 
     def _draw(self) -> None:
-        self._clear()
-        if self._at_m is None:
+        self.clear()
+        if self._at_m is None or not self._visible:
             return
         if self._walled.value in self._places_m:
             self._draw_wall(self._at_m(self._walled.value), self._at_m(SINK))
@@ -175,18 +200,21 @@ class WhatIf:
             depth_test=False,
         )
         place(arrows, rigid(np.eye(3), at_m))
+        start_m = (self._places_m | self._moved_m)[name]
 
         def dragged(event: Any) -> None:
             if event.phase == "end":
-                self._ui.post(partial(self.move, name, np.array(arrows.position) - at_m))
+                by_m = np.array(arrows.position) - at_m
+                self._ui.post(partial(self.move, name, start_m + by_m[:2]))
 
         arrows.on_update(dragged)
         self._drawn.append(arrows)
 
-    def move(self, name: str, by_m: FloatArray) -> None:
-        """Have the radio of a node stand so much farther; the third axis does not count."""
-        self._moved_m[name] = (self._places_m | self._moved_m)[name] + by_m[:2]
-        self._on_change()
+    def move(self, name: str, place_m: FloatArray) -> None:
+        """Have the radio of a node of this room stand somewhere else: (2,)."""
+        if name in self._places_m:
+            self._moved_m[name] = place_m
+            self._on_change()
 
 
 def places_of(view: DeliveryView) -> dict[str, FloatArray]:
@@ -197,6 +225,12 @@ def places_of(view: DeliveryView) -> dict[str, FloatArray]:
         for node in view.nodes
     }
     return places_m | {SINK: positions_m[view.run.roles.index(SINK)]}
+
+
+def _apart(view: DeliveryView) -> bool:
+    """Whether the cameras stand at different places; a rig without poses has all of them at one."""
+    cameras_m = np.array([node.T_world_camera[:3, 3] for node in view.nodes])
+    return len(cameras_m) == 1 or bool(np.ptp(cameras_m, axis=0).max() > 1e-6)
 
 
 def wall_m(places_m: dict[str, FloatArray], name: str) -> FloatArray:

@@ -11,7 +11,7 @@ from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
-from pipeline.merging import MergedClouds
+from pipeline.merging import FusedCloud
 from pipeline.stages import compared, compute
 from pipeline.surface import radii
 from pipeline.surface.baselines import TRIM_SPACINGS, poisson_depth
@@ -26,13 +26,13 @@ def baseline_job(store: Store, spec: Spec, name: BaselineName) -> Generator[Prog
     """
     if name not in get_args(BaselineName):
         raise InputError(f"There is no baseline '{name}'; try one of {', '.join(get_args(BaselineName))}.")
-    clouds, rig, placement = yield from store.stages(spec, "clouds", "rig", "placement")
+    clouds, rig, placement = yield from store.stages(spec, "fused", "rig", "placement")
     done = yield from compute(spec, name, store)
     truth = compared(rig, placement, done.value)
     return BaselineView(name, mesh_view(done.value, truth), done.elapsed_s, _note(clouds, name, spec))
 
 
-def _note(clouds: MergedClouds, name: BaselineName, spec: Spec) -> str:
+def _note(clouds: FusedCloud, name: BaselineName, spec: Spec) -> str:
     """How the surface was made, in a sentence."""
     if name == "alpha":
         largest_m = radii(spec.config.surface, clouds.r_F_m, clouds.sigma_D_m)[-1]

@@ -14,7 +14,7 @@ from app.screens.surface.view import SpacingView, SurfaceView
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
-from pipeline.merging import MergedClouds
+from pipeline.merging import FusedCloud
 from pipeline.stages import compute
 from pipeline.surface import nearest_distances_m
 
@@ -23,7 +23,7 @@ HISTOGRAM_BINS = 60
 
 def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, None, SurfaceView]:
     """The surfaces and everything about them; yielded as far as they are there."""
-    clouds = yield from store.stage(spec, "clouds")
+    clouds = yield from store.stage(spec, "fused")
     rolled = yield from compute(spec, "after", store)
     after = rolled.value
     view = SurfaceView(spacing_of(clouds), after.radii_m, mesh_view(after, None), None, rolled.elapsed_s)
@@ -44,7 +44,7 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
     )
 
 
-def spacing_of(clouds: MergedClouds) -> SpacingView:
+def spacing_of(clouds: FusedCloud) -> SpacingView:
     """The histogram of the distances of nearest points, up to five standard deviations over their mean."""
     r_F_m, sigma_D_m = clouds.r_F_m, clouds.sigma_D_m
     distances_m = nearest_distances_m(clouds.fused.points_m)

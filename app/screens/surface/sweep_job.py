@@ -17,18 +17,18 @@ from pipeline.surface.sweep import iterate_sweep, sweep_radii_m
 
 def suggestions_of(store: Store, spec: Spec) -> Generator[Progress, None, tuple[Suggestion, ...]]:
     """The radii that the cloud after fusion suggests; none if it has no inner point."""
-    clouds = yield from store.stage(spec, "clouds")
+    clouds = yield from store.stage(spec, "fused")
 
     def suggest() -> Generator[Progress, None, tuple[Suggestion, ...]]:
         yield Progress("reading the ball radius off the points", 0.4)
         return suggest_radii(clouds.fused)
 
-    return (yield from store.remember(("suggest", key(spec, "clouds")), suggest))
+    return (yield from store.remember(("suggest", key(spec, "fused")), suggest))
 
 
 def sweep_job(store: Store, spec: Spec) -> Generator[Progress | SweepView, None, SweepView]:
     """Roll one ball after another over the cloud after fusion, each alone; yields what there is so far."""
-    rig, placement, clouds = yield from store.stages(spec, "rig", "placement", "clouds")
+    rig, placement, clouds = yield from store.stages(spec, "rig", "placement", "fused")
     suggested = yield from suggestions_of(store, spec)
 
     def sweep() -> Generator[Progress | SweepView, None, SweepView]:
@@ -41,4 +41,4 @@ def sweep_job(store: Store, spec: Spec) -> Generator[Progress | SweepView, None,
             yield view
         return view
 
-    return (yield from store.remember(("sweep", key(spec, "clouds")), sweep))
+    return (yield from store.remember(("sweep", key(spec, "fused")), sweep))

@@ -8,7 +8,7 @@ import pytest
 from network_sim.config import PRESETS
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
-from pipeline.delivery.plan import network_of, places_of, places_of_senders, poses_known
+from pipeline.delivery.plan import network_of, placed, places_of, poses_known
 from pipeline.geometry import look_at
 from pipeline.io.demos import load_demo
 from pipeline.types import Rig
@@ -49,11 +49,22 @@ def test_places_that_are_given_go_before_the_cameras_own_and_follow_who_sends():
     network = with_settings(PRESETS["office"], ["nodes.count=3", f"nodes.places_m={str(given)[1:-1]}"])
     rig = load_demo("office")
     assert network_of(rig, (1, 1, 1), network).nodes.places_m == given
-    some = places_of_senders(network, 3, [0, 2]).nodes
+    some = placed(rig, network, [0, 2]).nodes
     assert (some.count, some.places_m) == (2, (0.0, 0.0, 2.0, 0.0, 9.0, 9.0))
-    assert places_of_senders(PRESETS["office"], 3, [0, 2]) == PRESETS["office"]
     with pytest.raises(InputError, match="places 3 nodes and the sink, and there are 2 nodes"):
-        places_of_senders(network, 2, [0, 1])
+        placed(Rig("two", rig.frames[:2]), network, [0, 1])
+
+
+def test_whoever_is_down_moves_nobody_else():
+    rig, network = load_demo("office"), PRESETS["office"]
+    whole = np.reshape(placed(rig, network, [0, 1, 2]).nodes.places_m, (-1, 2))
+    some = np.reshape(placed(rig, network, [0, 2]).nodes.places_m, (-1, 2))
+    np.testing.assert_array_equal(some, whole[[0, 2, 3]])
+    pose = rig.frames[0].T_world_camera
+    heap = Rig("heap", tuple(replace(frame, T_world_camera=pose) for frame in rig.frames))
+    assert placed(heap, network, [0, 1, 2]) == network
+    some = np.reshape(placed(heap, network, [0, 2]).nodes.places_m, (-1, 2))
+    np.testing.assert_allclose(some[:2] @ some[1], [-32.0, 64.0], atol=1e-9)  # of a star of three, 8 m
 
 
 def test_vehicles_are_no_cameras_of_a_room():
