@@ -21,6 +21,7 @@ from app.screens.network.lesson import CROSSING, LOST_PACKET, SETTINGS, NetworkL
 from app.screens.network.panel import ORIGIN, PICK, NetworkPanel
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import What
+from app.screens.network.what_if import WhatIf
 from app.state import Spec
 from network_sim.config import PRESETS
 from network_sim.types import Cause
@@ -251,16 +252,20 @@ def test_frames_go_round_a_wall_over_another_camera_until_it_is_gone(screen):
     assert screen.drawn("/network/what-if/wall") is None
 
 
-def test_a_second_drag_goes_on_from_the_first(screen):
-    gui = screen.gui
-    gui.set("Move radio of", "node_00")
-    start_m = screen.handle("battery-node_00").position[:2]
-    arrows = screen.drawn("/network/what-if/arrows")
-    for by_m in ((0.4, 0.0, 0.0), (0.0, 0.3, 0.0)):  # the second before the first is answered
-        screen.drag(arrows, by_m)
-    moved_m = screen.handle("battery-node_00").position[:2]
-    assert moved_m - start_m == pytest.approx((0.4, 0.3), abs=2e-3)
-    gui.set("Move radio of", "nobody")
+def test_a_second_drag_before_the_first_is_answered_counts_once(screen):
+    ui = ui_of(screen.ui.scene)
+    what_if = WhatIf(ui, "/alone", lambda: None)
+    what_if.load(screen.view, lambda name: np.array([1.0, 2.0, 3.0]))
+    ui.gui.set("Move radio of", "node_00")
+    for by_m in ((0.4, 0.0, 0.0), (0.0, 0.3, 0.0)):
+        screen.drag(screen.drawn("/alone/arrows"), by_m)
+    places_m = next(one for one in what_if.settings() if one.startswith("nodes.places_m="))
+    x_m, y_m = (float(word) for word in places_m.partition("=")[2].split(",")[:2])
+    run, row = screen.view.run, screen.view.nodes[0].row
+    assert np.array([x_m, y_m]) - run.positions_m(run.start_ns)[row] == pytest.approx((0.4, 0.3), abs=2e-3)
+    assert not what_if.off
+    ui.gui.set("Move radio of", "nobody")
+    assert what_if.settings() == ()
 
 
 def test_a_radio_that_is_dragged_out_of_range_is_not_heard_and_comes_back(screen):
