@@ -14,6 +14,7 @@ from typing import Any
 import tyro
 
 from app.cli.bench import bench
+from app.cli.calibrate import calibrate
 from app.cli.deliver import deliver
 from app.cli.doctor import doctor
 from app.cli.infer_depth import infer_depth
@@ -24,12 +25,15 @@ from app.cli.reproduce import reproduce
 from app.cli.scenes import scenes
 from app.cli.serve import serve
 from app.cli.simulate import simulate
+from app.cli.target import target
 from app.cli.text import say
 from packetmesh.errors import PacketMeshError
 
 COMMANDS: dict[str, Any] = {
     "serve": serve,
     "reconstruct": reconstruct,
+    "calibrate": calibrate,
+    "target": target,
     "register": register,
     "mesh": mesh,
     "infer-depth": infer_depth,

@@ -1,4 +1,4 @@
-"""Camera intrinsics in four common styles, recognised by their keys."""
+"""Camera intrinsics in the common styles, recognised by their keys."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, read_text
+from pipeline.io.camera_files import camera_in
 from pipeline.types import AnyPath, CameraIntrinsics
 
 _BROWN_CONRADY = {"", "plumb_bob", "rational_polynomial"}
@@ -20,11 +21,12 @@ _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?(?
 
 
 def read_intrinsics(path: AnyPath) -> CameraIntrinsics:
-    """Intrinsics from JSON or YAML.
+    """Intrinsics from JSON, YAML or text.
 
     Three styles: ``width height fx fy cx cy [distortion]``; Open3D's ``intrinsic_matrix``, which is
     column-major; ROS's camera_info (``K``, ``D``) or OpenCV's and ROS's calibration file
-    (``camera_matrix``, ``distortion_coefficients``).
+    (``camera_matrix``, ``distortion_coefficients``). And those of COLMAP, Kalibr and MATLAB
+    (``pipeline.io.camera_files``).
 
     Raises:
         InputError: unreadable, of no known style, or with impossible values.
@@ -32,7 +34,7 @@ def read_intrinsics(path: AnyPath) -> CameraIntrinsics:
     text = read_text(path, "intrinsics file")
     values = _parse_json(text, path) if text.lstrip().startswith("{") else _parse_yaml(text)
     try:
-        camera = _from_keys(values)
+        camera = _from_keys(values) or camera_in(text)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         camera = None
     if camera is None:

@@ -1,0 +1,249 @@
+"""Finding a board's points in an image: a ladder of detectors, never mirrored, and where none succeeds, why
+(SPEC 1.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.calibration.board import RING, Board
+from pipeline.types import ByteArray, FloatArray, IntArray
+
+SMALLEST_PX, LARGEST_SHARE = 20.0, 0.02
+"""Area of a circle: at least so many pixels, at most so much of the image. OpenCV's own limit of 5,000 pixels
+misses the circles of a board held near the camera."""
+SIZES = 4.0
+"""The largest circle over the smallest as a tilted board shows them, and over the core of the marked one."""
+CORNER_WINDOW_PX = 5
+MARK_STEP = 0.25
+"""Least brightness, over that of the paper around, by which the white ring tells its circle from others."""
+FEW_CHARUCO = 6
+"""Corners of a ChArUco board from which on a view counts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """What was found in one image."""
+
+    points_px: FloatArray
+    """(N, 2) of the board's points, sub-pixel; empty if the board was not found."""
+    indices: IntArray
+    """(N,) which of ``Board.points_m`` each of them is."""
+    reason: str = ""
+    """Why it was not found, in a sentence with what to try."""
+    blobs_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    """(B, 2) what looked like a circle, where the board was not found."""
+    oriented: bool = True
+    """Whether a mark or the pattern itself told which way is up; if not, all may be turned by 180°."""
+
+    @property
+    def found(self) -> bool:
+        """Whether the board was found."""
+        return len(self.points_px) > 0
+
+
+def detect(image: ByteArray, board: Board) -> Detection:
+    """Find a board's points.
+
+    Args:
+        image: (H, W) or (H, W, 3) uint8.
+        board: what to look for.
+
+    Raises:
+        InputError: no 8-bit image.
+    """
+    if image.dtype != np.uint8 or image.ndim not in (2, 3):
+        raise InputError(f"An image of {image.dtype} {image.shape} cannot be searched; try 8 bits a channel")
+    gray = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
+    if board.pattern == "charuco":
+        return _charuco(gray, board)
+    if board.pattern == "chessboard":
+        return _chessboard(gray, board)
+    return _circles(gray, board)
+
+
+def _all(board: Board, points_px: FloatArray, oriented: bool) -> Detection:
+    return Detection(points_px, np.arange(len(points_px)), oriented=oriented)
+
+
+# Circles.
+
+
+def _circles(gray: ByteArray, board: Board) -> Detection:
+    asymmetric = board.pattern == "circles-asymmetric"
+    grid = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
+    most: FloatArray = np.zeros((0, 2))
+    for picture, detector in _blob_detectors(gray):
+        blobs_px, sizes_px = _alike(detector.detect(picture))
+        if len(blobs_px) > len(most):
+            most = blobs_px
+        if len(blobs_px) < board.columns * board.rows:
+            continue
+        alone = _only(blobs_px, sizes_px, gray.shape)
+        for clustering in (cv2.CALIB_CB_CLUSTERING, 0):
+            found, rough = cv2.findCirclesGrid(
+                alone, board.size, flags=grid | clustering, blobDetector=detector
+            )
+            if found:
+                apart_px = np.linalg.norm(blobs_px[:, None] - rough.reshape(1, -1, 2), axis=2)
+                chosen = apart_px.argmin(axis=0)
+                if len(np.unique(chosen)) == len(chosen):
+                    return _upright(gray, board, blobs_px[chosen])
+    return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), _why_no_circles(board, most), most)
+
+
+def _blob_detectors(gray: ByteArray) -> Iterator[tuple[ByteArray, cv2.SimpleBlobDetector]]:
+    """Dark circles on light, then light ones on dark; strict about their shape, then lenient."""
+    for picture in (gray, 255 - gray):
+        for circularity, convexity, inertia in ((0.5, 0.9, 0.1), (0.2, 0.7, 0.02)):
+            given = cv2.SimpleBlobDetector.Params()
+            given.filterByColor, given.blobColor = True, 0
+            given.filterByArea, given.minArea = True, SMALLEST_PX
+            given.maxArea = max(LARGEST_SHARE * gray.size, 5000.0)
+            given.filterByCircularity, given.minCircularity = True, circularity
+            given.filterByConvexity, given.minConvexity = True, convexity
+            given.filterByInertia, given.minInertiaRatio = True, inertia
+            given.minDistBetweenBlobs = 4.0
+            given.minRepeatability = 2
+            yield picture, cv2.SimpleBlobDetector.create(given)
+
+
+def _alike(blobs: Sequence[cv2.KeyPoint]) -> tuple[FloatArray, FloatArray]:
+    """(B, 2) centres and (B,) diameters of the largest group of blobs of like sizes, without letters."""
+    sizes_px = np.array([blob.size for blob in blobs])
+    if not len(sizes_px):
+        return np.zeros((0, 2)), sizes_px
+    group = max(((sizes_px >= one) & (sizes_px <= SIZES * one) for one in sizes_px), key=np.sum)
+    return np.array([blob.pt for blob in blobs], float)[group], sizes_px[group]
+
+
+def _only(blobs_px: FloatArray, sizes_px: FloatArray, shape: tuple[int, ...]) -> ByteArray:
+    """A picture of nothing but these blobs, in which no shadow or letter keeps a grid from being found."""
+    picture = np.full(shape, 255, np.uint8)
+    for center_px, size_px in zip(blobs_px.round().astype(int).tolist(), sizes_px.tolist(), strict=True):
+        cv2.circle(picture, center_px, max(4, round(0.4 * size_px)), 0, -1, cv2.LINE_AA)
+    return picture
+
+
+def _why_no_circles(board: Board, blobs_px: FloatArray) -> str:
+    wanted = board.columns * board.rows
+    if not len(blobs_px):
+        return "Nothing in it looks like a circle; is the board in the picture, sharp and evenly lit?"
+    if len(blobs_px) < wanted:
+        return f"{len(blobs_px)} of {wanted} circles are seen; show the whole board, without glare"
+    return (
+        f"{len(blobs_px)} blobs are seen, but no grid of {board.columns} x {board.rows} among them; check "
+        "columns and rows, and that nothing round lies beside the board"
+    )
+
+
+def _upright(gray: ByteArray, board: Board, points_px: FloatArray) -> Detection:
+    """In the board's own order: right-handed always, and begun at the mark where there is one."""
+    orders = [order for order in _orders(board) if _right_handed(points_px[order], board)]
+    if board.pattern == "circles-asymmetric":
+        return _all(board, points_px[orders[0]], oriented=True)
+    ring = [_ring(gray, points_px[order], board) for order in orders]
+    best = int(np.argmax(ring))
+    marked = ring[best] > MARK_STEP and sum(value > MARK_STEP for value in ring) == 1
+    return _all(board, points_px[orders[best if marked else 0]], marked)
+
+
+def _orders(board: Board) -> list[IntArray]:
+    """Ways to read a grid: as it is, turned by 180°, mirrored, and transposed where it is square."""
+    grid = np.arange(board.columns * board.rows).reshape(board.rows, board.columns)
+    if board.pattern == "circles-asymmetric":
+        return [grid.ravel(), grid[::-1, ::-1].ravel(), grid[:, ::-1].ravel(), grid[::-1].ravel()]
+    grids = [grid, grid.T] if board.columns == board.rows else [grid]
+    return [
+        one[::down, ::right].ravel() for one in grids for down, right in ((1, 1), (-1, -1), (1, -1), (-1, 1))
+    ]
+
+
+def _right_handed(points_px: FloatArray, board: Board) -> bool:
+    """Whether columns run clockwise into rows, as x into y does in an image."""
+    first, last = points_px[0], points_px[-1]
+    right, down = points_px[board.columns - 1] - first, points_px[-board.columns] - first
+    turned = (right[0] * down[1] - right[1] * down[0]) > 0.0
+    opposite = (last - points_px[-board.columns]) @ right > 0.0
+    return bool(turned and opposite)
+
+
+def _ring(gray: ByteArray, points_px: FloatArray, board: Board) -> float:
+    """How much brighter the first circle is where its ring would be than its neighbours, over the paper."""
+    reach = 0.5 * sum(RING) * board.radius_m / board.spacing_m
+    near = [0, 1, board.columns, board.columns + 1]
+    right, down = points_px[1] - points_px[0], points_px[board.columns] - points_px[0]
+    around = reach * np.array([right, -right, down, -down])
+    first, *others = (_brightness(gray, points_px[row] + around).mean() for row in near)
+    paper = _brightness(gray, points_px[near].mean(axis=0)[None])[0]
+    dark = float(np.mean(others))
+    return float((first - dark) / (paper - dark)) if paper != dark else 0.0
+
+
+def _brightness(gray: ByteArray, points_px: FloatArray) -> FloatArray:
+    """(N,) between pixels."""
+    x, y = points_px.T.astype(np.float32)
+    return cv2.remap(gray.astype(np.float32), x[None], y[None], cv2.INTER_LINEAR)[0]
+
+
+# Corners.
+
+
+def _chessboard(gray: ByteArray, board: Board) -> Detection:
+    ways: tuple[Callable[[], tuple[bool, FloatArray | None]], ...] = (
+        lambda: cv2.findChessboardCornersSB(gray, board.size, flags=cv2.CALIB_CB_ACCURACY),
+        lambda: cv2.findChessboardCornersSB(
+            gray, board.size, flags=cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_NORMALIZE_IMAGE
+        ),
+        lambda: _refined(gray, board),
+    )
+    for find in ways:
+        found, corners = find()
+        if found and corners is not None:
+            points_px = np.asarray(corners, float).reshape(-1, 2)
+            order = next(order for order in _orders(board) if _right_handed(points_px[order], board))
+            return _dark_first(gray, board, points_px[order])
+    reason = (
+        f"No chessboard of {board.columns} x {board.rows} inner corners is seen; count the corners between "
+        "four squares, and have the whole board with its white rim in the picture"
+    )
+    return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), reason)
+
+
+def _refined(gray: ByteArray, board: Board) -> tuple[bool, FloatArray | None]:
+    flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
+    found, corners = cv2.findChessboardCorners(gray, board.size, flags=flags)
+    if not found:
+        return False, None
+    until = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
+    return True, cv2.cornerSubPix(gray, corners, (CORNER_WINDOW_PX,) * 2, (-1, -1), until)
+
+
+def _dark_first(gray: ByteArray, board: Board, points_px: FloatArray) -> Detection:
+    """Begun where the square between the first four corners is black; some boards have it at both ends."""
+    square = [0, 1, board.columns, board.columns + 1]
+    here, there = (
+        float(_brightness(gray, order[square].mean(axis=0)[None])[0])
+        for order in (points_px, points_px[::-1])
+    )
+    if not board.ambiguous and there < here:
+        points_px = points_px[::-1]
+    return _all(board, points_px, oriented=not board.ambiguous)
+
+
+def _charuco(gray: ByteArray, board: Board) -> Detection:
+    corners, ids, marker_corners, _ = cv2.aruco.CharucoDetector(board.charuco()).detectBoard(gray)
+    if ids is None or len(ids) < FEW_CHARUCO:
+        seen = 0 if ids is None else len(ids)
+        markers = 0 if marker_corners is None else len(marker_corners)
+        reason = (
+            f"{markers} markers and {seen} corners of the ChArUco board are seen, and it takes "
+            f"{FEW_CHARUCO}; check columns and rows, and hold it nearer or lit better"
+        )
+        return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), reason)
+    return Detection(np.asarray(corners, float).reshape(-1, 2), np.asarray(ids).ravel().astype(np.int64))

@@ -1,0 +1,241 @@
+"""A board to print, true to scale: as PDF or SVG, or as PNG for a monitor whose pixels are known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import cv2
+import numpy as np
+
+from packetmesh.errors import InputError
+from packetmesh.files import atomic_path
+from pipeline.calibration.board import MARKER_SHARE, MARKERS, RING, Board
+from pipeline.types import ByteArray
+
+MARGIN_MM = 15.0
+FOOT_MM = 16.0
+"""Below the board: the ruler and what it is."""
+RULER_MM, TICK_MM = 100.0, 10.0
+TEXT_MM = 3.5
+SUB_PIXEL = 6
+"""Bits of a pixel's fraction when a PNG is drawn."""
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """A filled circle in millimetres from the upper left."""
+
+    x_mm: float
+    y_mm: float
+    radius_mm: float
+    black: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A black rectangle."""
+
+    x_mm: float
+    y_mm: float
+    width_mm: float
+    height_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A line of text that begins at its base line."""
+
+    x_mm: float
+    y_mm: float
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """What is printed, and how large."""
+
+    width_mm: float
+    height_mm: float
+    shapes: tuple[Disc | Box | Text, ...]
+
+
+def sheet(board: Board) -> Sheet:
+    """The board with margins, a ruler to check the print and a line that says what it is."""
+    points_mm = 1000.0 * board.points_m[:, :2]
+    spacing_mm, radius_mm = 1000.0 * board.spacing_m, 1000.0 * board.radius_m
+    around_mm = spacing_mm if board.pattern in ("chessboard", "charuco") else 2.0 * radius_mm
+    low_mm = points_mm.min(axis=0) - around_mm - MARGIN_MM
+    width_mm, height_mm = points_mm.max(axis=0) + around_mm + MARGIN_MM - low_mm
+    places_mm = points_mm - low_mm
+    shapes: list[Disc | Box | Text]
+    if board.pattern in ("chessboard", "charuco"):
+        shapes = [*_squares(board, places_mm[0] - spacing_mm)]
+    else:
+        shapes = [Disc(float(x), float(y), radius_mm) for x, y in places_mm]
+        if board.ambiguous:
+            x, y = places_mm[0]
+            shapes.append(Disc(float(x), float(y), RING[1] * radius_mm, black=False))
+            shapes.append(Disc(float(x), float(y), RING[0] * radius_mm))
+    width_mm = max(float(width_mm), RULER_MM + 2.0 * MARGIN_MM)
+    shapes += _foot(board, float(height_mm))
+    return Sheet(width_mm, float(height_mm) + FOOT_MM, tuple(shapes))
+
+
+def _squares(board: Board, corner_mm: np.ndarray) -> Iterator[Box]:
+    """Black squares, the first of them at the upper left as OpenCV has it, and the markers between them."""
+    side_mm = 1000.0 * board.spacing_m
+    for row in range(board.rows + 1):
+        for column in range(board.columns + 1):
+            if (row + column) % 2 == 0:
+                x_mm, y_mm = corner_mm + side_mm * np.array([column, row])
+                yield Box(float(x_mm), float(y_mm), side_mm, side_mm)
+    if board.pattern == "charuco":
+        yield from _markers(board, corner_mm)
+
+
+def _markers(board: Board, corner_mm: np.ndarray) -> Iterator[Box]:
+    """Every black cell of every marker, row by row in as few boxes as it takes."""
+    made, dictionary = board.charuco(), cv2.aruco.getPredefinedDictionary(MARKERS)
+    cells = dictionary.markerSize + 2
+    cell_mm = 1000.0 * MARKER_SHARE * board.spacing_m / cells
+    for number, corners in zip(made.getIds().ravel().tolist(), made.getObjPoints(), strict=True):
+        x_mm, y_mm = corner_mm + 1000.0 * np.asarray(corners)[:, :2].min(axis=0)
+        picture = cv2.aruco.generateImageMarker(dictionary, number, cells, borderBits=1)
+        for row, line in enumerate(picture == 0):
+            edges = np.flatnonzero(np.diff(np.concatenate(([0], line.astype(int), [0]))))
+            for begin, end in edges.reshape(-1, 2).tolist():
+                width_mm = (end - begin) * cell_mm
+                yield Box(float(x_mm) + begin * cell_mm, float(y_mm) + row * cell_mm, width_mm, cell_mm)
+
+
+def _foot(board: Board, top_mm: float) -> Iterator[Box | Text]:
+    for tick in range(round(RULER_MM / TICK_MM) + 1):
+        high_mm = 4.0 if tick % 5 == 0 else 2.5
+        yield Box(MARGIN_MM + tick * TICK_MM - 0.1, top_mm - high_mm, 0.2, high_mm)
+    yield Box(MARGIN_MM - 0.1, top_mm - 0.2, RULER_MM + 0.2, 0.2)
+    words = f"{board.title}. The ruler is {RULER_MM:g} mm long: measure it; print at 100 %."
+    yield Text(MARGIN_MM, top_mm + 5.0, words)
+
+
+def write_target(board: Board, path: Path, pixel_mm: float | None = None) -> Board:
+    """Write the board as its file's ending says; returns it as it is written.
+
+    On a monitor the spacing is a whole number of pixels, so that all squares are alike.
+
+    Args:
+        board: what to draw.
+        path: a .pdf, .svg or .png file.
+        pixel_mm: side of a pixel of the monitor that shows a PNG.
+
+    Raises:
+        InputError: another ending, or a PNG whose pixels nobody knows.
+    """
+    ending = path.suffix.lower()
+    if ending == ".png":
+        if pixel_mm is None or not 0.01 <= pixel_mm <= 5.0:
+            raise InputError(
+                f"{path.name} is for a monitor: say how large its pixels are, for example --pixel-mm 0.277 "
+                "(width of the screen in mm over its pixels)"
+            )
+        pixels = max(1, round(1000.0 * board.spacing_m / pixel_mm))
+        board = replace(board, spacing_m=pixels * pixel_mm / 1000.0)
+        content = cv2.imencode(".png", picture_of(sheet(board), pixel_mm))[1].tobytes()
+    elif ending == ".svg":
+        content = svg_of(sheet(board)).encode()
+    elif ending == ".pdf":
+        content = pdf_of(sheet(board), board.title)
+    else:
+        raise InputError(f"A board cannot be written as {path.name}; try .pdf, .svg or .png")
+    with atomic_path(path) as sibling:
+        sibling.write_bytes(content)
+    return board
+
+
+def svg_of(whole: Sheet) -> str:
+    """An SVG file whose units are millimetres."""
+    size = f'width="{whole.width_mm:g}mm" height="{whole.height_mm:g}mm"'
+    box = f'viewBox="0 0 {whole.width_mm:g} {whole.height_mm:g}"'
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" {size} {box}>',
+        '<rect width="100%" height="100%" fill="#fff"/>',
+    ]
+    for shape in whole.shapes:
+        if isinstance(shape, Disc):
+            fill = "#000" if shape.black else "#fff"
+            place = f'cx="{shape.x_mm:.4f}" cy="{shape.y_mm:.4f}" r="{shape.radius_mm:.4f}"'
+            lines.append(f'<circle {place} fill="{fill}"/>')
+        elif isinstance(shape, Box):
+            lines.append(
+                f'<rect x="{shape.x_mm:.4f}" y="{shape.y_mm:.4f}" width="{shape.width_mm:.4f}" '
+                f'height="{shape.height_mm:.4f}"/>'
+            )
+        else:
+            font = f'font-family="sans-serif" font-size="{TEXT_MM}"'
+            lines.append(f'<text x="{shape.x_mm:g}" y="{shape.y_mm:g}" {font}>{escape(shape.words)}</text>')
+    return "\n".join([*lines, "</svg>", ""])
+
+
+def pdf_of(whole: Sheet, title: str) -> bytes:
+    """A PDF file of one page as large as the sheet; the same bytes for the same board."""
+    import io
+
+    from reportlab.lib.units import mm
+    from reportlab.pdfgen.canvas import Canvas
+
+    buffer = io.BytesIO()
+    canvas = Canvas(buffer, pagesize=(whole.width_mm * mm, whole.height_mm * mm), invariant=True)
+    canvas.setTitle(title)
+    canvas.setCreator("PacketMesh")
+    canvas.translate(0.0, whole.height_mm * mm)
+    for shape in whole.shapes:
+        if isinstance(shape, Disc):
+            canvas.setFillGray(0.0 if shape.black else 1.0)
+            canvas.circle(shape.x_mm * mm, -shape.y_mm * mm, shape.radius_mm * mm, stroke=0, fill=1)
+        elif isinstance(shape, Box):
+            canvas.setFillGray(0.0)
+            low_mm = -(shape.y_mm + shape.height_mm)
+            canvas.rect(
+                shape.x_mm * mm, low_mm * mm, shape.width_mm * mm, shape.height_mm * mm, stroke=0, fill=1
+            )
+        else:
+            canvas.setFillGray(0.0)
+            canvas.setFont("Helvetica", TEXT_MM * mm)
+            canvas.drawString(shape.x_mm * mm, -shape.y_mm * mm, shape.words)
+    canvas.save()
+    return buffer.getvalue()
+
+
+def picture_of(whole: Sheet, pixel_mm: float) -> ByteArray:
+    """(H, W) grey picture; edges fall between pixels as they do on the sheet."""
+    size = (round(whole.width_mm / pixel_mm), round(whole.height_mm / pixel_mm))
+    picture = np.full(size[::-1], 255, np.uint8)
+    scale = (1 << SUB_PIXEL) / pixel_mm
+
+    def fixed(value_mm: float) -> int:
+        return round(value_mm * scale - 0.5 * (1 << SUB_PIXEL))  # pixel centres lie at integers
+
+    for shape in whole.shapes:
+        if isinstance(shape, Disc):
+            center, radius = (fixed(shape.x_mm), fixed(shape.y_mm)), round(shape.radius_mm * scale)
+            cv2.circle(picture, center, radius, 0 if shape.black else 255, -1, cv2.LINE_AA, SUB_PIXEL)
+        elif isinstance(shape, Box):
+            left, top = round(shape.x_mm / pixel_mm), round(shape.y_mm / pixel_mm)
+            right = max(left + 1, round((shape.x_mm + shape.width_mm) / pixel_mm))
+            bottom = max(top + 1, round((shape.y_mm + shape.height_mm) / pixel_mm))
+            picture[top:bottom, left:right] = 0
+        else:
+            place = (round(shape.x_mm / pixel_mm), round(shape.y_mm / pixel_mm))
+            cv2.putText(
+                picture,
+                shape.words,
+                place,
+                cv2.FONT_HERSHEY_SIMPLEX,
+                0.045 * TEXT_MM / pixel_mm,
+                0,
+                1,
+                cv2.LINE_AA,
+            )
+    return picture

@@ -1,0 +1,219 @@
+"""Cameras in the files of other programs: each a writer, and readers of those that ``intrinsics`` knows not.
+
+Where pixels are counted otherwise, principal points are moved: the middle of the first pixel is (0, 0) here,
+(0.5, 0.5) in COLMAP and (1, 1) in MATLAB.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from packetmesh.files import atomic_path
+from pipeline.types import AnyPath, CameraIntrinsics
+
+COLMAP_MIDDLE, MATLAB_MIDDLE = 0.5, 1.0
+"""Of the first pixel."""
+_COLMAP = re.compile(r"^\s*\d+\s+(PINHOLE|OPENCV|FULL_OPENCV)\s+(.*)$", re.MULTILINE)
+_KALIBR = re.compile(r"^\s+(intrinsics|distortion_coeffs|resolution):\s*\[([^\]]*)\]", re.MULTILINE)
+_MATLAB = re.compile(
+    r"^\s*(FocalLength|PrincipalPoint|ImageSize|RadialDistortion|TangentialDistortion)\s*[:=]\s*\[([^\]]*)\]",
+    re.MULTILINE,
+)
+
+
+def opencv_yaml(camera: CameraIntrinsics) -> str:
+    """As ``cv2.FileStorage`` and the tools around OpenCV have it."""
+    return "\n".join(
+        (
+            "%YAML:1.0",
+            "---",
+            f"image_width: {camera.width_px}",
+            f"image_height: {camera.height_px}",
+            *_opencv_matrix("camera_matrix", camera.matrix),
+            *_opencv_matrix("distortion_coefficients", camera.distortion[None]),
+            "",
+        )
+    )
+
+
+def _opencv_matrix(name: str, values: np.ndarray) -> tuple[str, ...]:
+    rows, columns = values.shape
+    return (
+        f"{name}: !!opencv-matrix",
+        f"   rows: {rows}",
+        f"   cols: {columns}",
+        "   dt: d",
+        f"   data: [{_listed(values.ravel())}]",
+    )
+
+
+def camera_info(camera: CameraIntrinsics) -> str:
+    """ROS's camera_info, as ``camera_calibration`` writes it."""
+    projection = np.column_stack([camera.matrix, np.zeros(3)])
+    lines = [f"image_width: {camera.width_px}", f"image_height: {camera.height_px}", "camera_name: camera"]
+    for name, values in (
+        ("camera_matrix", camera.matrix),
+        ("distortion_model", None),
+        ("distortion_coefficients", camera.distortion[None]),
+        ("rectification_matrix", np.eye(3)),
+        ("projection_matrix", projection),
+    ):
+        if values is None:
+            lines.append("distortion_model: plumb_bob")
+        else:
+            rows, columns = values.shape
+            lines += [
+                f"{name}:",
+                f"  rows: {rows}",
+                f"  cols: {columns}",
+                f"  data: [{_listed(values.ravel())}]",
+            ]
+    return "\n".join([*lines, ""])
+
+
+def open3d_json(camera: CameraIntrinsics) -> str:
+    """Open3D's PinholeCameraIntrinsic, whose matrix goes column by column; it has no distortion.
+
+    Raises:
+        InputError: the camera has one: its images must be undistorted first.
+    """
+    _refuse(camera, camera.distortion, "Open3D's file", "undistort the images first")
+    values = {
+        "width": camera.width_px,
+        "height": camera.height_px,
+        "intrinsic_matrix": camera.matrix.T.ravel().tolist(),
+    }
+    return json.dumps(values, indent=1) + "\n"
+
+
+def colmap_text(camera: CameraIntrinsics) -> str:
+    """A cameras.txt of one camera: OPENCV, or FULL_OPENCV where k3 is not 0."""
+    places = (camera.fx_px, camera.fy_px, camera.cx_px + COLMAP_MIDDLE, camera.cy_px + COLMAP_MIDDLE)
+    whole = bool(camera.distortion[4])
+    model = "FULL_OPENCV" if whole else "OPENCV"
+    numbers = (*places, *camera.distortion[:4], *((camera.distortion[4], 0.0, 0.0, 0.0) if whole else ()))
+    return (
+        "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
+        f"1 {model} {camera.width_px} {camera.height_px} {_listed(np.array(numbers), ' ')}\n"
+    )
+
+
+def kalibr_yaml(camera: CameraIntrinsics) -> str:
+    """Kalibr's camchain of one camera with the lens radtan, which has no k3.
+
+    Raises:
+        InputError: the camera has one.
+    """
+    _refuse(camera, camera.distortion[4:], "Kalibr's radtan", "calibrate with the lens 'thesis'")
+    places = np.array([camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px])
+    return (
+        "cam0:\n  camera_model: pinhole\n"
+        f"  intrinsics: [{_listed(places)}]\n"
+        "  distortion_model: radtan\n"
+        f"  distortion_coeffs: [{_listed(camera.distortion[:4])}]\n"
+        f"  resolution: [{camera.width_px}, {camera.height_px}]\n"
+    )
+
+
+def matlab_text(camera: CameraIntrinsics) -> str:
+    """The properties of MATLAB's cameraIntrinsics, a line each."""
+    k1, k2, p1, p2, k3 = camera.distortion
+    middle = np.array([camera.cx_px, camera.cy_px]) + MATLAB_MIDDLE
+    radial = (k1, k2, k3) if k3 else (k1, k2)
+    return (
+        f"FocalLength: [{_listed(np.array([camera.fx_px, camera.fy_px]), ' ')}]\n"
+        f"PrincipalPoint: [{_listed(middle, ' ')}]\n"
+        f"ImageSize: [{camera.height_px} {camera.width_px}]\n"
+        f"RadialDistortion: [{_listed(np.array(radial), ' ')}]\n"
+        f"TangentialDistortion: [{_listed(np.array([p1, p2]), ' ')}]\n"
+    )
+
+
+WRITERS: Mapping[str, Callable[[CameraIntrinsics], str]] = MappingProxyType(
+    {
+        "camera.yaml": opencv_yaml,
+        "camera_info.yaml": camera_info,
+        "open3d.json": open3d_json,
+        "cameras.txt": colmap_text,
+        "camchain.yaml": kalibr_yaml,
+        "matlab.txt": matlab_text,
+    }
+)
+"""By the name that the file has usually."""
+
+
+def write_camera(path: AnyPath, camera: CameraIntrinsics, kind: str) -> None:
+    """Write a camera as one of ``WRITERS`` does.
+
+    Raises:
+        InputError: the format cannot hold the lens, or the folder cannot be written.
+    """
+    text = WRITERS[kind](camera)
+    with atomic_path(path) as sibling:
+        sibling.write_text(text)
+
+
+def camera_in(text: str) -> CameraIntrinsics | None:
+    """The camera of a COLMAP, Kalibr or MATLAB file; None if it is none of them."""
+    for read in (_from_colmap, _from_kalibr, _from_matlab):
+        camera = read(text)
+        if camera is not None:
+            return camera
+    return None
+
+
+def _from_colmap(text: str) -> CameraIntrinsics | None:
+    found = _COLMAP.search(text)
+    if found is None:
+        return None
+    width, height, fx, fy, cx, cy, *lens = (float(word) for word in found[2].split())
+    return _camera((fx, fy, cx - COLMAP_MIDDLE, cy - COLMAP_MIDDLE), lens, width, height)
+
+
+def _from_kalibr(text: str) -> CameraIntrinsics | None:
+    found = {name: _numbers(words) for name, words in reversed(_KALIBR.findall(text))}
+    if not {"intrinsics", "resolution"} <= found.keys():
+        return None
+    width, height = found["resolution"]
+    return _camera(found["intrinsics"], found.get("distortion_coeffs", []), width, height)
+
+
+def _from_matlab(text: str) -> CameraIntrinsics | None:
+    found = {name: _numbers(words) for name, words in _MATLAB.findall(text)}
+    if not {"FocalLength", "PrincipalPoint", "ImageSize"} <= found.keys():
+        return None
+    k1, k2, k3 = (*found.get("RadialDistortion", []), 0.0, 0.0, 0.0)[:3]
+    p1, p2 = (*found.get("TangentialDistortion", []), 0.0, 0.0)[:2]
+    cx, cy = (value - MATLAB_MIDDLE for value in found["PrincipalPoint"])
+    height, width = found["ImageSize"]
+    return _camera((*found["FocalLength"], cx, cy), [k1, k2, p1, p2, k3], width, height)
+
+
+def _camera(
+    places: tuple[float, ...] | list[float], lens: list[float], width: float, height: float
+) -> CameraIntrinsics:
+    fx, fy, cx, cy = places
+    coefficients = np.array([*lens, *[0.0] * (5 - len(lens))])
+    matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    return CameraIntrinsics(matrix, coefficients, int(width), int(height))
+
+
+def _numbers(words: str) -> list[float]:
+    return [float(word) for word in re.split(r"[\s,;]+", words.strip()) if word]
+
+
+def _listed(values: np.ndarray, between: str = ", ") -> str:
+    """Numbers exact to the last bit."""
+    return between.join(repr(float(value)) for value in values)
+
+
+def _refuse(camera: CameraIntrinsics, lens: np.ndarray, what: str, instead: str) -> None:
+    if np.any(lens):
+        told = ", ".join(f"{value:.4g}" for value in camera.distortion)
+        raise InputError(f"{what} cannot hold k1, k2, p1, p2, k3 = {told}; {instead}")

@@ -1,0 +1,94 @@
+"""Boards are found where they are, never mirrored, and where they are not it says why."""
+
+import cv2
+import numpy as np
+import pytest
+
+from packetmesh.errors import InputError
+from pipeline.calibration.board import Board
+from pipeline.calibration.detect import detect
+from tests.pipeline.calibration.views import photograph, poses, seen
+
+BOARDS = {
+    "thesis": Board(),
+    "square": Board("circles", 6, 6, 0.03),
+    "shifted": Board("circles-asymmetric", 4, 11, 0.02),
+    "chessboard": Board("chessboard", 9, 6, 0.025),
+    "charuco": Board("charuco", 8, 5, 0.03),
+}
+
+
+@pytest.fixture(scope="module", params=BOARDS)
+def board(request):
+    return BOARDS[request.param]
+
+
+@pytest.mark.parametrize("turn_deg", [7.0, 60.0])
+def test_points_are_found_where_they_are_in_the_boards_own_order(board, turn_deg):
+    for T in poses(board, 4, turn_deg):
+        found = detect(photograph(board, T), board)
+        assert found.found, found.reason
+        assert found.oriented
+        off_px = np.linalg.norm(found.points_px - seen(board, T)[found.indices], axis=1)
+        assert off_px.max() < 0.5
+        assert np.mean(off_px) < 0.15
+
+
+def test_without_its_mark_a_grid_may_be_upside_down_and_says_so_but_is_never_mirrored():
+    board = BOARDS["thesis"]
+    T = poses(board)[1]
+    picture = photograph(board, T)
+    x, y = seen(board, T)[0].round().astype(int).tolist()
+    cv2.circle(picture, (x, y), 6, int(picture[y, x]), -1)
+    found = detect(picture, board)
+    assert found.found
+    assert not found.oriented
+    right = found.points_px[1] - found.points_px[0]
+    down = found.points_px[board.columns] - found.points_px[0]
+    assert right[0] * down[1] - right[1] * down[0] > 0.0
+
+
+def test_light_circles_on_dark_paper_are_found_too():
+    board = BOARDS["thesis"]
+    T = poses(board)[2]
+    found = detect(255 - photograph(board, T), board)
+    assert found.found
+    assert np.linalg.norm(found.points_px - seen(board, T), axis=1).max() < 0.5
+
+
+def test_a_board_cut_off_by_the_rim_says_how_much_of_it_is_seen():
+    board = BOARDS["thesis"]
+    T = poses(board)[0].copy()
+    T[0, 3] += 0.8 * np.ptp(board.points_m[:, 0])
+    found = detect(photograph(board, T), board)
+    assert not found.found
+    assert "of 99 circles are seen" in found.reason
+    assert 20 < len(found.blobs_px) < 99
+
+
+@pytest.mark.parametrize("board", [BOARDS["thesis"], BOARDS["chessboard"], BOARDS["charuco"]])
+def test_a_picture_of_something_else_has_no_board(board):
+    noise = np.random.default_rng(0).integers(0, 255, (240, 320), np.uint8)
+    for picture in (np.full((240, 320, 3), 128, np.uint8), noise):
+        found = detect(picture, board)
+        assert not found.found
+        assert found.reason
+
+
+def test_only_eight_bits_are_searched():
+    with pytest.raises(InputError, match="try 8 bits"):
+        detect(np.zeros((4, 4), np.uint16), Board())
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (("rings",), "no pattern 'rings'"),
+        (("circles", 1), "1 columns"),
+        (("circles", 11, 99), "99 rows"),
+        (("circles", 11, 9, 0.0), "spacing of 0 m"),
+    ],
+)
+def test_boards_that_cannot_be_are_refused(given, sentence):
+    with pytest.raises(InputError, match=sentence):
+        Board(*given)
