@@ -91,7 +91,9 @@ ACCESS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "IEEE 802.15.4 without ACK": ("mac.kind=ieee802154", "mac.ack=false", *CC2420_POWER),
         "IEEE 802.11b": ("mac.kind=ieee80211b", *WAVELAN_POWER),
         "IEEE 802.11b with RTS/CTS": ("mac.kind=ieee80211b", "mac.rts=true", *WAVELAN_POWER),
-        "a link of its own for each": ("mac.kind=ideal",),
+        "a link of its own, 250 kbit/s": ("mac.kind=ideal", "mac.link_bps=250000"),
+        "a link of its own, 1 Mbit/s": ("mac.kind=ideal", "mac.link_bps=1000000"),
+        "a link of its own, 10 Mbit/s": ("mac.kind=ideal", "mac.link_bps=10000000"),
         "serial line, 57,600 baud": ("mac.kind=serial", "mac.link_bps=57600"),
     }
 )
