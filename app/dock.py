@@ -3,7 +3,7 @@
 The page's side is ``dock.js``, and ``dock_view.js`` for what it looks like. What the page is to know is in
 three hidden pieces of HTML, each of which says all of its part, so that a page that comes later knows as
 much. What a hand does there comes back through a hidden text field, as the list of all that the server has
-not yet said to have heard: of many changes within 50 ms viser sends only the last.
+not acknowledged yet: of many changes within 50 ms viser sends only the last.
 """
 
 from __future__ import annotations
@@ -200,8 +200,8 @@ class Dock:
     def _hear(self) -> None:
         """Do what the page did that was not yet heard of."""
         try:
-            said = json.loads(self._field.value)
-            page, actions = str(said["page"]), list(said["actions"])
+            message = json.loads(self._field.value)
+            page, actions = str(message["page"]), list(message["actions"])
         except (ValueError, KeyError, TypeError):
             return
         self._heard[page] = self._heard.pop(page, 0)

@@ -138,9 +138,11 @@ class LessonFolder(Generic[Look]):
             )
             ui.when_changed(self._stop, self._picked)
             keys = {"Back": lambda: self._go(-1), "Next": lambda: self._go(1)}
+            hint = "To the stop before or after."
             if any(ANSWER in stop.text for stop in lesson.stops):
                 keys["Answer"] = self._answer
-            ui.buttons("Go", keys, "To the stop before or after, or to the answer of this one.")
+                hint = "To the stop before or after, or to the answer of this one."
+            ui.buttons("Go", keys, hint)
             self._text = ui.gui.add_markdown(BEGIN)
 
     def _go(self, count: int) -> None:

@@ -128,15 +128,15 @@ def _sweep(
 
 
 def _told(steps: Generator[Progress, None, Result]) -> Result:
-    """What a computation gives; every tenth of its progress is said."""
-    said = 0
+    """What a computation gives; every tenth of its progress is printed."""
+    printed = 0
     while True:
         try:
             progress = next(steps)
         except StopIteration as stop:
             return stop.value
-        if (tenths := int(10.0 * progress.fraction + 1e-9)) > said:
-            said = tenths
+        if (tenths := int(10.0 * progress.fraction + 1e-9)) > printed:
+            printed = tenths
             say_progress(progress)
 
 

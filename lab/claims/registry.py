@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.claims import outliers
+from lab.claims.calibration.claims import CLAIMS as CALIBRATION
 from lab.claims.claim import Claim, Verdict
 from lab.claims.delivery import cameras, pieces
 from lab.claims.delivery.claims import CLAIMS as DELIVERY
@@ -22,6 +23,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 
 _ALL: tuple[Claim, ...] = (
+    *CALIBRATION,
     outliers.C10,
     *DEPTH,
     *REGISTRATION,

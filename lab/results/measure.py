@@ -18,6 +18,10 @@ from pipeline.config import PRESETS
 from pipeline.io.demos import DEMO_SCENES
 
 COMMANDS: dict[str, tuple[str, ...]] = {
+    "calibration_claims": (
+        *("packetmesh", "reproduce", "--only"),
+        "C01,C02,C03,C04,C05,C06,C07,C08",
+    ),
     "outlier_claims": ("packetmesh", "reproduce", "--only", "C10"),
     "depth_claims": ("packetmesh", "reproduce", "--only", "C12,C13,C14"),
     "registration_claims": ("packetmesh", "reproduce", "--only", "C16,C17,C18,C19,C20"),

@@ -13,6 +13,7 @@ import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import Lens
+from pipeline.geometry import rigid
 from pipeline.types import FloatArray
 
 FLAGS: dict[Lens, int] = {
@@ -155,9 +156,7 @@ _DEGENERATE = (
 
 def pose_of(turn: FloatArray, move: FloatArray) -> FloatArray:
     """(4, 4) of OpenCV's rotation vector and translation."""
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = cv2.Rodrigues(np.asarray(turn))[0], np.ravel(move)
-    return T
+    return rigid(cv2.Rodrigues(np.asarray(turn))[0], np.ravel(move))
 
 
 def residuals(

@@ -13,7 +13,7 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path
 from pipeline.calibration.board import MARKER_SHARE, MARKERS, RING, Board
-from pipeline.types import ByteArray
+from pipeline.types import ByteArray, FloatArray
 
 MARGIN_MM = 15.0
 FOOT_MM = 16.0
@@ -66,10 +66,9 @@ def sheet(board: Board) -> Sheet:
     """The board with margins, a ruler to check the print and a line that says what it is."""
     points_mm = 1000.0 * board.points_m[:, :2]
     spacing_mm, radius_mm = 1000.0 * board.spacing_m, 1000.0 * board.radius_m
-    around_mm = spacing_mm if board.pattern in ("chessboard", "charuco") else 2.0 * radius_mm
-    low_mm = points_mm.min(axis=0) - around_mm - MARGIN_MM
-    width_mm, height_mm = points_mm.max(axis=0) + around_mm + MARGIN_MM - low_mm
-    places_mm = points_mm - low_mm
+    rim_mm = _around_mm(board) + MARGIN_MM
+    width_mm, height_mm = np.ptp(points_mm, axis=0) + 2.0 * rim_mm
+    places_mm = points_mm - points_mm[0] + place_of_first_mm(board)
     shapes: list[Disc | Box | Text]
     if board.pattern in ("chessboard", "charuco"):
         shapes = [*_squares(board, places_mm[0] - spacing_mm)]
@@ -82,6 +81,18 @@ def sheet(board: Board) -> Sheet:
     width_mm = max(float(width_mm), RULER_MM + 2.0 * MARGIN_MM)
     shapes += _foot(board, float(height_mm))
     return Sheet(width_mm, float(height_mm) + FOOT_MM, tuple(shapes))
+
+
+def place_of_first_mm(board: Board) -> FloatArray:
+    """(2,) where the board's first point is on the sheet."""
+    points_mm = 1000.0 * board.points_m[:, :2]
+    return points_mm[0] - points_mm.min(axis=0) + _around_mm(board) + MARGIN_MM
+
+
+def _around_mm(board: Board) -> float:
+    """How far the board goes beyond its outermost points, with white paper around circles."""
+    squares = board.pattern in ("chessboard", "charuco")
+    return 1000.0 * (board.spacing_m if squares else 2.0 * board.radius_m)
 
 
 def _squares(board: Board, corner_mm: np.ndarray) -> Iterator[Box]:

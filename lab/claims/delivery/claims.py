@@ -126,13 +126,13 @@ def _d04(study: Study) -> Outcome:
             for rig in study.rigs
         ]
         ours[coding], ci95[coding] = estimate(groups)
-    said = ", ".join(f"{coding} {tables.ranged(ours[coding], ci95[coding])}" for coding in HEADLINE)
+    slopes = ", ".join(f"{coding} {tables.ranged(ours[coding], ci95[coding])}" for coding in HEADLINE)
     return Outcome(
         {f"gain_per_percent_{coding}": value for coding, value in ours.items()},
         {f"gain_per_percent_{coding}": value for coding, value in ci95.items()},
         all(low > 0.0 for low, _ in ci95.values()),
         "with every per cent of packets lost in bursts fusion gives so many more points of rays a surface "
-        f"than without losses: {said}",
+        f"than without losses: {slopes}",
     )
 
 

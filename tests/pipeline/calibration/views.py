@@ -1,13 +1,12 @@
 """Pictures of a board as a camera sees it that is known to the last digit."""
 
-from functools import cache
-
 import cv2
 import numpy as np
 
+from lab.claims.calibration.photograph import photograph as take
+from lab.claims.calibration.photograph import seen_px
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import View
-from pipeline.calibration.target import picture_of, sheet
 from pipeline.types import CameraIntrinsics
 
 CAMERA = CameraIntrinsics(
@@ -17,9 +16,6 @@ CAMERA = CameraIntrinsics(
     480,
 )
 TILTS_DEG = ((0, 0), (25, 5), (-25, 10), (5, 28), (-8, -30), (20, -20), (-18, 24), (30, 0))
-PIXEL_MM = 0.25
-OVER = 3
-"""Rays along either side of a pixel."""
 
 
 def poses(board: Board, count: int = 8, turn_deg: float = 7.0):
@@ -38,11 +34,7 @@ def poses(board: Board, count: int = 8, turn_deg: float = 7.0):
 
 def seen(board: Board, T_camera_board, noise_px=0.0, rng=None):
     """(N, 2) where the camera has the board's points."""
-    turn = cv2.Rodrigues(T_camera_board[:3, :3])[0]
-    points_px, _ = cv2.projectPoints(
-        board.points_m, turn, T_camera_board[:3, 3], CAMERA.matrix, CAMERA.distortion
-    )
-    points_px = points_px.reshape(-1, 2)
+    points_px = seen_px(board, T_camera_board, CAMERA)
     return points_px if not noise_px else points_px + rng.normal(0.0, noise_px, points_px.shape)
 
 
@@ -55,34 +47,6 @@ def views(board: Board, noise_px=0.0, seed=0, count=8):
     ]
 
 
-@cache
-def _rays():
-    """(3, N) directions of nine rays through every pixel."""
-    v, u = np.mgrid[0 : OVER * CAMERA.height_px, 0 : OVER * CAMERA.width_px].astype(np.float64)
-    pixels = (np.stack([u, v], axis=-1).reshape(-1, 1, 2) + 0.5) / OVER - 0.5
-    until = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-9)
-    flat = cv2.undistortPoints(pixels, CAMERA.matrix, CAMERA.distortion, criteria=until).reshape(-1, 2)
-    return np.column_stack([flat, np.ones(len(flat))]).T
-
-
 def photograph(board: Board, T_camera_board):
-    """(H, W) what the camera takes of the printed sheet; every pixel is the mean of nine rays."""
-    printed = picture_of(sheet(board), PIXEL_MM)
-    origin_px = 1000.0 * (board.points_m[0, :2] - _first_mm(board) / 1000.0) / PIXEL_MM
-    T = T_camera_board
-    H = np.column_stack([T[:3, 0], T[:3, 1], T[:3, 3]])
-    on_board = np.linalg.solve(H, _rays())
-    flat_m = (on_board[:2] / on_board[2]).T
-    at_px = 1000.0 * flat_m / PIXEL_MM - origin_px - 0.5
-    shape = (OVER * CAMERA.height_px, OVER * CAMERA.width_px)
-    x, y = (column.reshape(shape).astype(np.float32) for column in at_px.T)
-    fine = cv2.remap(printed, x, y, cv2.INTER_LINEAR, borderValue=205)
-    return cv2.resize(fine, (CAMERA.width_px, CAMERA.height_px), interpolation=cv2.INTER_AREA)
-
-
-def _first_mm(board: Board):
-    """(2,) where the first point is on the sheet."""
-    points_mm = 1000.0 * board.points_m[:, :2]
-    square = board.pattern in ("chessboard", "charuco")
-    around_mm = 1000.0 * board.spacing_m if square else 2000.0 * board.radius_m
-    return points_mm[0] - (points_mm.min(axis=0) - around_mm - 15.0)
+    """(H, W) what the camera takes of the printed sheet."""
+    return take(board, T_camera_board, CAMERA)

@@ -1,0 +1,60 @@
+"""What a camera that is known to the last digit takes of a printed board."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import cv2
+import numpy as np
+
+from pipeline.calibration.board import Board
+from pipeline.calibration.target import picture_of, place_of_first_mm, sheet
+from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
+
+PIXEL_MM = 0.25
+"""Of the print that is looked at."""
+OVER = 3
+"""Rays along either side of a pixel, which is their mean."""
+DESK = 205
+"""Grey beside the sheet."""
+
+
+def seen_px(board: Board, T_camera_board: FloatArray, camera: CameraIntrinsics) -> FloatArray:
+    """(N, 2) where the camera has the board's points."""
+    turn = cv2.Rodrigues(T_camera_board[:3, :3])[0]
+    points_px, _ = cv2.projectPoints(
+        board.points_m, turn, T_camera_board[:3, 3], camera.matrix, camera.distortion
+    )
+    return points_px.reshape(-1, 2)
+
+
+def photograph(board: Board, T_camera_board: FloatArray, camera: CameraIntrinsics) -> ByteArray:
+    """(H, W) grey picture of the printed sheet on a desk."""
+    print_ = _print(board)
+    T = T_camera_board
+    plane = np.column_stack([T[:3, 0], T[:3, 1], T[:3, 3]])
+    lens = (*camera.matrix.ravel().tolist(), *camera.distortion.tolist())
+    on_board = np.linalg.solve(plane, _rays(lens, camera.width_px, camera.height_px))
+    flat_mm = 1000.0 * (on_board[:2] / on_board[2]).T
+    first_mm = 1000.0 * board.points_m[0, :2]
+    at_px = (flat_mm - first_mm + place_of_first_mm(board)) / PIXEL_MM - 0.5
+    shape = (OVER * camera.height_px, OVER * camera.width_px)
+    x, y = (column.reshape(shape).astype(np.float32) for column in at_px.T)
+    fine = cv2.remap(print_, x, y, cv2.INTER_LINEAR, borderValue=DESK)
+    return cv2.resize(fine, (camera.width_px, camera.height_px), interpolation=cv2.INTER_AREA)
+
+
+@lru_cache(4)
+def _print(board: Board) -> ByteArray:
+    return picture_of(sheet(board), PIXEL_MM)
+
+
+@lru_cache(2)
+def _rays(lens: tuple[float, ...], width_px: int, height_px: int) -> FloatArray:
+    """(3, N) directions of all rays, those through a pixel beside each other."""
+    v, u = np.mgrid[0 : OVER * height_px, 0 : OVER * width_px].astype(np.float64)
+    pixels = (np.stack([u, v], axis=-1).reshape(-1, 1, 2) + 0.5) / OVER - 0.5
+    until = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-9)
+    matrix, distortion = np.reshape(lens[:9], (3, 3)), np.array(lens[9:])
+    flat = cv2.undistortPoints(pixels, matrix, distortion, criteria=until).reshape(-1, 2)
+    return np.column_stack([flat, np.ones(len(flat))]).T
