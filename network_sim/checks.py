@@ -26,6 +26,12 @@ def share(key: str, value: float, least: float = 0.0) -> None:
         raise InputError(f"{key} is {value}; try a share between {least} and 1")
 
 
+def one_of(key: str, value: float, choices: Iterable[float]) -> None:
+    """Refuses what is not among the choices."""
+    if value not in choices:
+        raise InputError(f"{key} is {value:g}; try one of {', '.join(f'{one:g}' for one in choices)}")
+
+
 def one_each(key: str, values: Sized, wanted: int, what: str) -> None:
     """Refuses values that are neither none nor as many as wanted; ``what`` says which these are."""
     if len(values) not in (0, wanted):

@@ -38,7 +38,7 @@ def _topology(
 ) -> tuple[FixedPlaces, Radio, NDArray[np.float64]]:
     """Positions, radio, and (N, N) success probability of each link."""
     layout_rng, radio_rng = rng.spawn(2)
-    places, radio = place_nodes(config.nodes, layout_rng), Radio(config.radio, radio_rng)
+    places, radio = place_nodes(config.nodes, layout_rng), Radio(config.radio, config.mac, radio_rng)
     return places, radio, link_success(config, radio, places)
 
 

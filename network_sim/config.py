@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from network_sim.checks import above, at_least, finite, one_each, several, share
+from network_sim.checks import above, at_least, finite, one_each, one_of, several, share
 from network_sim.losses import LossConfig
 from packetmesh.errors import InputError
 
@@ -46,7 +46,7 @@ class RadioConfig:
     nakagami_m: float | None = None
     """Shape of the fading drawn for each frame; 1 is Rayleigh, larger fades less, None is no fading."""
     range_m: float = 100.0
-    """Nominal range: the receive threshold is the mean power there."""
+    """Nominal range: the receive threshold is the mean power there (IEEE 802.11b: at 11 Mb/s)."""
     sense_range_m: float = 220.0
     """Distance up to which a transmission keeps others silent."""
     capture_db: float = 10.0
@@ -84,6 +84,8 @@ class MacConfig:
     """Acknowledge frames and send lost ones again; IEEE 802.11b always does."""
     retries: int | None = None
     """How often an unanswered frame is sent again; None is 3 times in IEEE 802.15.4, 6 in IEEE 802.11b."""
+    rate_bps: float = 11e6
+    """Rate of IEEE 802.11b's data frames: 1, 2, 5.5 or 11 Mb/s. A slower one reaches farther."""
     link_bps: float = 250e3
     """Rate of the ideal link or the serial line."""
     trace: str | None = None
@@ -92,6 +94,7 @@ class MacConfig:
     def __post_init__(self) -> None:
         above("mac.link_bps", self.link_bps, 0.0)
         at_least("mac.retries", self.retries, 0)
+        one_of("mac.rate_bps", self.rate_bps, (1e6, 2e6, 5.5e6, 11e6))
         if self.kind == "replay" and not self.trace:
             raise InputError("mac.kind is replay, but of which recorded link? Try mac.trace=FILE")
 
@@ -153,8 +156,7 @@ class NodesConfig:
         one_each("nodes.places_m", self.places_m, 2 * (self.count + 1), places)
         one_each("nodes.bytes_by_node", self.bytes_by_node, self.count, f"one size for each node ({nodes})")
         finite("nodes.places_m", self.places_m, "metres")
-        for size_bytes in self.bytes_by_node:
-            at_least("nodes.bytes_by_node", size_bytes, 1)
+        at_least("nodes.bytes_by_node", min(self.bytes_by_node, default=1), 1)
         if self.header_bytes >= self.payload_bytes:
             raise InputError(
                 f"nodes.header_bytes is {self.header_bytes}, which leaves no room for data in a payload of "

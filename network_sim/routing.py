@@ -12,7 +12,7 @@ from scipy.special import gammaincinv
 
 from network_sim.config import NetworkConfig
 from network_sim.places import Places
-from network_sim.radio import Modulation, Radio
+from network_sim.radio import Radio, modulation
 
 _QUANTILES = 64
 
@@ -115,6 +115,6 @@ def _frame_success(config: NetworkConfig, radio: Radio, power_w: float) -> float
     if radio.noise_w is None:
         return len(received_w) / len(gains)
     size_bytes = config.nodes.payload_bytes
-    kind: Modulation = "oqpsk" if config.mac.kind == "ieee802154" else "cck"
+    kind = modulation(config.mac)
     good = sum(1.0 - radio.error_rate(one_w / radio.noise_w, size_bytes, kind) for one_w in received_w)
     return good / len(gains)

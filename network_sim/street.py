@@ -21,7 +21,7 @@ from network_sim.mac import make_mac
 from network_sim.mac.context import MacContext
 from network_sim.mac.medium import Medium
 from network_sim.mobility import Contact, Routes, StreetPlaces, access_points_m, cell_numbers, contacts, drive
-from network_sim.radio import Radio
+from network_sim.radio import Radio, reach_m
 from network_sim.schemes import make_scheme
 from network_sim.snapshots import Snapshots
 from network_sim.trace import Recorder
@@ -41,11 +41,11 @@ def start_street(
     street_rng, radio_rng, medium_rng, mac_rng = rng.spawn(_STREAMS)
     driving, cameras, requests = street_rng.spawn(3)
     routes = drive(config.street, config.run.horizon_s, driving)
-    medium = Medium(env, Radio(config.radio, radio_rng), _places(routes), medium_rng)
+    medium = Medium(env, Radio(config.radio, config.mac, radio_rng), _places(routes), medium_rng)
     snapshots = Snapshots(config, routes, cameras)
     street = Street(medium, config, recorder, snapshots, requests, mac_rng)
     points_m = access_points_m(config.street)
-    for vehicle, meetings in enumerate(contacts(routes, points_m, config.radio.range_m)):
+    for vehicle, meetings in enumerate(contacts(routes, points_m, reach_m(config))):
         env.process(street.follow(vehicle, meetings))
     return street
 

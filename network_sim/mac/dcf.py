@@ -1,4 +1,4 @@
-"""IEEE 802.11b distributed coordination function at 11 Mb/s (SPEC 6.3), with or without RTS/CTS.
+"""IEEE 802.11b distributed coordination function (SPEC 6.3), with or without RTS/CTS.
 
 Contention is resolved per transmission, not per slot: a station knows when its countdown would end, and a
 busy channel freezes the rest of it. One timer runs for the countdown that ends first, an overtaken timer does
@@ -16,6 +16,7 @@ import simpy
 
 from network_sim.losses import LinkLosses
 from network_sim.mac.context import MacContext, random_below
+from network_sim.radio import IEEE80211B
 from network_sim.types import Cause, Delivery, EventKind, Packet
 
 if TYPE_CHECKING:
@@ -34,9 +35,9 @@ HEADER_BYTES = 28 + 8
 """MAC header with check sum, and LLC/SNAP."""
 ACK_BYTES = 14
 RTS_BYTES = 20
-ACK_NS = PLCP_NS + 8 * ACK_BYTES * 1000 // 2
-"""Acknowledgements and CTS of the same size are sent at 2 Mb/s."""
-RTS_NS = PLCP_NS + 8 * RTS_BYTES * 1000 // 2
+FASTEST_BPS = 11e6
+CONTROL_BPS = 2e6
+"""Acknowledgements, RTS and CTS; a network of 1 Mb/s has no faster ones."""
 EIFS_NS = SIFS_NS + PLCP_NS + 8 * ACK_BYTES * 1000 + DIFS_NS
 """Silence after a frame that could not be read: its acknowledgement may be on the air, at 1 Mb/s."""
 REPLY_WAIT_NS = GAP_NS + SLOT_NS + PLCP_NS
@@ -52,13 +53,23 @@ _AIR, _ACK, _DELIVER, _NONE = EventKind.AIR, EventKind.ACK, EventKind.DELIVER, C
 _FIRST_ATTEMPT = Delivery(True, Cause.NONE, 1)
 
 
-def data_ns(size_bytes: int) -> int:
+def air_ns(frame_bytes: int, rate_bps: float) -> int:
+    """Time on the air of a frame with its preamble."""
+    return PLCP_NS + round(8e9 * frame_bytes / rate_bps)
+
+
+def data_ns(size_bytes: int, rate_bps: float = FASTEST_BPS) -> int:
     """Time on the air of a data frame.
 
     Args:
         size_bytes: payload of the medium access: application bytes with UDP and IP headers.
+        rate_bps: 1, 2, 5.5 or 11 Mb/s.
     """
-    return PLCP_NS + (8 * (size_bytes + HEADER_BYTES) * 1000 + 5) // 11
+    return air_ns(size_bytes + HEADER_BYTES, rate_bps)
+
+
+ACK_NS = air_ns(ACK_BYTES, CONTROL_BPS)
+"""Also of a CTS, which has the same size; in a network of 1 Mb/s both take longer."""
 
 
 @dataclass(slots=True, eq=False)
@@ -152,6 +163,11 @@ class Dcf:
         self._rts = context.config.mac.rts
         retries = context.config.mac.retries
         self._attempts = ATTEMPTS if retries is None else 1 + retries
+        self._rate_bps = context.config.mac.rate_bps
+        self._modulation = IEEE80211B[self._rate_bps][0]
+        control_bps = min(self._rate_bps, CONTROL_BPS)
+        self._control = IEEE80211B[control_bps][0]
+        self._reply_ns, self._rts_ns = air_ns(ACK_BYTES, control_bps), air_ns(RTS_BYTES, control_bps)
         self._record = context.recorder.add_packet
         self._up = context.up
         self._receive = context.receive
@@ -210,7 +226,7 @@ class Dcf:
             if begins_ns < now_ns:
                 station.from_ns, station.slots = now_ns, 0
                 begins_ns = now_ns
-            first_ns = RTS_NS if self._rts else data_ns(size_bytes)
+            first_ns = self._rts_ns if self._rts else data_ns(size_bytes, self._rate_bps)
             if self._medium.undisturbed and env.peek() > begins_ns + first_ns:
                 station.begins_ns, station.from_ns, station.sending = begins_ns, _NEVER, True
                 return None
@@ -282,8 +298,8 @@ class Dcf:
             if cts is None:
                 return Cause.COLLISION
             begins_ns = cts.end_ns + GAP_NS
-        duration_ns, frame_bytes = data_ns(size_bytes), size_bytes + HEADER_BYTES
-        rest_ns = GAP_NS + ACK_NS
+        duration_ns, frame_bytes = data_ns(size_bytes, self._rate_bps), size_bytes + HEADER_BYTES
+        rest_ns = GAP_NS + self._reply_ns
         frame = self._start_frame(
             _AIR, packet, sender, receiver, frame_bytes, begins_ns, duration_ns, rest_ns, cts
         )
@@ -298,7 +314,9 @@ class Dcf:
             self._record(frame.end_ns, _DELIVER, packet, sender, receiver, size_bytes)
             self._receive(packet, receiver)
         begins_ns = frame.end_ns + GAP_NS
-        answer = self._start_frame(_ACK, packet, receiver, sender, ACK_BYTES, begins_ns, ACK_NS, 0, frame)
+        answer = self._start_frame(
+            _ACK, packet, receiver, sender, ACK_BYTES, begins_ns, self._reply_ns, 0, frame
+        )
         yield env.timeout(rest_ns)
         if self._outcome(answer):
             self._fail_attempt(packet, station, answer, Cause.ACK_LOST, 0)
@@ -311,22 +329,34 @@ class Dcf:
         self, packet: Packet, station: _Station, receiver: int
     ) -> Generator[simpy.Event, Any, Transmission | None]:
         """RTS and CTS; returns the CTS, after which the data frame has to be sent, or None."""
-        sender, begins_ns, rest_ns = station.node, station.begins_ns, GAP_NS + ACK_NS + GAP_NS
-        rts = self._start_frame(_ACK, packet, sender, receiver, RTS_BYTES, begins_ns, RTS_NS, rest_ns, None)
+        sender, begins_ns, rest_ns = station.node, station.begins_ns, GAP_NS + self._reply_ns + GAP_NS
+        rts = self._start_frame(
+            _ACK, packet, sender, receiver, RTS_BYTES, begins_ns, self._rts_ns, rest_ns, None
+        )
         yield self._env.timeout(rts.end_ns - self._env.now)
         cause = self._outcome(rts)
         if cause:
             self._fail_attempt(packet, station, rts, cause, self._reply_wait_ns)
             return None
         begins_ns = rts.end_ns + GAP_NS
-        rest_ns = GAP_NS + data_ns(packet.size_bytes) + GAP_NS + ACK_NS
-        cts = self._start_frame(_ACK, packet, receiver, sender, ACK_BYTES, begins_ns, ACK_NS, rest_ns, rts)
-        yield self._env.timeout(GAP_NS + ACK_NS)
+        rest_ns = GAP_NS + data_ns(packet.size_bytes, self._rate_bps) + GAP_NS + self._reply_ns
+        cts = self._start_frame(
+            _ACK, packet, receiver, sender, ACK_BYTES, begins_ns, self._reply_ns, rest_ns, rts
+        )
+        yield self._env.timeout(GAP_NS + self._reply_ns)
         cause = self._outcome(cts)
         if cause:
             self._fail_attempt(packet, station, cts, cause, 0)
             return None
         return cts
+
+    def _start_reply(
+        self, packet: Packet, sender: int, receiver: int, begins_ns: int, rest_ns: int, to: Transmission
+    ) -> Transmission:
+        """An acknowledgement or a CTS to a frame that ends now."""
+        return self._start_frame(
+            _ACK, packet, sender, receiver, ACK_BYTES, begins_ns, self._reply_ns, rest_ns, to
+        )
 
     def _start_frame(
         self,
@@ -341,7 +371,8 @@ class Dcf:
         replied_to: Transmission | None,
     ) -> Transmission:
         """Put a frame on the air; the one that it replies to ends now."""
-        frame = self._medium.start(sender, duration_ns, receiver, size_bytes, "cck", begins_ns, reserve_ns)
+        how = self._modulation if kind is _AIR else self._control
+        frame = self._medium.start(sender, duration_ns, receiver, size_bytes, how, begins_ns, reserve_ns)
         if replied_to is not None:
             self._medium.clear(replied_to)
         self._record(begins_ns, kind, packet, sender, receiver, size_bytes, _NONE, duration_ns)

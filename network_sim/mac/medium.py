@@ -138,7 +138,7 @@ class Medium:
         duration_ns: int,
         receiver: int,
         size_bytes: int = 0,
-        modulation: Modulation = "cck",
+        modulation: Modulation = "cck11",
         begins_ns: int | None = None,
         reserve_ns: int = 0,
     ) -> Transmission:

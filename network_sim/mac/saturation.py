@@ -71,7 +71,9 @@ def saturation(
     horizon_ns = to_ns(duration_s)
     env = simpy.Environment()
     rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]
-    medium = Medium(env, Radio(config.radio, rngs[1]), place_nodes(config.nodes, rngs[0]), rngs[2])
+    medium = Medium(
+        env, Radio(config.radio, config.mac, rngs[1]), place_nodes(config.nodes, rngs[0]), rngs[2]
+    )
     recorder = Recorder(config.run.keep, nodes + 1, to_ns(config.run.warmup_s))
     if not wait_after_loss and config.mac.kind != "ieee80211b":
         raise ValueError(f"{config.mac.kind} has no EIFS")

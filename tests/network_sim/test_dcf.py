@@ -45,13 +45,15 @@ class Scene:
         at_m: tuple[tuple[int, int], ...] = TOGETHER_M,
         rts: bool = False,
         sense_m: float = 220,
+        rate_bps: float = 11e6,
     ) -> None:
         self.env = simpy.Environment()
         self.config = config = NetworkConfig(
-            radio=RadioConfig(sense_range_m=sense_m), mac=MacConfig(kind="ieee80211b", rts=rts)
+            radio=RadioConfig(sense_range_m=sense_m),
+            mac=MacConfig(kind="ieee80211b", rts=rts, rate_bps=rate_bps),
         )
         rng = np.random.default_rng(0)
-        self.medium = Medium(self.env, Radio(config.radio, rng), FixedPlaces(np.array(at_m)), rng)
+        self.medium = Medium(self.env, Radio(config.radio, config.mac, rng), FixedPlaces(np.array(at_m)), rng)
         self.recorder = Recorder("all", len(at_m))
         self.down: set[int] = set()
         self.received: list[tuple[int, int]] = []
@@ -103,6 +105,34 @@ class Scene:
 
 def test_a_data_frame_lasts_what_the_standard_says() -> None:
     assert data_ns(1028) == DATA == round(192e3 + 8 * 1064 * 1000 / 11)
+
+
+@pytest.mark.parametrize(
+    ("rate_bps", "data_us", "reply_us"),
+    [(1e6, 192 + 8 * 1064, 304), (2e6, 192 + 4 * 1064, 248), (5.5e6, 192 + 8 * 1064 / 5.5, 248)],
+)
+def test_slower_frames_last_longer_and_are_answered_at_a_rate_no_faster(
+    rate_bps: float, data_us: float, reply_us: int
+) -> None:
+    it = Scene(5, 0, rts=True, rate_bps=rate_bps)
+    it.send(A, 0)
+    it.run()
+    cts = round(192e3 + 8e9 * 20 / min(rate_bps, 2e6)) + GAP
+    data = cts + reply_us * US + GAP
+    assert it.times(EventKind.AIR, A) == [data]
+    assert it.times(EventKind.DELIVER, A) == [data + round(data_us * US)]
+    assert it.ended[A] == data + round(data_us * US) + GAP + reply_us * US
+
+
+def test_a_slower_rate_reaches_farther() -> None:
+    at_m = ((150, 0), (0, 20), (-20, 0), (0, -20), (0, 0))
+    ways = {}
+    for rate_bps in (1e6, 2e6, 5.5e6, 11e6):
+        it = Scene(*range(7), at_m=at_m, rate_bps=rate_bps)
+        it.send(A, 0)
+        it.run()
+        ways[rate_bps] = it.deliveries[A][0].ok
+    assert ways == {1e6: True, 2e6: True, 5.5e6: False, 11e6: False}
 
 
 def test_a_lone_station_sends_at_once_and_backs_off_after_it() -> None:

@@ -42,7 +42,7 @@ class Scene:
         self.env = simpy.Environment()
         self.config = NetworkConfig(mac=MacConfig(ack=ack))
         rng = np.random.default_rng(0)
-        radio = Radio(self.config.radio, rng)
+        radio = Radio(self.config.radio, self.config.mac, rng)
         self.medium = Medium(self.env, radio, FixedPlaces(np.array(AROUND_M)), rng)
         self.recorder = Recorder("all", len(AROUND_M))
         self.down: set[int] = set()

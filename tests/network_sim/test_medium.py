@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import simpy
 
-from network_sim.config import RadioConfig
+from network_sim.config import MacConfig, RadioConfig
 from network_sim.mac.medium import MEMORY_NS, REFRESH_NS, Medium
 from network_sim.places import FixedPlaces
 from network_sim.radio import Radio, oqpsk_bit_error_rate
@@ -44,7 +44,7 @@ class Scene:
 def scene(*x_m: float, seed: int = 0, **radio: Any) -> Scene:
     env, rng = simpy.Environment(), np.random.default_rng(seed)
     places = FixedPlaces(np.array([[x, 0.0] for x in x_m]))
-    return Scene(env, Medium(env, Radio(RadioConfig(**radio), rng), places, rng), {})
+    return Scene(env, Medium(env, Radio(RadioConfig(**radio), MacConfig(), rng), places, rng), {})
 
 
 def test_alone_within_range() -> None:
@@ -115,7 +115,7 @@ def test_who_sends_hears_nothing() -> None:
 def test_noise_and_fading() -> None:
     for noise_dbm, expected in ((-140.0, Cause.NONE), (-40.0, Cause.NOISE)):
         it = scene(0, 50, noise_dbm=noise_dbm)
-        it.frame(0, 1000, 0, 1, size_bytes=1000, modulation="cck")
+        it.frame(0, 1000, 0, 1, size_bytes=1000, modulation="cck11")
         assert it.run() == {(0, 0): expected}
     it = scene(0, 100, nakagami_m=1.0)
     for start_us in range(0, 200_000, 100):
@@ -215,7 +215,7 @@ class Leaving:
 
 def test_moving_nodes_get_out_of_range() -> None:
     env, rng = simpy.Environment(), np.random.default_rng(0)
-    it = Scene(env, Medium(env, Radio(RadioConfig(), rng), Leaving(), rng), {})
+    it = Scene(env, Medium(env, Radio(RadioConfig(), MacConfig(), rng), Leaving(), rng), {})
     for start_us in range(0, 2_000_000, 50_000):
         it.frame(start_us, 100, 0, 1)
     outcomes = it.run()

@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
 from scipy import integrate, stats
 
 from network_sim import radio as r
-from network_sim.config import RadioConfig
+from network_sim.config import MacConfig, NetworkConfig, Propagation, RadioConfig
 from network_sim.places import FixedPlaces
 from packetmesh.errors import InputError
 
@@ -29,7 +30,7 @@ CONFIGS = [
 
 
 def radio(seed: int = 0, **changes: object) -> r.Radio:
-    return r.Radio(replace(RadioConfig(), **changes), np.random.default_rng(seed))
+    return r.Radio(replace(RadioConfig(), **changes), MacConfig(), np.random.default_rng(seed))
 
 
 def test_two_ray_gives_the_values_of_ns_2() -> None:
@@ -83,7 +84,7 @@ def test_power_falls_from_what_is_sent(config: RadioConfig) -> None:
 
 @pytest.mark.parametrize("config", CONFIGS)
 def test_thresholds_are_met_exactly_up_to_the_ranges(config: RadioConfig) -> None:
-    here = r.Radio(config, np.random.default_rng(0))
+    here = r.Radio(config, MacConfig(), np.random.default_rng(0))
     for range_m, threshold_w in (
         (config.range_m, here.rx_threshold_w),
         (config.sense_range_m, here.cs_threshold_w),
@@ -149,12 +150,12 @@ def test_cck_is_two_biorthogonal_symbols(sinr: float) -> None:
         return (2.0 * stats.norm.cdf(v + b) - 1.0) ** 7 * stats.norm.pdf(v)
 
     one = integrate.quad(right, -b, 12.0, epsabs=1e-13, epsrel=1e-12, limit=400)[0]
-    assert r.cck_symbol_error_rate(sinr) == pytest.approx(1.0 - one**2, rel=1e-4)
+    assert r.cck11_symbol_error_rate(sinr) == pytest.approx(1.0 - one**2, rel=1e-4)
 
 
 def test_cck_without_a_signal_is_a_guess_among_256() -> None:
-    assert r.cck_symbol_error_rate(0.0) == pytest.approx(255.0 / 256.0, rel=1e-12)
-    assert r.cck_symbol_error_rate(math.inf) == 0.0
+    assert r.cck11_symbol_error_rate(0.0) == pytest.approx(255.0 / 256.0, rel=1e-12)
+    assert r.cck11_symbol_error_rate(math.inf) == 0.0
 
 
 @pytest.mark.parametrize("sinr", [0.0, 0.1, 0.3, 0.6, 1.0])
@@ -175,7 +176,7 @@ def test_oqpsk_without_a_signal_is_a_coin() -> None:
     assert r.oqpsk_bit_error_rate(0.0) == pytest.approx(0.5, rel=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["cck", "oqpsk"])
+@pytest.mark.parametrize("kind", get_args(r.Modulation))
 def test_packet_errors_fall_with_the_signal_and_grow_with_the_size(kind: r.Modulation) -> None:
     here = radio()
     sinrs = np.concatenate([[0.0], np.geomspace(1e-3, 1e3, 400)]).tolist()
@@ -194,7 +195,9 @@ def test_frame_errors_are_independent_per_bit_or_symbol() -> None:
     assert here.error_rate(0.3, 50, "oqpsk") == pytest.approx(
         1.0 - (1.0 - r.oqpsk_bit_error_rate(0.3)) ** 400
     )
-    assert here.error_rate(3.0, 50, "cck") == pytest.approx(1.0 - (1.0 - r.cck_symbol_error_rate(3.0)) ** 50)
+    assert here.error_rate(3.0, 50, "cck11") == pytest.approx(
+        1.0 - (1.0 - r.cck11_symbol_error_rate(3.0)) ** 50
+    )
 
 
 WALL_M = np.array([[[1.0, -1.0], [1.0, 1.0]]])
@@ -235,3 +238,51 @@ def test_each_wall_takes_its_decibels_both_ways() -> None:
 def test_walls_that_cannot_be_are_refused(changes, sentence) -> None:
     with pytest.raises(InputError, match=sentence):
         RadioConfig(**changes)
+
+
+@pytest.mark.parametrize("sinr", [0.0, 0.02, 0.1, 0.3, 0.7])
+def test_dqpsk_is_gray_coded_and_compared_with_the_symbol_before(sinr: float) -> None:
+    """The phase between two noisy signals, integrated numerically (Proakis 2001, app. C)."""
+    rng = np.random.default_rng(1)
+    es = 22.0 * sinr  # two bits
+    signal = np.sqrt(es) + rng.standard_normal((2, 2_000_000)) * math.sqrt(0.5)
+    noise = rng.standard_normal((2, 2_000_000)) * math.sqrt(0.5)
+    first, second = signal + 1j * noise
+    turn = np.exp(0.25j * math.pi) * second * first.conj()  # the sent phase lies between the two axes
+    wrong = 0.5 * (np.mean(turn.real < 0.0) + np.mean(turn.imag < 0.0))
+    assert r.dqpsk_bit_error_rate(sinr) == pytest.approx(wrong, abs=4.0 * math.sqrt(max(wrong, 1e-6) / 4e6))
+
+
+def test_strong_dqpsk_errs_as_rarely_as_its_limit_says() -> None:
+    """Ferrari and Corazza 2004, the form that ns-3 has."""
+    sinr = 3.0
+    x = 11.0 * sinr
+    root = math.sqrt(2.0)
+    limit = (root + 1.0) / math.sqrt(8.0 * math.pi * root) / math.sqrt(x) * math.exp(-(2.0 - root) * x)
+    assert r.dqpsk_bit_error_rate(sinr) == pytest.approx(limit, rel=0.03)
+
+
+def test_slower_rates_take_less_power_and_err_less() -> None:
+    sinrs = np.geomspace(0.05, 3.0, 30).tolist()
+    here = radio()
+    rates = [[here.error_rate(sinr, 1024, kind) for sinr in sinrs] for kind, _ in r.IEEE80211B.values()]
+    assert (np.diff(rates, axis=0) >= -1e-12).all()
+    by_rate = {}
+    for rate_bps in r.IEEE80211B:
+        mac = MacConfig(kind="ieee80211b", rate_bps=rate_bps)
+        network = NetworkConfig(mac=mac)
+        by_rate[rate_bps] = r.reach_m(network)
+        here = r.Radio(network.radio, mac, np.random.default_rng(0))
+        assert here.mean_power_w(by_rate[rate_bps]) == pytest.approx(here.rx_threshold_w)
+        assert here.cs_threshold_w <= here.rx_threshold_w
+    assert by_rate[11e6] == pytest.approx(100.0)
+    crossover_m = r.crossover_m(1.5, r.wavelength_m(2.4e9))
+    assert by_rate[1e6] == pytest.approx(math.sqrt(100.0 * 10.0 ** (9.0 / 20.0) * crossover_m))
+    assert r.reach_m(NetworkConfig()) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("model", ["friis", "two-ray", "log-distance"])
+def test_the_distance_of_a_power_is_the_power_of_that_distance(model: Propagation) -> None:
+    law = r.path_loss(RadioConfig(model=model))
+    for distance_m in (0.5, 5.0, 60.0, 300.0, 2000.0):
+        assert law.distance_m(law.power_w(distance_m)) == pytest.approx(distance_m)

@@ -18,7 +18,7 @@ from packetmesh.settings import with_settings
 
 def line_success(config: NetworkConfig, *at_m: float) -> np.ndarray:
     places = FixedPlaces(np.array([[x, 0.0] for x in at_m]))
-    return link_success(config, Radio(config.radio, np.random.default_rng(0)), places)
+    return link_success(config, Radio(config.radio, config.mac, np.random.default_rng(0)), places)
 
 
 @settings(max_examples=50)
@@ -96,6 +96,6 @@ def test_frames_go_round_a_wall_over_another_node():
     parents = []
     for one in (radio, walled):
         config = NetworkConfig(radio=one)
-        success = link_success(config, Radio(one, np.random.default_rng(0)), places)
+        success = link_success(config, Radio(one, config.mac, np.random.default_rng(0)), places)
         parents.append(shortest_paths(success, 2).parents)
     assert parents == [(2, 2, -1), (1, 2, -1)]

@@ -30,7 +30,7 @@ def link(
     rng = np.random.default_rng(0)
     context = MacContext(
         env,
-        Medium(env, Radio(config.radio, rng), FixedPlaces(np.zeros((2, 2))), rng),
+        Medium(env, Radio(config.radio, config.mac, rng), FixedPlaces(np.zeros((2, 2))), rng),
         config,
         recorder,
         rng,

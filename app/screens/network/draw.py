@@ -15,6 +15,7 @@ from app.screens.network.labels import ANSWER, PACKET_COLORS
 from app.screens.network.view import NetworkView, Pieces, What
 from network_sim.coverage import RoadCoverage
 from network_sim.mobility import cells_m
+from network_sim.radio import reach_m
 from network_sim.types import Cause
 from pipeline.types import ByteArray, FloatArray
 
@@ -75,10 +76,10 @@ def ground_of(views: Sequence[NetworkView]) -> Ground:
     lows_m, highs_m = [], []
     for view in views:
         low_m, high_m = view.tracks_m.min(axis=(0, 1)), view.tracks_m.max(axis=(0, 1))
-        reach_m = view.config.radio.range_m
+        range_m = reach_m(view.config)
         still_m = view.tracks_m[0][_still(view)]
-        lows_m.append(np.minimum(low_m, (still_m - reach_m).min(axis=0, initial=np.inf)))
-        highs_m.append(np.maximum(high_m, (still_m + reach_m).max(axis=0, initial=-np.inf)))
+        lows_m.append(np.minimum(low_m, (still_m - range_m).min(axis=0, initial=np.inf)))
+        highs_m.append(np.maximum(high_m, (still_m + range_m).max(axis=0, initial=-np.inf)))
     low_m, high_m = np.min(lows_m, axis=0), np.max(highs_m, axis=0)
     size_m = np.maximum(high_m - low_m, 1.0)
     scale = SIDE / float(size_m.max())
@@ -214,7 +215,7 @@ class NetworkDrawing:
 
     def _circles(self, centers_m: FloatArray, view: NetworkView, index: int) -> FloatArray:
         """(S, 2, 3) segments of the receive range around each centre."""
-        rim_m = view.config.radio.range_m * np.column_stack([np.cos(CIRCLE), np.sin(CIRCLE)])
+        rim_m = reach_m(view.config) * np.column_stack([np.cos(CIRCLE), np.sin(CIRCLE)])
         flat = [self.ground.place(center_m + rim_m, index, -0.01) for center_m in centers_m]
         return np.concatenate([np.stack([one[:-1], one[1:]], axis=1) for one in flat])
 

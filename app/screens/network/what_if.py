@@ -12,6 +12,7 @@ from app.drawing.colors import NEUTRAL
 from app.drawing.poses import place
 from app.screens.network.delivery_view import DeliveryView
 from app.ui import Ui
+from network_sim.radio import IEEE80211B
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
@@ -20,6 +21,10 @@ SINK = "sink"
 RETRIES: dict[str, tuple[str, ...]] = {
     "as the standard has it": (),
     **{str(count): (f"mac.retries={count}",) for count in (0, 1, 2, 5, 10)},
+}
+RATES: dict[str, tuple[str, ...]] = {
+    f"{rate_bps / 1e6:g} Mbit/s": (f"mac.rate_bps={rate_bps:g}",) if index else ()
+    for index, rate_bps in enumerate(sorted(IEEE80211B, reverse=True))
 }
 WALL_AWAY, WALL_HALF = 0.2, 0.25
 """How far the wall is from its node on the way to the sink, and half its length, over that way."""
@@ -65,12 +70,19 @@ class WhatIf:
             hint="How often a frame that is not acknowledged is sent again; only IEEE 802.15.4 with ACK and "
             "802.11b do.",
         )
+        self._rate = gui.add_dropdown(
+            "Rate of 802.11b",
+            list(RATES),
+            hint="A slower frame lasts longer and is received from farther away and through thicker walls; "
+            "the other media have one rate each, under Medium access.",
+        )
         self._mover = gui.add_dropdown(
             "Move radio of", [NOBODY], hint="Arrows appear at this node; its camera stays where it is."
         )
         self._text = gui.add_markdown("")
         self._visible = True
-        for handle in (self._off, self._walled, self._wall_db, self._retries):
+        self._controls = (self._off, self._walled, self._wall_db, self._retries, self._rate)
+        for handle in self._controls:
             ui.when_changed(handle, on_change)
         ui.when_changed(self._mover, self._put_back_or_show)
         self._at_m: Callable[[str], FloatArray] | None = None
@@ -91,7 +103,7 @@ class WhatIf:
         if self._walled.value in places_m:
             changes.append("radio.walls_m=" + _text(wall_m(places_m, self._walled.value)))
             changes.append(f"radio.wall_db={float(self._wall_db.value):g}")
-        return (*changes, *RETRIES[self._retries.value])
+        return (*changes, *RETRIES[self._retries.value], *RATES[self._rate.value])
 
     def forget(self) -> None:
         """Nothing has happened."""
@@ -99,6 +111,7 @@ class WhatIf:
             handle.value = NOBODY
         self._wall_db.value = WALL_DB
         self._retries.value = next(iter(RETRIES))
+        self._rate.value = next(iter(RATES))
         self.put_back()
 
     def put_back(self) -> None:
@@ -122,7 +135,7 @@ class WhatIf:
 
     def show(self, visible: bool) -> None:
         """Show the controls or hide them; without them, what they have drawn goes, too."""
-        for handle in (self._off, self._walled, self._wall_db, self._retries, self._mover, self._text):
+        for handle in (*self._controls, self._mover, self._text):
             handle.visible = visible
         self._visible = visible
         if not visible:
