@@ -252,6 +252,16 @@ def test_frames_go_round_a_wall_over_another_camera_until_it_is_gone(screen):
     assert screen.drawn("/network/what-if/wall") is None
 
 
+def test_a_slower_rate_takes_longer(screen):
+    gui, before = screen.gui, screen.view
+    gui.set("802.11b rate", "5.5 Mbit/s")
+    assert screen.view.sent.network.mac.rate_bps == 5.5e6
+    assert screen.view.moments[-1].t_ns > 1.4 * before.moments[-1].t_ns
+    assert "mac.rate_bps=5500000" in screen.panel.command.replace("5.5e+06", "5500000")
+    gui.set("802.11b rate", "11 Mbit/s")
+    assert screen.view.sent == before.sent
+
+
 def test_a_second_drag_before_the_first_is_answered_counts_once(screen):
     ui = ui_of(screen.ui.scene)
     what_if = WhatIf(ui, "/alone", lambda: None)

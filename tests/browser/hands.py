@@ -76,3 +76,13 @@ def pick(page, label, option):
 
 def press(page, name):
     page.get_by_role("button", name=name, exact=True).last.click()
+
+
+def arrow(page):
+    """The middle of the red arrow of some transform controls, in the page's pixels."""
+    box = page.locator("canvas").first.bounding_box()
+    picture = cv2.imdecode(np.frombuffer(canvas(page), np.uint8), cv2.IMREAD_COLOR).astype(int)
+    blue, green, red = np.moveaxis(picture, 2, 0)
+    y, x = np.nonzero((red > 180) & (red - green > 100) & (blue > green) & (blue < 160))
+    assert len(x) > 20
+    return box["x"] + float(np.median(x)), box["y"] + float(np.median(y))

@@ -13,7 +13,7 @@ from pipeline.delivery.sending import DeliverySpec, received_at, send
 from pipeline.sources import Demo
 from pipeline.spec import Spec
 from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, pick, press
+from tests.browser.hands import ALIKE, arrow, canvas, changed_from, differing, go, pick, press
 
 ALL = re.compile(r"^\d cameras sent [\d.]+ MB in [\d,]+ packets; simulated in [\d.]+ s\.$")
 
@@ -125,6 +125,25 @@ def test_a_delivery_rests_while_nobody_looks_and_goes_on_from_there(network):
     network.get_by_text("Up to date").wait_for()
     go(network, "Network")
     network.get_by_text(re.compile("moment [234] of")).first.wait_for()
+    network.get_by_text("Up to date").wait_for()
+
+
+def test_a_hand_drags_a_radio_by_its_arrow_and_it_is_sent_again(network):
+    pick(network, "Move radio of", "node_01")
+    x, y = arrow(network)
+    network.mouse.move(x, y)
+    network.wait_for_timeout(300)
+    network.mouse.down()
+    for step in range(1, 9):
+        network.mouse.move(x + 5 * step, y - 4 * step)
+        network.wait_for_timeout(50)
+    network.mouse.up()
+    network.get_by_text(re.compile("radios moved")).first.wait_for()
+    network.get_by_text("Up to date").wait_for()
+    press(network, "Copy as command")
+    assert "nodes.places_m=" in network.locator("pre").first.inner_text()
+    press(network, "Close")
+    pick(network, "Move radio of", "nobody")
     network.get_by_text("Up to date").wait_for()
 
 

@@ -71,7 +71,7 @@ class WhatIf:
             "802.11b do.",
         )
         self._rate = gui.add_dropdown(
-            "Rate of 802.11b",
+            "802.11b rate",
             list(RATES),
             hint="A slower frame lasts longer and is received from farther away and through thicker walls; "
             "the other media have one rate each, under Medium access.",

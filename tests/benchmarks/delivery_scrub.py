@@ -1,0 +1,102 @@
+"""How long after a hand rests on the Network screen's timeline the mesh of that moment stands on the screen.
+
+``python tests/benchmarks/delivery_scrub.py`` opens the app in Chromium, delivers the living room over the
+preset ``office``, and has a hand click the timeline here and there. Prints the median and the 95th
+percentile, from the hand's rest to when OpenGL has drawn the first frame with the moment's mesh, for the
+machine's OpenGL driver (Mesa's software one where there is no graphics card) and for SwiftShader.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import sync_playwright
+from slider_latency import RENDERER, WATCH
+
+from app.screens.network import setup
+from app.server import build_server
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "browser"))
+
+from conftest import ARGUMENTS, chromium_path
+from hands import go
+
+REST = """
+addEventListener("pointerup", () => { window.handRested = performance.now(); }, true);
+"""
+LONGEST_S = 5.0
+
+
+def wait_s(page, triangles: int) -> float | None:
+    """Seconds from the hand's rest to the first frame with a mesh; None if it does not come."""
+    until = time.monotonic() + LONGEST_S
+    while time.monotonic() < until:
+        drawn = page.evaluate("surfaceLog.drawn.map(one => [one.at - handRested, one.indices])")
+        frames = [after_ms for after_ms, indices in drawn if indices == 3 * triangles and after_ms > 0.0]
+        if frames:
+            return min(frames) / 1000.0
+        page.wait_for_timeout(50)
+    return None
+
+
+def measure(playwright, app, angle: str, clicks: int) -> None:
+    """Click in one Chromium and print what came of it."""
+    arguments = [f"--use-angle={angle}" if "use-angle" in one else one for one in ARGUMENTS]
+    browser = playwright.chromium.launch(
+        executable_path=chromium_path(), args=[*arguments, "--ignore-gpu-blocklist"]
+    )
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.add_init_script(WATCH + REST)
+    page.goto(app.url)
+    page.set_default_timeout(240_000)
+    go(page, "Network")
+    page.get_by_text("Up to date").wait_for()
+    page.wait_for_timeout(3000)
+    (session,) = app.sessions.values()
+    view = session._current._delivery
+    meshes = {moment.t_ns: moment.triangles for moment in view.moments if moment.triangles}
+    field, rng = page.locator(".packetmesh-dock-field").bounding_box(), np.random.default_rng(0)
+    waits, before = [], 0
+    for t_ns in rng.choice(list(meshes), clicks).tolist():
+        if t_ns == before:
+            continue
+        before = t_ns
+        page.evaluate("surfaceLog.drawn.length = 0")
+        share = (t_ns + 1_000_000) / view.run.end_ns
+        page.mouse.click(field["x"] + min(share, 0.999) * field["width"], field["y"] + 8)
+        waits.append(wait_s(page, meshes[t_ns]))
+    renderer = page.evaluate(RENDERER)
+    browser.close()
+    seen = [one for one in waits if one is not None]
+    median, p95 = np.percentile(seen, (50, 95))
+    print(f"{angle}: {renderer}")
+    print(
+        f"  {len(waits)} clicks, {len(seen)} meshes of {min(meshes.values()):,} to {max(meshes.values()):,}"
+    )
+    print(f"  hand's rest to mesh: median {median:.3f} s, 95th percentile {p95:.3f} s", flush=True)
+
+
+def main() -> None:
+    """Measure with each renderer and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scene", default="living-room")
+    parser.add_argument("--moments", type=int, default=setup.MOMENTS)
+    parser.add_argument("--clicks", type=int, default=40)
+    parser.add_argument(
+        "--angle", nargs="+", default=["gl-egl", "swiftshader"], help="what Chromium draws with (--use-angle)"
+    )
+    options = parser.parse_args()
+    setup.MOMENTS = options.moments
+    app = build_server(options.scene, port=0)
+    with sync_playwright() as playwright:
+        for angle in options.angle:
+            measure(playwright, app, angle, options.clicks)
+    app.stop()
+
+
+if __name__ == "__main__":
+    main()
