@@ -36,7 +36,15 @@ from pipeline.nodes import (
 )
 from pipeline.sources import Source
 from pipeline.spec import CHAIN, NEEDS, Spec, StageName, key
-from pipeline.surface import Camera, compare_with_truth, measured, radii, roll_or_nothing
+from pipeline.surface import (
+    Camera,
+    Yardstick,
+    compare_with_truth,
+    measured,
+    radii,
+    roll_or_nothing,
+    yardstick_of,
+)
 from pipeline.surface.baselines import alpha_surface, poisson_surface
 from pipeline.types import PointCloud, Rig, SurfaceResult
 
@@ -205,7 +213,8 @@ def compare(rig: Rig, placement: Placement, after: SurfaceResult, before: Surfac
     if rig.truth is None:
         return None, None
     yield Progress("comparing with the truth", 0.9)
-    return compared(rig, placement, before), compared(rig, placement, after)
+    yardstick = yardstick_of_rig(rig)
+    return compared(rig, placement, before, yardstick), compared(rig, placement, after, yardstick)
 
 
 def poisson(rig: Rig, placement: Placement, clouds: FusedCloud) -> Steps[SurfaceResult]:
@@ -228,12 +237,19 @@ def with_rays(surface: SurfaceResult, rig: Rig, placement: Placement) -> Surface
     return measured(surface, cameras, points, [frame.depth for frame in rig.frames])
 
 
-def compared(rig: Rig, placement: Placement, surface: SurfaceResult) -> dict[str, float] | None:
+def yardstick_of_rig(rig: Rig) -> Yardstick | None:
+    """For those who compare several surfaces of one rig; None without truth."""
+    return None if rig.truth is None else yardstick_of(rig.truth, [one.intrinsics for one in rig.frames])
+
+
+def compared(
+    rig: Rig, placement: Placement, surface: SurfaceResult, yardstick: Yardstick | None = None
+) -> dict[str, float] | None:
     """A surface against the truth of its rig; None without truth or without a triangle."""
     if rig.truth is None or not len(surface.triangles):
         return None
     cameras = cameras_of(rig, placement)
-    return compare_with_truth(surface.vertices_m, surface.triangles, rig.truth, cameras)
+    return compare_with_truth(surface.vertices_m, surface.triangles, rig.truth, cameras, yardstick)
 
 
 def cameras_of(rig: Rig, placement: Placement) -> list[Camera]:

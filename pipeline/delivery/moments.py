@@ -16,7 +16,8 @@ from pipeline.delivery.sink import heard
 from pipeline.nodes import Placement
 from pipeline.sources import LoadedRig
 from pipeline.spec import REBUILD, Spec
-from pipeline.stages import compared, run, with_rays
+from pipeline.stages import compared, run, with_rays, yardstick_of_rig
+from pipeline.surface import Yardstick
 from pipeline.types import BoolArray, ByteArray, FloatArray, RgbdFrame, Rig, SurfaceResult
 
 
@@ -71,6 +72,7 @@ class Rebuilder:
     def __init__(self, sending: Sending) -> None:
         self.sending = sending
         self._memory = Memory(sending.spec.spec.config.fusion.align_nodes_with == "sensor")
+        self._yardstick = yardstick_of_rig(sending.rig)
         self._rebuilt = NOTHING
 
     def moment(self, index: int) -> Generator[Progress, None, Moment]:
@@ -78,7 +80,7 @@ class Rebuilder:
         received = received_at(self.sending, int(self.sending.times_ns[index]))
         frames = frames_at_sink(self.sending, received)
         if self._memory.look_at([frame for frame in frames if heard(frame)]):
-            self._rebuilt = yield from _rebuilt(self.sending, frames, self._memory)
+            self._rebuilt = yield from _rebuilt(self.sending, frames, self._memory, self._yardstick)
         return _moment(self.sending, index, received, self._rebuilt)
 
 
@@ -118,7 +120,7 @@ def _arrival(frame: RgbdFrame, stream: ByteArray, there: BoolArray, received: Re
 
 
 def _rebuilt(
-    sending: Sending, frames: Sequence[RgbdFrame], memory: Memory
+    sending: Sending, frames: Sequence[RgbdFrame], memory: Memory, yardstick: Yardstick | None
 ) -> Generator[Progress, None, Rebuilt]:
     present = [index for index, frame in enumerate(frames) if heard(frame)]
     if not present:
@@ -133,7 +135,7 @@ def _rebuilt(
     if len(present) < len(frames):
         surface = with_rays(surface, sending.rig, everyone)
     poses = {frames[index].name: pose for index, pose in zip(present, placement.T_world_camera, strict=True)}
-    return surface, compared(sending.rig, everyone, surface), poses
+    return surface, compared(sending.rig, everyone, surface, yardstick), poses
 
 
 def spec_of(sending: Sending, frames: Sequence[RgbdFrame], present: Sequence[int]) -> Spec:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -43,7 +44,7 @@ class DepthNetwork:
         if model_path is None and preset not in (None, "packetmesh"):
             raise InputError(f"The preset {preset} is for a network of that kind: name its ONNX file as well")
         self.model_path = SHIPPED_MODEL if model_path is None else Path(model_path)
-        self._session = open_session(self.model_path)
+        self._session = _open_session(self.model_path, _modified_ns(self.model_path))
         self._signature = signature_of(self._session, str(self.model_path))
         self.convention = convention_of(self._session, preset, overrides, str(self.model_path))
 
@@ -161,10 +162,16 @@ def depth_of(output: FloatArray, size_px: tuple[int, int], convention: Conventio
         return np.exp(cv2.resize(logarithm, size_px, interpolation=cv2.INTER_LINEAR))
 
 
-def open_session(model_path: Path) -> onnxruntime.InferenceSession:
-    """A session with few, non-spinning threads."""
+def _modified_ns(model_path: Path) -> int:
+    """When a network's file was last written."""
     if not model_path.is_file():
         raise InputError(f"There is no depth network at {model_path}: name an ONNX file, or none at all.")
+    return model_path.stat().st_mtime_ns
+
+
+@lru_cache(maxsize=1)
+def _open_session(model_path: Path, modified_ns: int) -> onnxruntime.InferenceSession:
+    """A session with few, non-spinning threads; the newest is kept, as opening takes as long as inferring."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = THREADS
     options.inter_op_num_threads = 1

@@ -7,11 +7,12 @@ from pipeline.surface.normals import estimate_normals
 from pipeline.surface.quality import measure_quality, measured
 from pipeline.surface.radii import nearest_distances_m, radii, spacing
 from pipeline.surface.smooth import smooth
-from pipeline.surface.truth import compare_with_truth, distances_to_truth_m
+from pipeline.surface.truth import Yardstick, compare_with_truth, distances_to_truth_m, yardstick_of
 from pipeline.surface.voxel import voxel_average, voxel_for_count
 
 __all__ = [
     "Camera",
+    "Yardstick",
     "boundary_loops",
     "compare_with_truth",
     "distances_to_truth_m",
@@ -28,4 +29,5 @@ __all__ = [
     "spacing",
     "voxel_average",
     "voxel_for_count",
+    "yardstick_of",
 ]

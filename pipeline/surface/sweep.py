@@ -13,7 +13,7 @@ from pipeline.rays import Camera
 from pipeline.surface.holes import open_area_m2
 from pipeline.surface.pivoting import compile_all, roll
 from pipeline.surface.quality import no_hit_ray_share
-from pipeline.surface.truth import compare_with_truth
+from pipeline.surface.truth import Yardstick, compare_with_truth, yardstick_of
 from pipeline.types import PointCloud, RigTruth
 
 STEPS = 12
@@ -51,19 +51,24 @@ def iterate_sweep(
     if truth is not None and not cameras:
         raise InputError("The truth is placed by the cameras and there are none; give the rig's cameras")
     compile_all()  # or the first ball's time would hold it
+    yardstick = None if truth is None else yardstick_of(truth, [camera.intrinsics for camera in cameras])
     for radius_m in radii_m:
-        yield _sweep_point(cloud, float(radius_m), cameras, truth)
+        yield _sweep_point(cloud, float(radius_m), cameras, truth, yardstick)
 
 
 def _sweep_point(
-    cloud: PointCloud, radius_m: float, cameras: Sequence[Camera], truth: RigTruth | None
+    cloud: PointCloud,
+    radius_m: float,
+    cameras: Sequence[Camera],
+    truth: RigTruth | None,
+    yardstick: Yardstick | None,
 ) -> SweepPoint:
     started = time.perf_counter()
     triangles = roll(cloud.points_m, cloud.normals, (radius_m,)).triangles
     elapsed_s = time.perf_counter() - started
     measures = {"accuracy_1cm": float("nan"), "f_score_5cm": float("nan")}
     if truth is not None and len(triangles):
-        measures = compare_with_truth(cloud.points_m, triangles, truth, cameras)
+        measures = compare_with_truth(cloud.points_m, triangles, truth, cameras, yardstick)
     return SweepPoint(
         radius_m=radius_m,
         triangles=len(triangles),

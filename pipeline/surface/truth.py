@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from pipeline.geometry import apply, inverse
 from pipeline.open3d_runtime import o3d
 from pipeline.rays import Camera, hit_depths, tensor, triangle_areas_m2, triangle_scene
 from pipeline.surface.ray_parts import sight
-from pipeline.types import FloatArray, IntArray, RigTruth
+from pipeline.types import CameraIntrinsics, FloatArray, IntArray, RigTruth
 
 TOLERANCES_M = (0.01, 0.03, 0.05)
 SAMPLES = 20_000
@@ -23,8 +25,44 @@ _DRAWS_A_SAMPLE = 4
 """Points drawn on the whole true surface for each wanted on the part that cameras see."""
 
 
+@dataclass(frozen=True, slots=True)
+class Yardstick:
+    """What every comparison with one truth needs, whatever the mesh."""
+
+    scene: o3d.t.geometry.RaycastingScene
+    """The true surface."""
+    cameras: tuple[Camera, ...]
+    """Where they truly are."""
+    seen_m: FloatArray
+    """(at most SAMPLES, 3) points uniform by area on what at least one camera sees of the true surface."""
+    rng: np.random.Generator
+    """As it is after these have been drawn."""
+
+
+def yardstick_of(truth: RigTruth, intrinsics: Sequence[CameraIntrinsics], seed: int = 0) -> Yardstick:
+    """The yardstick of a truth.
+
+    Args:
+        truth: the true surface, poses and depth maps.
+        intrinsics: one for each of the truth's poses.
+        seed: draws the sample points.
+    """
+    scene, rng = triangle_scene(truth.vertices_m, truth.triangles), np.random.default_rng(seed)
+    cameras = tuple(Camera(one, T) for one, T in zip(intrinsics, truth.T_world_camera, strict=True))
+    points_m = sample_surface(truth.vertices_m, truth.triangles, _DRAWS_A_SAMPLE * SAMPLES, rng)
+    seen = np.zeros(len(points_m), dtype=bool)
+    for camera in cameras:
+        seen_here = sight(points_m, scene, camera, _SELF_HIT_M)
+        seen |= seen_here.in_image & ~seen_here.hidden
+    return Yardstick(scene, cameras, points_m[seen][:SAMPLES], rng)
+
+
 def compare_with_truth(
-    vertices_m: FloatArray, triangles: IntArray, truth: RigTruth, cameras: Sequence[Camera], seed: int = 0
+    vertices_m: FloatArray,
+    triangles: IntArray,
+    truth: RigTruth,
+    cameras: Sequence[Camera],
+    yardstick: Yardstick | None = None,
 ) -> dict[str, float]:
     """Measures of a mesh beside the true surface.
 
@@ -36,7 +74,7 @@ def compare_with_truth(
         triangles: (F, 3).
         truth: the true surface, poses and depth maps.
         cameras: one for each of the truth's, with the poses the mesh was made with.
-        seed: draws the sample points.
+        yardstick: of this truth and these cameras, for those who compare many meshes; None makes one.
 
     Returns:
         For each of 1, 3 and 5 cm: ``coverage_1cm``, share of the true surface that a camera sees and
@@ -51,12 +89,9 @@ def compare_with_truth(
     if not len(triangles):
         raise InputError("There is no triangle to compare with the truth; try a larger ball radius")
     mesh_m = _in_true_frame(vertices_m, truth, cameras)
-    true_cameras = [
-        Camera(camera.intrinsics, T) for camera, T in zip(cameras, truth.T_world_camera, strict=True)
-    ]
-    rng = np.random.default_rng(seed)
-    return _surface_measures(mesh_m, triangles, truth, true_cameras, rng) | _ray_measures(
-        mesh_m, triangles, truth, true_cameras
+    yardstick = yardstick or yardstick_of(truth, [camera.intrinsics for camera in cameras])
+    return _surface_measures(mesh_m, triangles, yardstick) | _ray_measures(
+        mesh_m, triangles, truth, yardstick.cameras
     )
 
 
@@ -71,17 +106,10 @@ def _in_true_frame(vertices_m: FloatArray, truth: RigTruth, cameras: Sequence[Ca
     return apply(truth.T_world_camera[0] @ inverse(cameras[0].T_world_camera), vertices_m)
 
 
-def _surface_measures(
-    mesh_m: FloatArray,
-    triangles: IntArray,
-    truth: RigTruth,
-    true_cameras: Sequence[Camera],
-    rng: np.random.Generator,
-) -> dict[str, float]:
-    true_scene = triangle_scene(truth.vertices_m, truth.triangles)
-    seen_m = _seen_samples(truth, true_scene, true_cameras, rng)
-    missing_m = _distances_m(triangle_scene(mesh_m, triangles), seen_m)
-    error_m = _distances_m(true_scene, sample_surface(mesh_m, triangles, SAMPLES, rng))
+def _surface_measures(mesh_m: FloatArray, triangles: IntArray, yardstick: Yardstick) -> dict[str, float]:
+    missing_m = _distances_m(triangle_scene(mesh_m, triangles), yardstick.seen_m)
+    drawn_m = sample_surface(mesh_m, triangles, SAMPLES, deepcopy(yardstick.rng))
+    error_m = _distances_m(yardstick.scene, drawn_m)
     measures = {}
     for tolerance_m in TOLERANCES_M:
         name = f"{100 * tolerance_m:.0f}cm"
@@ -118,21 +146,6 @@ def sample_surface(
     )
     root, share = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
     return (1 - root) * a + root * (1 - share) * b + root * share * c
-
-
-def _seen_samples(
-    truth: RigTruth,
-    true_scene: o3d.t.geometry.RaycastingScene,
-    true_cameras: Sequence[Camera],
-    rng: np.random.Generator,
-) -> FloatArray:
-    """(at most SAMPLES, 3) points uniform by area on what at least one camera sees of the true surface."""
-    points_m = sample_surface(truth.vertices_m, truth.triangles, _DRAWS_A_SAMPLE * SAMPLES, rng)
-    seen = np.zeros(len(points_m), dtype=bool)
-    for camera in true_cameras:
-        seen_here = sight(points_m, true_scene, camera, _SELF_HIT_M)
-        seen |= seen_here.in_image & ~seen_here.hidden
-    return points_m[seen][:SAMPLES]
 
 
 def _distances_m(scene: o3d.t.geometry.RaycastingScene, points_m: FloatArray) -> FloatArray:

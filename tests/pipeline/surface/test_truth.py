@@ -6,7 +6,7 @@ import pytest
 from packetmesh.errors import InputError
 from pipeline.geometry import apply, look_at, rigid, rotation_exp
 from pipeline.surface import Camera, compare_with_truth, hit_depth
-from pipeline.surface.truth import sample_surface
+from pipeline.surface.truth import sample_surface, yardstick_of
 from pipeline.types import CameraIntrinsics, RigTruth
 from tests.pipeline.surface.shapes import rectangle
 
@@ -92,8 +92,13 @@ def test_depth_errors_are_those_along_the_rays():
 
 def test_the_same_seed_gives_the_same_numbers():
     half = rectangle((-8, 0), (-2, 12))
-    first, second, other = (compare_with_truth(*half, truth_of(*FLOOR), CAMERAS, seed) for seed in (1, 1, 2))
+    truth, intrinsics = truth_of(*FLOOR), [camera.intrinsics for camera in CAMERAS]
+    one, two = yardstick_of(truth, intrinsics, seed=1), yardstick_of(truth, intrinsics, seed=2)
+    first, second, other = (compare_with_truth(*half, truth, CAMERAS, by) for by in (one, one, two))
     assert first == second != other
+    assert compare_with_truth(*half, truth, CAMERAS, yardstick_of(truth, intrinsics)) == compare_with_truth(
+        *half, truth, CAMERAS
+    )
     assert first["coverage_3cm"] == pytest.approx(other["coverage_3cm"], abs=0.03)
 
 
