@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -20,7 +21,8 @@ from pipeline.delivery.sink import frame_at_sink, heard, images_of
 from pipeline.io.demos import load_demo
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
-from pipeline.stages import compared, run, with_rays
+from pipeline.stages import compared, run, with_rays, yardstick_of_rig
+from pipeline.surface import Yardstick
 from pipeline.types import BoolArray, DepthMap, RgbdFrame, Rig
 
 Loss = Literal["random", "burst", "deadline"]
@@ -72,9 +74,21 @@ class SubsetTask:
     nodes: tuple[int, ...]
 
 
+@cache
+def demo(name: str) -> Rig:
+    """A demo scene, read once in a process."""
+    return load_demo(name)
+
+
+@cache
+def yardstick(name: str) -> Yardstick | None:
+    """What surfaces of a demo scene are compared with."""
+    return yardstick_of_rig(demo(name))
+
+
 def loss_trial(task: LossTask) -> Values:
     """Code, lose packets, decode what is left and run the chain on it once."""
-    rig = load_demo(task.rig)
+    rig = demo(task.rig)
     frames, traffic = frames_left(rig, task)
     return rebuilt(rig, frames, task.alignment) | traffic
 
@@ -120,7 +134,7 @@ def packets_lost(counts: Sequence[int], losses: LossConfig, seed: int) -> list[B
 
 def colorless_trial(rig_name: str) -> Values:
     """All depth of a rig arrives, and no colour."""
-    rig = load_demo(rig_name)
+    rig = demo(rig_name)
     depth_only = [
         replace(Received.nothing(frame.rgb.shape[:2]), depth=images_of(frame).depth) for frame in rig.frames
     ]
@@ -129,7 +143,7 @@ def colorless_trial(rig_name: str) -> Values:
 
 def piece_trial(task: PieceTask) -> Values:
     """One piece of one node's depth is missing; its colour is there."""
-    rig = load_demo(task.rig)
+    rig = demo(task.rig)
     frames = list(rig.frames)
     z_m = frames[task.node].depth.z_m.copy()
     z_m[piece_area(z_m.shape, task.piece)] = np.nan
@@ -146,7 +160,7 @@ def piece_area(shape: tuple[int, ...], piece: int) -> tuple[slice, slice]:
 
 def subset_trial(task: SubsetTask) -> Values:
     """Only some nodes' images are there."""
-    rig = load_demo(task.rig)
+    rig = demo(task.rig)
     nothing = [
         frame_at_sink(frame, Received.nothing(frame.rgb.shape[:2])) if i not in task.nodes else frame
         for i, frame in enumerate(rig.frames)
@@ -158,7 +172,7 @@ def rebuilt(rig: Rig, frames: Sequence[RgbdFrame], alignment: AlignmentMode = "l
     """What the chain makes of the frames at the sink, compared with the rig's truth.
 
     Args:
-        rig: as it was taken, with its truth.
+        rig: a demo scene as it was taken, with its truth.
         frames: of every node, as far as they have arrived.
         alignment: how inferred depth is made metric.
 
@@ -186,7 +200,7 @@ def rebuilt(rig: Rig, frames: Sequence[RgbdFrame], alignment: AlignmentMode = "l
             surface = results[when].value
             if len(present) < len(frames):
                 surface = with_rays(surface, rig, placement)
-            truth = compared(rig, placement, surface)
+            truth = compared(rig, placement, surface, yardstick(rig.name))
             if truth is not None:
                 values[f"f_{when}"] = truth["f_score_5cm"]
                 values[f"no_hit_{when}"] = surface.quality.no_hit_ray_share
