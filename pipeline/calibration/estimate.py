@@ -289,6 +289,6 @@ def information(fitted: Sequence[FittedView], optics: Optics) -> FloatArray:
 def informed(board_m: FloatArray, T_camera_board: FloatArray, optics: Optics) -> FloatArray:
     """(P, P) what one view tells."""
     told = optics.linearised(board_m, T_camera_board)
-    known = told.by_pose @ np.linalg.lstsq(told.by_pose, told.by_lens, rcond=None)[0]
-    left = told.by_lens - known
+    base = np.linalg.qr(told.by_pose)[0]
+    left = told.by_lens - base @ (base.T @ told.by_lens)
     return left.T @ left

@@ -134,7 +134,7 @@ def _facing(ray: FloatArray) -> FloatArray:
 
 
 def _cost_m2(seen: Sight, place: FloatArray) -> FloatArray:
-    """(P, P) whose product with a lens's covariance has the mean squared error over the image as its trace."""
+    """(P, P) whose product with a lens's covariance has the mean squared error over the image as trace."""
     change = seen.metres @ (seen.by_lens + seen.by_pose @ place)
     change = change[np.isfinite(change).all(axis=(1, 2))]
     return np.einsum("gij,gik->jk", change, change) / len(change)

@@ -11,7 +11,7 @@ from packetmesh.errors import ReconstructionError
 from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, View, calibrate
 
 MOST_SDS = 3.5
-"""Robust standard deviations from the median, of the logarithm of a view's RMS, from which on it stands out."""
+"""Robust standard deviations of the logarithm of a view's RMS above the median: from there on it stands out."""
 LEAST_SD = 0.15
 """Of that logarithm: views of sharp boards differ by about so much however alike they are."""
 
@@ -34,8 +34,8 @@ class OutlierView:
     def reason(self) -> str:
         """In a sentence."""
         return (
-            f"{self.name} has {self.rms_px:.2f} px where the others have {self.others_px:.2f}; without it the "
-            f"camera changes by {self.lens_moves_sd:.1f} standard errors and the others come to "
+            f"{self.name} has {self.rms_px:.2f} px where the others have {self.others_px:.2f}; without it "
+            f"the camera changes by {self.lens_moves_sd:.1f} standard errors and the others come to "
             f"{self.rms_without_px:.2f} px. Is it blurred, another board, or a wrong order?"
         )
 

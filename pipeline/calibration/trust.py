@@ -20,7 +20,6 @@ from pipeline.calibration.estimate import (
     Calibration,
     View,
     calibrate,
-    place,
     settle,
 )
 from pipeline.calibration.lens import FREE, Optics

@@ -68,8 +68,8 @@ def verdict(
     of_most_m = float(np.quantile(placed, LEAST_SHARE, method="higher"))
     passed = share >= LEAST_SHARE
     told = (
-        f"At {sd.range_m:g} m a point is placed within {_mm(accuracy_m)} (95 %) over {100.0 * share:.0f} % of "
-        f"the image, and within {_mm(of_most_m)} over {100.0 * LEAST_SHARE:.0f} % of it: "
+        f"At {sd.range_m:g} m a point is placed within {_mm(accuracy_m)} (95 %) over {100.0 * share:.0f} % "
+        f"of the image, and within {_mm(of_most_m)} over {100.0 * LEAST_SHARE:.0f} % of it: "
         f"{'pass' if passed else 'fail'}."
     )
     advice = [] if passed else _advice(calibration, halves, following)
@@ -80,8 +80,8 @@ def _advice(calibration: Calibration, halves: HalfDifference | None, following: 
     if halves is not None and halves.beyond_noise:
         return [
             f"Two halves of the views differ by {halves.rms_px:.2g} px, where noise explains "
-            f"{halves.noise_px:.2g}: try --lens {WIDER[calibration.lens]}, --board-warp, or leave out the views "
-            "that stand out."
+            f"{halves.noise_px:.2g}: try --lens {WIDER[calibration.lens]}, --board-warp, or leave out the "
+            "views that stand out."
         ]
     if following is None:
         return ["Take more views, near the edges of the image."]
