@@ -13,6 +13,8 @@ RaysAt = Callable[[FloatArray], FloatArray]
 """(N, 3) directions with z = 1 of (N, 2) positions in an image."""
 REACH, OVERLAP = 0.5, 0.15
 """Half a depth pixel is its own; a little more closes the cracks that noise opens between two."""
+STEEPEST = 0.05
+"""Share of the depth by which it may change over a pixel; more is an edge (SPEC 2)."""
 STEP = 0.02
 """Share of the depth by which a surface in a crack must be nearer than what shows through it."""
 NEAREST_M = 0.02
@@ -42,7 +44,9 @@ def register_depth(
         color_camera: whose image the depth is registered to, with its distortion.
         T_color_depth: (4, 4), metres.
     """
-    z_m = carried(depth.z_m, lambda pixels: undistorted_rays(depth_camera, pixels), color_camera, T_color_depth)
+    z_m = carried(
+        depth.z_m, lambda pixels: undistorted_rays(depth_camera, pixels), color_camera, T_color_depth
+    )
     return DepthMap(z_m, depth.kind)
 
 
@@ -53,9 +57,9 @@ def carried(
     size = color_camera.height_px * color_camera.width_px
     own, near = np.full(size, np.inf, np.float32), np.full(size, np.inf, np.float32)
     limits = _limits(color_camera)
-    for corners_m, center_m in _pieces(z_m, rays_at, T_color_depth):
-        inside = _in_view(center_m, limits) & (corners_m[..., 2] > NEAREST_M).all(axis=0)
-        at_px, seen_m, within = _covered(corners_m[:, inside], center_m[inside], color_camera)
+    for sides_m, center_m in _pieces(z_m, rays_at, T_color_depth):
+        inside = _in_view(center_m, limits) & (sides_m[..., 2] > NEAREST_M).all(axis=0)
+        at_px, seen_m, within = _covered(sides_m[:, inside], center_m[inside], color_camera)
         np.minimum.at(near, at_px, seen_m)
         np.minimum.at(own, at_px[within], seen_m[within])
     depth_m = np.where(near < (1.0 - STEP) * own, near, own)
@@ -75,29 +79,26 @@ def _pieces(
     for first in range(0, len(rows), AT_ONCE):
         v, u = rows[first : first + AT_ONCE], columns[first : first + AT_ONCE]
         pixels, here_m, slope_m = np.stack([u, v], axis=1).astype(float), z_m[v, u], slopes_m[v, u]
-
-        def point(axis: int, side: float, at=pixels, depth_m=here_m, slope=slope_m) -> FloatArray:
-            offset = np.eye(2)[axis] * side
-            return apply(T_color_depth, rays_at(at + offset) * (depth_m + slope[:, axis] * side)[:, None])
-
-        corners_m = np.stack([point(axis, side) for axis in (0, 1) for side in (-REACH, REACH)])
-        yield corners_m, point(0, 0.0)
+        points_m = [
+            rays_at(pixels + offset) * (here_m + slope_m @ offset)[:, None]
+            for offset in REACH * np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0], [0.0, 0.0]])
+        ]
+        *sides_m, center_m = (apply(T_color_depth, point_m) for point_m in points_m)
+        yield np.stack(sides_m), center_m
 
 
 def _slope(z_m: FloatArray, axis: int) -> FloatArray:
-    """(H, W) change of depth over a pixel: the smaller of the two sides', so none across an edge; 0 where a
-    pixel stands alone.
-    """
+    """(H, W) change of depth over a pixel: the smaller of the two sides', and none across an edge."""
     step = np.diff(z_m, axis=axis)
     unknown = np.full_like(np.take(z_m, [0], axis=axis), np.nan)
     before = np.concatenate([unknown, step], axis=axis)
     after = np.concatenate([step, unknown], axis=axis)
-    smaller = np.where(~(np.abs(after) > np.abs(before)) & np.isfinite(after), after, before)
-    return np.nan_to_num(np.where(np.isfinite(smaller), smaller, after))
+    smaller = np.where(np.fmin(np.abs(before), np.abs(after)) == np.abs(after), after, before)
+    return np.where(np.abs(smaller) < STEEPEST * z_m, smaller, 0.0)
 
 
 def _limits(camera: CameraIntrinsics) -> tuple[FloatArray, FloatArray]:
-    """Least and largest x / z and y / z in the image; beyond them a lens's polynomial may fold back into it."""
+    """Least and largest x / z and y / z in the image; a lens's polynomial may fold what is beyond into it."""
     u, v = np.arange(-1, camera.width_px + 1), np.arange(-1, camera.height_px + 1)
     rim = [np.column_stack([u, np.full_like(u, edge)]) for edge in (-1, camera.height_px)]
     rim += [np.column_stack([np.full_like(v, edge), v]) for edge in (-1, camera.width_px)]
@@ -112,10 +113,10 @@ def _in_view(points_m: FloatArray, limits: tuple[FloatArray, FloatArray]) -> Boo
 
 
 def _covered(
-    corners_m: FloatArray, center_m: FloatArray, camera: CameraIntrinsics
+    sides_m: FloatArray, center_m: FloatArray, camera: CameraIntrinsics
 ) -> tuple[IntArray, FloatArray, BoolArray]:
-    """(P,) flat indices of colour pixels, the depth of a piece there, and whether its own half pixel covers it."""
-    left, right, above, below = (project(camera, corner_m) for corner_m in corners_m)
+    """(P,) flat indices of colour pixels, depth of a piece there, and whether the piece proper covers it."""
+    left, right, above, below = (project(camera, side_m) for side_m in sides_m)
     center = project(camera, center_m)
     across, down = right - left, below - above
     wide = 1.0 + OVERLAP / REACH
@@ -130,14 +131,14 @@ def _covered(
     s, t = _shares(at - center[of], across[of], down[of])
     touched = np.maximum(np.abs(s), np.abs(t)) <= REACH + OVERLAP
     of, at, s, t = of[touched], at[touched], s[touched], t[touched]
-    slope_m = corners_m[[1, 3], :, 2] - corners_m[[0, 2], :, 2]
+    slope_m = sides_m[[1, 3], :, 2] - sides_m[[0, 2], :, 2]
     seen_m = center_m[of, 2] + slope_m[0, of] * s + slope_m[1, of] * t
     within = np.maximum(np.abs(s), np.abs(t)) <= REACH
     return at[:, 1] * camera.width_px + at[:, 0], seen_m.astype(np.float32), within
 
 
 def _shares(offset: FloatArray, across: FloatArray, down: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Offsets in the image as shares s of ``across`` and t of ``down``; beyond all where they are parallel."""
+    """Offsets in the image as shares s of ``across`` and t of ``down``; infinite where they are parallel."""
     area = across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0]
     seen = np.abs(area) > 1e-12
     safe = np.where(seen, area, 1.0)

@@ -28,8 +28,8 @@ def read_extrinsics(path: AnyPath) -> FloatArray:
         T = None
     if T is None:
         raise InputError(
-            f'The extrinsics file {path} holds no rigid transform; try {{"{KEY}": four rows of four numbers, a '
-            "rotation and a translation in metres}"
+            f'The extrinsics file {path} holds no rigid transform; try {{"{KEY}": four rows of four}}, a '
+            "rotation and a translation in metres"
         )
     return T
 
