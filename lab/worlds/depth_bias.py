@@ -18,7 +18,7 @@ class DepthBias:
     c_per_m: float = 0.0
     waves: FloatArray = field(default_factory=lambda: np.zeros((1, 1)))
     """(K, L) of s, a share of the depth: how much of cos(k pi v') cos(l pi u') it holds, u' and v' from 0 to
-    1 across the image. Without the first, s has no mean; it is no spline, which a calibration may well fit."""
+    1 across the image. Without the first, s has no mean; it is no spline, which a calibration may fit."""
 
     def share(self, shape: tuple[int, int]) -> FloatArray:
         """(H, W) s at every pixel."""
