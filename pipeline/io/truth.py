@@ -6,17 +6,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from packetmesh.errors import InputError
+from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.io.poses import read_pose, write_pose
 from pipeline.rays import Camera, hit_depths
-from pipeline.types import RgbdFrame, RigTruth, Surface
+from pipeline.types import RigTruth, Surface
 
 MESH_NAME = "truth.ply"
 POSE_NAME = "true_pose.txt"
 
 
-def read_truth(directory: Path, frames: Sequence[RgbdFrame]) -> RigTruth | None:
-    """The true surface and poses beside ``frames``, with the depth that the true cameras see of it.
+def read_truth(directory: Path, names: Sequence[str]) -> RigTruth | None:
+    """The true surface and poses of a rig's nodes, with the depth that the true cameras see of it.
 
     Raises:
         InputError: there is a true surface, but it cannot be read, or a node has no true pose.
@@ -24,18 +25,18 @@ def read_truth(directory: Path, frames: Sequence[RgbdFrame]) -> RigTruth | None:
     if not (directory / MESH_NAME).exists():
         return None
     mesh = read_mesh(directory / MESH_NAME)
-    poses = []
-    for frame in frames:
-        path = directory / frame.name / POSE_NAME
+    cameras = []
+    for name in names:
+        path = directory / name / POSE_NAME
         if not path.exists():
             raise InputError(
-                f"The rig {directory} has a true surface, but {frame.name} has no {POSE_NAME}; add it, or "
-                f"remove {MESH_NAME}"
+                f"The rig {directory} has a true surface, but {name} has no {POSE_NAME}; add it, or remove "
+                f"{MESH_NAME}"
             )
-        poses.append(read_pose(path))
-    cameras = [Camera(frame.intrinsics, T) for frame, T in zip(frames, poses, strict=True)]
+        cameras.append(Camera(read_intrinsics(directory / name / "intrinsics.json"), read_pose(path)))
     depth = tuple(hit_depths(mesh.vertices_m, mesh.triangles, cameras))
-    return RigTruth(mesh.vertices_m, mesh.triangles, tuple(poses), depth)
+    poses = tuple(camera.T_world_camera for camera in cameras)
+    return RigTruth(mesh.vertices_m, mesh.triangles, poses, depth)
 
 
 def write_truth(directory: Path, names: Sequence[str], truth: RigTruth) -> None:
