@@ -11,7 +11,7 @@ from packetmesh.errors import ReconstructionError
 from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, View, calibrate
 
 MOST_SDS = 3.5
-"""Robust standard deviations of the logarithm of a view's RMS above the median: from there on it stands out."""
+"""Robust standard deviations of the logarithm of a view's RMS above the median, from which on it stands out."""
 LEAST_SD = 0.15
 """Of that logarithm: views of sharp boards differ by about so much however alike they are."""
 
