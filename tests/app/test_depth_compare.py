@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from app.compare import CompareArea, captions_html, split
 from app.drawing.colors import CONFIDENCE_STOPS, HOLE
 from app.drawing.pictures import (
     EQUAL,
@@ -15,7 +16,6 @@ from app.drawing.pictures import (
     difference_picture,
 )
 from app.records import ColorBar, Picture, ResidualView
-from app.compare import CompareArea, captions_html, split
 from app.screens.depth.residuals import residual_figure
 from pipeline.types import DepthMap
 from tests.app.fakes import ui_of

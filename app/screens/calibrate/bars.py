@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.drawing.colors import BRAND, LOSS, NEUTRAL, SOURCE, css
+from app.screens.calibrate.view import CameraView
 from app.ui import Ui
 
 MARK = "packetmesh-views"
@@ -36,13 +37,24 @@ class Bar:
     """Whether it is proposed to drop it."""
 
 
+def bars_of(camera: CameraView) -> tuple[Bar, ...]:
+    """A bar for each photograph."""
+    suspects = {one.name for one in camera.outliers}
+    bars = []
+    for photograph in camera.photographs:
+        name, fitted = photograph.name, camera.fitted(photograph.name)
+        dropped, rms_px = name in camera.dropped, None if fitted is None else fitted.rms_px
+        bars.append(Bar(name, rms_px, camera.unseen_rms_px(name), dropped, name in suspects))
+    return tuple(bars)
+
+
 class Bars:
     """The bars of one camera's views; a click on one of them picks it."""
 
     def __init__(self, ui: Ui, on_pick: Callable[[str], None]) -> None:
         """Add an empty row; ``on_pick`` is called with the name of a view."""
         self._on_pick = on_pick
-        self._html = ui.gui.add_html("")
+        self._html = ui.gui.add_html(bars_html((), ""))
         self._field = ui.when_changed(ui.gui.add_text("View that was clicked", ""), self._picked)
 
     def show(self, bars: tuple[Bar, ...], chosen: str) -> None:

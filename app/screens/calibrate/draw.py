@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import viser
@@ -12,14 +12,13 @@ from app.drawing.cameras import Stage
 from app.drawing.clouds import clear
 from app.drawing.colors import BRAND, NEUTRAL, SOURCE, TARGET
 from app.drawing.poses import place
+from app.screens.calibrate.labels import Around
 from app.screens.calibrate.photograph import decoded, picture_of
 from app.screens.calibrate.view import CameraView
 from pipeline.calibration.board import Board
 from pipeline.geometry import inverse, look_at
 from pipeline.types import FloatArray
 
-Around = Literal["camera", "board"]
-"""What stays in its place."""
 BELOW = "/calibrate"
 LEVEL = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
 """(4, 4) of what stays, upright and looking along +y."""
@@ -37,11 +36,11 @@ class BoardsDrawing:
         self._handles: dict[str, Any] = {}
         self._dropped: frozenset[str] = frozenset()
 
-    def draw(self, camera: CameraView | None, board: Board, around: Around, chosen: str) -> None:
+    def draw(self, camera: CameraView | None, board: Board | None, around: Around, chosen: str) -> None:
         """Draw another camera's views."""
         clear(self._scene, BELOW)
         self._handles, self._around = {}, around
-        if camera is None or camera.calibration is None:
+        if camera is None or camera.calibration is None or board is None:
             return
         poses = {}
         for photograph in camera.photographs:

@@ -1,4 +1,4 @@
-"""The job of the Calibrate screen: the board in every photograph, and the cameras that took them."""
+"""The job of the Calibrate screen: the board in every photograph, the cameras that took them, their depth."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from pathlib import Path
 
 import cv2
 
+from app.screens.calibrate.bias import bias_of
+from app.screens.calibrate.files import camera_files, true_parameters, view_name
+from app.screens.calibrate.request import board_of, dropped_of
 from app.screens.calibrate.view import CalibrationView, CameraView, Photograph
 from app.state import BoardViews, Spec
 from app.store import Store
@@ -16,7 +19,7 @@ from packetmesh.progress import Progress
 from pipeline.calibration.board import Board
 from pipeline.calibration.detect import Detection, detect
 from pipeline.calibration.estimate import FittedView, View, calibrate, held_out, place
-from pipeline.calibration.from_images import ENDINGS
+from pipeline.calibration.outliers import outlier_views
 from pipeline.io.images import read_color
 from pipeline.types import ByteArray
 
@@ -24,52 +27,46 @@ PICTURE_WIDTH_PX, QUALITY = 640, 85
 """Of the photographs in the panel."""
 FOLDS = 4
 """In so many turns views are held out."""
-FOUND_SHARE = 0.9
-"""Of the work is looking for the board."""
+CAMERAS_SHARE, FOUND_SHARE = 0.7, 0.9
+"""Of the work is for the cameras, the rest for their depth; and of a camera's for looking for the board."""
 
 
 def calibrate_job(store: Store, spec: Spec) -> Generator[Progress | CalibrationView, None, CalibrationView]:
-    """Find the board in all photographs and estimate every camera; yields the cameras as they come."""
+    """Find the board in all photographs, estimate every camera, then the bias of its depth; yields what there
+    is so far.
+    """
     views = spec.views
     assert views is not None
-    board = Board(views.pattern, views.columns, views.rows, views.spacing_m)
+    board = board_of(views)
     folders = camera_files(Path(views.folder))
-    view = CalibrationView(board, ())
-    for index, (name, files) in enumerate(folders.items()):
-
-        def read(files: Sequence[Path] = files, index: int = index) -> Generator[Progress, None, list[Found]]:
-            return (yield from _read(files, board, index / len(folders), 1.0 / len(folders)))
-
-        key = (f"board-{name}", views.folder, views.edition, board, tuple(file.name for file in files))
-        found = yield from store.remember(key, read)
-        yield Progress(f"estimating {name}", (index + FOUND_SHARE) / len(folders))
-        dropped = tuple(one for camera, one in views.dropped if camera == name)
-        view = replace(view, cameras=(*view.cameras, _camera(name, found, board, views, dropped)))
-        if len(view.cameras) < len(folders):
-            yield view
+    view = CalibrationView(board, (), {})
+    share = CAMERAS_SHARE / len(folders)
+    for index, name in enumerate(folders):
+        yield Progress(f"estimating {name}", (index + FOUND_SHARE) * share)
+        camera = yield from camera_of(store, views, name, index * share, FOUND_SHARE * share)
+        view = replace(view, cameras=(*view.cameras, camera))
+        yield view
+    for index, camera in enumerate(view.cameras):
+        done = CAMERAS_SHARE + (1.0 - CAMERAS_SHARE) * index / len(folders)
+        told = yield from bias_of(store, views, camera, done)
+        view = replace(view, depth=view.depth | {camera.name: told if isinstance(told, str) else told.view})
     return view
 
 
-def camera_files(folder: Path) -> dict[str, list[Path]]:
-    """The photographs of each camera: below folders ``node_...``, or those of one camera in the folder itself.
+def camera_of(
+    store: Store, views: BoardViews, name: str, begin: float = 0.0, share: float = 1.0
+) -> Generator[Progress, None, CameraView]:
+    """One camera; its progress goes from ``begin`` over ``share``."""
+    files = camera_files(Path(views.folder))[name]
+    board = board_of(views)
+    read_key = (f"board-{name}", views.folder, views.edition, board, tuple(file.name for file in files))
+    dropped = dropped_of(views, name)
 
-    Raises:
-        InputError: there is none.
-    """
-    nodes = sorted(one for one in folder.glob("node_*") if one.is_dir()) or [folder]
-    files = {
-        one.name if one != folder else "camera": sorted(
-            file
-            for file in one.iterdir()
-            if file.suffix.lower() in ENDINGS and not file.name.startswith("depth")
-        )
-        for one in nodes
-        if one.is_dir()
-    }
-    files = {name: some for name, some in files.items() if some}
-    if not files:
-        raise InputError(f"There is no photograph in {folder.name}; try PNG or JPEG images of the board")
-    return files
+    def compute() -> Generator[Progress, None, CameraView]:
+        found = yield from store.remember(read_key, lambda: _read(files, board, begin, share))
+        return _camera(name, found, board, views, dropped)
+
+    return (yield from store.remember((f"camera-{name}", views.lens, dropped, read_key), compute))
 
 
 Found = tuple[Photograph, Detection, tuple[int, int]]
@@ -81,7 +78,7 @@ def _read(
 ) -> Generator[Progress, None, list[Found]]:
     found: list[Found] = []
     for index, path in enumerate(files):
-        done = begin + FOUND_SHARE * share * index / len(files)
+        done = begin + share * index / len(files)
         yield Progress(f"looking for the board in {path.parent.name}/{path.name}", done)
         image = read_color(path)
         one = detect(image, board)
@@ -89,12 +86,6 @@ def _read(
         photograph = Photograph(view_name(path), jpeg, zoom, one.points_px, one.blobs_px, one.reason)
         found.append((photograph, one, (image.shape[1], image.shape[0])))
     return found
-
-
-def view_name(path: Path) -> str:
-    """What a view is called: the number after ``color_``, or the file's name."""
-    _, sign, number = path.stem.partition("_")
-    return number if sign and path.stem.startswith("color_") else path.stem
 
 
 def thinned(image: ByteArray) -> tuple[bytes, float]:
@@ -116,18 +107,27 @@ def _camera(
         for photograph, one, _ in found
         if one.found
     ]
-    camera = CameraView(name, size_px, tuple(one[0] for one in found), None, "", (), dropped)
     used = [view for view in seen if view.name not in dropped]
+    camera = CameraView(name, size_px, tuple(one[0] for one in found), dropped=dropped)
+    camera = replace(camera, truth=true_parameters(Path(views.folder), name))
     try:
         _check_sizes(found)
         lens = calibrate(used, size_px, views.lens)
-        unseen: list[FittedView] = [
-            place(view, lens.matrix, lens.distortion) for view in seen if view.name in dropped
+        unseen = [
+            place(view, lens.matrix, lens.distortion, lens.lens) for view in seen if view.name in dropped
         ]
-        unseen += held_out(used, size_px, min(FOLDS, len(used)), views.lens)
     except PacketMeshError as error:
         return replace(camera, reason=str(error))
-    return replace(camera, calibration=lens, unseen=tuple(unseen))
+    unseen += _held_out(used, size_px, views)
+    return replace(camera, calibration=lens, unseen=tuple(unseen), outliers=outlier_views(lens, used))
+
+
+def _held_out(used: Sequence[View], size_px: tuple[int, int], views: BoardViews) -> list[FittedView]:
+    """Nothing where the views that are left do not determine the lens."""
+    try:
+        return list(held_out(used, size_px, min(FOLDS, len(used)), views.lens))
+    except PacketMeshError:
+        return []
 
 
 def _check_sizes(found: Sequence[Found]) -> None:

@@ -92,7 +92,7 @@ class NoiseFolder:
 
     def load(self, view: NoiseView) -> None:
         """Show what there is so far of the noise that is wanted; what comes late is of another one."""
-        if view.request.sigma_px != self.wanted_px or not view.trials:
+        if not isinstance(view, NoiseView) or view.request.sigma_px != self.wanted_px or not view.trials:
             return
         self._view = view
         self._draw()

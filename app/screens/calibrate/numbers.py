@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from app.screens.calibrate.view import CameraView
 from app.tables import number, table
-from pipeline.calibration.estimate import rms_px
-from pipeline.calibration.estimate import Calibration
-import numpy as np
-from collections.abc import Sequence
+from pipeline.calibration.estimate import Calibration, rms_px
 
 UNITS = {"fx": "px", "fy": "px", "cx": "px", "cy": "px"}
 MEANING = {
@@ -68,24 +69,19 @@ def within(found: Calibration | None, name: str) -> str:
     return f"{value:.{digits}f} ± {0.5 * (high - low):.{digits}f}{' px' if name in UNITS else ''}"
 
 
-def parameter_table(found: Calibration | None) -> str:
-    """HTML: every parameter that was estimated, its standard error and its 95 % interval."""
+def parameter_table(camera: CameraView) -> str:
+    """HTML: every parameter that was estimated, its standard error and 95 % interval, and the truth if known."""
+    found = camera.calibration
     if found is None:
         return ""
     rows = []
     for name, error in found.standard_errors.items():
-        digits, unit = (3, " px") if name in UNITS else (5, "")
+        digits, unit = (3, ", px") if name in UNITS else (5, "")
         low, high = found.intervals[name]
         meaning = MEANING.get(name, "Part of the denominator of a rational lens.")
-        label = f"{name}, px" if unit else name
-        value = found.parameters[name]
-        rows.append(
-            (
-                label,
-                meaning,
-                f"{value:.{digits}f}",
-                f"{error:.{digits}f}",
-                f"{low:.{digits}f} to {high:.{digits}f}",
-            )
-        )
-    return table(rows, ("value", "standard error", "95 % interval"))
+        values = [f"{found.parameters[name]:.{digits}f}", f"{error:.{digits}f}"]
+        values.append(f"{low:.{digits}f} to {high:.{digits}f}")
+        if camera.truth:
+            values.append(number(camera.truth.get(name), digits))
+        rows.append((f"{name}{unit}", meaning, *values))
+    return table(rows, ("value", "std. error", "95 % interval", *(("truth",) if camera.truth else ())))

@@ -4,28 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar, get_args
 
 from app.drawing.cameras import turn
 from app.screens.calibrate.area import PictureArea
-from app.screens.calibrate.bars import Bar, Bars
-from app.screens.calibrate.draw import BELOW, Around, BoardsDrawing, place_of
+from app.screens.calibrate.bars import Bars, bars_of
+from app.screens.calibrate.depth import DepthFolder
+from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of
+from app.screens.calibrate.files import board_views
+from app.screens.calibrate.labels import AROUND, DEPTH
 from app.screens.calibrate.noise import NoiseFolder
-from app.screens.calibrate.noise_view import NoiseRequest, NoiseView
+from app.screens.calibrate.noise_view import NoiseRequest
 from app.screens.calibrate.numbers import parameter_table, summary_table
 from app.screens.calibrate.photograph import found_picture, picture_of, straightened_picture
+from app.screens.calibrate.trust import TrustFolder, verdict_html
 from app.screens.calibrate.uploads import UploadFolder
-from app.screens.calibrate.view import CalibrationView, CameraView
+from app.screens.calibrate.use import WRITING, UseRow
+from app.screens.calibrate.view import CalibrationView, CameraView, DepthErrorView, TrustView
 from app.state import BoardViews, Spec, Step
 from app.ui import Panel
 from packetmesh.errors import InputError
 from pipeline.config import Lens
+from pipeline.io.demos import DEMO_SCENES, board_views_of
+from pipeline.sources import Calibrated, Demo, Source
 
 TEXT = """**What you see.** Photographs of a board of known size tell how each camera bends what it sees, and
-where the board stood: click a bar, a board or a photograph. What counts is not how well the lens explains these
-views, but how sure it is of **others**. Go on with **Depth**."""
-AROUND: dict[str, Around] = {"boards around the camera": "camera", "cameras around the board": "board"}
-RIGHT = {"straightened": "straightened photograph"}
+where the board stood: click a bar or a board. What counts is not how well the lens explains these views, but how
+sure it is of **others**. Go on with **Depth**."""
+NOTHING = """This scene comes **without photographs of a board**: its cameras are taken at their word. Open a scene
+whose cameras need calibration, or use your own photographs below."""
 
 
 class CalibratePanel(Panel):
@@ -37,26 +45,39 @@ class CalibratePanel(Panel):
     only_when_shown: ClassVar[bool] = True
 
     def build(self) -> None:
-        """Camera, bars, views, the split picture, the stage; numbers; the rest in folders."""
+        """Verdict, camera, bars, views, the split picture, the stage; numbers; the rest in folders."""
         gui, ui = self.gui, self.ui
-        self._source = self.session.spec.source
-        self._here = False
-        self._own: BoardViews | None = None
+        self._source = inner(self.session.spec.source)
+        self._here, self._own = False, False
         self._view: CalibrationView | None = None
         self._whole: dict[str, CameraView] = {}
         """Every camera before a view of it was dropped."""
-        self._chosen = ""
+        self._chosen, self._uses = "", 0
+        self._trust: TrustView | None = None
+        self._off: DepthErrorView | None = None
+        self._asked: list[Hashable] = [None, None]
+        """For what the newest verdict and the newest depth pictures were asked."""
+        self._judging = False
         self._framed: tuple[Hashable, ...] = ()
         gui.add_markdown(TEXT)
         self._status = gui.add_markdown("")
+        self._open = ui.buttons(
+            "Open",
+            {DEMO_SCENES[name].title: partial(self._open_scene, name) for name in with_boards()}
+            or {"–": self.on_show},
+            "A scene with views of a board.",
+            visible=False,
+        )
+        self._verdict = gui.add_html("")
+        self._use = UseRow(ui, self._use_it, self._as_before)
         self._camera = gui.add_dropdown("Camera", ["node_00"], hint="Whose views are shown.", visible=False)
         ui.when_changed(self._camera, self._show_camera)
         self._bars = Bars(ui, self._pick)
         self._row = ui.buttons(
             "View",
             {
-                "Back": lambda: self._go(-1),
-                "Next": lambda: self._go(1),
+                "Back": partial(self._go, -1),
+                "Next": partial(self._go, 1),
                 "Drop": self._drop,
                 "All": self._keep_all,
             },
@@ -64,7 +85,7 @@ class CalibratePanel(Panel):
             "out.",
             visible=False,
         )
-        self._area = PictureArea(ui, RIGHT, "straightened")
+        self._area = PictureArea(ui, self._show_view)
         self._around = gui.add_dropdown(
             "In space", list(AROUND), hint="What stays in its place in the 3-D scene."
         )
@@ -76,8 +97,10 @@ class CalibratePanel(Panel):
 
     def _build_folders(self) -> None:
         gui, ui, session = self.gui, self.ui, self.session
+        self._judge = TrustFolder(ui, self._ask)
         with gui.add_folder("Every parameter, and how sure it is", expand_by_default=False):
             self._parameters = gui.add_html("")
+        self._depth = DepthFolder(ui)
         self._noise = NoiseFolder(ui, self._replay, session.cancel_side_job)
         self._uploads = UploadFolder(ui, session.folder, self._use_own)
         with gui.add_folder("Advanced", expand_by_default=False):
@@ -85,7 +108,7 @@ class CalibratePanel(Panel):
                 "Lens",
                 list(get_args(Lens)),
                 hint="Which distortions the camera may have: k1 and k2 (thesis), also p1, p2, k3 (brown), or k4 to "
-                "k6 as well (rational).",
+                "k6 as well (rational); or that of a fisheye.",
             )
             ui.when_changed(self._lens, self._picked_lens)
 
@@ -95,31 +118,36 @@ class CalibratePanel(Panel):
         """Look for the board at the first visit."""
         self._here = True
         if self.session.spec.views is None:
-            self._want(self._of_scene() if self._own is None else self._own)
+            self._use_own(None)
 
     def on_hide(self) -> None:
         """Another step is shown."""
         self._here = False
 
-    def _of_scene(self) -> BoardViews | None:
-        """The board views of the scene; None if it has none."""
-        return None
-
     def _use_own(self, views: BoardViews | None) -> None:
-        self._own = views
-        self._want(self._of_scene() if views is None else views)
+        """Take the photographs of the person, or those of the scene."""
+        self._own = views is not None
+        if views is None and isinstance(self._source, Demo):
+            folder = board_views_of(self._source.name)
+            views = None if folder is None else board_views(folder)
+        self._want(views)
+
+    def _open_scene(self, name: str) -> None:
+        self.session.want(replace(self.session.spec, source=Demo(name), views=None))
 
     def _want(self, views: BoardViews | None) -> None:
         if views is not None:
             views = replace(views, lens=self._lens.value)
         self.session.want(replace(self.session.spec, views=views))
+        self._show_camera()
 
     def on_spec(self, spec: Spec) -> None:
         """Another scene has other cameras; what is replayed belongs to the views before."""
-        if spec.source != self._source:
-            self._source, self._own = spec.source, None
-            if spec.views is not None:
-                self.ui.post(self._want, None)
+        if inner(spec.source) != self._source:
+            self._source = inner(spec.source)
+            self._view, self._whole = None, {}
+            self._use.forget()
+            self.ui.post(self._want, None)
         if spec.views is None and self._here:
             self.ui.post(self.on_show)
         if not self.session.results.fresh("calibrate", spec):
@@ -131,25 +159,30 @@ class CalibratePanel(Panel):
             self._take(view)
 
     def on_view(self, step: Step, view: Any) -> None:
-        """Show all cameras."""
+        """Show all cameras; and what becomes of the surface."""
         if step == "scene":
             self._uploads.cameras([node.name for node in view.nodes])
+            self._judge.at_range([0.5 * (node.nearest_m + node.farthest_m) for node in view.nodes])
+        if step == "surface" and self.session.results.fresh("surface", self.session.spec):
+            self._use.surface(view.after, isinstance(self.session.spec.source, Calibrated))
         if step == "calibrate":
             self._take(view)
 
     def on_failure(self, step: Step, sentence: str) -> None:
         """Say why there is no camera."""
         if step == "calibrate":
+            self._view = None
+            self._show_camera()
             self._status.content = sentence
 
     def _take(self, view: CalibrationView) -> None:
         self._view = view
         names = tuple(camera.name for camera in view.cameras)
         if names != self._camera.options:
+            chosen = self._camera.value
             self._camera.options = names
-        for camera in view.cameras:
-            if not camera.dropped:
-                self._whole[camera.name] = camera
+            self._camera.value = chosen if chosen in names else names[0]
+        self._whole |= {camera.name: camera for camera in view.cameras if not camera.dropped}
         self._show_camera()
 
     # The camera that is shown.
@@ -159,35 +192,50 @@ class CalibratePanel(Panel):
 
     def _show_camera(self) -> None:
         camera = self._shown()
-        there = camera is not None
         with self.ui.atomic():
             for handle in (self._row, self._around):
-                handle.visible = there
+                handle.visible = camera is not None
             self._camera.visible = self._view is not None and len(self._view.cameras) > 1
-            if camera is None:
-                self._area.load(None, {})
-                return
-            if self._chosen not in [one.name for one in camera.photographs]:
-                self._chosen = camera.photographs[0].name
-            before = self._whole.get(camera.name)
-            pair = [camera] if before is None or not camera.dropped else [camera, before]
-            self._numbers.content = summary_table(pair, ("now", "all views") if len(pair) > 1 else ())
-            self._parameters.content = parameter_table(camera.calibration)
-            self._status.content = camera.reason
+            self._use.show(camera is not None and camera.calibration is not None)
+            nothing = camera is None and self.session.spec.views is None
+            self._open.visible = nothing and bool(with_boards())
+            self._status.content = NOTHING if nothing else "" if camera is None else camera.reason
+            self._show_numbers(camera)
             self._show_view()
         self._draw()
 
+    def _show_numbers(self, camera: CameraView | None) -> None:
+        if camera is None or self._view is None:
+            self._verdict.content = self._numbers.content = self._parameters.content = ""
+            self._judge.load(None)
+            self._depth.load("")
+            return
+        before = self._whole.get(camera.name)
+        pair = [camera] if before is None or not camera.dropped else [camera, before]
+        self._numbers.content = summary_table(pair, ("now", "all views") if len(pair) > 1 else ())
+        self._parameters.content = parameter_table(camera)
+        self._depth.load(self._view.depth.get(camera.name))
+
     def _show_view(self) -> None:
+        """Show the chosen view, and what is known of its pixels."""
         camera = self._shown()
         if camera is None:
+            self._area.load({})
+            self._bars.show((), "")
             return
+        if self._chosen not in [one.name for one in camera.photographs]:
+            self._chosen = camera.photographs[0].name
         photograph = picture_of(camera, self._chosen)
-        left = found_picture(photograph, camera.fitted(photograph.name))
-        right = {}
+        pictures = {"photo": found_picture(photograph, camera.fitted(photograph.name))}
         if camera.calibration is not None:
-            right["straightened"] = straightened_picture(photograph, camera.calibration)
-        self._area.load(left, right)
+            pictures["straightened"] = straightened_picture(photograph, camera.calibration)
+        if self._trust is not None and self._trust.request.camera == camera.name:
+            pictures |= self._trust.pictures
+        if self._off is not None and (self._off.camera, self._off.view) == (camera.name, self._chosen):
+            pictures |= self._off.pictures
+        self._area.load(pictures)
         self._bars.show(bars_of(camera), self._chosen)
+        self._ask()
 
     def _pick(self, name: str) -> None:
         """Show another view."""
@@ -207,10 +255,9 @@ class CalibratePanel(Panel):
         camera, views = self._shown(), self.session.spec.views
         if camera is None or views is None:
             return
-        one = (camera.name, self._chosen)
         if not picture_of(camera, self._chosen).found:
             raise InputError(f"In view {self._chosen} no board was found, so it is left out already.")
-        left = set(views.dropped) ^ {one}
+        left = set(views.dropped) ^ {(camera.name, self._chosen)}
         self._want(replace(views, dropped=tuple(sorted(left))))
 
     def _keep_all(self) -> None:
@@ -219,17 +266,77 @@ class CalibratePanel(Panel):
             self._want(replace(views, dropped=()))
 
     def _picked_lens(self) -> None:
+        self._whole = {}
         if self.session.spec.views is not None:
             self._want(self.session.spec.views)
+
+    # What is asked beside the chain.
+
+    def _ask(self) -> None:
+        """Ask for the verdict; once it is there, for the depth of the chosen view if it is wanted."""
+        camera = self._shown()
+        if camera is None or camera.calibration is None or self._judging:
+            return
+        key = self.session.spec.key("calibrate")
+        request = self._judge.request(camera.name)
+        if self._asked[0] != (key, request):
+            self._asked[0], self._judging = (key, request), True
+            self.session.quick_job("calibrate.trust_job:trust_job", request, on_end=self._judged)
+        elif self._area.wanted == DEPTH and self._asked[1] != (key, camera.name, self._chosen):
+            self._asked[1] = (key, camera.name, self._chosen)
+            job = "calibrate.depth_job:depth_job"
+            self.session.quick_job(job, camera.name, self._chosen, on_end=self._compared)
+
+    def _judged(self, view: TrustView | None) -> None:
+        self._judging, self._trust = False, view
+        with self.ui.atomic():
+            self._verdict.content = verdict_html(view)
+            self._judge.load(view)
+            self._show_view()
+
+    def _compared(self, view: DepthErrorView | None) -> None:
+        self._off = view
+        self._show_view()
+
+    def _replay(self, sigma_px: float) -> None:
+        camera = self._shown()
+        if camera is None or camera.calibration is None:
+            raise InputError("There is no calibration to repeat; add photographs first.")
+        request = NoiseRequest(camera.name, sigma_px)
+        self.session.side_job(
+            "calibrate.noise_job:noise_job",
+            request,
+            on_partial=self._noise.load,
+            on_end=lambda view: self._noise.ended(view, request),
+        )
+
+    # The chain.
+
+    def _use_it(self) -> None:
+        """Write what is shown, and have the chain compute with it."""
+        self._uses += 1
+        self._use.say(WRITING)
+        folder = str(self.session.folder / f"calibration_{self._uses:02d}")
+        self.session.quick_job("calibrate.use_job:use_job", folder, on_end=self._written)
+
+    def _written(self, folder: str | None) -> None:
+        if folder is None:
+            self._use.say("")
+            return
+        source: Any = self._source
+        self._use.used(folder)
+        self.session.want(replace(self.session.spec, source=Calibrated(source, folder)))
+
+    def _as_before(self) -> None:
+        self._use.used(None)
+        self.session.want(replace(self.session.spec, source=self._source))
 
     # What is drawn.
 
     def _draw(self) -> None:
         camera, around = self._shown(), AROUND[self._around.value]
-        if self._view is None:
-            return
         with self.ui.atomic():
-            self._drawing.draw(camera, self._view.board, around, self._chosen)
+            self._drawing.draw(camera, self._view and self._view.board, around, self._chosen)
         if self._here:
             self.look()
 
@@ -246,37 +353,12 @@ class CalibratePanel(Panel):
                 turn(client, stage.middle_m, stage.viewpoint_m)
         return True
 
-    # The noise experiment.
 
-    def _replay(self, sigma_px: float) -> None:
-        camera = self._shown()
-        if camera is None or camera.calibration is None:
-            raise InputError("There is no calibration to repeat; add photographs first.")
-        request = NoiseRequest(camera.name, sigma_px)
-
-        def shown(view: Any) -> None:
-            if isinstance(view, NoiseView):
-                self._noise.load(view)
-
-        self.session.side_job(
-            "calibrate.noise_job:noise_job",
-            request,
-            on_partial=shown,
-            on_end=lambda view: self._noise.ended(view, request),
-        )
+def inner(source: Source) -> Source:
+    """A source without the calibration that is laid over it."""
+    return source.source if isinstance(source, Calibrated) else source
 
 
-def bars_of(camera: CameraView) -> tuple[Bar, ...]:
-    """A bar for each photograph."""
-    bars = []
-    for photograph in camera.photographs:
-        fitted = camera.fitted(photograph.name)
-        bars.append(
-            Bar(
-                photograph.name,
-                None if fitted is None else fitted.rms_px,
-                camera.unseen_rms_px(photograph.name),
-                photograph.name in camera.dropped,
-            )
-        )
-    return tuple(bars)
+def with_boards() -> list[str]:
+    """The demo scenes that have views of a board."""
+    return [name for name in DEMO_SCENES if board_views_of(name) is not None]

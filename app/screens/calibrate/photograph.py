@@ -24,11 +24,12 @@ def found_picture(photograph: Photograph, fitted: FittedView | None) -> Picture:
     rgb = decoded(photograph)
     name = f"View {photograph.name}"
     if not photograph.found:
-        _rings(rgb, photograph.blobs_px, photograph.zoom, LOSS)
+        _rings(rgb, photograph.blobs_px, photograph.zoom, LOSS, 6.0)
         seen = f" Red: {len(photograph.blobs_px)} blobs." if len(photograph.blobs_px) else ""
         return Picture(rgb, f"{name}, no board found. {photograph.reason.rstrip('.')}.{seen}")
-    _rings(rgb, photograph.points_px, photograph.zoom, DELIVERED)
-    _rings(rgb, photograph.points_px[:1], photograph.zoom, FIRST)
+    size_px = _ring_px(photograph.points_px, photograph.zoom)
+    _rings(rgb, photograph.points_px, photograph.zoom, DELIVERED, size_px)
+    _rings(rgb, photograph.points_px[:1], photograph.zoom, FIRST, size_px + 1.0)
     caption = f"{name}, {len(photograph.points_px)} points found (green, the first yellow)"
     if fitted is None:
         return Picture(rgb, caption)
@@ -37,7 +38,7 @@ def found_picture(photograph: Photograph, fitted: FittedView | None) -> Picture:
     ends_px = photograph.points_px - times * fitted.residuals_px  # towards what the lens predicts
     lines = np.stack([photograph.points_px, ends_px], axis=1) * photograph.zoom
     fixed = [np.rint(line * (1 << SHIFT)).astype(np.int32) for line in lines]
-    cv2.polylines(rgb, fixed, False, SOURCE, 2, cv2.LINE_AA, shift=SHIFT)
+    cv2.polylines(rgb, fixed, False, SOURCE, 1, cv2.LINE_AA, shift=SHIFT)
     return Picture(rgb, f"{caption}; orange: to where the lens puts them, × {times:,.0f}")
 
 
@@ -71,6 +72,16 @@ def picture_of(camera: CameraView, name: str) -> Photograph:
     return next((one for one in camera.photographs if one.name == name), camera.photographs[0])
 
 
-def _rings(rgb: ByteArray, points_px: FloatArray, zoom: float, color: tuple[int, int, int]) -> None:
+def _rings(
+    rgb: ByteArray, points_px: FloatArray, zoom: float, color: tuple[int, int, int], size_px: float
+) -> None:
     for x, y in np.rint(points_px * zoom * (1 << SHIFT)).astype(int).tolist():
-        cv2.circle(rgb, (x, y), 6 << SHIFT, color, 2, cv2.LINE_AA, shift=SHIFT)
+        cv2.circle(rgb, (x, y), round(size_px * (1 << SHIFT)), color, 1, cv2.LINE_AA, shift=SHIFT)
+
+
+def _ring_px(points_px: FloatArray, zoom: float) -> float:
+    """Radius of rings that do not touch each other."""
+    if len(points_px) < 2:
+        return 6.0
+    apart_px = np.linalg.norm(points_px[1:] - points_px[:-1], axis=1)
+    return float(np.clip(0.35 * zoom * np.median(apart_px), 2.0, 8.0))

@@ -12,6 +12,7 @@ from typing import get_args
 
 import viser
 
+from app.screens.calibrate.files import ENDINGS, board_views, camera_files
 from app.state import BoardViews
 from app.ui import Ui
 from packetmesh.errors import InputError
@@ -19,11 +20,12 @@ from pipeline.config import Pattern
 
 TEXT = """Photograph a flat board of circles or squares from eight or more directions, tilted by 20 to 40°, also
 into the corners of the image. `packetmesh target` prints one. Add the photographs one by one, or all in a ZIP,
-with a folder for each camera (node_00, node_01 …) if there are several."""
-ENDINGS = (".png", ".jpg", ".jpeg")
+with a folder for each camera (node_00, node_01 …) if there are several; depth images beside them
+(depth_05.png of color_05.png) tell what the depth sensor is off by."""
+BOARD = "board.json"
 UPLOAD_LIMIT_BYTES = 64 << 20
 UNPACKED_LIMIT_BYTES = 256 << 20
-MOST_PHOTOGRAPHS = 120
+MOST_FILES = 240
 INSTEAD = "use packetmesh calibrate for larger files"
 NONE = "No photograph yet."
 
@@ -87,11 +89,19 @@ class UploadFolder:
             self._folder = self._below / f"photographs_{self._edition:03d}"
         self._edition += 1
         kept = keep_photographs(file, self._folder, self._node.value)
-        count = len([one for one in self._folder.rglob("*") if one.is_file()])
+        if BOARD in kept:
+            self._write(board_views(self._folder))
+        count = sum(len(files) for files in camera_files(self._folder).values())
         noun = "photograph" if count == 1 else "photographs"
         self._have.content = (
             f"**{count} {noun}**, the last {kept[-1]}. Add more, or press *Find the cameras*."
         )
+
+    def _write(self, views: BoardViews) -> None:
+        """Show what a ZIP says of the board."""
+        self._pattern.value = views.pattern
+        self._columns.value, self._rows.value = views.columns, views.rows
+        self._spacing.value = 1000.0 * views.spacing_m
 
     def _use(self) -> None:
         if self._folder is None or not self._folder.exists():
@@ -128,8 +138,8 @@ def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[
     elif not file.name.lower().endswith(ENDINGS):
         raise InputError(f"{file.name} is no photograph; try PNG or JPEG, or a ZIP of them.")
     there = len(list(folder.glob("*/*")))
-    if there + len(photographs) > MOST_PHOTOGRAPHS:
-        raise InputError(f"The app takes up to {MOST_PHOTOGRAPHS} photographs; {INSTEAD}.")
+    if there + len(photographs) > MOST_FILES:
+        raise InputError(f"The app takes up to {MOST_FILES} images; {INSTEAD}.")
     for place, content in photographs.items():
         path = folder / place
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -140,7 +150,9 @@ def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[
 def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
     try:
         with zipfile.ZipFile(io.BytesIO(file.content)) as archive:
-            inside = [one for one in archive.infolist() if one.filename.lower().endswith(ENDINGS)]
+            inside = [
+                one for one in archive.infolist() if one.filename.lower().endswith((*ENDINGS, BOARD))
+            ]
             if sum(one.file_size for one in inside) > UNPACKED_LIMIT_BYTES:
                 raise InputError(
                     f"{file.name} unpacks to more than {UNPACKED_LIMIT_BYTES >> 20} MB; {INSTEAD}."
@@ -148,11 +160,11 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
             found = {
                 _place(one.filename, node): archive.read(one)
                 for one in inside
-                if not PurePosixPath(one.filename).name.startswith(("depth", "."))
+                if not PurePosixPath(one.filename).name.startswith(".")
             }
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error):
         raise InputError(f"{file.name} cannot be read as a ZIP; pack the photographs again.") from None
-    if not found:
+    if not set(found) - {BOARD}:
         raise InputError(f"{file.name} holds no PNG or JPEG; try a ZIP of photographs.")
     return found
 
@@ -160,5 +172,7 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
 def _place(name: str, node: str) -> str:
     """``NODE/NAME`` of a file, in the node's folder that its own path names or else in ``node``."""
     path = PurePosixPath(name.replace("\\", "/"))
+    if path.name == BOARD:
+        return BOARD
     named = next((part for part in path.parts[:-1] if re.fullmatch(r"node_\d\d", part)), node)
     return f"{named}/{re.sub(r'[^A-Za-z0-9._-]', '-', path.name)[-60:]}"

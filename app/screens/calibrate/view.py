@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from app.records import Picture
 from pipeline.calibration.board import Board
+from pipeline.calibration.diagnosis import RadialCurve, RadialResiduals
 from pipeline.calibration.estimate import Calibration, FittedView
+from pipeline.calibration.outliers import OutlierView
 from pipeline.types import FloatArray
 
 
@@ -39,14 +42,18 @@ class CameraView:
     name: str
     size_px: tuple[int, int]
     photographs: tuple[Photograph, ...]
-    calibration: Calibration | None
+    calibration: Calibration | None = None
     """None if the views do not determine it."""
-    reason: str
+    reason: str = ""
     """Why they do not, in a sentence."""
-    unseen: tuple[FittedView, ...]
+    unseen: tuple[FittedView, ...] = ()
     """Every view by a lens that has not seen it: those held out in turn, and those that were dropped."""
-    dropped: tuple[str, ...]
+    dropped: tuple[str, ...] = ()
     """Names of the views that are left out."""
+    outliers: tuple[OutlierView, ...] = ()
+    """Those that one may leave out."""
+    truth: dict[str, float] = field(default_factory=dict)
+    """Parameters as they truly are, by name; empty for real cameras."""
 
     def fitted(self, name: str) -> FittedView | None:
         """A view as the lens explains it, which may have been dropped; None without board or lens."""
@@ -61,12 +68,80 @@ class CameraView:
 
 
 @dataclass(frozen=True, slots=True)
+class BiasView:
+    """What the board says of a camera's depth sensor."""
+
+    terms: tuple[str, ...]
+    """Those that held-out views justify."""
+    rows: tuple[tuple[str, float, float, float, str], ...]
+    """Of each number of theirs: its name, value, ends of its 95 % interval and unit."""
+    rms_before_m: float
+    rms_after_m: float
+    true_m: FloatArray
+    """(N,) depth of some pixels on the boards, by the boards' planes."""
+    before_m: FloatArray
+    """(N,) measured less true."""
+    after_m: FloatArray
+    """(N,) corrected less true."""
+    curve_z_m: FloatArray
+    """(K,)"""
+    curve_m: FloatArray
+    """(K,) by which a sensor of this bias is off at each, measured less true, in the mean over the image."""
+    sd_m: FloatArray
+    """(K,) of its noise on a board that faces it."""
+    note: str
+    """What the views cannot tell apart; empty if they can."""
+
+
+@dataclass(frozen=True, slots=True)
 class CalibrationView:
     """All cameras of which there are photographs; while they are computed, those that are done."""
 
     board: Board
     cameras: tuple[CameraView, ...]
+    depth: dict[str, BiasView | str]
+    """By camera: the bias of its depth, or why it is not known; without those that are still to come."""
 
     def camera(self, name: str) -> CameraView | None:
         """The camera of that name, or the first."""
         return next((one for one in self.cameras if one.name == name), next(iter(self.cameras), None))
+
+
+@dataclass(frozen=True, slots=True)
+class TrustRequest:
+    """How far a camera is to be trusted at a range."""
+
+    camera: str
+    range_m: float
+    accuracy_m: float
+    """Within which a point must be placed, across the ray."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrustView:
+    """The answer."""
+
+    request: TrustRequest
+    passed: bool
+    lines: tuple[str, ...]
+    """The verdict in a sentence, and what to do, in some more."""
+    pictures: dict[str, Picture]
+    """Of the size of the thinned photographs: what is known of each pixel."""
+    bends: RadialCurve
+    left: RadialResiduals
+    uncertainty_m: float
+    """Within which noise leaves a point 95 times in 100, root mean square over the image."""
+    difference_m: float | None
+    """Between two halves of the views, likewise; None with too few of them."""
+    halves_px: tuple[float, float] | None
+    """That difference in px, and what noise alone makes it at most in 95 of 100 cases."""
+
+
+@dataclass(frozen=True, slots=True)
+class DepthErrorView:
+    """One view's depth beside the board's plane."""
+
+    camera: str
+    view: str
+    pictures: dict[str, Picture]
+    """As measured and corrected."""
