@@ -122,9 +122,9 @@ __all__ = [
     "RegistrationResult", "RegistrationStep", "RgbdFrame", "Rig", "RigTruth", "RunConfig", "SchemeConfig",
     "StreetConfig", "Surface", "SurfaceConfig", "SurfaceQuality", "SurfaceResult", "UplinkConfig", "arrivals",
     "back_project", "board_views_of", "deliver", "drain", "estimate_normals", "image_delays_s",
-    "iterate_ball", "iterate_registration", "iterate_simulation", "load_demo", "load_frame", "load_rig", "network_metrics",
-    "point_error_m", "read_cloud", "read_mesh", "reconstruct", "register", "roll_ball", "save_rig",
-    "simulate", "spacing", "with_settings", "write_cloud", "write_mesh",
+    "iterate_ball", "iterate_registration", "iterate_simulation", "load_demo", "load_frame", "load_rig",
+    "network_metrics", "point_error_m", "read_cloud", "read_mesh", "reconstruct", "register", "roll_ball",
+    "save_rig", "simulate", "spacing", "with_settings", "write_cloud", "write_mesh",
 ]  # fmt: skip
 
 

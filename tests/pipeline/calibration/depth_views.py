@@ -5,8 +5,8 @@ import numpy as np
 
 from lab.claims.calibration.photograph import seen_px
 from pipeline.calibration.board import Board
-from pipeline.calibration.depth_samples import board_depth_samples
 from pipeline.calibration.estimate import View, calibrate
+from pipeline.calibration.depth_samples import board_depth_samples
 from pipeline.geometry import pixel_rays
 from pipeline.io.depth_correction import DepthCorrection
 from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise
