@@ -15,14 +15,14 @@ from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, read_text, write_json
 from pipeline.calibration.board import Board
 from pipeline.io.images import read_color, read_depth, write_depth_mm
-from pipeline.types import CameraIntrinsics
+from pipeline.types import CameraIntrinsics, DepthMap
 
 BOARD_NAME, TRUTH_NAME = "board.json", "truth.json"
 JPEG_QUALITY = 92
 
 
 def save_board_views(folder: Path, views: BoardViews) -> None:
-    """Write the images, what the board is, and the truth.
+    """Write the images, what the board is, and the truth; no depth image where no depth is known.
 
     Raises:
         InputError: the folder cannot be written.
@@ -34,7 +34,8 @@ def save_board_views(folder: Path, views: BoardViews) -> None:
                 bgr = image.rgb[..., ::-1]
                 coded = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
                 sibling.write_bytes(coded.tobytes())
-            write_depth_mm(place / f"depth_{moment:02d}.png", image.depth)
+            if image.depth.valid.any():
+                write_depth_mm(place / f"depth_{moment:02d}.png", image.depth)
     board = views.board
     size = {"pattern": board.pattern, "columns": board.columns, "rows": board.rows}
     write_json(folder / BOARD_NAME, size | {"spacing_mm": round(1000.0 * board.spacing_m, 6)})
@@ -60,16 +61,18 @@ def load_board_views(folder: Path) -> BoardViews:
             f"{folder} does not hold rendered board views ({error}); render them again"
         ) from None
     images = tuple(
-        tuple(
-            BoardImage(
-                read_color(folder / f"node_{node:02d}" / f"color_{moment:02d}.jpg"),
-                read_depth(folder / f"node_{node:02d}" / f"depth_{moment:02d}.png"),
-            )
-            for node in range(len(cameras))
-        )
+        tuple(_image(folder / f"node_{node:02d}", moment) for node in range(len(cameras)))
         for moment in range(len(poses))
     )
     return BoardViews(board, cameras, poses, images)
+
+
+def _image(folder: Path, moment: int) -> BoardImage:
+    rgb = read_color(folder / f"color_{moment:02d}.jpg")
+    depth = folder / f"depth_{moment:02d}.png"
+    if depth.exists():
+        return BoardImage(rgb, read_depth(depth))
+    return BoardImage(rgb, DepthMap(np.full(rgb.shape[:2], np.nan, np.float32)))
 
 
 def _camera(camera: BoardCamera) -> dict[str, Any]:

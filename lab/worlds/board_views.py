@@ -111,6 +111,24 @@ def render_board_views(
     return BoardViews(board, tuple(cameras), tuple(T_world_board), tuple(zip(*rows, strict=True)))
 
 
+def with_depth_near_boards(views: BoardViews, margin_px: int) -> BoardViews:
+    """The same, but no depth farther than a margin from the rectangle around the board."""
+    rows = []
+    for moment, images in enumerate(views.images):
+        row = []
+        for node, image in enumerate(images):
+            lens = views.cameras[node].intrinsics
+            near = np.zeros(image.depth.z_m.shape, np.uint8)
+            window = _window(views.board, views.T_camera_board(moment, node), lens)
+            if window is not None:
+                near[window] = 1
+            near = cv2.dilate(near, np.ones((2 * margin_px + 1,) * 2, np.uint8))
+            z_m = np.where(near > 0, image.depth.z_m, np.float32(np.nan))
+            row.append(BoardImage(image.rgb, DepthMap(z_m)))
+        rows.append(tuple(row))
+    return replace(views, images=tuple(rows))
+
+
 def room_around(board: Board, cameras: Sequence[BoardCamera], T_world_board: Sequence[FloatArray]) -> Scene:
     """A plain room that holds all cameras and boards, along the world's axes."""
     held = [camera.T_world_camera[:3, 3][None] for camera in cameras]
