@@ -8,7 +8,7 @@ from pathlib import Path
 import plotly.graph_objects as go
 
 from app.drawing import calibration_plots as plots
-from app.reports.html import table, write_page
+from app.reports.html import pictures, table, write_page
 from pipeline.calibration.assess import Trust
 from pipeline.calibration.diagnosis import radial_curve, radial_residuals
 from pipeline.calibration.from_images import CameraReport
@@ -23,11 +23,10 @@ def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> 
         InputError: the folder cannot be written.
     """
     found = report.calibration
-    mark = "reproduced" if trust.verdict.passed else "not-reproduced"
+    mark, judged = ("reproduced", "pass") if trust.verdict.passed else ("not-reproduced", "fail")
     body = (
-        f"<h1>Calibration of a camera</h1>"
-        f'<p class="lead"><span class="{mark}">{"Pass" if trust.verdict.passed else "Fail"}.</span> '
-        f"{escape(trust.verdict.sentence)}</p>"
+        f'<h1>Calibration of a camera: <span class="{mark}">{judged}</span></h1>'
+        f'<p class="lead">{escape(trust.verdict.sentence)}</p>'
         f'<p class="note">{escape(_made_of(report))}</p>'
     )
     errors = found.standard_errors
@@ -88,5 +87,4 @@ def _figures(figures: list[go.Figure]) -> str:
         )
         for row, figure in enumerate(figures)
     ]
-    style = "grid-template-columns: repeat(auto-fit, minmax(480px, 1fr))"
-    return f'<div class="pictures" style="{style}">{"".join(f"<div>{part}</div>" for part in parts)}</div>'
+    return pictures((f'<div style="min-width: 0">{part}</div>' for part in parts), 2)
