@@ -27,8 +27,8 @@ from pipeline.calibration.verdict import Verdict
 from pipeline.types import FloatArray
 
 RAMP = [(index / 4.0, css(color)) for index, color in enumerate(DISTANCE_STOPS)]
-ARROWS = 20.0
-"""Times that residuals are drawn longer than they are."""
+ARROW_SHARE = 0.03
+"""Of the image's width, about the length of the median residual's arrow."""
 MOST_ARROWS = 1500
 BAND95 = 1.96
 
@@ -89,12 +89,14 @@ def distortion_figure(curve: RadialCurve) -> go.Figure:
 
 def residuals_figure(calibration: Calibration) -> go.Figure:
     """An arrow from where a point is predicted towards where it was seen, drawn longer, for all views."""
-    figure = _image_figure(f"What the lens leaves, drawn {ARROWS:g} times", calibration.size_px)
     points_px = np.concatenate([view.points_px for view in calibration.views])
     residuals_px = np.concatenate([view.residuals_px for view in calibration.views])
+    median_px = float(np.median(np.linalg.norm(residuals_px, axis=1)))
+    times = _round_number(ARROW_SHARE * calibration.size_px[0] / max(median_px, 1e-6))
+    figure = _image_figure(f"What the lens leaves, drawn {times:g} times as long", calibration.size_px)
     every = max(1, -(-len(points_px) // MOST_ARROWS))
     begin_px = (points_px - residuals_px)[::every]
-    end_px = begin_px + ARROWS * residuals_px[::every]
+    end_px = begin_px + times * residuals_px[::every]
     figure.add_scatter(
         x=begin_px[:, 0],
         y=begin_px[:, 1],
@@ -281,6 +283,12 @@ def _image_figure(title: str, size_px: tuple[int, int]) -> go.Figure:
         showlegend=False,
     )
     return figure
+
+
+def _round_number(value: float) -> float:
+    """The largest of 1, 2, 5, 10, 20, ... that is not above a value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))
 
 
 def _faint(color: tuple[int, int, int]) -> str:

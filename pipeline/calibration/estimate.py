@@ -143,9 +143,18 @@ def calibrate(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "the
         raise ReconstructionError(_DEGENERATE)
     if _tilt_deg(poses) < LEAST_TILT_DEG:
         raise ReconstructionError(_DEGENERATE)
+    return calibration_of(views, poses, optics, size_px)
+
+
+def calibration_of(
+    views: Sequence[View], poses: Sequence[FloatArray], optics: Optics, size_px: tuple[int, int]
+) -> Calibration:
+    """The record of a lens and of (4, 4) poses that were estimated together."""
     fitted = tuple(_fitted(view, pose, optics) for view, pose in zip(views, poses, strict=True))
-    covariance = coordinate_sd_px(fitted, lens) ** 2 * np.linalg.pinv(information(fitted, optics))
-    return Calibration(lens, size_px, optics.matrix, optics.distortion, FREE[lens], covariance, fitted)
+    covariance = coordinate_sd_px(fitted, optics.lens) ** 2 * np.linalg.pinv(information(fitted, optics))
+    return Calibration(
+        optics.lens, size_px, optics.matrix, optics.distortion, FREE[optics.lens], covariance, fitted
+    )
 
 
 def _brown(views: Sequence[View], size_px: tuple[int, int], lens: Lens) -> tuple[Optics, list[FloatArray]]:
@@ -257,6 +266,12 @@ def held_out(
     """
     if not 2 <= folds <= len(views):
         raise InputError(f"{len(views)} views cannot be held out in {folds} folds; try 2 to {len(views)}")
+    left = len(views) - -(-len(views) // folds)
+    if left < LEAST_VIEWS:
+        raise InputError(
+            f"{len(views)} views in {folds} folds leave {left} for the lens, and it takes {LEAST_VIEWS}; "
+            "hold out fewer at a time with more folds, or take more images"
+        )
     told: dict[int, FittedView] = {}
     for fold in range(folds):
         rest = [view for index, view in enumerate(views) if index % folds != fold]

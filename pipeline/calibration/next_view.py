@@ -27,6 +27,8 @@ WIDTHS = (0.3, 0.45, 0.65)
 """Of the board, as shares of the image's: how near it is."""
 RIM = 0.02
 """Share of the image that stays free around the board's points."""
+NEAREST = 0.02
+"""Of a board's points in front of the camera, as a share of the board's distance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +76,9 @@ def next_view(calibration: Calibration, board: Board, range_m: float) -> NextVie
     boards = [(view.board_m, view.T_camera_board) for view in calibration.views]
     cost = _cost_m2(sight(optics, size_px, range_m), placing(boards, optics))
     best: tuple[float, FloatArray] | None = None
+    points_m = board.points_m
     for T in candidates(board, optics, size_px):
-        covariance = sd_px**2 * np.linalg.pinv(known + informed(board.points_m, T, optics))
+        covariance = sd_px**2 * np.linalg.pinv(known + informed(points_m, T, optics))
         after_m = _error_m(covariance, cost)
         if best is None or after_m < best[0]:
             best = after_m, T
@@ -84,7 +87,7 @@ def next_view(calibration: Calibration, board: Board, range_m: float) -> NextVie
             f"The board ({board.title}) fits nowhere into the image; is its spacing right?"
         )
     after_m, T = best
-    points_px = optics.project(board.points_m, T)
+    points_px = optics.project(points_m, T)
     corners = [0, board.columns - 1, len(points_px) - 1, len(points_px) - board.columns]
     before_m = _error_m(calibration.covariance, cost)
     return NextView(T, points_px, points_px[corners], before_m, after_m)
@@ -95,26 +98,24 @@ def candidates(board: Board, optics: Optics, size_px: tuple[int, int]) -> Iterat
 
     Every place in the image, tilt, side to tilt to, and distance; the upper edge of the board is up.
     """
-    size = np.array(size_px, float)
+    size, points_m = np.array(size_px, float), board.points_m
     low_px, high_px = RIM * size - 0.5, (1.0 - RIM) * size - 0.5
-    width_m = float(np.ptp(board.points_m[:, 0]))
     sides = np.arange(SIDES) * 2.0 * np.pi / SIDES
     tilts = [
-        np.radians(tilt) * np.array([np.cos(side), np.sin(side), 0.0])
+        rotation_exp(np.radians(tilt) * np.array([np.cos(side), np.sin(side), 0.0]))
         for tilt in TILTS_DEG
         for side in (sides if tilt else sides[:1])
     ]
+    rays = optics.rays(np.array([size * (x, y) for x in PLACES for y in PLACES]))
     for share in WIDTHS:
-        away_m = width_m / _angle(optics, size, share)
-        for place_px in (size * (x, y) for x in PLACES for y in PLACES):
-            ray = optics.rays(place_px[None])[0]
-            if not np.isfinite(ray[2]):
-                continue
+        away_m = float(np.ptp(points_m[:, 0])) / _angle(optics, size, share)
+        for ray in rays[np.isfinite(rays[:, 2])]:
+            facing = _facing(ray)
             for tilt in tilts:
-                T = rigid(_facing(ray) @ rotation_exp(tilt), away_m * ray)
-                if (apply(T, board.points_m)[:, 2] <= 0.02 * away_m).any():
+                T = rigid(facing @ tilt, away_m * ray)
+                if (apply(T, points_m)[:, 2] <= NEAREST * away_m).any():
                     continue
-                points_px = optics.project(board.points_m, T)
+                points_px = optics.project(points_m, T)
                 if ((points_px >= low_px) & (points_px <= high_px)).all():
                     yield T
 

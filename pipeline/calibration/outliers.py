@@ -11,9 +11,9 @@ from packetmesh.errors import ReconstructionError
 from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, View, calibrate
 
 MOST_SDS = 3.5
-"""Robust standard deviations of the logarithm of a view's RMS above the median, from which on it stands out."""
-LEAST_SD = 0.15
-"""Of that logarithm: views of sharp boards differ by about so much however alike they are."""
+"""Robust standard deviations of the logarithm of a view's RMS above the median: then it stands out."""
+LEAST_SD = 0.2
+"""Of that logarithm, so that no view stands out whose error is less than twice the others'."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,15 +57,16 @@ class HalfDifference:
 
     map: ErrorMap
     """Lengths of the difference."""
-    rms_px: float
-    """Over the map."""
-    noise_px: float
-    """Noise alone makes a smaller ``rms_px`` in 95 of 100 cases."""
+    ratio: float
+    """The difference over what noise alone lets one expect, root mean square over the image: near 1 if the
+    lens is right."""
+    most_by_noise: float
+    """Noise alone makes a smaller ``ratio`` in 95 of 100 cases."""
 
     @property
     def beyond_noise(self) -> bool:
-        """Whether the lens itself must be wrong, or the board not flat."""
-        return self.rms_px > self.noise_px
+        """Whether there is more than noise: a lens of the wrong kind, a board that is not flat."""
+        return self.ratio > self.most_by_noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,21 +204,25 @@ def half_difference_px(
     told = seen.map_of(np.linalg.norm(difference_px, axis=1), np.linalg.norm(across_m, axis=1))
     boards = [(view.board_m, view.T_camera_board) for view in whole.views]
     change = (seen.by_lens + seen.by_pose @ placing(boards, whole.optics))[known]
-    return HalfDifference(
-        told,
-        float(np.sqrt(np.mean(told.error_px[np.isfinite(told.error_px)] ** 2))),
-        _rms95_px(change, halves[0].covariance + halves[1].covariance),
-    )
+    ratio, most = _over_noise(difference_px[known], change, halves[0].covariance + halves[1].covariance)
+    return HalfDifference(told, ratio, most)
 
 
-def _rms95_px(change: FloatArray, covariance: FloatArray) -> float:
-    """95th percentile of the RMS over (G, 2, P) changes by lenses of a covariance."""
-    flat = change.reshape(-1, change.shape[2])
+def _over_noise(difference_px: FloatArray, change: FloatArray, covariance: FloatArray) -> tuple[float, float]:
+    """(G, 2) differences over their own predicted sd, root mean square, and what noise stays below.
+
+    Args:
+        difference_px: of two lenses.
+        change: (G, 2, P) of the pixels with the lens.
+        covariance: (P, P) of the difference of two lenses.
+    """
     values, turns = np.linalg.eigh(covariance)
-    root = turns * np.sqrt(np.maximum(values, 0.0))
-    weights = np.linalg.eigvalsh(root.T @ flat.T @ flat @ root) / len(change)
+    root = change @ (turns * np.sqrt(np.maximum(values, 0.0)))
+    spread = np.linalg.inv(root @ root.transpose(0, 2, 1))
+    ratio = np.sqrt(np.mean(np.einsum("gi,gij,gj->g", difference_px, spread, difference_px)) / 2.0)
+    weights = np.linalg.eigvalsh(np.einsum("gip,gij,gjq->pq", root, spread, root) / (2.0 * len(root)))
     draws = np.random.default_rng(0).standard_normal((DRAWS, len(weights)))
-    return float(np.sqrt(np.percentile(draws**2 @ np.maximum(weights, 0.0), 95.0)))
+    return float(ratio), float(np.sqrt(np.percentile(draws**2 @ np.maximum(weights, 0.0), 95.0)))
 
 
 def _in_camera(views: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:

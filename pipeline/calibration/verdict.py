@@ -10,12 +10,13 @@ from packetmesh.errors import InputError
 from pipeline.calibration.estimate import Calibration
 from pipeline.calibration.next_view import NextView
 from pipeline.calibration.trust import CIRCLE95, ErrorMap, HalfDifference
+from pipeline.config import Lens
 from pipeline.types import FloatArray
 
 LEAST_SHARE = 0.95
 """Of the image in which points must be placed well enough."""
-WIDER = {"thesis": "brown", "brown": "rational", "rational": "fisheye", "fisheye": "rational"}
-"""Lenses to try next."""
+RICHER: dict[Lens, Lens] = {"thesis": "brown", "brown": "rational"}
+"""Lenses with more freedom."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,7 @@ class Verdict:
     share: float
     """Of the image in which that is at most ``accuracy_m``."""
     error_of_most_m: float
-    """It is not more over ``LEAST_SHARE`` of the image; infinite where too much of it cannot be placed."""
+    """It is not more over ``LEAST_SHARE`` of the image; infinite if more of it cannot be placed at all."""
     sentence: str
     """All this, and what to do."""
 
@@ -69,8 +70,7 @@ def verdict(
     passed = share >= LEAST_SHARE
     told = (
         f"At {sd.range_m:g} m a point is placed within {_mm(accuracy_m)} (95 %) over {100.0 * share:.0f} % "
-        f"of the image, and within {_mm(of_most_m)} over {100.0 * LEAST_SHARE:.0f} % of it: "
-        f"{'pass' if passed else 'fail'}."
+        f"of the image, {_over_most(placed, of_most_m)}: {'pass' if passed else 'fail'}."
     )
     advice = [] if passed else _advice(calibration, halves, following)
     return Verdict(passed, sd.range_m, accuracy_m, error_m, share, of_most_m, " ".join([told, *advice]))
@@ -78,10 +78,11 @@ def verdict(
 
 def _advice(calibration: Calibration, halves: HalfDifference | None, following: NextView | None) -> list[str]:
     if halves is not None and halves.beyond_noise:
+        richer = RICHER.get(calibration.lens)
+        lens = f"--lens {richer}, " if richer else ""
         return [
-            f"Two halves of the views differ by {halves.rms_px:.2g} px, where noise explains "
-            f"{halves.noise_px:.2g}: try --lens {WIDER[calibration.lens]}, --board-warp, or leave out the "
-            "views that stand out."
+            f"Two halves of the views differ by {halves.ratio:.1f} times what noise explains (by chance up "
+            f"to {halves.most_by_noise:.1f}): try {lens}--board-warp, or leave out views that stand out."
         ]
     if following is None:
         return ["Take more views, near the edges of the image."]
@@ -92,6 +93,12 @@ def _advice(calibration: Calibration, halves: HalfDifference | None, following: 
         f"{following.tilt_deg:.0f}°: that is predicted to bring the error over the whole "
         f"image from {_mm(following.error_before_m)} to {_mm(following.error_after_m)}."
     ]
+
+
+def _over_most(placed_m: FloatArray, of_most_m: float) -> str:
+    if np.isfinite(of_most_m):
+        return f"and within {_mm(of_most_m)} over {100.0 * LEAST_SHARE:.0f} % of it"
+    return f"and nowhere in {100.0 * np.isinf(placed_m).mean():.0f} % of it, where the lens folds back"
 
 
 def _third(share: float, low: str, high: str) -> str:
