@@ -10,6 +10,8 @@ from packetmesh.errors import InputError
 from pipeline.types import AnyPath, Rig
 
 SCENES = Path(__file__).resolve().parents[2] / "assets" / "scenes"
+BOARDS = "board"
+"""Folder of a scene whose nodes need calibration: what they see of a board."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,20 @@ def _described() -> dict[str, DemoScene]:
 
 DEMO_SCENES: dict[str, DemoScene] = _described()
 """By name; the living room first, which opens by itself."""
+
+
+def board_views_of(scene: str) -> Path | None:
+    """The folder with views of a board by a demo's nodes, from which they can be calibrated; None without.
+
+    It holds node_00/{color_00.jpg, depth_00.png, ...}, node_01/..., board.json and truth.json; images of
+    the same number are of the same moment.
+    """
+    folder = SCENES / scene / BOARDS
+    return folder if scene in DEMO_SCENES and folder.is_dir() else None
+
+
+CALIBRATED_SCENES = tuple(name for name in DEMO_SCENES if board_views_of(name) is None)
+"""Those whose nodes' intrinsics and depth are right, on which claims and benchmarks are measured."""
 
 
 def load_demo(name: str, calibration: AnyPath | None = None) -> Rig:

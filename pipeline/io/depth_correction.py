@@ -13,7 +13,7 @@ from scipy.interpolate import BSpline
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, read_text
-from pipeline.types import AnyPath, DepthMap, DepthNoise, FloatArray
+from pipeline.types import AnyPath, DepthMap, DepthNoise, FloatArray, IntArray
 
 FILE_NAME = "depth_correction.json"
 FORMAT = "packetmesh depth correction 1"
@@ -66,7 +66,7 @@ class DepthCorrection:
         corrected_m = self._corrected_m(depth.z_m.astype(np.float64), self.map_over_image())
         return DepthMap(np.where(corrected_m > 0.0, corrected_m, np.nan).astype(np.float32))
 
-    def corrected_m(self, z_m: FloatArray, pixels: FloatArray) -> FloatArray:
+    def corrected_m(self, z_m: FloatArray, pixels: FloatArray | IntArray) -> FloatArray:
         """(N,) true depth of (N,) measured depth at (N, 2) pixels."""
         rows, columns = map_basis(self.size_px, pixels)
         share = np.einsum("nr,rc,nc->n", rows, self.map_coefficients, columns)
@@ -81,7 +81,7 @@ class DepthCorrection:
         return self.offset_m + (self.scale + share + self.curvature_per_m * z_m) * z_m
 
 
-def map_basis(size_px: tuple[int, int], pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
+def map_basis(size_px: tuple[int, int], pixels: FloatArray | IntArray) -> tuple[FloatArray, FloatArray]:
     """(N, 3) and (N, 4) splines of the map's rows and columns at (N, 2) pixels."""
     u, v = (np.asarray(pixels, float) + 0.5).T / np.array(size_px, float)[:, None]
     return _splines(v, MAP_SHAPE[0]), _splines(u, MAP_SHAPE[1])

@@ -182,7 +182,7 @@ def save_rig(directory: AnyPath, rig: Rig) -> None:
         write_intrinsics(folder / "intrinsics.json", frame.intrinsics)
         write_pose(folder / "pose.txt", frame.T_world_camera)
     if rig.truth is not None:
-        write_truth(directory, names, rig.truth)
+        write_truth(directory, dict(zip(names, rig.frames, strict=True)), rig.truth)
 
 
 def _node_folders(directory: Path) -> list[Path]:

@@ -1,19 +1,24 @@
-"""The true surface and poses of a rig: ``RIG/truth.ply`` and ``RIG/node_NN/true_pose.txt``."""
+"""What is true of a rig: ``RIG/truth.ply``, ``RIG/node_NN/true_pose.txt`` and ``true_intrinsics.json``, which
+is there where the node's own intrinsics are not right.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from packetmesh.errors import InputError
-from pipeline.io.intrinsics import read_intrinsics
+from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.io.poses import read_pose, write_pose
 from pipeline.rays import Camera, hit_depths
-from pipeline.types import RigTruth, Surface
+from pipeline.types import CameraIntrinsics, RgbdFrame, RigTruth, Surface
 
 MESH_NAME = "truth.ply"
 POSE_NAME = "true_pose.txt"
+INTRINSICS_NAME = "true_intrinsics.json"
 
 
 def read_truth(directory: Path, names: Sequence[str]) -> RigTruth | None:
@@ -33,18 +38,33 @@ def read_truth(directory: Path, names: Sequence[str]) -> RigTruth | None:
                 f"The rig {directory} has a true surface, but {name} has no {POSE_NAME}; add it, or remove "
                 f"{MESH_NAME}"
             )
-        cameras.append(Camera(read_intrinsics(directory / name / "intrinsics.json"), read_pose(path)))
+        lens = directory / name / INTRINSICS_NAME
+        known = lens if lens.exists() else lens.with_name("intrinsics.json")
+        cameras.append(Camera(read_intrinsics(known), read_pose(path)))
     depth = tuple(hit_depths(mesh.vertices_m, mesh.triangles, cameras))
     poses = tuple(camera.T_world_camera for camera in cameras)
-    return RigTruth(mesh.vertices_m, mesh.triangles, poses, depth)
+    lenses = tuple(camera.intrinsics for camera in cameras)
+    return RigTruth(mesh.vertices_m, mesh.triangles, poses, depth, lenses)
 
 
-def write_truth(directory: Path, names: Sequence[str], truth: RigTruth) -> None:
-    """Write the true surface and the true pose of every node in ``names``.
+def write_truth(directory: Path, frames: Mapping[str, RgbdFrame], truth: RigTruth) -> None:
+    """Write the true surface, and what is true of every node.
+
+    Args:
+        directory: of the rig.
+        frames: by the names of the nodes' folders; their true intrinsics are written where they differ.
+        truth: what to write.
 
     Raises:
         InputError: the folder cannot be written.
     """
     write_mesh(directory / MESH_NAME, Surface(truth.vertices_m, truth.triangles))
-    for name, T_world_camera in zip(names, truth.T_world_camera, strict=True):
+    nodes = zip(frames.items(), truth.T_world_camera, truth.intrinsics, strict=True)
+    for (name, frame), T_world_camera, true in nodes:
         write_pose(directory / name / POSE_NAME, T_world_camera)
+        if not _same(true, frame.intrinsics):
+            write_intrinsics(directory / name / INTRINSICS_NAME, true)
+
+
+def _same(one: CameraIntrinsics, other: CameraIntrinsics) -> bool:
+    return np.array_equal(one.matrix, other.matrix) and np.array_equal(one.distortion, other.distortion)

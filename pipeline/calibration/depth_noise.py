@@ -1,0 +1,113 @@
+"""How the noise of a depth sensor grows with distance and angle, from what a fit leaves (SPEC 1.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from pipeline.calibration.depth_samples import DepthSamples
+from pipeline.types import DepthNoise, FloatArray
+
+PARTS, FEWEST = 4, 60
+"""Each view gives so many points to the law, nearest to farthest, of at least so many pixels."""
+MOST_EXPONENT = 5.0
+CLIP_SDS = 4.0
+RESAMPLES = 200
+LEAST_M = 1e-5
+NAMES = ("s0_m", "s1_m", "p", "q")
+
+
+@dataclass(frozen=True, slots=True)
+class NoisePoints:
+    """Measured noise: K patches of boards."""
+
+    z_m: FloatArray
+    """(K,) mean distance."""
+    cosine: FloatArray
+    """(K,) mean cosine of incidence."""
+    sd_m: FloatArray
+    """(K,) standard deviation of the depth about the board's plane, wherever that is."""
+    view: FloatArray
+    """(K,) of which view."""
+
+
+@dataclass(frozen=True, slots=True)
+class FittedNoise:
+    """A law, and how sure it is."""
+
+    law: DepthNoise
+    ci95: Mapping[str, FloatArray]
+    """(2,) by name: views are drawn anew with repetition."""
+    points: NoisePoints
+
+
+def fit_noise(samples: DepthSamples, residuals_m: FloatArray) -> FittedNoise:
+    """The law max(s0, s1 z^p) / cos(angle)^q.
+
+    Each view's own plane is taken out of its residuals: what the board's pose is off by is no noise.
+
+    Args:
+        samples: the pixels.
+        residuals_m: (N,) true less corrected depth.
+    """
+    points = _points(samples, residuals_m)
+    law = _law(points)
+    views = np.unique(points.view)
+    rng = np.random.default_rng(0)
+    drawn = []
+    for _ in range(RESAMPLES):
+        rows = np.concatenate([np.flatnonzero(points.view == one) for one in rng.choice(views, len(views))])
+        drawn.append(_values(_law(_select(points, rows))))
+    low, high = np.percentile(drawn, (2.5, 97.5), axis=0)
+    return FittedNoise(law, {name: np.array([low[k], high[k]]) for k, name in enumerate(NAMES)}, points)
+
+
+def _points(samples: DepthSamples, residuals_m: FloatArray) -> NoisePoints:
+    rows = []
+    for view in np.unique(samples.view):
+        mine = np.flatnonzero(samples.view == view)
+        u, v = samples.pixels[mine].T
+        plane = np.column_stack([np.ones(len(mine)), u / samples.size_px[0], v / samples.size_px[1]])
+        flat_m = residuals_m[mine] - plane @ np.linalg.lstsq(plane, residuals_m[mine], rcond=None)[0]
+        parts = max(1, min(PARTS, len(mine) // FEWEST))
+        for part in np.array_split(np.argsort(samples.true_m[mine], kind="stable"), parts):
+            seen = mine[part]
+            rows.append(
+                (samples.true_m[seen].mean(), samples.cosine[seen].mean(), _clipped_sd_m(flat_m[part]), view)
+            )
+    return NoisePoints(*np.array(rows).T)
+
+
+def _clipped_sd_m(values_m: FloatArray) -> float:
+    """Standard deviation without what lies more than four of them off; never quite 0."""
+    kept = values_m
+    for _ in range(5):
+        kept = kept[np.abs(kept - kept.mean()) <= CLIP_SDS * max(kept.std(), LEAST_M)]
+    return max(float(kept.std()), LEAST_M)
+
+
+def _select(points: NoisePoints, rows: FloatArray) -> NoisePoints:
+    return NoisePoints(points.z_m[rows], points.cosine[rows], points.sd_m[rows], points.view[rows])
+
+
+def _law(points: NoisePoints) -> DepthNoise:
+    """Least squares on the logarithm, robust, so that near and far count alike."""
+    log_z, log_cos, log_sd = np.log(points.z_m), np.log(points.cosine), np.log(points.sd_m)
+
+    def errors(x: FloatArray) -> FloatArray:
+        return np.maximum(x[0], x[1] + x[2] * log_z) - x[3] * log_cos - log_sd
+
+    least, middle = float(log_sd.min()), float(np.median(log_sd))
+    start = np.array([least, middle - 2.0 * float(np.median(log_z)), 2.0, 0.5])
+    low = np.array([np.log(LEAST_M), -np.inf, 0.0, 0.0])
+    high = np.array([np.inf, np.inf, MOST_EXPONENT, MOST_EXPONENT])
+    start = np.clip(start, low + 1e-9, high)
+    x = least_squares(errors, start, bounds=(low, high), loss="soft_l1", f_scale=0.2).x
+    return DepthNoise(float(np.exp(x[0])), float(np.exp(x[1])), float(x[2]), float(x[3]))
+
+
+def _values(law: DepthNoise) -> tuple[float, ...]:
+    return law.s0_m, law.s1_m, law.p, law.q
