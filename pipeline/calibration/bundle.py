@@ -1,5 +1,5 @@
-"""Poses of cameras and boards that best explain all sightings together: a bundle adjustment (Triggs et al.,
-"Bundle adjustment: a modern synthesis", 2000), small enough for dense normal equations.
+"""Lenses and poses that best explain all sightings together: a bundle adjustment (Triggs et al., "Bundle
+adjustment: a modern synthesis", 2000), small enough for dense normal equations.
 """
 
 from __future__ import annotations
@@ -9,14 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from packetmesh.errors import ReconstructionError
 from pipeline.calibration.lens import FREE, Optics
 from pipeline.geometry import apply, rigid, rotation_exp
-from pipeline.types import FloatArray
+from pipeline.types import FloatArray, IntArray
 
-STEPS = 50
-SMALL = 1e-9
-"""Radians or metres: a step after which nothing moves any more."""
+STEPS = 60
+LITTLE = 1e-10
+"""Share by which the squares must fall for another step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,151 +31,155 @@ class Sighting:
 
 
 @dataclass(frozen=True, slots=True)
-class Placement:
+class Bundle:
     """Cameras and boards in the frame of the first camera."""
 
+    optics: tuple[Optics, ...]
+    """Of every camera."""
     T_camera_first: tuple[FloatArray, ...]
     """(4, 4) of every camera; the first is the identity."""
     T_first_board: tuple[FloatArray, ...]
     """(4, 4) of every moment."""
 
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """How many numbers move the cameras but the first, the boards, and each lens."""
+        lenses = (len(FREE[one.lens]) for one in self.optics)
+        return 6 * (len(self.optics) - 1), 6 * len(self.T_first_board), *lenses
+
     def T_camera_board(self, sighting: Sighting) -> FloatArray:
         """(4, 4) where the camera of a sighting has its board."""
         return self.T_camera_first[sighting.camera] @ self.T_first_board[sighting.moment]
 
-    def moved(self, step: FloatArray) -> Placement:
-        """After small motions, (6 (C - 1 + M),): of every camera but the first, then of every board."""
-        motions = [rigid(rotation_exp(one[:3]), one[3:]) for one in step.reshape(-1, 6)]
-        cameras, boards = self.T_camera_first[1:], self.T_first_board
-        motions_of_cameras, motions_of_boards = motions[: len(cameras)], motions[len(cameras) :]
-        return Placement(
-            (np.eye(4), *(move @ T for move, T in zip(motions_of_cameras, cameras, strict=True))),
-            tuple(move @ T for move, T in zip(motions_of_boards, boards, strict=True)),
+    def residuals_px(self, sightings: Sequence[Sighting]) -> tuple[FloatArray, ...]:
+        """(N, 2) of each, seen less predicted."""
+        return tuple(
+            one.points_px - self.optics[one.camera].project(one.board_m, self.T_camera_board(one))
+            for one in sightings
+        )
+
+    def moved(self, step: FloatArray) -> Bundle:
+        """After small changes in the order of ``sizes``: turns (radians) and moves (metres) of cameras, then
+        of boards, then what is added to the free parameters of the lenses.
+        """
+        cameras, boards, *lenses = np.split(step, np.cumsum(self.sizes)[:-1])
+        return Bundle(
+            tuple(_changed(one, change) for one, change in zip(self.optics, lenses, strict=True)),
+            (self.T_camera_first[0], *_moved(self.T_camera_first[1:], cameras)),
+            _moved(self.T_first_board, boards),
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Adjusted:
-    """The best placement and how sure it is."""
+    """The best bundle and how sure it is."""
 
-    placement: Placement
+    bundle: Bundle
     residuals_px: tuple[FloatArray, ...]
     """(N, 2) of each sighting, seen less predicted."""
-    covariance: FloatArray
-    """(6 (C - 1), 6 (C - 1)) of the motions of all cameras but the first."""
+    camera_covariance: FloatArray
+    """(6 (C - 1), 6 (C - 1)) of turns and moves of all cameras but the first."""
+    lens_covariances: tuple[FloatArray, ...]
+    """(P, P) of the free parameters of every lens."""
 
 
-def residuals_px(
-    sightings: Sequence[Sighting], optics: Sequence[Optics], placement: Placement
-) -> tuple[FloatArray, ...]:
-    """(N, 2) of each sighting, seen less predicted."""
-    return tuple(
-        one.points_px - optics[one.camera].project(one.board_m, placement.T_camera_board(one))
-        for one in sightings
-    )
+def adjust(sightings: Sequence[Sighting], start: Bundle) -> Adjusted:
+    """The bundle near ``start`` with the least squared distances in the images (Levenberg, Marquardt).
 
-
-def adjust(
-    sightings: Sequence[Sighting],
-    optics: Sequence[Optics],
-    lens_covariances: Sequence[FloatArray],
-    start: Placement,
-) -> Adjusted:
-    """The placement near ``start`` with the least squared distances in the images (Levenberg, Marquardt).
-
-    The lenses stay as they are. What is uncertain about them makes the cameras' poses uncertain, too: the
-    error of a lens that was estimated with a free pose for each of its views is, to first order, independent
-    of the error that the poses have for a given lens, so that both covariances add.
+    The lenses are free as well. Held at what each camera alone says of its lens, they would leave more than
+    twice the error in the cameras' poses (tests/pipeline/calibration/test_rig.py).
 
     Args:
-        sightings: of all cameras.
-        optics: of every camera.
-        lens_covariances: (P, P) of the free parameters of every lens.
+        sightings: of all cameras; shared moments must link them.
         start: near the truth.
-
-    Raises:
-        ReconstructionError: the sightings leave a camera free to move.
     """
-    placement, system = _nearest(sightings, optics, start, slice(None))
-    covariance = _covariance(system, lens_covariances, 6 * (len(placement.T_camera_first) - 1))
-    return Adjusted(placement, residuals_px(sightings, optics, placement), covariance)
+    bundle, system = _nearest(sightings, start, slice(None))
+    scale = 1.0 / np.sqrt(np.diag(system.normal))
+    spread = np.outer(scale, scale) * np.linalg.pinv(system.normal * np.outer(scale, scale), hermitian=True)
+    freedom = max(system.coordinates - len(system.normal), 1)
+    covariance = system.squares / freedom * spread
+    ends = np.cumsum(bundle.sizes)
+    cameras, _, *lenses = (
+        covariance[end - size : end, end - size : end] for end, size in zip(ends, bundle.sizes, strict=True)
+    )
+    return Adjusted(bundle, bundle.residuals_px(sightings), cameras, tuple(lenses))
 
 
-def place_boards(sightings: Sequence[Sighting], optics: Sequence[Optics], start: Placement) -> Placement:
-    """The boards adjusted to all sightings while the cameras stay where they are."""
-    boards = slice(6 * (len(start.T_camera_first) - 1), None)
-    return _nearest(sightings, optics, start, boards)[0]
+def place_boards(sightings: Sequence[Sighting], start: Bundle) -> Bundle:
+    """The boards adjusted to all sightings while cameras and lenses stay as they are."""
+    cameras, boards, *_ = start.sizes
+    return _nearest(sightings, start, slice(cameras, cameras + boards))[0]
 
 
-def _nearest(
-    sightings: Sequence[Sighting], optics: Sequence[Optics], start: Placement, free: slice
-) -> tuple[Placement, _System]:
-    """The best placement that the free motions lead to, with its normal equations."""
-    placement, system = start, _System(sightings, optics, start)
+def _nearest(sightings: Sequence[Sighting], start: Bundle, free: slice) -> tuple[Bundle, _System]:
+    """The best bundle that the free changes lead to, with its normal equations."""
+    bundle, system = start, _System(sightings, start)
     damping = 1e-3
     for _ in range(STEPS):
         step = np.zeros(len(system.pull))
         step[free] = np.linalg.solve(system.damped(damping)[free, free], system.pull[free])
-        nearer = placement.moved(step)
-        nearer_system = _System(sightings, optics, nearer)
-        if nearer_system.squares <= system.squares:
-            placement, system, damping = nearer, nearer_system, 0.1 * damping
+        nearer = bundle.moved(step)
+        nearer_system = _System(sightings, nearer)
+        fallen = system.squares - nearer_system.squares
+        if fallen >= 0.0:
+            bundle, system, damping = nearer, nearer_system, 0.1 * damping
         else:
             damping *= 10.0
-        if np.abs(step).max() < SMALL:
+        if abs(fallen) <= LITTLE * system.squares:
             break
-    return placement, system
+    return bundle, system
 
 
 class _System:
-    """The normal equations of all poses at a placement, and how lenses pull at them."""
+    """The normal equations of a bundle."""
 
-    def __init__(self, sightings: Sequence[Sighting], optics: Sequence[Optics], placement: Placement) -> None:
-        others = len(placement.T_camera_first) - 1
-        size = 6 * (others + len(placement.T_first_board))
+    def __init__(self, sightings: Sequence[Sighting], bundle: Bundle) -> None:
+        size = sum(bundle.sizes)
         self.normal, self.pull = np.zeros((size, size)), np.zeros(size)
-        self.by_lens = [np.zeros((size, len(FREE[one.lens]))) for one in optics]
         self.squares, self.coordinates = 0.0, 0
         for one in sightings:
-            J, by_lens, off_px = _linearised(one, optics[one.camera], placement)
-            board = 6 * (others + one.moment) + np.arange(6)
-            at = np.concatenate([6 * (one.camera - 1) + np.arange(6), board]) if one.camera else board
-            J = J if one.camera else J[:, 6:]
+            J, off_px = _linearised(one, bundle)
+            at = _columns(one, bundle)
+            J = J[:, -len(at) :]
             self.normal[np.ix_(at, at)] += J.T @ J
             self.pull[at] += J.T @ off_px
-            self.by_lens[one.camera][at] += J.T @ by_lens
             self.squares += float(off_px @ off_px)
             self.coordinates += len(off_px)
 
     def damped(self, damping: float) -> FloatArray:
+        """With the diagonal that much larger."""
         return self.normal + damping * np.diag(np.diag(self.normal))
 
 
-def _linearised(
-    sighting: Sighting, optics: Optics, placement: Placement
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(2 N, 12) by motions of camera and board, (2 N, P) by the lens, and (2 N,) seen less predicted."""
-    T_camera_first = placement.T_camera_first[sighting.camera]
-    first_m = apply(placement.T_first_board[sighting.moment], sighting.board_m)
-    told = optics.linearised(first_m, T_camera_first)
+def _columns(sighting: Sighting, bundle: Bundle) -> IntArray:
+    """Of the numbers on which it depends: its camera's (none of the first), its board's, and its lens's."""
+    ends = np.cumsum(bundle.sizes)
+    camera = 6 * (sighting.camera - 1) + np.arange(6 if sighting.camera else 0)
+    board = ends[0] + 6 * sighting.moment + np.arange(6)
+    lens = np.arange(ends[1 + sighting.camera], ends[2 + sighting.camera])
+    return np.concatenate([camera, board, lens])
+
+
+def _linearised(sighting: Sighting, bundle: Bundle) -> tuple[FloatArray, FloatArray]:
+    """(2 N, 12 + P) by changes of camera, board and lens, and (2 N,) seen less predicted."""
+    T_camera_first = bundle.T_camera_first[sighting.camera]
+    first_m = apply(bundle.T_first_board[sighting.moment], sighting.board_m)
+    told = bundle.optics[sighting.camera].linearised(first_m, T_camera_first)
     by_camera_m = told.by_pose[:, 3:]
     by_first_m = by_camera_m @ T_camera_first[:3, :3]
     camera_m, first_m = (np.repeat(points, 2, axis=0) for points in (apply(T_camera_first, first_m), first_m))
-    J = np.hstack([np.cross(camera_m, by_camera_m), by_camera_m, np.cross(first_m, by_first_m), by_first_m])
-    return J, told.by_lens, (sighting.points_px - told.points_px).ravel()
+    turns = np.cross(camera_m, by_camera_m), np.cross(first_m, by_first_m)
+    J = np.hstack([turns[0], by_camera_m, turns[1], by_first_m, told.by_lens])
+    return J, (sighting.points_px - told.points_px).ravel()
 
 
-def _covariance(system: _System, lens_covariances: Sequence[FloatArray], wanted: int) -> FloatArray:
-    """(wanted, wanted) of the first motions: of noise in the images and of the lenses."""
-    freedom = max(system.coordinates - len(system.normal), 1)
-    scale = np.sqrt(np.diag(system.normal))
-    if not (scale > 0.0).all() or np.linalg.cond(system.normal / np.outer(scale, scale)) > 1e12:
-        raise ReconstructionError(
-            "The views leave a camera free to move; take more moments in which cameras see the board together"
-        )
-    inverse = np.linalg.inv(system.normal)
-    covariance = system.squares / freedom * inverse[:wanted, :wanted]
-    for by_lens, of_lens in zip(system.by_lens, lens_covariances, strict=True):
-        moved = -inverse[:wanted] @ by_lens
-        covariance = covariance + moved @ of_lens @ moved.T
-    return covariance
+def _moved(poses: Sequence[FloatArray], step: FloatArray) -> tuple[FloatArray, ...]:
+    motions = step.reshape(-1, 6)
+    return tuple(rigid(rotation_exp(m[:3]), m[3:]) @ T for m, T in zip(motions, poses, strict=True))
+
+
+def _changed(optics: Optics, change: FloatArray) -> Optics:
+    matrix, distortion = optics.matrix.copy(), optics.distortion.copy()
+    matrix[[0, 1, 0, 1], [0, 1, 2, 2]] += change[:4]
+    distortion[: len(change) - 4] += change[4:]
+    return Optics(optics.lens, matrix, distortion)

@@ -9,12 +9,11 @@ from itertools import combinations
 
 import numpy as np
 
-from packetmesh.errors import InputError, ReconstructionError
+from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
-from pipeline.calibration.bundle import Adjusted, Placement, Sighting, adjust, place_boards, residuals_px
-from pipeline.calibration.estimate import Calibration, View, rms_px
-from pipeline.calibration.lens import Optics
-from pipeline.calibration.rig_start import Look, look, start
+from pipeline.calibration.bundle import Adjusted, Bundle, Sighting, adjust, place_boards
+from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, FittedView, View, rms_px
+from pipeline.calibration.rig_start import look, start
 from pipeline.geometry import inverse, rigid, rotation_angle_rad, rotation_exp
 from pipeline.types import FloatArray
 
@@ -74,8 +73,8 @@ class RelativePose:
 class HeldOutRig:
     """Moments that had no part in the poses by which they are predicted."""
 
-    residuals_px: Mapping[tuple[str, str], FloatArray]
-    """(N, 2) by camera and moment; the board's pose alone is fitted, to all cameras that see it."""
+    views: Mapping[str, tuple[FittedView, ...]]
+    """By camera; the board's pose alone is fitted, to all cameras that see it."""
     rotation_deg: Mapping[str, float]
     """By camera, the largest difference of its pose without a fold of the moments from that with all."""
     position_m: Mapping[str, float]
@@ -83,14 +82,15 @@ class HeldOutRig:
     @property
     def rms_px(self) -> float:
         """Over all points."""
-        return rms_px(np.concatenate(list(self.residuals_px.values())))
+        return rms_px(np.concatenate([one.residuals_px for views in self.views.values() for one in views]))
 
 
 @dataclass(frozen=True, slots=True)
 class RigCalibration:
     """Cameras and boards in one frame."""
 
-    names: tuple[str, ...]
+    cameras: Mapping[str, Calibration]
+    """The lenses as all cameras together have them."""
     moments: tuple[str, ...]
     adjusted: Adjusted
     sightings: tuple[Sighting, ...]
@@ -103,26 +103,26 @@ class RigCalibration:
         return rms_px(np.concatenate(self.adjusted.residuals_px))
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Of the cameras, the first of which is the others' reference."""
+        return tuple(self.cameras)
+
+    @property
     def T_first_camera(self) -> dict[str, FloatArray]:
         """(4, 4) pose of every camera in the frame of the first."""
-        placed = self.adjusted.placement.T_camera_first
+        placed = self.adjusted.bundle.T_camera_first
         return {name: inverse(T) for name, T in zip(self.names, placed, strict=True)}
 
-    def camera_rms_px(self, name: str) -> float:
-        """Over all points that one camera sees."""
-        return rms_px(np.concatenate(list(self.residuals_px(name).values())))
-
-    def residuals_px(self, name: str) -> dict[str, FloatArray]:
-        """(N, 2) of one camera by moment, seen less predicted."""
+    def moments_of(self, name: str) -> set[str]:
+        """At which a camera sees the board."""
         camera = self.names.index(name)
-        every = zip(self.sightings, self.adjusted.residuals_px, strict=True)
-        return {self.moments[one.moment]: off_px for one, off_px in every if one.camera == camera}
+        return {self.moments[one.moment] for one in self.sightings if one.camera == camera}
 
     def relative(self, camera: str, reference: str | None = None) -> RelativePose:
         """Where one camera stands to another, by default to the first."""
         reference = self.names[0] if reference is None else reference
         a, b = self.names.index(reference), self.names.index(camera)
-        placed = self.adjusted.placement.T_camera_first
+        placed = self.adjusted.bundle.T_camera_first
         T_a_b = placed[a] @ inverse(placed[b])
         x, y, z = T_a_b[:3, 3]
         by_a, by_b = np.eye(6), np.zeros((6, 6))
@@ -131,8 +131,8 @@ class RigCalibration:
         J = np.zeros((6, len(self.names) * 6))
         J[:, 6 * a : 6 * a + 6] += by_a
         J[:, 6 * b : 6 * b + 6] += by_b
-        covariance = J[:, 6:] @ self.adjusted.covariance @ J[:, 6:].T
-        both = self.residuals_px(camera).keys() & self.residuals_px(reference).keys()
+        covariance = J[:, 6:] @ self.adjusted.camera_covariance @ J[:, 6:].T
+        both = self.moments_of(camera) & self.moments_of(reference)
         return RelativePose(camera, reference, T_a_b, covariance, len(both))
 
     def pairs(self) -> list[RelativePose]:
@@ -146,18 +146,19 @@ def calibrate_rig(
     board: Board,
     folds: int = 0,
 ) -> RigCalibration:
-    """Place cameras whose lenses are known.
+    """Place cameras, and refine their lenses, which a rig sees better than each camera alone.
 
-    All poses of cameras and boards are adjusted together to the points in all images; two cameras need not
-    see the board together if a third links them. The lenses stay as they are, and their uncertainty is
-    carried into that of the poses. A board without a mark is turned as the other cameras have it (SPEC 1.2).
+    Lenses and all poses of cameras and boards are adjusted together to the points in all images; two cameras
+    need not see the board together if a third links them. A board without a mark is turned as the other
+    cameras have it (SPEC 1.2).
 
-    OpenCV's ``calibrateMultiviewExtended`` finds the same poses (tests/pipeline/calibration/test_rig.py), but
-    it takes every board as held the right way up, and tells nothing of how sure it is.
+    OpenCV's ``calibrateMultiviewExtended`` finds the same poses for the same lenses, but it leaves each lens as
+    its camera alone has it, which more than doubles the error of the poses; it takes every board as held the
+    right way up, and tells nothing of how sure it is (tests/pipeline/calibration/test_rig.py).
 
     Args:
-        cameras: the lens of every camera by its name, the reference first.
-        seen: by camera and moment.
+        cameras: every camera by its name, as its own views have it, the reference first.
+        seen: by camera and moment, also moments of one camera alone.
         board: which is seen.
         folds: in how many turns moments are held out; 0 holds none out.
 
@@ -171,22 +172,45 @@ def calibrate_rig(
             f"{len(names)} cameras are given; a rig has two to six, each with one for depth at most"
         )
     optics = tuple(one.optics for one in cameras.values())
-    seers = Counter(moment for name in names for moment in seen[name])
-    moments = tuple(moment for moment, count in seers.items() if count > 1)
+    moments = tuple(dict.fromkeys(moment for name in names for moment in seen[name]))
     looks = [
-        look(_sighting(camera, index, seen[name][moment].view), optics[camera], seen[name][moment].oriented)
+        look(
+            Sighting(camera, moments.index(moment), one.view.points_px, one.view.board_m),
+            optics[camera],
+            one.oriented,
+        )
         for camera, name in enumerate(names)
-        for index, moment in enumerate(moments)
-        if moment in seen[name]
+        for moment, one in seen[name].items()
     ]
-    problem = _Problem(names, optics, [one.covariance for one in cameras.values()], _turns(board))
-    adjusted, sightings = problem.solved(looks)
-    unseen = problem.held_out(sightings, adjusted.placement, moments, folds) if folds else None
-    return RigCalibration(names, moments, adjusted, sightings, unseen)
+    begun, sightings = start(looks, optics, names, _turns(board))
+    adjusted = adjust(sightings, begun)
+    titles = [seen[names[one.camera]][moments[one.moment]].view.name for one in sightings]
+    views = _views(names, titles, sightings, adjusted.bundle)
+    lenses = {
+        name: replace(
+            cameras[name],
+            matrix=lens.matrix,
+            distortion=lens.distortion,
+            covariance=covariance,
+            views=views[name],
+        )
+        for name, lens, covariance in zip(
+            names, adjusted.bundle.optics, adjusted.lens_covariances, strict=True
+        )
+    }
+    unseen = _held_out(names, titles, sightings, adjusted.bundle, folds) if folds else None
+    return RigCalibration(lenses, moments, adjusted, sightings, unseen)
 
 
-def _sighting(camera: int, moment: int, view: View) -> Sighting:
-    return Sighting(camera, moment, view.points_px, view.board_m)
+def _views(
+    names: Sequence[str], titles: Sequence[str], sightings: Sequence[Sighting], bundle: Bundle
+) -> dict[str, tuple[FittedView, ...]]:
+    """By camera, in the order of the sightings."""
+    views: dict[str, list[FittedView]] = {name: [] for name in names}
+    for title, one, off_px in zip(titles, sightings, bundle.residuals_px(sightings), strict=True):
+        fitted = FittedView(title, bundle.T_camera_board(one), off_px, one.points_px, one.board_m)
+        views[names[one.camera]].append(fitted)
+    return {name: tuple(some) for name, some in views.items()}
 
 
 def _turns(board: Board) -> list[FloatArray]:
@@ -197,50 +221,46 @@ def _turns(board: Board) -> list[FloatArray]:
     return [rigid(rotation_exp(np.array([0.0, 0.0, 0.5 * np.pi * k])), np.zeros(3)) for k in quarters]
 
 
-@dataclass(frozen=True, slots=True)
-class _Problem:
-    names: tuple[str, ...]
-    optics: tuple[Optics, ...]
-    lens_covariances: list[FloatArray]
-    turns: list[FloatArray]
-
-    def solved(self, looks: Sequence[Look]) -> tuple[Adjusted, tuple[Sighting, ...]]:
-        begun, sightings = start(looks, self.optics, self.names, self.turns)
-        return adjust(sightings, self.optics, self.lens_covariances, begun), sightings
-
-    def held_out(
-        self, sightings: Sequence[Sighting], whole: Placement, moments: Sequence[str], folds: int
-    ) -> HeldOutRig | None:
-        """Every moment by poses from the others."""
-        residuals: dict[tuple[str, str], FloatArray] = {}
-        turned_deg, moved_m = dict.fromkeys(self.names[1:], 0.0), dict.fromkeys(self.names[1:], 0.0)
-        for fold in range(folds):
-            known = [one for one in sightings if one.moment % folds != fold]
-            left = [one for one in sightings if one.moment % folds == fold]
-            try:
-                cameras = self._without(known, whole)
-            except ReconstructionError:
-                return None
-            for name, T, T_whole in zip(self.names[1:], cameras[1:], whole.T_camera_first[1:], strict=True):
-                apart = inverse(T_whole) @ T
-                turned_deg[name] = max(turned_deg[name], float(np.degrees(rotation_angle_rad(apart[:3, :3]))))
-                off_m = inverse(T)[:3, 3] - inverse(T_whole)[:3, 3]
-                moved_m[name] = max(moved_m[name], float(np.linalg.norm(off_m)))
-            numbered, boards = _alone(left, whole)
-            placed = place_boards(numbered, self.optics, Placement(cameras, boards))
-            for one, off_px in zip(left, residuals_px(numbered, self.optics, placed), strict=True):
-                residuals[self.names[one.camera], moments[one.moment]] = off_px
-        return HeldOutRig(residuals, turned_deg, moved_m)
-
-    def _without(self, known: Sequence[Sighting], whole: Placement) -> tuple[FloatArray, ...]:
-        """(4, 4) of every camera in the first's frame, by some of the moments."""
-        numbered, boards = _alone(known, whole)
-        begun = Placement(whole.T_camera_first, boards)
-        return adjust(numbered, self.optics, self.lens_covariances, begun).placement.T_camera_first
+def _held_out(
+    names: Sequence[str], titles: Sequence[str], sightings: Sequence[Sighting], whole: Bundle, folds: int
+) -> HeldOutRig | None:
+    """Every moment by cameras from the others; None where these do not link the cameras."""
+    views: dict[str, tuple[FittedView, ...]] = dict.fromkeys(names, ())
+    turned_deg, moved_m = dict.fromkeys(names[1:], 0.0), dict.fromkeys(names[1:], 0.0)
+    for fold in range(folds):
+        left = [index for index, one in enumerate(sightings) if one.moment % folds == fold]
+        rest, begun = _alone([one for one in sightings if one.moment % folds != fold], whole)
+        if not left or not _determined(rest, len(names)):
+            return None
+        found = adjust(rest, begun).bundle
+        for name, T, T_whole in zip(
+            names[1:], found.T_camera_first[1:], whole.T_camera_first[1:], strict=True
+        ):
+            apart = np.degrees(rotation_angle_rad(T[:3, :3] @ T_whole[:3, :3].T))
+            turned_deg[name] = max(turned_deg[name], float(apart))
+            off_m = inverse(T)[:3, 3] - inverse(T_whole)[:3, 3]
+            moved_m[name] = max(moved_m[name], float(np.linalg.norm(off_m)))
+        unseen, boards = _alone([sightings[index] for index in left], whole)
+        placed = place_boards(unseen, replace(found, T_first_board=boards.T_first_board))
+        for name, some in _views(names, [titles[index] for index in left], unseen, placed).items():
+            views[name] += some
+    return HeldOutRig(views, turned_deg, moved_m)
 
 
-def _alone(some: Sequence[Sighting], whole: Placement) -> tuple[list[Sighting], tuple[FloatArray, ...]]:
-    """Sightings with their moments numbered anew, and the boards of these."""
+def _alone(some: Sequence[Sighting], whole: Bundle) -> tuple[list[Sighting], Bundle]:
+    """Sightings with their moments numbered anew, and the bundle with only these boards."""
     kept = sorted({one.moment for one in some})
     numbered = [replace(one, moment=kept.index(one.moment)) for one in some]
-    return numbered, tuple(whole.T_first_board[moment] for moment in kept)
+    return numbered, replace(whole, T_first_board=tuple(whole.T_first_board[moment] for moment in kept))
+
+
+def _determined(sightings: Sequence[Sighting], cameras: int) -> bool:
+    """Whether shared moments link all cameras, and each has enough views for its lens."""
+    counts = Counter(one.camera for one in sightings)
+    together = [
+        {one.camera for one in sightings if one.moment == moment} for moment in {s.moment for s in sightings}
+    ]
+    linked = {0}
+    for _ in range(cameras):
+        linked |= set().union(*(some for some in together if some & linked))
+    return len(linked) == cameras and min(counts[camera] for camera in range(cameras)) >= LEAST_VIEWS

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
-from pipeline.calibration.bundle import Placement, Sighting
+from pipeline.calibration.bundle import Bundle, Sighting
 from pipeline.calibration.estimate import View, place, rms_px
 from pipeline.calibration.lens import Optics
 from pipeline.geometry import apply, inverse, rotation_angle_rad
@@ -47,7 +47,7 @@ def look(sighting: Sighting, optics: Optics, oriented: bool) -> Look:
 
 def start(
     looks: Sequence[Look], optics: Sequence[Optics], names: Sequence[str], turns: Sequence[FloatArray]
-) -> tuple[Placement, tuple[Sighting, ...]]:
+) -> tuple[Bundle, tuple[Sighting, ...]]:
     """Where cameras and boards are, roughly, and the sightings with the board of a moment the same way up.
 
     Cameras are linked in the order of how many moments they share with those that are linked already.
@@ -83,7 +83,7 @@ def start(
         T_first_board, turned = _agreed([one[moment] for one in of if moment in one], optics, cameras, turns)
         boards.append(T_first_board)
         sightings += turned
-    return Placement(tuple(cameras), tuple(boards)), tuple(sightings)
+    return Bundle(tuple(optics), tuple(cameras), tuple(boards)), tuple(sightings)
 
 
 def _unlinked(linked: Sequence[int], names: Sequence[str]) -> str:

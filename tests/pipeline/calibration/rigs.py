@@ -6,7 +6,6 @@ import numpy as np
 
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import Calibration, View, calibrate
-from pipeline.calibration.lens import FREE
 from pipeline.calibration.rig import Seen
 from pipeline.geometry import apply, inverse, look_at, project, rigid, rotation_exp
 from pipeline.types import CameraIntrinsics, FloatArray
@@ -26,22 +25,7 @@ class Session:
     T_first_board: list[FloatArray]
     seen: dict[str, dict[str, Seen]]
 
-    def known_lenses(self) -> dict[str, Calibration]:
-        """The true lenses, as sure as can be."""
-        return {
-            name: Calibration(
-                "thesis",
-                (camera.width_px, camera.height_px),
-                camera.matrix,
-                camera.distortion,
-                FREE["thesis"],
-                np.zeros((6, 6)),
-                (),
-            )
-            for name, camera in self.cameras.items()
-        }
-
-    def estimated_lenses(self) -> dict[str, Calibration]:
+    def lenses(self) -> dict[str, Calibration]:
         """From each camera's own views."""
         return {
             name: calibrate(
