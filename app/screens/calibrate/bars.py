@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from app.drawing.colors import BRAND, LOSS, NEUTRAL, SOURCE, css
@@ -37,9 +37,8 @@ class Bar:
     """Whether it is proposed to drop it."""
 
 
-def bars_of(camera: CameraView) -> tuple[Bar, ...]:
-    """A bar for each photograph."""
-    suspects = {one.name for one in camera.outliers}
+def bars_of(camera: CameraView, suspects: Collection[str] = ()) -> tuple[Bar, ...]:
+    """A bar for each photograph; ``suspects`` are those that stand out."""
     bars = []
     for photograph in camera.photographs:
         name, fitted = photograph.name, camera.fitted(photograph.name)

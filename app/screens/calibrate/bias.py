@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from app.screens.calibrate.files import depth_file
-from app.screens.calibrate.request import board_of
+from app.screens.calibrate.request import board_of, shots_of
 from app.screens.calibrate.view import BiasView, CameraView
 from app.state import BoardViews
 from app.store import Store
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import Progress
-from pipeline.calibration.board import Board
 from pipeline.calibration.depth_bias import DepthFit, fit_depth
 from pipeline.calibration.depth_samples import DepthSamples, board_depth_samples
 from pipeline.calibration.estimate import View
@@ -51,22 +49,21 @@ def bias_of(
     def compute() -> Generator[Progress, None, DepthFound | str]:
         yield Progress(f"depth of {camera.name} against the board", done)
         try:
-            fit, samples = fit_bias(Path(views.folder), camera, board_of(views))
+            fit, samples = fit_bias(views, camera)
         except PacketMeshError as error:
             return str(error)
         return DepthFound(fit.correction, bias_view(fit, samples))
 
-    key = (f"bias-{camera.name}", replace(views, dropped=()), camera.dropped)
+    key = (f"bias-{camera.name}", views)
     return (yield from store.remember(key, compute))
 
 
-def fit_bias(folder: Path, camera: CameraView, board: Board) -> tuple[DepthFit, DepthSamples]:
+def fit_bias(views: BoardViews, camera: CameraView) -> tuple[DepthFit, DepthSamples]:
     """Estimate the bias.
 
     Args:
-        folder: of the photographs.
-        camera: that took them.
-        board: what they show.
+        views: the photographs.
+        camera: that took some of them.
 
     Raises:
         InputError: no lens, or too few depth images.
@@ -75,16 +72,23 @@ def fit_bias(folder: Path, camera: CameraView, board: Board) -> tuple[DepthFit, 
     lens = camera.calibration
     if lens is None:
         raise InputError(f"{camera.name} has no lens yet, and depth is judged through it; {camera.reason}")
-    views = [View(one.name, one.points_px, one.board_m) for one in lens.views]
-    files = [depth_file(folder, camera.name, view.name) for view in views]
+    board = board_of(views)
+    seen = [View(one.name, one.points_px, one.board_m) for one in lens.views]
+    files = [depth_file(views, camera.name, view.name) for view in seen]
     if not any(files):
         raise InputError(
             f"There are no depth images beside the photographs of {camera.name}; add depth_00.png beside "
             "color_00.png and so on"
         )
     depths = [None if file is None else read_depth(file) for file in files]
-    samples = board_depth_samples(views, depths, lens, board)
+    samples = board_depth_samples(seen, depths, lens, board)
     return fit_depth(samples), samples
+
+
+def depth_file(views: BoardViews, camera: str, moment: str) -> Path | None:
+    """The depth image of a view, on the pixels of its photograph; None without one."""
+    (node,) = (one for one in shots_of(views) if one.name == camera)
+    return next((shot.depth for shot in node.shots if shot.moment == moment and shot.infrared is None), None)
 
 
 def bias_view(fit: DepthFit, samples: DepthSamples) -> BiasView:

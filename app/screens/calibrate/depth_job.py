@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from pathlib import Path
 
 import cv2
 import numpy as np
 
 from app.records import Picture
-from app.screens.calibrate.bias import bias_of
-from app.screens.calibrate.files import depth_file
-from app.screens.calibrate.job import camera_of
+from app.screens.calibrate.bias import bias_of, depth_file
+from app.screens.calibrate.cameras import cameras_of, finished
 from app.screens.calibrate.maps import off_picture
 from app.screens.calibrate.request import board_of
 from app.screens.calibrate.view import DepthErrorView
@@ -31,15 +29,17 @@ def depth_job(store: Store, spec: Spec, name: str, view: str) -> Generator[Progr
     """What a view's depth is off by on the board; no picture where there is no depth or no board."""
     views = spec.views
     assert views is not None
-    camera = yield from camera_of(store, views, name)
-    path, fitted = depth_file(Path(views.folder), name, view), camera.fitted(view)
-    if path is None or fitted is None or camera.calibration is None:
+    known = yield from finished(cameras_of(store, views))
+    camera = known.camera(name)
+    fitted = None if camera is None else camera.fitted(view)
+    path = depth_file(views, name, view)
+    if camera is None or camera.calibration is None or path is None or fitted is None:
         return DepthErrorView(name, view, {})
     depth = read_depth(path)
     found = yield from bias_of(store, views, camera)
     off_m = depth.z_m - board_depth_m(camera.calibration, fitted.T_camera_board, board_of(views))
-    known_m = np.abs(off_m[np.isfinite(off_m)])
-    most_m = max(float(np.quantile(known_m, 0.95)), LEAST_SCALE_M) if len(known_m) else LEAST_SCALE_M
+    off_most_m = np.abs(off_m[np.isfinite(off_m)])
+    most_m = max(float(np.quantile(off_most_m, 0.95)), LEAST_SCALE_M) if len(off_most_m) else LEAST_SCALE_M
     zoom = camera.photographs[0].zoom
     pictures: dict[str, Picture] = {
         "off-before": off_picture(off_m, most_m, zoom, "Depth as measured, less the board's plane"),

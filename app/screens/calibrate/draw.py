@@ -1,4 +1,4 @@
-"""Boards and cameras in space: as the camera sees them, or as the board does."""
+"""Boards and cameras in space: as a camera sees them, as the board does, or all cameras of a rig."""
 
 from __future__ import annotations
 
@@ -8,27 +8,29 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.drawing.cameras import Stage
-from app.drawing.clouds import clear
+from app.drawing.cameras import Stage, add_camera
+from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import BRAND, NEUTRAL, SOURCE, TARGET
 from app.drawing.poses import place
+from app.records import SceneView
 from app.screens.calibrate.labels import Around
 from app.screens.calibrate.photograph import decoded, picture_of
-from app.screens.calibrate.view import CameraView
+from app.screens.calibrate.view import CalibrationView, CameraView, RigView
 from pipeline.calibration.board import Board
-from pipeline.geometry import inverse, look_at
+from pipeline.geometry import inverse
+from pipeline.io.rigs import LEVEL_POSE
 from pipeline.types import FloatArray
 
 BELOW = "/calibrate"
-LEVEL = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
-"""(4, 4) of what stays, upright and looking along +y."""
 FACES = np.array([[0, 1, 2], [0, 2, 3]])
 RIM = 0.9
 """Of the board beyond its outer points, in its spacing."""
+FAR = 0.95
+"""How far away one stands, over the size of what is seen."""
 
 
 class BoardsDrawing:
-    """The boards of one camera's views, or the cameras around one board, of which one is chosen."""
+    """The boards of one camera's views, the cameras around one board, or those of a rig; one view is chosen."""
 
     def __init__(self, scene: viser.SceneApi, on_pick: Callable[[str], None]) -> None:
         """Draw nothing yet; ``on_pick`` is called, on any thread, with a view that was clicked."""
@@ -36,26 +38,50 @@ class BoardsDrawing:
         self._handles: dict[str, Any] = {}
         self._dropped: frozenset[str] = frozenset()
 
-    def draw(self, camera: CameraView | None, board: Board | None, around: Around, chosen: str) -> None:
-        """Draw another camera's views."""
+    def draw_scene(self, scene: SceneView | None) -> None:
+        """Draw what the cameras see, as nothing is known of a board."""
         clear(self._scene, BELOW)
-        self._handles, self._around = {}, around
-        if camera is None or camera.calibration is None or board is None:
-            return
-        poses = {}
-        for photograph in camera.photographs:
-            fitted = camera.fitted(photograph.name)
-            if fitted is not None:
-                poses[photograph.name] = fitted.T_camera_board
-        self._dropped = frozenset(camera.dropped)
+        self._handles = {}
+        for node in () if scene is None else scene.nodes:
+            add_cloud(self._scene, f"{BELOW}/{node.name}/cloud", node.sensor, node.T_world_camera)
+            add_camera(self._scene, f"{BELOW}/{node.name}/camera", node, node.T_world_camera)
+
+    def draw_camera(self, camera: CameraView, board: Board, around: Around, chosen: str) -> None:
+        """Draw the views of a camera."""
+        clear(self._scene, BELOW)
+        self._handles, self._dropped = {}, frozenset(camera.dropped)
+        poses = poses_of(camera)
         if around == "camera":
-            self._add_frustum(camera, "camera", LEVEL, camera.name, chosen)
+            self._add_frustum("camera", LEVEL_POSE, camera, camera.name, 0.16, BRAND, chosen)
             for name, pose in poses.items():
-                self._add_board(board, name, LEVEL @ pose)
+                self._add_board(board, name, LEVEL_POSE @ pose)
         else:
-            self._add_board(board, "", LEVEL)
+            self._add_board(board, "", LEVEL_POSE)
             for name, pose in poses.items():
-                self._add_frustum(camera, name, LEVEL @ inverse(pose), name, name)
+                self._add_frustum(name, LEVEL_POSE @ inverse(pose), camera, name, 0.06, TARGET)
+        self.choose(chosen)
+
+    def draw_rig(self, view: CalibrationView, rig: RigView, scene: SceneView | None, chosen: str) -> None:
+        """Draw all cameras where the board puts them, beside where the scene has them."""
+        clear(self._scene, BELOW)
+        self._handles, self._dropped = {}, frozenset()
+        T_world_first = LEVEL_POSE
+        if scene is not None:
+            believed = {node.name: node.T_world_camera for node in scene.nodes}
+            T_world_first = believed.get(rig.cameras[0].name, LEVEL_POSE)
+            for node in scene.nodes:
+                add_cloud(self._scene, f"{BELOW}/{node.name}/cloud", node.sensor, node.T_world_camera)
+                camera = view.camera(node.name)
+                if camera is not None and node.name != rig.cameras[0].name:
+                    self._add_frustum(f"before-{node.name}", node.T_world_camera, camera, "", 0.12, NEUTRAL)
+        for one in rig.cameras:
+            camera = view.camera(one.name)
+            if camera is not None and camera.calibration is not None:
+                sure = f" ± {1000.0 * one.position_sd_m:.1f} mm" if one.position_sd_m else ""
+                pose = T_world_first @ one.T_first_camera
+                self._add_frustum(one.name, pose, camera, f"{one.name}{sure}", 0.12, BRAND)
+        for name, pose in rig.T_first_board.items():
+            self._add_board(view.board, name, T_world_first @ pose)
         self.choose(chosen)
 
     def choose(self, chosen: str) -> None:
@@ -67,68 +93,80 @@ class BoardsDrawing:
 
     def _add_board(self, board: Board, name: str, pose: FloatArray) -> None:
         """A sheet with its points; one without a name is the board of all views."""
-        low, high = board.points_m.min(axis=0), board.points_m.max(axis=0)
+        (left, upper, _), (right, lower, _) = board.points_m.min(axis=0), board.points_m.max(axis=0)
         rim = RIM * board.spacing_m
         corners = np.array(
             [
-                [low[0] - rim, low[1] - rim, 0.0],
-                [high[0] + rim, low[1] - rim, 0.0],
-                [high[0] + rim, high[1] + rim, 0.0],
-                [low[0] - rim, high[1] + rim, 0.0],
+                [left - rim, upper - rim, 0.0],
+                [right + rim, upper - rim, 0.0],
+                [right + rim, lower + rim, 0.0],
+                [left - rim, lower + rim, 0.0],
             ]
         )
         below = f"{BELOW}/board-{name or 'all'}"
+        opacity = 0.35 if name else 0.9
         sheet = self._scene.add_mesh_simple(
-            below, corners, FACES, color=TARGET, opacity=0.35 if name else 0.9, side="double"
+            below, corners, FACES, color=TARGET, opacity=opacity, side="double"
         )
         place(sheet, pose)
-        points = self._scene.add_point_cloud(
+        self._scene.add_point_cloud(
             f"{below}/points",
             board.points_m.astype(np.float32),
             np.array((30, 30, 30), np.uint8),
-            point_size=0.16 * board.spacing_m if name else 0.4 * board.spacing_m,
+            point_size=(0.16 if name else 0.4) * board.spacing_m,
             point_shape="circle",
             point_shading="flat",
         )
-        place(points, np.eye(4))
         if name:
             self._scene.add_label(f"{below}/name", name, position=tuple(corners[0]), font_screen_scale=0.8)
             self._handles[name] = sheet
             sheet.on_click(lambda _, name=name: self._on_pick(name))
 
-    def _add_frustum(self, camera: CameraView, name: str, pose: FloatArray, label: str, picture: str) -> None:
+    def _add_frustum(
+        self,
+        name: str,
+        pose: FloatArray,
+        camera: CameraView,
+        label: str,
+        scale: float,
+        color: tuple[int, int, int],
+        picture: str | None = None,
+    ) -> None:
+        """A camera; one that is named like a view can be clicked."""
         assert camera.calibration is not None
         width_px, height_px = camera.size_px
-        fov = 2.0 * float(np.arctan2(0.5 * height_px, camera.calibration.matrix[1, 1]))
-        around_camera = self._around == "camera"
         frustum = self._scene.add_camera_frustum(
             f"{BELOW}/frustum-{name}",
-            fov=fov,
+            fov=2.0 * float(np.arctan2(0.5 * height_px, camera.calibration.matrix[1, 1])),
             aspect=width_px / height_px,
-            scale=0.16 if around_camera else 0.06,
-            thickness=0.004 if around_camera else 0.002,
-            color=BRAND if around_camera else TARGET,
-            image=decoded(picture_of(camera, picture))[::4, ::4] if around_camera else None,
+            scale=scale,
+            thickness=0.025 * scale,
+            color=color,
+            image=None if picture is None else decoded(picture_of(camera, picture))[::4, ::4],
         )
         place(frustum, pose)
-        self._scene.add_label(
-            f"{BELOW}/frustum-{name}/name", label, position=(0.0, -0.1, 0.0), font_screen_scale=0.8
-        )
-        if not around_camera:
+        below = f"{BELOW}/frustum-{name}/name"
+        if label:
+            self._scene.add_label(below, label, position=(0.0, -0.9 * scale, 0.0), font_screen_scale=0.8)
+        if label == name and camera.fitted(name) is not None:
             self._handles[name] = frustum
             frustum.on_click(lambda _: self._on_pick(name))
 
 
-def place_of(camera: CameraView, around: Around) -> Stage | None:
-    """Where to stand to see all of it; None without a calibration."""
-    if camera.calibration is None:
-        return None
-    poses = [view.T_camera_board for view in camera.calibration.views]
-    spread_m = np.array([(LEVEL @ (pose if around == "camera" else inverse(pose)))[:3, 3] for pose in poses])
-    every_m = np.vstack([spread_m, np.zeros((1, 3))])
+def poses_of(camera: CameraView) -> dict[str, FloatArray]:
+    """(4, 4) T_camera_board by view."""
+    fitted = (camera.fitted(photograph.name) for photograph in camera.photographs)
+    return {view.name: view.T_camera_board for view in fitted if view is not None}
+
+
+def place_of(camera: CameraView, around: Around) -> Stage:
+    """Where to stand to see all views of a camera."""
+    poses = poses_of(camera).values()
+    spread = [LEVEL_POSE @ (pose if around == "camera" else inverse(pose)) for pose in poses]
+    every_m = np.array([np.zeros(3), *(pose[:3, 3] for pose in spread)])
     middle_m = 0.5 * (every_m.min(axis=0) + every_m.max(axis=0))
     size_m = max(float(np.linalg.norm(np.ptp(every_m, axis=0))), 0.5)
     direction = np.array([0.85, -0.75 if around == "camera" else -0.9, 0.55])
-    stand_m = middle_m + 1.15 * size_m * direction / np.linalg.norm(direction)
+    stand_m = middle_m + FAR * size_m * direction / np.linalg.norm(direction)
     right = np.cross(middle_m - stand_m, (0.0, 0.0, 1.0))
     return Stage(stand_m, middle_m, right / np.linalg.norm(right), size_m, middle_m)

@@ -8,7 +8,7 @@ from typing import Literal
 PictureName = Literal[
     "photo", "straightened", "uncertainty", "halves", "coverage", "next", "off-before", "off-after"
 ]
-Around = Literal["camera", "board"]
+Around = Literal["camera", "board", "rig"]
 """What stays in its place in space."""
 
 
@@ -29,4 +29,8 @@ PAIRS: dict[str, Pair] = {
     "depth error measured | corrected": Pair("off-before", "off-after"),
 }
 STRAIGHTENED, UNCERTAINTY, HALVES, COVERAGE, NEXT, DEPTH = PAIRS
-AROUND: dict[str, Around] = {"boards around the camera": "camera", "cameras around the board": "board"}
+AROUND: dict[str, Around] = {
+    "boards around the camera": "camera",
+    "cameras around the board": "board",
+    "cameras of the rig": "rig",
+}

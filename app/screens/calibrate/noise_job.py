@@ -6,18 +6,15 @@ import time
 from collections.abc import Generator, Sequence
 from dataclasses import replace
 
-import cv2
 import numpy as np
 
-from app.screens.calibrate.job import calibrate_job
+from app.screens.calibrate.cameras import cameras_of, finished
 from app.screens.calibrate.noise_view import NoiseRequest, NoiseView
-from app.screens.calibrate.view import CalibrationView
 from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import Progress
-from pipeline.calibration.board import Board
-from pipeline.calibration.estimate import Calibration, View, calibrate
+from pipeline.calibration.estimate import View, calibrate
 
 SHOW_S = 0.25
 """Between two pictures of what there is so far."""
@@ -34,13 +31,16 @@ def noise_job(
     Raises:
         InputError: the camera has no calibration.
     """
-    steps = calibrate_job(store, spec)
-    known = yield from _quietly(steps)
+    assert spec.views is not None
+    known = yield from finished(cameras_of(store, spec.views))
     camera = known.camera(request.camera)
     if camera is None or camera.calibration is None:
         raise InputError(f"There is no calibration of {request.camera} to repeat; add views first")
     true = camera.calibration
-    exact = [_exact(true, view.name, view.T_camera_board, known.board) for view in true.views]
+    exact = [
+        View(view.name, true.optics.project(view.board_m, view.T_camera_board), view.board_m)
+        for view in true.views
+    ]
     names = true.names
     view = NoiseView(request, names, np.array([true.parameters[name] for name in names]))
     told_s = time.monotonic()
@@ -59,24 +59,6 @@ def noise_job(
             yield Progress(f"trial {trial + 1} of {request.trials}", (trial + 1) / request.trials)
             yield _so_far(view, found, predicted)
     return _so_far(view, found, predicted)
-
-
-def _quietly(steps: Generator[object, None, CalibrationView]) -> Generator[Progress, None, CalibrationView]:
-    """The calibration without what it shows on its way."""
-    while True:
-        try:
-            step = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        if isinstance(step, Progress):
-            yield step
-
-
-def _exact(camera: Calibration, name: str, pose: np.ndarray, board: Board) -> View:
-    """Where a camera without noise would see the whole board."""
-    turn = cv2.Rodrigues(pose[:3, :3])[0]
-    points_px, _ = cv2.projectPoints(board.points_m, turn, pose[:3, 3], camera.matrix, camera.distortion)
-    return View(name, points_px.reshape(-1, 2), board.points_m)
 
 
 def _with_noise(views: Sequence[View], sigma_px: float, rng: np.random.Generator) -> list[View]:

@@ -8,20 +8,22 @@ from functools import partial
 from typing import Any, ClassVar, get_args
 
 from app.drawing.cameras import turn
+from app.records import SceneView
 from app.screens.calibrate.area import PictureArea
 from app.screens.calibrate.bars import Bars, bars_of
 from app.screens.calibrate.depth import DepthFolder
 from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of
-from app.screens.calibrate.files import board_views
 from app.screens.calibrate.labels import AROUND, DEPTH
 from app.screens.calibrate.noise import NoiseFolder
 from app.screens.calibrate.noise_view import NoiseRequest
 from app.screens.calibrate.numbers import parameter_table, summary_table
 from app.screens.calibrate.photograph import found_picture, picture_of, straightened_picture
+from app.screens.calibrate.request import views_in
+from app.screens.calibrate.rig import RigFolder
 from app.screens.calibrate.trust import TrustFolder, verdict_html
 from app.screens.calibrate.uploads import UploadFolder
 from app.screens.calibrate.use import WRITING, UseRow
-from app.screens.calibrate.view import CalibrationView, CameraView, DepthErrorView, TrustView
+from app.screens.calibrate.view import CalibrationView, CameraView, DepthErrorView, RigView, TrustView
 from app.state import BoardViews, Spec, Step
 from app.ui import Panel
 from packetmesh.errors import InputError
@@ -101,6 +103,7 @@ class CalibratePanel(Panel):
         with gui.add_folder("Every parameter, and how sure it is", expand_by_default=False):
             self._parameters = gui.add_html("")
         self._depth = DepthFolder(ui)
+        self._rig = RigFolder(ui)
         self._noise = NoiseFolder(ui, self._replay, session.cancel_side_job)
         self._uploads = UploadFolder(ui, session.folder, self._use_own)
         with gui.add_folder("Advanced", expand_by_default=False):
@@ -129,7 +132,7 @@ class CalibratePanel(Panel):
         self._own = views is not None
         if views is None and isinstance(self._source, Demo):
             folder = board_views_of(self._source.name)
-            views = None if folder is None else board_views(folder)
+            views = None if folder is None else views_in(folder)
         self._want(views)
 
     def _open_scene(self, name: str) -> None:
@@ -163,6 +166,8 @@ class CalibratePanel(Panel):
         if step == "scene":
             self._uploads.cameras([node.name for node in view.nodes])
             self._judge.at_range([0.5 * (node.nearest_m + node.farthest_m) for node in view.nodes])
+            if self._view is None:
+                self._draw()
         if step == "surface" and self.session.results.fresh("surface", self.session.spec):
             self._use.surface(view.after, isinstance(self.session.spec.source, Calibrated))
         if step == "calibrate":
@@ -209,12 +214,14 @@ class CalibratePanel(Panel):
             self._verdict.content = self._numbers.content = self._parameters.content = ""
             self._judge.load(None)
             self._depth.load("")
+            self._rig.load(None)
             return
         before = self._whole.get(camera.name)
         pair = [camera] if before is None or not camera.dropped else [camera, before]
         self._numbers.content = summary_table(pair, ("now", "all views") if len(pair) > 1 else ())
         self._parameters.content = parameter_table(camera)
         self._depth.load(self._view.depth.get(camera.name))
+        self._rig.load(self._view.rig)
 
     def _show_view(self) -> None:
         """Show the chosen view, and what is known of its pixels."""
@@ -228,13 +235,16 @@ class CalibratePanel(Panel):
         photograph = picture_of(camera, self._chosen)
         pictures = {"photo": found_picture(photograph, camera.fitted(photograph.name))}
         if camera.calibration is not None:
-            pictures["straightened"] = straightened_picture(photograph, camera.calibration)
+            pictures["straightened"] = straightened_picture(
+                pictures["photo"], camera.calibration, photograph.zoom
+            )
         if self._trust is not None and self._trust.request.camera == camera.name:
             pictures |= self._trust.pictures
         if self._off is not None and (self._off.camera, self._off.view) == (camera.name, self._chosen):
             pictures |= self._off.pictures
         self._area.load(pictures)
-        self._bars.show(bars_of(camera), self._chosen)
+        trusted = self._trust is not None and self._trust.request.camera == camera.name
+        self._bars.show(bars_of(camera, self._trust.outliers if trusted else ()), self._chosen)
         self._ask()
 
     def _pick(self, name: str) -> None:
@@ -334,21 +344,27 @@ class CalibratePanel(Panel):
     # What is drawn.
 
     def _draw(self) -> None:
-        camera, around = self._shown(), AROUND[self._around.value]
+        camera, view, around = self._shown(), self._view, AROUND[self._around.value]
+        scene: SceneView | None = self.session.results.view("scene")
         with self.ui.atomic():
-            self._drawing.draw(camera, self._view and self._view.board, around, self._chosen)
+            if view is None or camera is None or camera.calibration is None:
+                self._drawing.draw_scene(scene)
+            elif around == "rig" and isinstance(view.rig, RigView):
+                self._drawing.draw_rig(view, view.rig, scene, self._chosen)
+            else:
+                self._drawing.draw_camera(camera, view.board, around, self._chosen)
         if self._here:
-            self.look()
+            self.session.frame_view()
 
     def look(self) -> bool:
-        """Turn the view to the boards when there are others."""
+        """Turn the view to the boards when there are others; the cameras of a rig stand in the scene."""
         camera, around = self._shown(), AROUND[self._around.value]
-        stage = None if camera is None else place_of(camera, around)
-        if camera is None or stage is None:
+        if camera is None or camera.calibration is None or around == "rig":
+            self._framed = ()
             return False
         framed = (camera.name, around, len(camera.photographs))
         if framed != self._framed:
-            self._framed = framed
+            self._framed, stage = framed, place_of(camera, around)
             for client in self.session.clients():
                 turn(client, stage.middle_m, stage.viewpoint_m)
         return True

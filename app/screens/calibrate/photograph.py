@@ -48,10 +48,13 @@ def decoded(photograph: Photograph) -> ByteArray:
     return np.ascontiguousarray(bgr[..., ::-1])
 
 
-def straightened_picture(photograph: Photograph, camera: Calibration) -> Picture:
-    """The photograph as a lens without distortion would have taken it."""
-    matrix = scaled_matrix(camera.matrix, photograph.zoom)
-    rgb = cv2.undistort(decoded(photograph), matrix, camera.distortion)
+def straightened_picture(found: Picture, camera: Calibration, zoom: float) -> Picture:
+    """A photograph, with what is drawn over it, as a lens without distortion would have taken it."""
+    matrix = scaled_matrix(camera.matrix, zoom)
+    if camera.lens == "fisheye":
+        rgb = cv2.fisheye.undistortImage(found.rgb, matrix, camera.distortion, Knew=matrix)
+    else:
+        rgb = cv2.undistort(found.rgb, matrix, camera.distortion)
     return Picture(rgb, "Straightened: edges that are straight in the world are straight here")
 
 

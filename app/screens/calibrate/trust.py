@@ -96,7 +96,6 @@ def verdict_html(view: TrustView | None) -> str:
 
 def trust_table(view: TrustView) -> str:
     """HTML: what noise leaves, and what two halves of the views say of each other."""
-    seen, noise = view.halves_px or (None, None)
     return table(
         [
             (
@@ -112,15 +111,15 @@ def trust_table(view: TrustView) -> str:
                 number(view.difference_m, 2, "mm", 1000.0),
             ),
             (
-                "The same in px",
-                "Root mean square over the image.",
-                number(seen, 3, "px"),
+                "Over what noise explains",
+                "The difference of the halves over what noise alone lets one expect: near 1 if the lens is right.",
+                "–" if view.halves is None else f"{view.halves[0]:.2f} ×",
             ),
             (
-                "Noise explains",
-                "Noise alone puts the two halves apart by less in 95 of 100 cases; what is more is the lens, a view "
-                "or a board that is wrong.",
-                number(noise, 3, "px"),
+                "By chance up to",
+                "Noise alone makes that ratio smaller in 95 of 100 cases; what is more is a lens, a view or a board that "
+                "is wrong.",
+                "–" if view.halves is None else f"{view.halves[1]:.2f} ×",
             ),
         ]
     )

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 
 import numpy as np
 
-from app.screens.calibrate.job import camera_of
+from app.screens.calibrate.cameras import cameras_of, finished
 from app.screens.calibrate.maps import coverage_picture, map_picture, next_picture
-from app.screens.calibrate.request import board_of
 from app.screens.calibrate.view import CameraView, TrustRequest, TrustView
 from app.state import Spec
 from app.store import Store
-from packetmesh.errors import InputError, PacketMeshError
+from packetmesh.errors import InputError
 from packetmesh.progress import Progress
+from pipeline.calibration.assess import Trust, assess
 from pipeline.calibration.board import Board
-from pipeline.calibration.diagnosis import coverage, radial_curve, radial_residuals
+from pipeline.calibration.diagnosis import radial_curve, radial_residuals
 from pipeline.calibration.estimate import Calibration, View
-from pipeline.calibration.next_view import NextView, next_view
-from pipeline.calibration.trust import CIRCLE95, HalfDifference, half_difference_px, projected_sd_px
-from pipeline.calibration.verdict import Verdict, verdict
+from pipeline.calibration.trust import CIRCLE95
 from pipeline.types import FloatArray
-
-FAR_BEYOND = 2.0
-"""Times what noise explains: from there on a difference is told that does not matter for what is asked."""
-WIDER = {"thesis": "brown", "brown": "rational", "rational": "fisheye", "fisheye": "rational"}
 
 
 def trust_job(store: Store, spec: Spec, request: TrustRequest) -> Generator[Progress, None, TrustView]:
@@ -35,96 +29,83 @@ def trust_job(store: Store, spec: Spec, request: TrustRequest) -> Generator[Prog
     """
     views = spec.views
     assert views is not None
-    camera = yield from camera_of(store, views, request.camera)
+    known = yield from finished(cameras_of(store, views))
+    camera = known.camera(request.camera)
+    if camera is None or camera.calibration is None:
+        raise InputError(f"{request.camera} has no lens to judge; add views of the board first")
 
     def judge() -> Generator[Progress, None, TrustView]:
         yield Progress(f"trust in {camera.name}", 0.5)
-        return _judged(camera, request, board_of(views))
+        return _judged(camera, request, known.board)
 
-    key = ("trust", views.folder, views.edition, board_of(views), views.lens, camera.dropped, request)
-    return (yield from store.remember(key, judge))
+    return (yield from store.remember(("trust", views, request), judge))
 
 
 def _judged(camera: CameraView, request: TrustRequest, board: Board) -> TrustView:
     lens = camera.calibration
-    if lens is None:
-        raise InputError(camera.reason)
-    sd = projected_sd_px(lens, request.range_m)
-    halves = _halves(lens, request.range_m)
-    following = _following(lens, board, request.range_m)
-    judged = verdict(lens, sd, halves, request.accuracy_m, following)
+    assert lens is not None
+    views = [View(one.name, one.points_px, one.board_m) for one in lens.views]
+    trust = assess(lens, views, board, request.range_m, request.accuracy_m)
     zoom = camera.photographs[0].zoom
     size_px = (round(lens.size_px[0] * zoom), round(lens.size_px[1] * zoom))
-    noise_m = CIRCLE95 * sd.error_m
-    apart_m = None if halves is None else halves.map.error_m
+    noise_m = CIRCLE95 * trust.sd.error_m
+    apart_m = None if trust.halves is None else trust.halves.map.error_m
     most_m = _most_m(noise_m, apart_m)
     at = f"at {request.range_m:g} m"
     pictures = {
-        "uncertainty": map_picture(noise_m, most_m, size_px, f"Noise leaves a point {at} within, 95 %"),
-        "coverage": coverage_picture(coverage(lens.views, lens.size_px), lens.views, zoom, size_px),
+        "uncertainty": map_picture(
+            noise_m, most_m, size_px, f"95 times in 100 noise moves a point {at} less than"
+        ),
+        "coverage": coverage_picture(trust.coverage, lens.views, zoom, size_px),
     }
     if apart_m is not None:
-        told = f"Two halves of the views put a point {at} apart by"
-        pictures["halves"] = map_picture(apart_m, most_m, size_px, told)
-    if following is not None:
-        pictures["next"] = next_picture(following, lens, zoom, size_px)
+        pictures["halves"] = map_picture(
+            apart_m, most_m, size_px, f"Two halves of the views put a point {at} apart by"
+        )
+    if trust.following is not None:
+        pictures["next"] = next_picture(trust.following, lens, zoom, size_px)
     return TrustView(
         request,
-        judged.passed,
-        _lines(judged, lens, halves, following),
+        trust.verdict.passed,
+        tuple(_lines(trust, lens)),
+        tuple(one.name for one in trust.outliers),
         pictures,
         radial_curve(lens),
         radial_residuals(lens),
         _rms(noise_m),
         None if apart_m is None else _rms(apart_m),
-        None if halves is None else (halves.rms_px, halves.noise_px),
+        None if trust.halves is None else (trust.halves.ratio, trust.halves.most_by_noise),
     )
 
 
-def _halves(lens: Calibration, range_m: float) -> HalfDifference | None:
-    """None where there are too few views for halves, or one of them does not determine the lens."""
-    views = [View(one.name, one.points_px, one.board_m) for one in lens.views]
-    try:
-        return half_difference_px(views, lens.size_px, range_m, lens.lens)
-    except PacketMeshError:
-        return None
-
-
-def _following(lens: Calibration, board: Board, range_m: float) -> NextView | None:
-    try:
-        return next_view(lens, board, range_m)
-    except PacketMeshError:
-        return None
-
-
-def _lines(
-    judged: Verdict, lens: Calibration, halves: HalfDifference | None, following: NextView | None
-) -> tuple[str, ...]:
-    """The verdict, and what to do in the words of the screen."""
+def _lines(trust: Trust, lens: Calibration) -> Iterator[str]:
+    """The verdict, and what to do, in the words of the screen."""
+    judged, halves, following = trust.verdict, trust.halves, trust.following
     asked = f"{1000.0 * judged.accuracy_m:g} mm at {judged.range_m:g} m"
     most = 1000.0 * judged.error_of_most_m
-    reached = f"{most:.2g} mm" if np.isfinite(most) else "more than can be told"
-    lines = [
-        f"{'Good enough' if judged.passed else 'Not good enough'} for {asked}: a point is placed as well over "
-        f"{judged.share:.0%} of the image, and within {reached} over 95 % of it."
-    ]
-    if halves is not None and halves.beyond_noise and (not judged.passed or _far_beyond(halves)):
-        lines.append(
-            f"Two halves of the views differ by {halves.rms_px:.2g} px, where noise explains "
-            f"{halves.noise_px:.2g}: the lens is of the wrong kind, or a view or the board is. Try the lens "
-            f"{WIDER[lens.lens]} under Advanced, or drop views that stand out."
+    reached = f"within {most:.2g} mm" if np.isfinite(most) else "nowhere, as the lens folds back,"
+    yield (
+        f"{'Good enough' if judged.passed else 'Not good enough'} for {asked}: so well a point is placed over "
+        f"{100.0 * judged.share:.0f} % of the image, and {reached} over 95 % of it."
+    )
+    if halves is not None and halves.beyond_noise and not judged.passed:
+        yield (
+            f"Two halves of the views differ by {halves.ratio:.1f} times what noise explains (by chance up to "
+            f"{halves.most_by_noise:.1f}): the lens is of the wrong kind, or a view or the board is wrong. Try another "
+            "lens under Advanced, or drop the views that stand out."
         )
-    if not judged.passed and following is not None:
-        lines.append(
-            f"The view to take next (Right side) would bring {1000.0 * following.error_before_m:.2g} mm to "
-            f"{1000.0 * following.error_after_m:.2g} mm."
+    elif following is not None and not judged.passed:
+        yield (
+            f"The next view to take (under Compare) is predicted to bring {1000.0 * following.error_before_m:.2g} mm "
+            f"to {1000.0 * following.error_after_m:.2g} mm."
         )
-    return tuple(lines)
-
-
-def _far_beyond(halves: HalfDifference) -> bool:
-    """Whether there is more than noise to a difference that is small enough for what is asked."""
-    return halves.rms_px > FAR_BEYOND * halves.noise_px
+    if trust.outliers:
+        names = ", ".join(one.name for one in trust.outliers)
+        worst = trust.outliers[0]
+        yield (
+            f"Out of line: view {names}, red below; {worst.name} has {worst.rms_px:.2f} px where the others have "
+            f"{worst.others_px:.2f}. Look at it, then drop it or not."
+        )
 
 
 def _most_m(noise_m: FloatArray, apart_m: FloatArray | None) -> float:

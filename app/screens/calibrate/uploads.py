@@ -12,17 +12,18 @@ from typing import get_args
 
 import viser
 
-from app.screens.calibrate.files import ENDINGS, board_views, camera_files
+from app.screens.calibrate.request import shots_of, views_in
 from app.state import BoardViews
 from app.ui import Ui
 from packetmesh.errors import InputError
+from pipeline.calibration.shots import BOARD_FILE
 from pipeline.config import Pattern
 
 TEXT = """Photograph a flat board of circles or squares from eight or more directions, tilted by 20 to 40°, also
 into the corners of the image. `packetmesh target` prints one. Add the photographs one by one, or all in a ZIP,
 with a folder for each camera (node_00, node_01 …) if there are several; depth images beside them
 (depth_05.png of color_05.png) tell what the depth sensor is off by."""
-BOARD = "board.json"
+ENDINGS = (".png", ".jpg", ".jpeg")
 UPLOAD_LIMIT_BYTES = 64 << 20
 UNPACKED_LIMIT_BYTES = 256 << 20
 MOST_FILES = 240
@@ -89,9 +90,10 @@ class UploadFolder:
             self._folder = self._below / f"photographs_{self._edition:03d}"
         self._edition += 1
         kept = keep_photographs(file, self._folder, self._node.value)
-        if BOARD in kept:
-            self._write(board_views(self._folder))
-        count = sum(len(files) for files in camera_files(self._folder).values())
+        views = views_in(self._folder)
+        if BOARD_FILE in kept:
+            self._write(views)
+        count = sum(len(node.shots) for node in shots_of(views))
         noun = "photograph" if count == 1 else "photographs"
         self._have.content = (
             f"**{count} {noun}**, the last {kept[-1]}. Add more, or press *Find the cameras*."
@@ -151,7 +153,7 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
     try:
         with zipfile.ZipFile(io.BytesIO(file.content)) as archive:
             inside = [
-                one for one in archive.infolist() if one.filename.lower().endswith((*ENDINGS, BOARD))
+                one for one in archive.infolist() if one.filename.lower().endswith((*ENDINGS, BOARD_FILE))
             ]
             if sum(one.file_size for one in inside) > UNPACKED_LIMIT_BYTES:
                 raise InputError(
@@ -164,7 +166,7 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
             }
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error):
         raise InputError(f"{file.name} cannot be read as a ZIP; pack the photographs again.") from None
-    if not set(found) - {BOARD}:
+    if not set(found) - {BOARD_FILE}:
         raise InputError(f"{file.name} holds no PNG or JPEG; try a ZIP of photographs.")
     return found
 
@@ -172,7 +174,7 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
 def _place(name: str, node: str) -> str:
     """``NODE/NAME`` of a file, in the node's folder that its own path names or else in ``node``."""
     path = PurePosixPath(name.replace("\\", "/"))
-    if path.name == BOARD:
-        return BOARD
+    if path.name == BOARD_FILE:
+        return BOARD_FILE
     named = next((part for part in path.parts[:-1] if re.fullmatch(r"node_\d\d", part)), node)
     return f"{named}/{re.sub(r'[^A-Za-z0-9._-]', '-', path.name)[-60:]}"

@@ -8,7 +8,6 @@ from app.records import Picture
 from pipeline.calibration.board import Board
 from pipeline.calibration.diagnosis import RadialCurve, RadialResiduals
 from pipeline.calibration.estimate import Calibration, FittedView
-from pipeline.calibration.outliers import OutlierView
 from pipeline.types import FloatArray
 
 
@@ -50,8 +49,6 @@ class CameraView:
     """Every view by a lens that has not seen it: those held out in turn, and those that were dropped."""
     dropped: tuple[str, ...] = ()
     """Names of the views that are left out."""
-    outliers: tuple[OutlierView, ...] = ()
-    """Those that one may leave out."""
     truth: dict[str, float] = field(default_factory=dict)
     """Parameters as they truly are, by name; empty for real cameras."""
 
@@ -94,12 +91,42 @@ class BiasView:
 
 
 @dataclass(frozen=True, slots=True)
+class PlacedCamera:
+    """Where a camera of a rig stands, and how sure that is."""
+
+    name: str
+    T_first_camera: FloatArray
+    """(4, 4) in the frame of the first camera."""
+    moments: int
+    """At which it sees the board together with the first; of the first, all of its own."""
+    rotation_sd_deg: float = 0.0
+    position_sd_m: float = 0.0
+    held_out_rotation_deg: float | None = None
+    """The most by which its pose changes when a part of the moments is left out; None if none was."""
+    held_out_position_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RigView:
+    """Cameras and boards in the frame of the first camera."""
+
+    cameras: tuple[PlacedCamera, ...]
+    T_first_board: dict[str, FloatArray]
+    """(4, 4) by moment."""
+    rms_px: float
+    held_out_rms_px: float | None
+    """In moments that had no part in the poses."""
+
+
+@dataclass(frozen=True, slots=True)
 class CalibrationView:
     """All cameras of which there are photographs; while they are computed, those that are done."""
 
     board: Board
-    cameras: tuple[CameraView, ...]
-    depth: dict[str, BiasView | str]
+    cameras: tuple[CameraView, ...] = ()
+    rig: RigView | str | None = None
+    """All of them together, or why that cannot be; None for one camera, and while it is to come."""
+    depth: dict[str, BiasView | str] = field(default_factory=dict)
     """By camera: the bias of its depth, or why it is not known; without those that are still to come."""
 
     def camera(self, name: str) -> CameraView | None:
@@ -125,6 +152,8 @@ class TrustView:
     passed: bool
     lines: tuple[str, ...]
     """The verdict in a sentence, and what to do, in some more."""
+    outliers: tuple[str, ...]
+    """Views that stand out, the worst first."""
     pictures: dict[str, Picture]
     """Of the size of the thinned photographs: what is known of each pixel."""
     bends: RadialCurve
@@ -133,8 +162,8 @@ class TrustView:
     """Within which noise leaves a point 95 times in 100, root mean square over the image."""
     difference_m: float | None
     """Between two halves of the views, likewise; None with too few of them."""
-    halves_px: tuple[float, float] | None
-    """That difference in px, and what noise alone makes it at most in 95 of 100 cases."""
+    halves: tuple[float, float] | None
+    """That difference over what noise lets one expect, and how much that is at most in 95 of 100 cases."""
 
 
 @dataclass(frozen=True, slots=True)
