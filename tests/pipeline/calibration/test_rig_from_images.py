@@ -81,15 +81,14 @@ def test_without_a_rig_the_first_camera_stands_level(report, tmp_path):
 
 
 def test_what_is_wrong_with_one_camera_names_it(tmp_path):
-    touch = [(name, index) for name in ("node_00", "node_01") for index in range(3)]
-    for name, index in touch:
-        (tmp_path / name).mkdir(exist_ok=True)
-        write_color(tmp_path / name / f"color_{index}.png", np.full((60, 80, 3), 200, np.uint8))
+    for name in ("node_00", "node_01"):
+        for index in range(3):
+            write_color(tmp_path / name / f"color_{index}.png", np.full((60, 80, 3), 200, np.uint8))
     board = board_beside([SESSION])
     with pytest.raises(InputError, match=r"^node_00: The board .* is found in 0 of 3 images"):
         drain(iterate_rig_calibration(node_shots([tmp_path]), board))
     write_color(tmp_path / "node_00" / "color_9.png", np.full((50, 80, 3), 200, np.uint8))
-    with pytest.raises(InputError, match="^node_00: The images are not of one size"):
+    with pytest.raises(InputError, match=r"^node_00: The images are not of one size"):
         drain(iterate_rig_calibration(node_shots([tmp_path]), board))
     with pytest.raises(InputError, match=r"^node_09/color_00\.jpg is none of the cameras' images"):
         drain(iterate_rig_calibration(node_shots([tmp_path]), board, without=["node_09/color_00.jpg"]))
