@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from pipeline.calibration.depth_samples import DepthSamples
 from pipeline.types import DepthNoise, FloatArray
 
 PARTS, FEWEST = 4, 60
 """Each view gives so many points to the law, nearest to farthest, of at least so many pixels."""
-MOST_EXPONENT = 5.0
+BENDS = 24
+"""Places along the measured distances where the law may bend."""
 CLIP_SDS = 4.0
 RESAMPLES = 200
 LEAST_M = 1e-5
@@ -94,19 +95,31 @@ def _select(points: NoisePoints, rows: FloatArray) -> NoisePoints:
 
 
 def _law(points: NoisePoints) -> DepthNoise:
-    """Least squares on the logarithm, robust, so that near and far count alike."""
+    """Least squares on the logarithm, so that near and far count alike.
+
+    The law has a bend where s1 z^p reaches s0. For each place that the bend may have it is linear; the one
+    with the smallest squares is taken.
+    """
     log_z, log_cos, log_sd = np.log(points.z_m), np.log(points.cosine), np.log(points.sd_m)
+    best, least = DepthNoise(LEAST_M, LEAST_M, 0.0, 0.0), np.inf
+    for bend in np.linspace(log_z.min(), log_z.max(), BENDS, endpoint=False):
+        columns = np.column_stack([np.ones(len(log_z)), np.maximum(log_z - bend, 0.0), -log_cos])
+        (log_s0, p, q), squares = _not_negative(columns, log_sd)
+        if squares < least:
+            best, least = DepthNoise(math.exp(log_s0), math.exp(log_s0 - p * bend), p, q), squares
+    return best
 
-    def errors(x: FloatArray) -> FloatArray:
-        return np.maximum(x[0], x[1] + x[2] * log_z) - x[3] * log_cos - log_sd
 
-    least, middle = float(log_sd.min()), float(np.median(log_sd))
-    start = np.array([least, middle - 2.0 * float(np.median(log_z)), 2.0, 0.5])
-    low = np.array([np.log(LEAST_M), -np.inf, 0.0, 0.0])
-    high = np.array([np.inf, np.inf, MOST_EXPONENT, MOST_EXPONENT])
-    start = np.clip(start, low + 1e-9, high)
-    x = least_squares(errors, start, bounds=(low, high), loss="soft_l1", f_scale=0.2).x
-    return DepthNoise(float(np.exp(x[0])), float(np.exp(x[1])), float(x[2]), float(x[3]))
+def _not_negative(columns: FloatArray, values: FloatArray) -> tuple[list[float], float]:
+    """Parameters of (K, 3) columns with the last two not below 0, and what they leave squared."""
+    used = [0, 1, 2]
+    while True:
+        found = np.linalg.lstsq(columns[:, used], values, rcond=None)[0]
+        if found[1:].min(initial=0.0) >= 0.0:
+            x = np.zeros(3)
+            x[used] = found
+            return x.tolist(), float(((values - columns @ x) ** 2).sum())
+        del used[1 + int(np.argmin(found[1:]))]
 
 
 def _values(law: DepthNoise) -> tuple[float, ...]:

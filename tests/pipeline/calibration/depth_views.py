@@ -5,8 +5,8 @@ import numpy as np
 
 from lab.claims.calibration.photograph import seen_px
 from pipeline.calibration.board import Board
-from pipeline.calibration.estimate import View, calibrate
 from pipeline.calibration.depth_samples import board_depth_samples
+from pipeline.calibration.estimate import View, calibrate
 from pipeline.geometry import pixel_rays
 from pipeline.io.depth_correction import DepthCorrection
 from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise
@@ -26,7 +26,7 @@ RAYS = pixel_rays(CAMERA)
 
 
 def poses(rng, count=16, range_m=(0.5, 1.8), tilt_deg=(10.0, 45.0)):
-    """(4, 4) of boards wholly in the picture, tilted to all sides, distances spread evenly in their logarithm."""
+    """(4, 4) of boards wholly in the picture, tilted to all sides, from near to far."""
     made = []
     for away_m in np.geomspace(*range_m, count):
         while True:
