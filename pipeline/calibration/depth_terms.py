@@ -179,9 +179,7 @@ class Problem:
         return (len(each) - 1) / len(each) * off.T @ off + shifts @ shifts.T
 
     def wide(self, together: int = 1) -> float:
-        """Standard errors of a 95 % interval of one or of several parameters together: Student's, with a degree
-        of freedom less than views.
-        """
+        """Standard errors of a 95 % interval of so many parameters together: Student's, by the number of views."""
         return float(student.ppf(1.0 - 0.025 / together, len(self.views) - 1))
 
     def residuals_m(self, columns: IntArray) -> FloatArray:
@@ -217,8 +215,8 @@ def robust_problem(
 
     Args:
         samples: the pixels.
-        expected_m: (N,) what the sensor measures but for its noise. The terms are taken there: at the measured
-            depth itself noise would be in both sides of the equation and pull the scale towards 0.
+        expected_m: (N,) what the sensor measures but for its noise. The terms are taken there: at the
+            measured depth itself noise would be on both sides and pull the scale towards 0.
         sd_m: (N,) of the noise.
         choice: the models.
     """
