@@ -132,7 +132,9 @@ class RigTruth:
     T_world_camera: tuple[FloatArray, ...]
     """True pose of every node."""
     depth: tuple[DepthMap, ...]
-    """True, hole-free depth of every node."""
+    """True, hole-free depth of every node, on the pixels of its true camera."""
+    intrinsics: tuple[CameraIntrinsics, ...]
+    """True camera of every node."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,7 @@ from packetmesh.progress import drain
 from pipeline.config import Lens, Pattern
 
 if TYPE_CHECKING:
+    from pipeline.calibration.assess import Trust
     from pipeline.calibration.from_images import CameraReport
 
 
@@ -24,6 +26,10 @@ def calibrate(
     spacing_mm: float = 35.0,
     lens: Lens = "thesis",
     held_out: int = 2,
+    range_m: float = 2.0,
+    accuracy_mm: float = 5.0,
+    without: tuple[str, ...] = (),
+    board_warp: bool = False,
     json: bool = False,
 ) -> None:
     """Estimate a camera from images of a board, with how sure each number is.
@@ -31,46 +37,71 @@ def calibrate(
     Args:
         images: Three or more of one camera, the board tilted to all sides: files, a folder, or a pattern in
             quotes such as "left*.jpg".
-        out: Folder for intrinsics.json, which the other commands take, metrics.json, and the same camera as
-            OpenCV, ROS, COLMAP, Kalibr, MATLAB and Open3D have it, where they can hold it.
+        out: Folder for intrinsics.json, which the other commands take, report.html with pictures of all that
+            follows, metrics.json, and the same camera as OpenCV, ROS, COLMAP, Kalibr, MATLAB and Open3D have
+            it, where they can hold it.
         pattern: What is printed on the board.
         columns: Circles, or inner corners, in a row.
         rows: How many rows of them.
         spacing_mm: Pitch of the circles, or side of a square; half the pitch in a row if rows are shifted.
-        lens: Distortion: k1 and k2 (thesis), also p1, p2, k3 (brown), or k4 to k6 as well (rational).
+        lens: Distortion: k1 and k2 (thesis), also p1, p2, k3 (brown), or k4 to k6 as well (rational); or a
+            fisheye's k1 to k4. The other commands take thesis and brown.
         held_out: In so many turns images are left out and predicted; 2 leaves out half of them as the thesis
             does, 0 none.
+        range_m: Where the camera will measure: the verdict is about points so far away.
+        accuracy_mm: Within how many millimetres a point must be placed there.
+        without: Names of images to leave out, such as those that the command proposes.
+        board_warp: Whether to estimate the board's shape, too, and to use it if that predicts images better.
         json: Print everything as one JSON object.
     """
+    from app.reports.calibration import write_calibration_report
     from packetmesh.errors import InputError
     from packetmesh.files import writable_folder
+    from pipeline.calibration.assess import assess
     from pipeline.calibration.board import Board
     from pipeline.calibration.from_images import image_files, iterate_calibration
-    from pipeline.calibration.report import write_camera_folder
+    from pipeline.calibration.report import metrics, write_camera_folder
 
     board = Board(pattern, columns, rows, spacing_mm / 1000.0)
     if held_out < 0 or held_out == 1:
         raise InputError(f"--held-out {held_out} leaves no view to predict; try 2, or 0 for none")
     files = image_files(images)
-    report = drain(iterate_calibration(files, board, lens, held_out), say_progress)
+    report = drain(iterate_calibration(files, board, lens, held_out, without, board_warp), say_progress)
+    trust = assess(report.calibration, report.views, board, range_m, accuracy_mm / 1000.0)
     writable_folder(out)
-    for sentence in write_camera_folder(report, out):
+    for sentence in write_camera_folder(report, out, trust):
         say(sentence)
+    write_calibration_report(report, trust, out / "report.html")
     if json:
-        print_json(report.metrics())
+        print_json(metrics(report, trust))
     else:
-        say(_lines(report))
+        say("\n".join((*_camera_lines(report), *_trust_lines(trust))))
 
 
-def _lines(report: CameraReport) -> str:
+def _camera_lines(report: CameraReport) -> Iterator[str]:
     """Parameters with their intervals, then the images."""
-    found, intervals = report.calibration, report.calibration.intervals
-    lines = [
-        f"{name:>4} {found.parameters[name]:12.5g}   95 %: {low:.5g} to {high:.5g}"
-        for name, (low, high) in intervals.items()
-    ]
+    found = report.calibration
+    for name, (low, high) in found.intervals.items():
+        yield f"{name:>4} {found.parameters[name]:12.5g}   95 %: {low:.5g} to {high:.5g}"
     unseen = report.held_out_rms_px
     beside = "" if unseen is None else f"; {unseen:.3f} px in images that it has not seen"
-    lines.append(f"RMS {found.rms_px:.3f} px over {len(found.views)} images{beside}")
-    missing = [f"not used: {name}. {one.reason}" for name, one in report.detections.items() if not one.found]
-    return "\n".join([*lines, *missing])
+    yield f"RMS {found.rms_px:.3f} px over {len(found.views)} images{beside}"
+    nearest_m, farthest_m = report.distances_m
+    yield (f"The board was {nearest_m:.2g} to {farthest_m:.2g} m away; if that is wrong, so is --spacing-mm")
+    if report.warp is not None:
+        used = "used" if report.warp.helps else "not used"
+        yield (
+            f"The board is bent by {1000.0 * report.warp.warp_m:.2g} mm, which is {used}: images held out "
+            f"have {report.warp.rms_px:.3f} px with it and {report.warp.flat_rms_px:.3f} px with a flat board"
+        )
+    for name, one in report.detections.items():
+        if not one.found:
+            yield f"not used: {name}. {one.reason}"
+
+
+def _trust_lines(trust: Trust) -> Iterator[str]:
+    """What it is worth."""
+    yield f"Points were seen in {100.0 * trust.coverage.share:.0f} % of the image"
+    for one in trust.outliers:
+        yield f"Perhaps leave out: {one.reason} (--without {one.name})"
+    yield trust.verdict.sentence

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, finite
+from pipeline.calibration.assess import Trust
 from pipeline.calibration.from_images import CameraReport
 from pipeline.io.camera_files import WRITERS, write_camera
+from pipeline.io.fisheye_files import FISHEYE_WRITERS, write_fisheye
 from pipeline.io.intrinsics import write_intrinsics
 
 
-def write_camera_folder(report: CameraReport, folder: Path) -> list[str]:
+def metrics(report: CameraReport, trust: Trust | None = None) -> dict[str, Any]:
+    """What ``--json`` prints: the camera, and under ``trust`` what it is worth."""
+    return report.metrics() | ({} if trust is None else {"trust": trust.metrics()})
+
+
+def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None = None) -> list[str]:
     """Write metrics.json, intrinsics.json and the files of other programs.
 
     Returns:
@@ -22,11 +30,16 @@ def write_camera_folder(report: CameraReport, folder: Path) -> list[str]:
         InputError: the folder cannot be written.
     """
     with atomic_path(folder / "metrics.json") as sibling:
-        sibling.write_text(json.dumps(finite(report.metrics()), indent=1, allow_nan=False) + "\n")
+        sibling.write_text(json.dumps(finite(metrics(report, trust)), indent=1, allow_nan=False) + "\n")
+    found = report.calibration
+    if found.lens == "fisheye":
+        for name in FISHEYE_WRITERS:
+            write_fisheye(folder / name, found.matrix, found.distortion, found.size_px, name)
     try:
         camera = report.intrinsics
     except InputError as error:
-        return [str(error)]
+        held = "" if found.lens != "fisheye" else f"; it is in {', '.join(FISHEYE_WRITERS)}"
+        return [f"intrinsics.json is not written: {error}{held}"]
     write_intrinsics(folder / "intrinsics.json", camera)
     missing = []
     for name in WRITERS:
