@@ -179,7 +179,7 @@ class Problem:
         return (len(each) - 1) / len(each) * off.T @ off + shifts @ shifts.T
 
     def wide(self, together: int = 1) -> float:
-        """Standard errors of a 95 % interval of so many parameters together: Student's, by the number of views."""
+        """Standard errors of a 95 % interval of so many parameters together, by Student."""
         return float(student.ppf(1.0 - 0.025 / together, len(self.views) - 1))
 
     def residuals_m(self, columns: IntArray) -> FloatArray:

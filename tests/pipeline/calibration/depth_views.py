@@ -76,4 +76,4 @@ def samples(bias, seed, count=16, range_m=(0.5, 1.8), tilt_deg=(10.0, 45.0), noi
     boards = poses(rng, count, range_m, tilt_deg)
     views = [view_of(T, noise_px, rng, f"view {index}") for index, T in enumerate(boards)]
     depths = [depth_of(T, bias, noise, rng) for T in boards]
-    return board_depth_samples(views, depths, calibrate(views, SIZE), BOARD)
+    return board_depth_samples(calibrate(views, SIZE), depths, BOARD)
