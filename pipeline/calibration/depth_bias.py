@@ -5,13 +5,13 @@ the image, and the noise, with as many terms as held-out views justify (SPEC 1.5
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.calibration.depth_noise import FittedNoise, NoisePoints, fit_noise
+from pipeline.calibration.depth_noise import NoisePoints, noise_ci95, noise_law, noise_points
 from pipeline.calibration.depth_samples import DepthSamples
 from pipeline.calibration.depth_terms import (
     GROUPS,
@@ -24,7 +24,7 @@ from pipeline.calibration.depth_terms import (
     separable,
 )
 from pipeline.io.depth_correction import MAP_SHAPE, DepthCorrection
-from pipeline.types import FloatArray
+from pipeline.types import DepthNoise, FloatArray
 
 LEAST_VIEWS = 4
 ROUNDS = 3
@@ -60,7 +60,6 @@ class DepthFit:
     def metrics(self) -> dict[str, Any]:
         """The block ``depth`` of ``packetmesh calibrate --json``."""
         correction = self.correction
-        noise = correction.noise
         values: dict[str, Any] = {
             "offset_m": correction.offset_m,
             "scale": correction.scale,
@@ -71,7 +70,7 @@ class DepthFit:
             "terms": list(self.terms),
             "values": values,
             "ci95": {name: interval.tolist() for name, interval in correction.ci95.items()},
-            "noise_law": None if noise is None else {name: getattr(noise, name) for name in noise.__slots__},
+            "noise_law": None if correction.noise is None else asdict(correction.noise),
             "range_m": list(correction.range_m),
             "rms_before_m": self.rms_before_m,
             "rms_after_m": self.rms_after_m,
@@ -106,13 +105,14 @@ def fit_depth(samples: DepthSamples) -> DepthFit:
     choice = separable(paper)
     bias_m: FloatArray = np.zeros(len(paper))
     for _ in range(ROUNDS):
-        noise = fit_noise(paper, paper.true_m - paper.measured_m - bias_m)
-        sd_m = noise.law.sd_m(paper.true_m, paper.cosine)
+        points = noise_points(paper, paper.true_m - paper.measured_m - bias_m)
+        noise = noise_law(points)
+        sd_m = noise.sd_m(paper.true_m, paper.cosine)
         problem = robust_problem(paper, paper.true_m - bias_m, sd_m, choice)
         bias_m = problem.y_m - problem.residuals_m(columns_of(choice.richest))
     terms, held_out_m = chosen_terms(problem, choice)
     columns = columns_of(terms)
-    correction = _correction(paper, problem, terms, noise)
+    correction = _correction(paper, problem, terms, noise, noise_ci95(points))
     return DepthFit(
         correction=correction,
         terms=terms,
@@ -121,7 +121,7 @@ def fit_depth(samples: DepthSamples) -> DepthFit:
         rms_before_m=problem.rms_m(problem.y_m),
         rms_after_m=problem.rms_m(problem.residuals_m(columns)),
         scale_focal_correlation=_with_focal(problem, terms, samples.lens_focal),
-        noise_points=noise.points,
+        noise_points=points,
         ink_offset_m=_ink_offset_m(samples, correction),
         note=choice.note,
     )
@@ -138,7 +138,11 @@ def _with_focal(problem: Problem, terms: tuple[str, ...], lens_focal: FloatArray
 
 
 def _correction(
-    samples: DepthSamples, problem: Problem, terms: tuple[str, ...], noise: FittedNoise
+    samples: DepthSamples,
+    problem: Problem,
+    terms: tuple[str, ...],
+    noise: DepthNoise,
+    intervals: Mapping[str, FloatArray],
 ) -> DepthCorrection:
     """The terms as a record, with intervals."""
     columns = columns_of(terms)
@@ -166,9 +170,9 @@ def _correction(
         scale=float(1.0 + values[1]),
         curvature_per_m=float(values[2]),
         map_coefficients=coefficients,
-        noise=noise.law,
+        noise=noise,
         range_m=(float(samples.measured_m.min()), float(samples.measured_m.max())),
-        ci95=ci95 | dict(noise.ci95),
+        ci95={**ci95, **intervals},
     )
 
 
