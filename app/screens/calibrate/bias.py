@@ -16,7 +16,6 @@ from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.calibration.depth_bias import DepthFit, fit_depth
 from pipeline.calibration.depth_samples import DepthSamples, board_depth_samples
-from pipeline.calibration.estimate import View
 from pipeline.io.depth_correction import DepthCorrection
 from pipeline.io.images import read_depth
 from pipeline.types import FloatArray
@@ -72,16 +71,14 @@ def fit_bias(views: BoardViews, camera: CameraView) -> tuple[DepthFit, DepthSamp
     lens = camera.calibration
     if lens is None:
         raise InputError(f"{camera.name} has no lens yet, and depth is judged through it; {camera.reason}")
-    board = board_of(views)
-    seen = [View(one.name, one.points_px, one.board_m) for one in lens.views]
-    files = [depth_file(views, camera.name, view.name) for view in seen]
+    files = [depth_file(views, camera.name, view.name) for view in lens.views]
     if not any(files):
         raise InputError(
             f"There are no depth images beside the photographs of {camera.name}; add depth_00.png beside "
             "color_00.png and so on"
         )
     depths = [None if file is None else read_depth(file) for file in files]
-    samples = board_depth_samples(seen, depths, lens, board)
+    samples = board_depth_samples(lens, depths, board_of(views))
     return fit_depth(samples), samples
 
 

@@ -14,8 +14,9 @@ from app.tables import number, table
 from app.ui import Ui
 
 TEXT = """What if every circle were seen a little beside its place? The calibration above is taken as the
-**truth**, its views are photographed again with this noise on every point, and the camera is estimated anew,
-200 times. The thesis did it once for each noise (Table 4.1)."""
+**truth**, its views are seen again with this noise on every point, and the camera is estimated anew, 200 times.
+The thesis did it once for each noise (Table 4.1)."""
+THIS, OTHER = "this lens", "one of another kind"
 PAIRS = {
     "fx against k1": ("fx", "k1"),
     "fx against fy": ("fx", "fy"),
@@ -36,13 +37,13 @@ class NoiseFolder:
 
         Args:
             ui: where to add it.
-            on_replay: called with the noise in px.
+            on_replay: called with the noise in px, and whether the lens is of another kind.
             on_stop: called when what runs is to end.
         """
         self._on_replay, self._on_stop = on_replay, on_stop
         self._view: NoiseView | None = None
-        self.wanted_px: float | None = None
-        """The noise that is being replayed."""
+        self._wanted: tuple[float, bool] | None = None
+        """What is being replayed."""
         gui = ui.gui
         self._resting = ui.debounce(REST_S, self._rested)
         self._folder = gui.add_folder("What if the points were noisier?", expand_by_default=False)
@@ -57,6 +58,13 @@ class NoiseFolder:
                 hint="Standard deviation added to the column and the row of every point.",
             )
             ui.when_changed(self._sigma, self._moved)
+            self._through = gui.add_dropdown(
+                "Seen through",
+                [THIS, OTHER],
+                hint="The lens through which the views are seen: the one that was found, or one that is distorted in "
+                "ways (p1, p2, k3) that the lens thesis does not know.",
+            )
+            ui.when_changed(self._through, self._moved)
             self._pair = gui.add_dropdown("Axes", list(PAIRS), hint="Which two parameters are plotted.")
             ui.when_changed(self._pair, self._draw)
             ui.buttons(
@@ -73,16 +81,16 @@ class NoiseFolder:
             )
             self._table = gui.add_html("")
 
-    def set(self, sigma_px: float) -> None:
+    def set(self, sigma_px: float, other_lens: bool) -> None:
         """Choose for the person, and begin."""
-        self._sigma.value = sigma_px
+        self._sigma.value, self._through.value = sigma_px, OTHER if other_lens else THIS
         self._rested()
 
     def forget(self) -> None:
         """What was replayed is of another camera, or of other views."""
-        if self.wanted_px is not None:
+        if self._wanted is not None:
             self._on_stop()
-        self._view = self.wanted_px = None
+        self._view = self._wanted = None
         self._plot.visible = False
         self._table.content, self._status.content = "", READY
 
@@ -92,7 +100,7 @@ class NoiseFolder:
 
     def load(self, view: NoiseView) -> None:
         """Show what there is so far of the noise that is wanted; what comes late is of another one."""
-        if not isinstance(view, NoiseView) or view.request.sigma_px != self.wanted_px or not view.trials:
+        if not isinstance(view, NoiseView) or asked(view.request) != self._wanted or not view.trials:
             return
         self._view = view
         self._draw()
@@ -101,24 +109,24 @@ class NoiseFolder:
 
     def ended(self, view: NoiseView | None, request: NoiseRequest) -> None:
         """The last trial, or none: it was stopped or could not be."""
-        if request.sigma_px != self.wanted_px:
+        if asked(request) != self._wanted:
             return
         if view is not None:
             self.load(view)
         elif self._view is None:
             self._status.content = STOPPED
-        self.wanted_px = None
+        self._wanted = None
 
     def _moved(self) -> None:
         """Stop at once what runs with another noise; begin when the hand rests."""
-        if self.wanted_px is not None:
+        if self._wanted is not None:
             self._on_stop()
         self._resting.restart()
 
     def _rested(self) -> None:
-        self.wanted_px, self._view = float(self._sigma.value), None
+        self._wanted, self._view = (float(self._sigma.value), self._through.value == OTHER), None
         self._status.content = "The first trials are coming …"
-        self._on_replay(self.wanted_px)
+        self._on_replay(*self._wanted)
 
     def _draw(self) -> None:
         if self._view is not None:
@@ -126,17 +134,26 @@ class NoiseFolder:
         self._plot.visible = self._view is not None
 
 
+def asked(request: NoiseRequest) -> tuple[float, bool]:
+    """The part of a request that the controls set."""
+    return request.sigma_px, request.other_lens
+
+
 def noise_line(view: NoiseView) -> str:
-    """The experiment in a sentence."""
+    """The experiment in some sentences."""
     done = (
         f"{view.trials} of {view.request.trials} trials"
         if view.trials < view.request.trials
         else "All trials"
     )
-    return (
-        f"**{done}.** fx, fy, cx and cy are all within {CLOSE:.1%} of the truth in "
-        f"**{view.close_share:.0%}** of them."
+    told = (
+        f"**{done}.** fx, fy, cx and cy are all within {100.0 * CLOSE:g} % of the truth in "
+        f"**{100.0 * view.close_share:.0f} %** of them. RMS {view.rms_px:.3f} px; noise alone leaves "
+        f"{np.sqrt(2.0) * view.request.sigma_px:.3f} px at most."
     )
+    if not view.halved:
+        return told
+    return f"{told} Two halves of the views differ beyond noise in **{view.beyond_noise} of {view.halved}** trials."
 
 
 def noise_table(view: NoiseView) -> str:

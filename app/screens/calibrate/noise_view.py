@@ -22,6 +22,8 @@ class NoiseRequest:
     camera: str
     sigma_px: float
     """Standard deviation, of either coordinate."""
+    other_lens: bool = False
+    """Whether the views are taken through a lens of another kind than the one that is estimated."""
     trials: int = TRIALS
 
 
@@ -38,6 +40,12 @@ class NoiseView:
     """(T, P)"""
     covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     """(P, P) that the trials predict of themselves, their mean."""
+    rms_px: float = 0.0
+    """Of the trials' points, their mean."""
+    halved: int = 0
+    """In so many trials two halves of the views were compared."""
+    beyond_noise: int = 0
+    """In so many of these they differed by more than noise explains."""
 
     @property
     def trials(self) -> int:

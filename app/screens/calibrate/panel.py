@@ -308,11 +308,11 @@ class CalibratePanel(Panel):
         self._off = view
         self._show_view()
 
-    def _replay(self, sigma_px: float) -> None:
+    def _replay(self, sigma_px: float, other_lens: bool) -> None:
         camera = self._shown()
         if camera is None or camera.calibration is None:
             raise InputError("There is no calibration to repeat; add photographs first.")
-        request = NoiseRequest(camera.name, sigma_px)
+        request = NoiseRequest(camera.name, sigma_px, other_lens)
         self.session.side_job(
             "calibrate.noise_job:noise_job",
             request,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from app.state import BoardViews
 from pipeline.calibration.board import Board
-from pipeline.calibration.shots import NodeShots, node_shots, read_board
+from pipeline.calibration.shots import BOARD_FILE, NodeShots, node_shots, read_board
 
 TRUTH = "truth.json"
 
@@ -18,7 +18,8 @@ def views_in(folder: Path) -> BoardViews:
     Raises:
         InputError: the file says something else.
     """
-    board = read_board(folder) or Board()
+    path = folder / BOARD_FILE
+    board = read_board(path) if path.exists() else Board()
     return BoardViews(str(folder), 0, board.pattern, board.columns, board.rows, board.spacing_m)
 
 
