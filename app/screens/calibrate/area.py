@@ -8,7 +8,7 @@ import numpy as np
 
 from app.compare import captions_html, split
 from app.records import Picture
-from app.screens.calibrate.labels import PAIRS, STRAIGHTENED, PictureName
+from app.screens.calibrate.labels import PAIRS, STRAIGHTENED
 from app.ui import Ui
 
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
@@ -21,7 +21,7 @@ class PictureArea:
 
     def __init__(self, ui: Ui, on_pair: Callable[[], None]) -> None:
         """Add the area to the current container; ``on_pair`` is called when others are wanted."""
-        self._pictures: Mapping[PictureName, Picture] = {}
+        self._pictures: Mapping[str, Picture] = {}
         self._drawn: tuple[object, ...] = ()
         self._pair = ui.gui.add_dropdown(
             "Compare", list(PAIRS), hint="What stands left and right of the line."
@@ -39,7 +39,7 @@ class PictureArea:
         """The pair that is to be shown, one of ``PAIRS``."""
         return self._pair.value
 
-    def load(self, pictures: Mapping[PictureName, Picture]) -> None:
+    def load(self, pictures: Mapping[str, Picture]) -> None:
         """Show what there is; without the photograph nothing."""
         self._pictures, self._drawn = pictures, ()
         for handle in (self._pair, self._split, self._image, self._captions):

@@ -93,7 +93,8 @@ def bars_html(bars: tuple[Bar, ...], chosen: str) -> str:
         f'<div style="display: flex; gap: 0.4em"><div style="text-align: right; display: flex; '
         f'flex-direction: column; justify-content: space-between; font-variant-numeric: tabular-nums">'
         f"<span>{most:.2g}</span><span>0</span></div>"
-        f'<div role="group" aria-label="Views" style="display: flex; flex: 1; gap: 2px; height: {HEIGHT_PX}px; '
+        f'<div role="group" aria-label="Views" style="display: flex; flex: 1; gap: 2px; '
+        f"height: {HEIGHT_PX}px; "
         f'border-left: 1px solid #bbb; border-bottom: 1px solid #bbb">{columns}</div></div>'
         f'<div style="margin-top: 0.3em; color: #667">{meaning}</div></div>'
     )
@@ -127,6 +128,7 @@ def _column(bar: Bar, most: float, chosen: bool) -> str:
     )
     pressed = "true" if chosen else "false"
     return (
-        f'<button type="button" data-view="{name}" title="{told}" aria-label="{told}" aria-pressed="{pressed}" '
+        f'<button type="button" data-view="{name}" title="{told}" aria-label="{told}" '
+        f'aria-pressed="{pressed}" '
         f'style="{look}" onclick="{html.escape(PICK, quote=True)}">{inside}</button>'
     )

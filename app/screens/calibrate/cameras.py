@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from app.screens.calibrate.request import board_of, shots_of, true_parameters
+from app.screens.calibrate.request import FOLDS, board_of, shots_of, true_parameters
 from app.screens.calibrate.view import CalibrationView, CameraView, Photograph, PlacedCamera, RigView
 from app.state import BoardViews
 from app.store import Store
@@ -25,8 +25,6 @@ from pipeline.types import ByteArray
 
 PICTURE_WIDTH_PX, QUALITY = 640, 85
 """Of the photographs in the panel."""
-FOLDS = 4
-"""In so many turns views, or moments of several cameras, are held out."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,7 +58,8 @@ def bias_table(view: BiasView) -> str:
     rows.append(
         (
             "Error",
-            "Root mean square of depth less the board's plane, views counted alike: measured, then corrected.",
+            "Root mean square of depth less the board's plane, views counted alike: measured, then "
+            "corrected.",
             number(view.rms_before_m, 1, "mm", 1000.0),
             "→ " + number(view.rms_after_m, 1, "mm", 1000.0),
         )
@@ -67,7 +68,7 @@ def bias_table(view: BiasView) -> str:
 
 
 def bias_figure(view: BiasView | None) -> go.Figure:
-    """Depth less the board's plane over the true depth, measured and corrected, and the bias that was fitted."""
+    """Depth less the board's plane over the true depth, measured and corrected, and the bias found."""
     figure = go.Figure()
     figure.update_layout(
         template="plotly_white",

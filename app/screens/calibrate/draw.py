@@ -30,7 +30,7 @@ FAR = 0.95
 
 
 class BoardsDrawing:
-    """The boards of one camera's views, the cameras around one board, or those of a rig; one view is chosen."""
+    """The boards of one camera, the cameras around one board, or those of a rig; one view is chosen."""
 
     def __init__(self, scene: viser.SceneApi, on_pick: Callable[[str], None]) -> None:
         """Draw nothing yet; ``on_pick`` is called, on any thread, with a view that was clicked."""
@@ -56,32 +56,48 @@ class BoardsDrawing:
             for name, pose in poses.items():
                 self._add_board(board, name, LEVEL_POSE @ pose)
         else:
-            self._add_board(board, "", LEVEL_POSE)
+            self._add_board(board, "", LEVEL_POSE, 0.9)
             for name, pose in poses.items():
                 self._add_frustum(name, LEVEL_POSE @ inverse(pose), camera, name, 0.06, TARGET)
         self.choose(chosen)
 
-    def draw_rig(self, view: CalibrationView, rig: RigView, scene: SceneView | None, chosen: str) -> None:
-        """Draw all cameras where the board puts them, beside where the scene has them."""
+    def draw_rig(
+        self,
+        view: CalibrationView,
+        rig: RigView,
+        scene: SceneView | None,
+        came: SceneView | None,
+        chosen: str,
+    ) -> None:
+        """Draw all cameras where the board puts them, beside where the scene had them.
+
+        Args:
+            view: the cameras.
+            rig: where they stand.
+            scene: what they see, as the chain has it.
+            came: the scene as it came.
+            chosen: the view that is chosen.
+        """
         clear(self._scene, BELOW)
         self._handles, self._dropped = {}, frozenset()
-        T_world_first = LEVEL_POSE
-        if scene is not None:
-            believed = {node.name: node.T_world_camera for node in scene.nodes}
-            T_world_first = believed.get(rig.cameras[0].name, LEVEL_POSE)
-            for node in scene.nodes:
-                add_cloud(self._scene, f"{BELOW}/{node.name}/cloud", node.sensor, node.T_world_camera)
-                camera = view.camera(node.name)
-                if camera is not None and node.name != rig.cameras[0].name:
-                    self._add_frustum(f"before-{node.name}", node.T_world_camera, camera, "", 0.12, NEUTRAL)
+        first = rig.cameras[0].name
+        believed: dict[str, FloatArray] = (
+            {} if came is None else {node.name: node.T_world_camera for node in came.nodes}
+        )
+        T_world_first = believed.get(first, LEVEL_POSE)
+        for node in () if scene is None else scene.nodes:
+            add_cloud(self._scene, f"{BELOW}/{node.name}/cloud", node.sensor, node.T_world_camera)
         for one in rig.cameras:
             camera = view.camera(one.name)
-            if camera is not None and camera.calibration is not None:
-                sure = f" ± {1000.0 * one.position_sd_m:.1f} mm" if one.position_sd_m else ""
-                pose = T_world_first @ one.T_first_camera
-                self._add_frustum(one.name, pose, camera, f"{one.name}{sure}", 0.12, BRAND)
+            if camera is None or camera.calibration is None:
+                continue
+            sure = f" ± {1000.0 * one.position_sd_m:.1f} mm" if one.position_sd_m else ""
+            placed = T_world_first @ one.T_first_camera
+            self._add_frustum(one.name, placed, camera, f"{one.name}{sure}", 0.12, BRAND)
+            if one.name in believed and one.name != first:
+                self._add_frustum(f"before-{one.name}", believed[one.name], camera, "", 0.12, NEUTRAL)
         for name, pose in rig.T_first_board.items():
-            self._add_board(view.board, name, T_world_first @ pose)
+            self._add_board(view.board, name, T_world_first @ pose, 0.12)
         self.choose(chosen)
 
     def choose(self, chosen: str) -> None:
@@ -91,7 +107,7 @@ class BoardsDrawing:
             if tuple(handle.color) != color:
                 handle.color = color
 
-    def _add_board(self, board: Board, name: str, pose: FloatArray) -> None:
+    def _add_board(self, board: Board, name: str, pose: FloatArray, opacity: float = 0.35) -> None:
         """A sheet with its points; one without a name is the board of all views."""
         (left, upper, _), (right, lower, _) = board.points_m.min(axis=0), board.points_m.max(axis=0)
         rim = RIM * board.spacing_m
@@ -104,7 +120,6 @@ class BoardsDrawing:
             ]
         )
         below = f"{BELOW}/board-{name or 'all'}"
-        opacity = 0.35 if name else 0.9
         sheet = self._scene.add_mesh_simple(
             below, corners, FACES, color=TARGET, opacity=opacity, side="double"
         )

@@ -28,4 +28,5 @@ def calibrate_job(store: Store, spec: Spec) -> Generator[Progress | CalibrationV
         done = CAMERAS_SHARE + (1.0 - CAMERAS_SHARE) * index / len(view.cameras)
         told = yield from bias_of(store, views, camera, done)
         view = replace(view, depth=view.depth | {camera.name: told if isinstance(told, str) else told.view})
+        yield view
     return view

@@ -14,8 +14,8 @@ from app.tables import number, table
 from app.ui import Ui
 
 TEXT = """What if every circle were seen a little beside its place? The calibration above is taken as the
-**truth**, its views are seen again with this noise on every point, and the camera is estimated anew, 200 times.
-The thesis did it once for each noise (Table 4.1)."""
+**truth**, its views are seen again with this noise on every point, and the camera is estimated anew, 200
+times. The thesis did it once for each noise (Table 4.1)."""
 THIS, OTHER = "this lens", "one of another kind"
 PAIRS = {
     "fx against k1": ("fx", "k1"),
@@ -32,7 +32,7 @@ REST_S = 0.25
 class NoiseFolder:
     """A slider, the scatter of the trials as they come, and their numbers."""
 
-    def __init__(self, ui: Ui, on_replay: Callable[[float], None], on_stop: Callable[[], None]) -> None:
+    def __init__(self, ui: Ui, on_replay: Callable[[float, bool], None], on_stop: Callable[[], None]) -> None:
         """Add the folder.
 
         Args:
@@ -61,8 +61,8 @@ class NoiseFolder:
             self._through = gui.add_dropdown(
                 "Seen through",
                 [THIS, OTHER],
-                hint="The lens through which the views are seen: the one that was found, or one that is distorted in "
-                "ways (p1, p2, k3) that the lens thesis does not know.",
+                hint="The lens through which the views are seen: the one that was found, or one with "
+                "distortions (p1, p2, k3) that the lens thesis does not know.",
             )
             ui.when_changed(self._through, self._moved)
             self._pair = gui.add_dropdown("Axes", list(PAIRS), hint="Which two parameters are plotted.")
@@ -153,14 +153,15 @@ def noise_line(view: NoiseView) -> str:
     )
     if not view.halved:
         return told
-    return f"{told} Two halves of the views differ beyond noise in **{view.beyond_noise} of {view.halved}** trials."
+    beyond = f"{view.beyond_noise} of {view.halved}"
+    return f"{told} Two halves of the views differ beyond noise in **{beyond}** trials."
 
 
 def noise_table(view: NoiseView) -> str:
     """HTML: how far the trials are off, and how far they think they are."""
     hint = (
-        "Error: root mean square of the trials' difference from the truth. Predicted: the standard error that "
-        "each of them gives itself, in the mean. Where it can be trusted, the two agree."
+        "Error: root mean square of the trials' difference from the truth. Predicted: the standard error "
+        "that each of them gives itself, in the mean. Where it can be trusted, the two agree."
     )
     rows = []
     for name in view.names:

@@ -26,7 +26,7 @@ HALVED = 8
 AT_M = 2.0
 """Range at which they are."""
 OTHER = np.array([0.0, 0.0, 0.003, -0.002, 0.3])
-"""What a lens of another kind has more of k1, k2, p1, p2 and k3: as much as a cheap one that is mounted askew."""
+"""What a lens of another kind has more of k1, k2, p1, p2 and k3: as a cheap one has that is mounted askew."""
 
 
 @dataclass(slots=True)

@@ -23,10 +23,13 @@ MEANING = {
     "p2": "Tangential distortion in the other direction.",
 }
 ABOUT_RMS = (
-    "Root mean square distance between where a point was seen and where the lens puts it, over all points that "
-    "the lens was made from. A low one says that the lens explains these views, not that it is right."
+    "Root mean square distance between where a point was seen and where the lens puts it, over all points "
+    "that the lens was made from. A low one says that the lens explains these views, not that it is right."
 )
-ABOUT_UNSEEN = "The same for views by a lens that has not seen them: each is left out in turn, and only its pose is fitted."
+ABOUT_UNSEEN = (
+    "The same for views by a lens that has not seen them: each is left out in turn, and only its pose is "
+    "fitted to it."
+)
 ABOUT_VIEWS = "Photographs in which the board was found and that are used, of all there are."
 
 
@@ -45,7 +48,7 @@ def summary_table(cameras: Sequence[CameraView], names: Sequence[str] = ()) -> s
 
     rows = [
         row("Views used", ABOUT_VIEWS, [views_used(camera) for camera in cameras]),
-        row("RMS error", ABOUT_RMS, [number(one and one.rms_px, 3, "px") for one in found]),
+        row("RMS error", ABOUT_RMS, [number(None if one is None else one.rms_px, 3, "px") for one in found]),
         row("Held-out RMS", ABOUT_UNSEEN, [number(unseen_rms_px(camera), 3, "px") for camera in cameras]),
     ]
     rows += [
@@ -70,7 +73,7 @@ def within(found: Calibration | None, name: str) -> str:
 
 
 def parameter_table(camera: CameraView) -> str:
-    """HTML: every parameter that was estimated, its standard error and 95 % interval, and the truth if known."""
+    """HTML: every parameter, its standard error, its 95 % interval, and the truth where it is known."""
     found = camera.calibration
     if found is None:
         return ""

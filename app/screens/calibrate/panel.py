@@ -8,34 +8,37 @@ from functools import partial
 from typing import Any, ClassVar, get_args
 
 from app.drawing.cameras import turn
-from app.records import SceneView
+from app.lesson import LessonFolder, read_lesson
+from app.records import Picture, SceneView
+from app.screens.calibrate.answers import Answers
 from app.screens.calibrate.area import PictureArea
 from app.screens.calibrate.bars import Bars, bars_of
 from app.screens.calibrate.depth import DepthFolder
 from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of
 from app.screens.calibrate.labels import AROUND, DEPTH
+from app.screens.calibrate.lesson import SETTINGS, SHIPPED, CalibrateLook, left_out
 from app.screens.calibrate.noise import NoiseFolder
 from app.screens.calibrate.noise_view import NoiseRequest
 from app.screens.calibrate.numbers import parameter_table, summary_table
 from app.screens.calibrate.photograph import found_picture, picture_of, straightened_picture
-from app.screens.calibrate.request import views_in
+from app.screens.calibrate.request import calibrate_command, inner, views_in, with_boards
 from app.screens.calibrate.rig import RigFolder
 from app.screens.calibrate.trust import TrustFolder, verdict_html
 from app.screens.calibrate.uploads import UploadFolder
 from app.screens.calibrate.use import WRITING, UseRow
-from app.screens.calibrate.view import CalibrationView, CameraView, DepthErrorView, RigView, TrustView
+from app.screens.calibrate.view import CalibrationView, CameraView, RigView, TrustView
 from app.state import BoardViews, Spec, Step
 from app.ui import Panel
 from packetmesh.errors import InputError
 from pipeline.config import Lens
 from pipeline.io.demos import DEMO_SCENES, board_views_of
-from pipeline.sources import Calibrated, Demo, Source
+from pipeline.sources import Calibrated, Demo
 
 TEXT = """**What you see.** Photographs of a board of known size tell how each camera bends what it sees, and
-where the board stood: click a bar or a board. What counts is not how well the lens explains these views, but how
-sure it is of **others**. Go on with **Depth**."""
-NOTHING = """This scene comes **without photographs of a board**: its cameras are taken at their word. Open a scene
-whose cameras need calibration, or use your own photographs below."""
+where the board stood: click a bar or a board. What counts is not how well the lens explains these views, but
+how sure it is of **others**. Go on with **Depth**."""
+NOTHING = """This scene comes **without photographs of a board**: its cameras are taken at their word. Open a
+scene whose cameras need calibration, or use your own photographs below."""
 
 
 class CalibratePanel(Panel):
@@ -55,13 +58,13 @@ class CalibratePanel(Panel):
         self._whole: dict[str, CameraView] = {}
         """Every camera before a view of it was dropped."""
         self._chosen, self._uses = "", 0
-        self._trust: TrustView | None = None
-        self._off: DepthErrorView | None = None
-        self._asked: list[Hashable] = [None, None]
-        """For what the newest verdict and the newest depth pictures were asked."""
-        self._judging = False
+        self._answers = Answers(self.session, self._judged, self._show_view)
         self._framed: tuple[Hashable, ...] = ()
+        self._look: CalibrateLook | None = None
+        self._came: SceneView | None = None
+        """The scene as it came."""
         gui.add_markdown(TEXT)
+        LessonFolder(ui, read_lesson(SHIPPED, SETTINGS, CalibrateLook()), self._take_look)
         self._status = gui.add_markdown("")
         self._open = ui.buttons(
             "Open",
@@ -83,8 +86,8 @@ class CalibratePanel(Panel):
                 "Drop": self._drop,
                 "All": self._keep_all,
             },
-            "Back, Next: the view before or after. Drop: leave this one out, or take it in again. All: leave none "
-            "out.",
+            "Back, Next: the view before or after. Drop: leave this one out, or take it in again. All: leave "
+            "none out.",
             visible=False,
         )
         self._area = PictureArea(ui, self._show_view)
@@ -110,8 +113,8 @@ class CalibratePanel(Panel):
             self._lens = gui.add_dropdown(
                 "Lens",
                 list(get_args(Lens)),
-                hint="Which distortions the camera may have: k1 and k2 (thesis), also p1, p2, k3 (brown), or k4 to "
-                "k6 as well (rational); or that of a fisheye.",
+                hint="Distortions that the camera may have: k1 and k2 (thesis), also p1, p2, k3 (brown), or "
+                "k4 to k6 as well (rational); or those of a fisheye.",
             )
             ui.when_changed(self._lens, self._picked_lens)
 
@@ -166,12 +169,15 @@ class CalibratePanel(Panel):
         if step == "scene":
             self._uploads.cameras([node.name for node in view.nodes])
             self._judge.at_range([0.5 * (node.nearest_m + node.farthest_m) for node in view.nodes])
-            if self._view is None:
+            if not isinstance(self.session.spec.source, Calibrated):
+                self._came = view
+            if self._view is None or AROUND[self._around.value] == "rig":
                 self._draw()
         if step == "surface" and self.session.results.fresh("surface", self.session.spec):
             self._use.surface(view.after, isinstance(self.session.spec.source, Calibrated))
         if step == "calibrate":
             self._take(view)
+            self._show_look()
 
     def on_failure(self, step: Step, sentence: str) -> None:
         """Say why there is no camera."""
@@ -232,19 +238,16 @@ class CalibratePanel(Panel):
             return
         if self._chosen not in [one.name for one in camera.photographs]:
             self._chosen = camera.photographs[0].name
+        trust = self._answers.trust_in(camera)
         photograph = picture_of(camera, self._chosen)
-        pictures = {"photo": found_picture(photograph, camera.fitted(photograph.name))}
+        pictures: dict[str, Picture] = {"photo": found_picture(photograph, camera.fitted(photograph.name))}
         if camera.calibration is not None:
             pictures["straightened"] = straightened_picture(
                 pictures["photo"], camera.calibration, photograph.zoom
             )
-        if self._trust is not None and self._trust.request.camera == camera.name:
-            pictures |= self._trust.pictures
-        if self._off is not None and (self._off.camera, self._off.view) == (camera.name, self._chosen):
-            pictures |= self._off.pictures
+        pictures |= self._answers.pictures_of(camera, self._chosen)
         self._area.load(pictures)
-        trusted = self._trust is not None and self._trust.request.camera == camera.name
-        self._bars.show(bars_of(camera, self._trust.outliers if trusted else ()), self._chosen)
+        self._bars.show(bars_of(camera, () if trust is None else trust.outliers), self._chosen)
         self._ask()
 
     def _pick(self, name: str) -> None:
@@ -283,30 +286,17 @@ class CalibratePanel(Panel):
     # What is asked beside the chain.
 
     def _ask(self) -> None:
-        """Ask for the verdict; once it is there, for the depth of the chosen view if it is wanted."""
+        """Ask for the verdict, and for the depth of the chosen view where it is wanted."""
         camera = self._shown()
-        if camera is None or camera.calibration is None or self._judging:
-            return
-        key = self.session.spec.key("calibrate")
-        request = self._judge.request(camera.name)
-        if self._asked[0] != (key, request):
-            self._asked[0], self._judging = (key, request), True
-            self.session.quick_job("calibrate.trust_job:trust_job", request, on_end=self._judged)
-        elif self._area.wanted == DEPTH and self._asked[1] != (key, camera.name, self._chosen):
-            self._asked[1] = (key, camera.name, self._chosen)
-            job = "calibrate.depth_job:depth_job"
-            self.session.quick_job(job, camera.name, self._chosen, on_end=self._compared)
+        if camera is not None and camera.calibration is not None:
+            request = self._judge.request(camera.name)
+            self._answers.ask(request, self._chosen, self._area.wanted == DEPTH)
 
     def _judged(self, view: TrustView | None) -> None:
-        self._judging, self._trust = False, view
         with self.ui.atomic():
             self._verdict.content = verdict_html(view)
             self._judge.load(view)
             self._show_view()
-
-    def _compared(self, view: DepthErrorView | None) -> None:
-        self._off = view
-        self._show_view()
 
     def _replay(self, sigma_px: float, other_lens: bool) -> None:
         camera = self._shown()
@@ -341,6 +331,48 @@ class CalibratePanel(Panel):
         self._use.used(None)
         self.session.want(replace(self.session.spec, source=self._source))
 
+    @property
+    def command(self) -> str:
+        """The command line that finds the cameras that are shown."""
+        views = self.session.spec.views
+        return super().command if views is None else calibrate_command(views)
+
+    # The lesson.
+
+    def _take_look(self, look: CalibrateLook) -> None:
+        """Set the controls as a stop says; what needs the cameras waits for them."""
+        with self.ui.atomic():
+            self._area.set(look.pair, look.split_share)
+            self._around.value = next(name for name, key in AROUND.items() if key == look.around)
+            if look.range_m is not None:
+                self._judge.set(look.range_m)
+            if self._lens.value != look.lens:
+                self._lens.value, self._whole = look.lens, {}
+            self._noise.forget()
+        if not look.used and isinstance(self.session.spec.source, Calibrated):
+            self._as_before()
+        self._look = look
+        views = self.session.spec.views
+        if views is not None:
+            self._want(replace(views, dropped=()))
+        if self.session.results.fresh("calibrate", self.session.spec):
+            self._show_look()
+
+    def _show_look(self) -> None:
+        """What the stop wants of the cameras, now that all of them are there."""
+        look, views = self._look, self.session.spec.views
+        if look is None or views is None or not self.session.results.fresh("calibrate", self.session.spec):
+            return
+        self._look = None
+        self._show_camera()
+        dropped = sorted(one for camera in self._whole.values() for one in left_out(camera, look.keep))
+        if dropped:
+            self._want(replace(views, dropped=tuple(dropped)))
+        if look.noise_px is not None:
+            self._noise.set(look.noise_px, look.other_lens)
+        if look.used and not isinstance(self.session.spec.source, Calibrated):
+            self._use_it()
+
     # What is drawn.
 
     def _draw(self) -> None:
@@ -350,7 +382,7 @@ class CalibratePanel(Panel):
             if view is None or camera is None or camera.calibration is None:
                 self._drawing.draw_scene(scene)
             elif around == "rig" and isinstance(view.rig, RigView):
-                self._drawing.draw_rig(view, view.rig, scene, self._chosen)
+                self._drawing.draw_rig(view, view.rig, scene, self._came, self._chosen)
             else:
                 self._drawing.draw_camera(camera, view.board, around, self._chosen)
         if self._here:
@@ -368,13 +400,3 @@ class CalibratePanel(Panel):
             for client in self.session.clients():
                 turn(client, stage.middle_m, stage.viewpoint_m)
         return True
-
-
-def inner(source: Source) -> Source:
-    """A source without the calibration that is laid over it."""
-    return source.source if isinstance(source, Calibrated) else source
-
-
-def with_boards() -> list[str]:
-    """The demo scenes that have views of a board."""
-    return [name for name in DEMO_SCENES if board_views_of(name) is not None]

@@ -45,6 +45,7 @@ def found_picture(photograph: Photograph, fitted: FittedView | None) -> Picture:
 def decoded(photograph: Photograph) -> ByteArray:
     """(H, W, 3) RGB."""
     bgr = cv2.imdecode(np.frombuffer(photograph.jpeg, np.uint8), cv2.IMREAD_COLOR)
+    assert bgr is not None
     return np.ascontiguousarray(bgr[..., ::-1])
 
 

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 from app.state import BoardViews
 from pipeline.calibration.board import Board
 from pipeline.calibration.shots import BOARD_FILE, NodeShots, node_shots, read_board
+from pipeline.io.demos import DEMO_SCENES, board_views_of
+from pipeline.sources import Calibrated, Source
 
 TRUTH = "truth.json"
+FOLDS = 4
+"""In so many turns views, or moments of several cameras, are held out."""
 
 
 def views_in(folder: Path) -> BoardViews:
@@ -47,3 +52,30 @@ def true_parameters(views: BoardViews, camera: str) -> dict[str, float]:
         return places | {name: float(value) for name, value in lens}
     except (OSError, KeyError, TypeError, ValueError):
         return {}
+
+
+def calibrate_command(views: BoardViews) -> str:
+    """The command line that finds the same cameras."""
+    board, nodes = board_of(views), shots_of(views)
+    folder = views.folder if len(nodes) > 1 else str(nodes[0].folder)
+    words = ["packetmesh", "calibrate", folder, "--pattern", board.pattern]
+    words += ["--columns", str(board.columns), "--rows", str(board.rows)]
+    words += ["--spacing-mm", f"{1000.0 * board.spacing_m:g}", "--lens", views.lens, "--held-out", str(FOLDS)]
+    names = {
+        (node.name, shot.moment): f"{node.name}/{shot.color.name}" if len(nodes) > 1 else shot.color.name
+        for node in nodes
+        for shot in node.shots
+    }
+    if views.dropped:
+        words += ["--without", *(names[one] for one in views.dropped if one in names)]
+    return shlex.join([*words, "--out", "runs/calibration"])
+
+
+def inner(source: Source) -> Source:
+    """A source without the calibration that is laid over it."""
+    return source.source if isinstance(source, Calibrated) else source
+
+
+def with_boards() -> list[str]:
+    """The demo scenes that have views of a board."""
+    return [name for name in DEMO_SCENES if board_views_of(name) is not None]

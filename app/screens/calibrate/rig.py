@@ -8,11 +8,11 @@ from app.screens.calibrate.view import RigView
 from app.tables import number, table
 from app.ui import Ui
 
-TEXT = """Moments at which several cameras see the board tell where these stand to each other. Choose **cameras of
-the rig** under *In space*: grey is where the scene has them, blue where the board puts them."""
+TEXT = """Moments at which several cameras see the board tell where these stand to each other. Choose
+**cameras of the rig** under *In space*: grey is where the scene had them, blue where the board puts them."""
 MEANING = (
-    "Distance from the first camera with its standard error, then the error of the rotation, and the moments at which "
-    "both see the board."
+    "Distance from the first camera with its standard error, then the error of the rotation, and the moments "
+    "at which both see the board."
 )
 
 
@@ -59,6 +59,6 @@ def rig_line(rig: RigView) -> str:
         return f"{told}; there are too few shared moments to hold some out."
     moved = [one.held_out_position_m for one in rig.cameras[1:] if one.held_out_position_m is not None]
     return (
-        f"{told}, {rig.held_out_rms_px:.3f} px in moments that were held out; without a quarter of the moments no "
-        f"camera moves by more than {1000.0 * max(moved, default=0.0):.2f} mm."
+        f"{told}, {rig.held_out_rms_px:.3f} px in moments that were held out; without a quarter of the "
+        f"moments no camera moves by more than {1000.0 * max(moved, default=0.0):.2f} mm."
     )

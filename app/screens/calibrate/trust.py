@@ -59,9 +59,9 @@ class TrustFolder:
         """Ask for the middle of these distances."""
         self._range.value = round(sum(ranges_m) / len(ranges_m), 1)
 
-    def set(self, range_m: float, accuracy_m: float) -> None:
+    def set(self, range_m: float) -> None:
         """Choose for the person."""
-        self._range.value, self._accuracy.value = range_m, 1000.0 * accuracy_m
+        self._range.value = range_m
 
     def load(self, view: TrustView | None) -> None:
         """Show the answer; None where there is none."""
@@ -100,25 +100,26 @@ def trust_table(view: TrustView) -> str:
         [
             (
                 "Noise, 95 %",
-                "Within which noise in the views leaves a point at the range 95 times in 100; root mean square over "
-                "the image. A lens of the wrong kind does not show in it.",
+                "Within which noise in the views leaves a point at the range 95 times in 100; root mean "
+                "square over the image. A lens of the wrong kind does not show in it.",
                 number(view.uncertainty_m, 2, "mm", 1000.0),
             ),
             (
                 "Two halves apart",
-                "The camera is estimated from every other view and from the others; how far apart both put a point at "
-                "the range, root mean square over the image. A lens of the wrong kind shows here.",
+                "The camera is estimated from every other view and from the others; how far apart both put a "
+                "point at the range, root mean square over the image. A lens of the wrong kind shows here.",
                 number(view.difference_m, 2, "mm", 1000.0),
             ),
             (
                 "Over what noise explains",
-                "The difference of the halves over what noise alone lets one expect: near 1 if the lens is right.",
+                "The difference of the halves over what noise alone lets one expect: near 1 if the lens is "
+                "right.",
                 "–" if view.halves is None else f"{view.halves[0]:.2f} ×",
             ),
             (
                 "By chance up to",
-                "Noise alone makes that ratio smaller in 95 of 100 cases; what is more is a lens, a view or a board that "
-                "is wrong.",
+                "Noise alone makes that ratio smaller in 95 of 100 cases; what is more is a lens, a view or "
+                "a board that is wrong.",
                 "–" if view.halves is None else f"{view.halves[1]:.2f} ×",
             ),
         ]

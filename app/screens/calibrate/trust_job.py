@@ -85,26 +85,26 @@ def _lines(trust: Trust, lens: Calibration) -> Iterator[str]:
     most = 1000.0 * judged.error_of_most_m
     reached = f"within {most:.2g} mm" if np.isfinite(most) else "nowhere, as the lens folds back,"
     yield (
-        f"{'Good enough' if judged.passed else 'Not good enough'} for {asked}: so well a point is placed over "
-        f"{100.0 * judged.share:.0f} % of the image, and {reached} over 95 % of it."
+        f"{'Good enough' if judged.passed else 'Not good enough'} for {asked}: a point is placed that well "
+        f"over {100.0 * judged.share:.0f} % of the image, and {reached} over 95 % of it."
     )
     if halves is not None and halves.beyond_noise and not judged.passed:
         yield (
-            f"Two halves of the views differ by {halves.ratio:.1f} times what noise explains (by chance up to "
-            f"{halves.most_by_noise:.1f}): the lens is of the wrong kind, or a view or the board is wrong. Try another "
-            "lens under Advanced, or drop the views that stand out."
+            f"Two halves of the views differ by {halves.ratio:.1f} times what noise explains (by chance up "
+            f"to {halves.most_by_noise:.1f}): the lens is of the wrong kind, or a view or the board is "
+            "wrong. Try another lens under Advanced, or drop the views that stand out."
         )
     elif following is not None and not judged.passed:
         yield (
-            f"The next view to take (under Compare) is predicted to bring {1000.0 * following.error_before_m:.2g} mm "
-            f"to {1000.0 * following.error_after_m:.2g} mm."
+            "The next view to take (under Compare) is predicted to bring "
+            f"{1000.0 * following.error_before_m:.2g} mm to {1000.0 * following.error_after_m:.2g} mm."
         )
     if trust.outliers:
         names = ", ".join(one.name for one in trust.outliers)
         worst = trust.outliers[0]
         yield (
-            f"Out of line: view {names}, red below; {worst.name} has {worst.rms_px:.2f} px where the others have "
-            f"{worst.others_px:.2f}. Look at it, then drop it or not."
+            f"Out of line: view {names}, red below; {worst.name} has {worst.rms_px:.2f} px where the others "
+            f"have {worst.others_px:.2f}. Look at it, then drop it or not."
         )
 
 

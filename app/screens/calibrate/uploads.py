@@ -19,9 +19,9 @@ from packetmesh.errors import InputError
 from pipeline.calibration.shots import BOARD_FILE
 from pipeline.config import Pattern
 
-TEXT = """Photograph a flat board of circles or squares from eight or more directions, tilted by 20 to 40°, also
-into the corners of the image. `packetmesh target` prints one. Add the photographs one by one, or all in a ZIP,
-with a folder for each camera (node_00, node_01 …) if there are several; depth images beside them
+TEXT = """Photograph a flat board of circles or squares from eight or more directions, tilted by 20 to 40°,
+also into the corners of the image. `packetmesh target` prints one. Add the photographs one by one, or all in
+a ZIP, with a folder for each camera (node_00, node_01 …) if there are several; depth images beside them
 (depth_05.png of color_05.png) tell what the depth sensor is off by."""
 ENDINGS = (".png", ".jpg", ".jpeg")
 UPLOAD_LIMIT_BYTES = 64 << 20
@@ -131,8 +131,8 @@ def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[
     """
     if len(file.content) > UPLOAD_LIMIT_BYTES:
         raise InputError(
-            f"{file.name} has {len(file.content) >> 20} MB; the app takes up to {UPLOAD_LIMIT_BYTES >> 20} MB, "
-            f"so {INSTEAD}."
+            f"{file.name} has {len(file.content) >> 20} MB; the app takes up to {UPLOAD_LIMIT_BYTES >> 20} "
+            f"MB, so {INSTEAD}."
         )
     photographs = {_place(file.name, node): file.content}
     if file.name.lower().endswith(".zip"):

@@ -36,8 +36,8 @@ class UseRow:
         self._row = ui.buttons(
             "In the chain",
             {USE: on_use, BEFORE: on_before},
-            "Use this calibration: all later steps are computed with it, and the surface changes. As before: with "
-            "what the rig came with.",
+            "Use this calibration: all later steps are computed with it, and the surface changes. As before: "
+            "with what the rig came with.",
             visible=False,
         )
         self._text = ui.gui.add_markdown("")
@@ -81,24 +81,20 @@ class UseRow:
 
 def surface_table(columns: dict[str, Any]) -> str:
     """HTML: the surface's numbers, a column for each mesh; a dash for one that is not there."""
-
-    def values(of: Callable[[Any], str]) -> list[str]:
-        return ["–" if mesh is None else of(mesh) for mesh in columns.values()]
-
+    meshes = list(columns.values())
     rows = [
         (
             "No-hit rays",
             "Share of the cameras' pixel rays that miss the surface.",
-            *values(lambda mesh: number(mesh.quality.no_hit_ray_share, 1, "%", 100.0)),
+            *(number(mesh and mesh.quality.no_hit_ray_share, 1, "%", 100.0) for mesh in meshes),
         )
     ]
-    if any(mesh is not None and mesh.truth for mesh in columns.values()):
-        rows += [
-            (name, hint, *values(lambda mesh, key=key, unit=unit: _true(mesh, key, unit)))
-            for name, hint, key, unit in ROWS
-        ]
+    if any(mesh is not None and mesh.truth for mesh in meshes):
+        rows += [(name, hint, *(_true(mesh, key, unit) for mesh in meshes)) for name, hint, key, unit in ROWS]
     return table(rows, tuple(f"surface {name}" for name in columns))
 
 
 def _true(mesh: Any, key: str, unit: str) -> str:
+    if mesh is None:
+        return "–"
     return "…" if mesh.truth is None else number(mesh.truth.get(key), 1, unit, 100.0)

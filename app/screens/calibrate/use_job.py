@@ -23,8 +23,8 @@ CHAIN_LENSES = ("thesis", "brown")
 
 
 def use_job(store: Store, spec: Spec, folder: str) -> Generator[Progress, None, str]:
-    """Write the cameras, where they stand if all were placed together, and the correction of their depth where
-    it is known. The first camera stays where the rig has it.
+    """Write the cameras, where they stand if all were placed together, and the correction of their depth
+    where it is known. The first camera stays where the rig has it.
 
     Returns:
         The folder.
@@ -55,7 +55,7 @@ def use_job(store: Store, spec: Spec, folder: str) -> Generator[Progress, None, 
 
 
 def _poses(placed: RigView, rig: Rig) -> dict[str, FloatArray]:
-    """(4, 4) T_world_camera by name; none unless all nodes were placed, since others would be in another world."""
+    """(4, 4) T_world_camera by name; none unless all nodes were placed: others would be in another world."""
     believed = {frame.name: frame.T_world_camera for frame in rig.frames}
     found = {one.name: one.T_first_camera for one in placed.cameras}
     if set(found) != set(believed):
@@ -88,5 +88,6 @@ def _check(camera: CameraView, rig: Rig) -> None:
         )
     if lens.lens not in CHAIN_LENSES:
         raise InputError(
-            f"The chain knows no {lens.lens} lens; choose {' or '.join(CHAIN_LENSES)} under Advanced to use it"
+            f"The chain knows no {lens.lens} lens; choose {' or '.join(CHAIN_LENSES)} under Advanced to use "
+            "it"
         )
