@@ -29,7 +29,7 @@ from pipeline.calibration.warp import BoardWarp, board_warp
 from pipeline.io.images import read_color
 from pipeline.types import CameraIntrinsics
 
-ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
+ENDINGS = (".png", ".jpg", ".jpeg", ".pgm", ".ppm")
 
 
 @dataclass(frozen=True, slots=True)
