@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.calibrate_rig import calibrate_cameras, several_cameras
+from app.cli.calibrate_rig import calibrate_cameras, depth_line, several_cameras
 from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
 from pipeline.config import Lens, Pattern
@@ -65,6 +65,7 @@ def calibrate(
     from pipeline.calibration.assess import assess
     from pipeline.calibration.from_images import image_files, iterate_calibration
     from pipeline.calibration.report import metrics, write_camera_folder
+    from pipeline.calibration.session_depth import depth_beside, fit_session_depth
     from pipeline.calibration.shots import board_beside
 
     board = board_beside(images, pattern, columns, rows, spacing_mm)
@@ -72,19 +73,26 @@ def calibrate(
         raise InputError(f"--held-out {held_out} leaves no view to predict; try 2, or 0 for none")
     nodes = several_cameras(images)
     if nodes:
-        calibrate_cameras(nodes, out, board, lens, held_out, without, like, json)
+        accuracy_m = accuracy_mm / 1000.0
+        calibrate_cameras(nodes, out, board, lens, held_out, range_m, accuracy_m, without, like, json)
         return
     files = image_files(images)
     report = drain(iterate_calibration(files, board, lens, held_out, without, board_warp), say_progress)
     trust = assess(report.calibration, report.views, board, range_m, accuracy_mm / 1000.0)
+    depth = None
+    try:
+        depth = fit_session_depth(report, beside) if (beside := depth_beside(files)) else None
+    except InputError as error:
+        say(f"depth_correction.json is not written: {error}")
     writable_folder(out)
-    for sentence in write_camera_folder(report, out, trust):
+    for sentence in write_camera_folder(report, out, trust, depth):
         say(sentence)
     write_calibration_report(report, trust, out / "report.html")
     if json:
-        print_json(metrics(report, trust))
+        print_json(metrics(report, trust, depth))
     else:
-        say("\n".join((*_camera_lines(report), *_trust_lines(trust))))
+        of_depth = () if depth is None else (f"Its {depth_line(depth)}",)
+        say("\n".join((*_camera_lines(report), *of_depth, *_trust_lines(trust))))
 
 
 def _camera_lines(report: CameraReport) -> Iterator[str]:

@@ -6,7 +6,7 @@ import pytest
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.calibration.rig_from_images import iterate_rig_calibration
-from pipeline.calibration.rig_report import pose_like, write_rig_folder
+from pipeline.calibration.rig_report import pose_like, rig_metrics, write_rig_folder
 from pipeline.calibration.shots import board_beside, node_shots
 from pipeline.geometry import inverse, rotation_angle_rad
 from pipeline.io.images import write_color
@@ -43,7 +43,7 @@ def test_their_lenses_are_those_that_took_the_photographs(report):
 
 
 def test_moments_that_were_held_out_are_predicted(report):
-    metrics = report.metrics()
+    metrics = rig_metrics(report)
     assert metrics["rms_px"] < metrics["held_out_rms_px"] < 1.5 * metrics["rms_px"] < 0.1
     for name, camera in metrics["cameras"].items():
         assert camera["held_out_rms_px"] < 0.1, name
@@ -73,6 +73,21 @@ def test_the_folder_is_laid_over_the_rig_in_its_own_world(report, tmp_path):
     )
 
 
+def test_depth_is_corrected_by_the_same_boards(report, tmp_path):
+    write_rig_folder(report, tmp_path, pose_like(RIG, "node_00"))
+    assert sorted(report.depth) == sorted(report.cameras)
+
+    def off_m(rig):
+        return [
+            abs(float(np.nanmedian(frame.depth.z_m - true.z_m)))
+            for frame, true in zip(rig.frames, rig.truth.depth, strict=True)
+        ]
+
+    before_m, after_m = off_m(load_rig(RIG)), off_m(load_rig(RIG, tmp_path))
+    assert max(before_m) > 0.02
+    assert max(after_m) < 0.3 * max(before_m)
+
+
 def test_without_a_rig_the_first_camera_stands_level(report, tmp_path):
     write_rig_folder(report, tmp_path)
     np.testing.assert_array_equal(read_pose(tmp_path / "node_00" / "pose.txt"), LEVEL_POSE)
@@ -91,4 +106,4 @@ def test_what_is_wrong_with_one_camera_names_it(tmp_path):
     with pytest.raises(InputError, match=r"^node_00: The images are not of one size"):
         drain(iterate_rig_calibration(node_shots([tmp_path]), board))
     with pytest.raises(InputError, match=r"^node_09/color_00\.jpg is none of the cameras' images"):
-        drain(iterate_rig_calibration(node_shots([tmp_path]), board, without=["node_09/color_00.jpg"]))
+        drain(iterate_rig_calibration(node_shots([tmp_path]), board, leave_out=["node_09/color_00.jpg"]))
