@@ -9,7 +9,7 @@ from packetmesh.errors import InputError
 
 Pattern = Literal["circles", "circles-asymmetric", "chessboard", "charuco"]
 """What is printed on a calibration board."""
-Lens = Literal["thesis", "brown", "rational"]
+Lens = Literal["thesis", "brown", "rational", "fisheye"]
 """Distortion that a camera may have: k1, k2 (SPEC 1.1); also p1, p2, k3; also k4 to k6."""
 OutlierMode = Literal["thesis", "depth_normalised", "robust"]
 AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]

@@ -239,7 +239,7 @@ def with_rays(surface: SurfaceResult, rig: Rig, placement: Placement) -> Surface
 
 def yardstick_of_rig(rig: Rig) -> Yardstick | None:
     """For those who compare several surfaces of one rig; None without truth."""
-    return None if rig.truth is None else yardstick_of(rig.truth, [one.intrinsics for one in rig.frames])
+    return None if rig.truth is None else yardstick_of(rig.truth)
 
 
 def compared(

@@ -61,10 +61,14 @@ class Board:
         return flat - 0.5 * (flat.min(axis=0) + flat.max(axis=0))
 
     @property
+    def nearest_m(self) -> float:
+        """From a point to its nearest neighbour."""
+        return self.spacing_m * (2.0**0.5 if self.pattern == "circles-asymmetric" else 1.0)
+
+    @property
     def radius_m(self) -> float:
         """Of a circle."""
-        nearest = np.sqrt(2.0) if self.pattern == "circles-asymmetric" else 1.0
-        return 0.5 * CIRCLE_SHARE * nearest * self.spacing_m
+        return 0.5 * CIRCLE_SHARE * self.nearest_m
 
     @property
     def ambiguous(self) -> bool:

@@ -12,24 +12,17 @@ import cv2
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
+from pipeline.calibration.lens import FLAGS, FREE, NAMES, Optics
 from pipeline.config import Lens
 from pipeline.geometry import rigid
 from pipeline.types import FloatArray
 
-FLAGS: dict[Lens, int] = {
-    "thesis": cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST,
-    "brown": 0,
-    "rational": cv2.CALIB_RATIONAL_MODEL,
-}
-"""k1 and k2 (SPEC 1.1); with tangential p1, p2 and k3; with the denominator's k4, k5, k6."""
-NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-"""Of the parameters, in OpenCV's order."""
-FREE: dict[Lens, tuple[str, ...]] = {
-    "thesis": NAMES[:6],
-    "brown": NAMES[:9],
-    "rational": NAMES,
-}
 LEAST_VIEWS = 3
+LEAST_POINTS = 4
+"""Of a view that is placed."""
+SETTLE_STEPS = 30
+LEAST_INFORMATION = 1e-14
+"""Of a combination of parameters, over that of each alone: below it there is but rounding."""
 LEAST_TILT_DEG = 5.0
 """Between the two views that differ most: views of a board held ever alike fit many lenses."""
 Z95 = 1.959964
@@ -55,6 +48,10 @@ class FittedView:
     """(4, 4)"""
     residuals_px: FloatArray
     """(N, 2) seen less predicted."""
+    points_px: FloatArray
+    """(N, 2) seen."""
+    board_m: FloatArray
+    """(N, 3) the same points on the board."""
 
     @property
     def rms_px(self) -> float:
@@ -72,12 +69,17 @@ class Calibration:
     matrix: FloatArray
     """(3, 3) K."""
     distortion: FloatArray
-    """OpenCV's vector: k1, k2, p1, p2, k3 and, of a rational lens, k4, k5, k6."""
+    """OpenCV's vector: k1, k2, p1, p2, k3 and, of a rational lens, k4, k5, k6; of a fisheye k1 to k4."""
     names: tuple[str, ...]
     """Of the parameters that were estimated."""
     covariance: FloatArray
     """(P, P) of them."""
     views: tuple[FittedView, ...]
+
+    @property
+    def optics(self) -> Optics:
+        """The lens alone."""
+        return Optics(self.lens, self.matrix, self.distortion)
 
     @property
     def rms_px(self) -> float:
@@ -88,7 +90,8 @@ class Calibration:
     def parameters(self) -> dict[str, float]:
         """All by name."""
         k, lens = self.matrix, self.distortion.ravel().tolist()
-        return dict(zip(NAMES, (k[0, 0], k[1, 1], k[0, 2], k[1, 2], *lens), strict=False))
+        names = FREE["fisheye"] if self.lens == "fisheye" else NAMES
+        return dict(zip(names, (k[0, 0], k[1, 1], k[0, 2], k[1, 2], *lens), strict=False))
 
     @property
     def standard_errors(self) -> dict[str, float]:
@@ -106,6 +109,13 @@ class Calibration:
 def rms_px(residuals_px: FloatArray) -> float:
     """Root mean square length of (N, 2) residuals."""
     return float(np.sqrt((residuals_px**2).sum(axis=1).mean()))
+
+
+def coordinate_sd_px(views: Sequence[FittedView], lens: Lens) -> float:
+    """Standard deviation of a coordinate of a point, from what is left after lens and poses are fitted."""
+    every = np.concatenate([view.residuals_px for view in views])
+    freedom = max(every.size - 6 * len(views) - len(FREE[lens]), 1)
+    return float(np.sqrt((every**2).sum() / freedom))
 
 
 def calibrate(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "thesis") -> Calibration:
@@ -127,30 +137,65 @@ def calibrate(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "the
             f"The board was found in {len(views)} images, and it takes {LEAST_VIEWS}, tilted differently; "
             "take more"
         )
-    board_m = [view.board_m.astype(np.float32) for view in views]
-    seen_px = [view.points_px.astype(np.float32).reshape(-1, 1, 2) for view in views]
     try:
-        _, matrix, distortion, turns, moves, *_ = cv2.calibrateCameraExtended(
-            board_m, seen_px, size_px, None, None, flags=FLAGS[lens]
-        )
+        optics, poses = _fisheye(views, size_px) if lens == "fisheye" else _brown(views, size_px, lens)
     except cv2.error:
-        raise ReconstructionError(_DEGENERATE) from None
-    if not (np.isfinite(matrix).all() and np.isfinite(distortion).all()):
+        raise ReconstructionError(_UNEXPLAINED) from None
+    if not (np.isfinite(optics.matrix).all() and np.isfinite(optics.distortion).all()):
         raise ReconstructionError(_DEGENERATE)
-    poses = [pose_of(turn, move) for turn, move in zip(turns, moves, strict=True)]
     if _tilt_deg(poses) < LEAST_TILT_DEG:
         raise ReconstructionError(_DEGENERATE)
-    fitted = tuple(
-        FittedView(view.name, pose, residuals(view, pose, matrix, distortion))
-        for view, pose in zip(views, poses, strict=True)
+    return calibration_of(views, poses, optics, size_px)
+
+
+def calibration_of(
+    views: Sequence[View], poses: Sequence[FloatArray], optics: Optics, size_px: tuple[int, int]
+) -> Calibration:
+    """The record of a lens and of (4, 4) poses that were estimated together."""
+    fitted = tuple(_fitted(view, pose, optics) for view, pose in zip(views, poses, strict=True))
+    covariance = coordinate_sd_px(fitted, optics.lens) ** 2 * inverted(information(fitted, optics))
+    return Calibration(
+        optics.lens, size_px, optics.matrix, optics.distortion, FREE[optics.lens], covariance, fitted
     )
-    covariance = _covariance(views, fitted, matrix, distortion, FREE[lens])
-    return Calibration(lens, size_px, matrix, distortion.ravel(), FREE[lens], covariance, fitted)
+
+
+def _brown(views: Sequence[View], size_px: tuple[int, int], lens: Lens) -> tuple[Optics, list[FloatArray]]:
+    """OpenCV's lens, and the boards' poses."""
+    _, matrix, distortion, turns, moves, *_ = cv2.calibrateCameraExtended(
+        [view.board_m.astype(np.float32) for view in views],
+        [view.points_px.astype(np.float32).reshape(-1, 1, 2) for view in views],
+        size_px,
+        None,
+        None,
+        flags=FLAGS[lens],
+    )
+    poses = [pose_of(turn, move) for turn, move in zip(turns, moves, strict=True)]
+    return Optics(lens, matrix, distortion.ravel()), poses
+
+
+def _fisheye(views: Sequence[View], size_px: tuple[int, int]) -> tuple[Optics, list[FloatArray]]:
+    """OpenCV's fisheye lens, and the boards' poses."""
+    own = cv2.fisheye if hasattr(cv2.fisheye, "CALIB_FIX_SKEW") else cv2  # OpenCV 5 moved the flags
+    _, matrix, distortion, turns, moves = cv2.fisheye.calibrate(
+        [view.board_m.astype(np.float64)[None] for view in views],
+        [view.points_px.astype(np.float64)[None] for view in views],
+        size_px,
+        np.eye(3),
+        np.zeros((4, 1)),
+        flags=own.CALIB_RECOMPUTE_EXTRINSIC | own.CALIB_FIX_SKEW,
+        criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-9),
+    )
+    poses = [pose_of(turn, move) for turn, move in zip(turns, moves, strict=True)]
+    return Optics("fisheye", matrix, distortion.ravel()), poses
 
 
 _DEGENERATE = (
     f"All views show the board from nearly the same direction (within {LEAST_TILT_DEG:g}°), which many "
     "lenses explain alike; tilt it by 20 to 40° to different sides"
+)
+_UNEXPLAINED = (
+    "No lens of this kind explains the views; check columns and rows, tilt the board by 20 to 40° to "
+    "different sides, or try another lens"
 )
 
 
@@ -160,26 +205,56 @@ def pose_of(turn: FloatArray, move: FloatArray) -> FloatArray:
 
 
 def residuals(
-    view: View, T_camera_board: FloatArray, matrix: FloatArray, distortion: FloatArray
+    view: View,
+    T_camera_board: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+    lens: Lens = "thesis",
 ) -> FloatArray:
     """(N, 2) seen less predicted."""
-    turn = cv2.Rodrigues(T_camera_board[:3, :3])[0]
-    predicted_px, _ = cv2.projectPoints(view.board_m, turn, T_camera_board[:3, 3], matrix, distortion)
-    return view.points_px - predicted_px.reshape(-1, 2)
+    return view.points_px - Optics(lens, matrix, distortion).project(view.board_m, T_camera_board)
 
 
-def place(view: View, matrix: FloatArray, distortion: FloatArray) -> FittedView:
+def place(view: View, matrix: FloatArray, distortion: FloatArray, lens: Lens = "thesis") -> FittedView:
     """Where the board of a view is that had no part in the lens.
 
     Raises:
         ReconstructionError: no pose explains it.
     """
-    found, turn, move = cv2.solvePnP(view.board_m, view.points_px, matrix, distortion)
+    optics = Optics(lens, matrix, distortion)
+    rays = optics.rays(view.points_px)
+    known = np.isfinite(rays[:, 2])
+    found = False
+    if known.sum() >= LEAST_POINTS:
+        flat = rays[known, :2] / rays[known, 2:]
+        found, turn, move = cv2.solvePnP(view.board_m[known], flat, np.eye(3), None)
     if not found:
         raise ReconstructionError(f"No place of the board explains {view.name}; is it the same board?")
-    turn, move = cv2.solvePnPRefineLM(view.board_m, view.points_px, matrix, distortion, turn, move)
-    pose = pose_of(turn, move)
-    return FittedView(view.name, pose, residuals(view, pose, matrix, distortion))
+    return _fitted(view, settle(view.board_m, view.points_px, pose_of(turn, move), optics), optics)
+
+
+def settle(
+    points_m: FloatArray, points_px: FloatArray, T_camera_points: FloatArray, optics: Optics
+) -> FloatArray:
+    """(4, 4) pose near a given one, from which (N, 3) points are seen nearest to (N, 2) pixels.
+
+    Levenberg and Marquardt's method on the distances in the image.
+    """
+    pose = np.concatenate([cv2.Rodrigues(T_camera_points[:3, :3])[0].ravel(), T_camera_points[:3, 3]])
+    damping, told = 1e-3, optics.linearised(points_m, T_camera_points)
+    off_px = (points_px - told.points_px).ravel()
+    for _ in range(SETTLE_STEPS):
+        normal = told.by_pose.T @ told.by_pose
+        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), told.by_pose.T @ off_px)
+        nearer = optics.linearised(points_m, pose_of(pose[:3] + step[:3], pose[3:] + step[3:]))
+        nearer_px = (points_px - nearer.points_px).ravel()
+        if nearer_px @ nearer_px <= off_px @ off_px:
+            pose, told, off_px, damping = pose + step, nearer, nearer_px, 0.1 * damping
+        else:
+            damping *= 10.0
+        if np.abs(step).max() < 1e-12:
+            break
+    return pose_of(pose[:3], pose[3:])
 
 
 def held_out(
@@ -193,12 +268,18 @@ def held_out(
     """
     if not 2 <= folds <= len(views):
         raise InputError(f"{len(views)} views cannot be held out in {folds} folds; try 2 to {len(views)}")
+    left = len(views) - -(-len(views) // folds)
+    if left < LEAST_VIEWS:
+        raise InputError(
+            f"{len(views)} views in {folds} folds leave {left} for the lens, and it takes {LEAST_VIEWS}; "
+            "hold out fewer at a time with more folds, or take more images"
+        )
     told: dict[int, FittedView] = {}
     for fold in range(folds):
         rest = [view for index, view in enumerate(views) if index % folds != fold]
         lens_of_rest = calibrate(rest, size_px, lens)
         for index in range(fold, len(views), folds):
-            told[index] = place(views[index], lens_of_rest.matrix, lens_of_rest.distortion)
+            told[index] = place(views[index], lens_of_rest.matrix, lens_of_rest.distortion, lens_of_rest.lens)
     return tuple(told[index] for index in range(len(views)))
 
 
@@ -207,22 +288,32 @@ def _tilt_deg(poses: Sequence[FloatArray]) -> float:
     return float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1.0, 1.0))).max())
 
 
-def _covariance(
-    views: Sequence[View],
-    fitted: Sequence[FittedView],
-    matrix: FloatArray,
-    distortion: FloatArray,
-    names: tuple[str, ...],
-) -> FloatArray:
-    """(P, P) of the lens: its part of (J^T J)^-1 s^2, in which the poses are parameters, too (SPEC 1.3 d)."""
-    columns = [NAMES.index(name) for name in names]
-    normal = np.zeros((len(columns), len(columns)))
-    for view, one in zip(views, fitted, strict=True):
-        turn = cv2.Rodrigues(one.T_camera_board[:3, :3])[0]
-        _, J = cv2.projectPoints(view.board_m, turn, one.T_camera_board[:3, 3], matrix, distortion)
-        pose, lens = J[:, :6], J[:, 6:][:, columns]
-        lens = lens - pose @ np.linalg.lstsq(pose, lens, rcond=None)[0]
-        normal += lens.T @ lens
-    every = np.concatenate([one.residuals_px for one in fitted])
-    freedom = max(every.size - 6 * len(views) - len(columns), 1)
-    return np.linalg.pinv(normal) * float((every**2).sum()) / freedom
+def _fitted(view: View, T_camera_board: FloatArray, optics: Optics) -> FittedView:
+    residuals_px = view.points_px - optics.project(view.board_m, T_camera_board)
+    return FittedView(view.name, T_camera_board, residuals_px, view.points_px, view.board_m)
+
+
+def information(fitted: Sequence[FittedView], optics: Optics) -> FloatArray:
+    """(P, P) what views tell of the lens if a coordinate is known to 1 px: its part of J^T J, in which the
+    poses are parameters, too (SPEC 1.3 d).
+    """
+    return sum(
+        (informed(view.board_m, view.T_camera_board, optics) for view in fitted),
+        start=np.zeros((len(FREE[optics.lens]),) * 2),
+    )
+
+
+def inverted(told: FloatArray) -> FloatArray:
+    """(P, P) covariance of (P, P) information; what the views hardly tell is very unsure, never sure."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(told), LEAST_INFORMATION))
+    values, turns = np.linalg.eigh(told * np.outer(scale, scale))
+    root = scale[:, None] * turns / np.sqrt(np.maximum(values, LEAST_INFORMATION))
+    return root @ root.T
+
+
+def informed(board_m: FloatArray, T_camera_board: FloatArray, optics: Optics) -> FloatArray:
+    """(P, P) what one view tells."""
+    told = optics.linearised(board_m, T_camera_board)
+    base = np.linalg.qr(told.by_pose)[0]
+    left = told.by_lens - base @ (base.T @ told.by_lens)
+    return left.T @ left

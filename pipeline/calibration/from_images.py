@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from packetmesh.errors import InputError
@@ -23,10 +24,11 @@ from pipeline.calibration.estimate import (
     held_out,
     rms_px,
 )
+from pipeline.calibration.refine import refined_px
+from pipeline.calibration.shots import photographs
+from pipeline.calibration.warp import BoardWarp, board_warp
 from pipeline.io.images import read_color
 from pipeline.types import CameraIntrinsics
-
-ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +38,15 @@ class CameraReport:
     board: Board
     detections: dict[str, Detection]
     """By the image's name."""
+    views: tuple[View, ...]
+    """Those that the camera comes from."""
     calibration: Calibration
     held_out: tuple[FittedView, ...]
     """The same views, each by a lens of others; empty if none was held out."""
+    left_out: tuple[str, ...] = ()
+    """Images that somebody wanted left out."""
+    warp: BoardWarp | None = None
+    """Of the board, where it was asked for."""
 
     @property
     def held_out_rms_px(self) -> float | None:
@@ -48,15 +56,23 @@ class CameraReport:
         return rms_px(np.concatenate([view.residuals_px for view in self.held_out]))
 
     @property
+    def distances_m(self) -> tuple[float, float]:
+        """Of the board's middle from the camera: the least and the most."""
+        away_m = [float(np.linalg.norm(view.T_camera_board[:3, 3])) for view in self.calibration.views]
+        return min(away_m), max(away_m)
+
+    @property
     def intrinsics(self) -> CameraIntrinsics:
         """The camera as the chain takes it.
 
         Raises:
-            InputError: a rational lens, which it does not know.
+            InputError: a rational or fisheye lens, which it does not know.
         """
         found = self.calibration
-        if found.lens == "rational":
-            raise InputError("The chain knows no rational lens; calibrate with the lens 'thesis' or 'brown'")
+        if found.lens in ("rational", "fisheye"):
+            raise InputError(
+                f"The chain knows no {found.lens} lens; calibrate with the lens 'thesis' or 'brown' for it"
+            )
         return CameraIntrinsics(found.matrix, found.distortion[:5].copy(), *found.size_px)
 
     def metrics(self) -> dict[str, Any]:
@@ -74,16 +90,29 @@ class CameraReport:
             "distortion": found.distortion.tolist(),
             "standard_errors": found.standard_errors,
             "ci95": {name: list(interval) for name, interval in found.intervals.items()},
+            "left_out": list(self.left_out),
+            "board_warp": self._warp_metrics(),
             "views": [
                 {
                     "image": name,
                     "found": one.found,
+                    "used": name in fitted,
                     "rms_px": fitted.get(name),
                     "held_out_rms_px": unseen.get(name),
                     "reason": one.reason,
                 }
                 for name, one in self.detections.items()
             ],
+        }
+
+    def _warp_metrics(self) -> dict[str, Any] | None:
+        if self.warp is None:
+            return None
+        return {
+            "warp_m": self.warp.warp_m,
+            "used": self.warp.helps,
+            "held_out_rms_px_flat": self.warp.flat_rms_px,
+            "held_out_rms_px": self.warp.rms_px,
         }
 
 
@@ -97,7 +126,7 @@ def image_files(given: Sequence[str]) -> list[Path]:
     for word in given:
         path = Path(word)
         if path.is_dir():
-            named = sorted(one for one in path.iterdir() if one.suffix.lower() in ENDINGS)
+            named = photographs(path)
         elif any(sign in word for sign in "*?["):
             named = sorted(Path(path.anchor or ".").glob(str(path.relative_to(path.anchor))))
         else:
@@ -111,52 +140,102 @@ def image_files(given: Sequence[str]) -> list[Path]:
 
 
 def iterate_calibration(
-    files: Sequence[Path], board: Board, lens: Lens = "thesis", folds: int = 0
+    files: Sequence[Path],
+    board: Board,
+    lens: Lens = "thesis",
+    folds: int = 0,
+    without: Sequence[str] = (),
+    warp: bool = False,
 ) -> Generator[Progress, None, CameraReport]:
     """Find the board in every image and estimate the camera.
+
+    Circles are found once more where perspective does not move their centres, with the first estimate.
 
     Args:
         files: images of one size.
         board: what they show.
         lens: which distortions the camera may have.
-        folds: in how many turns views are held out; 0 holds none out, 2 half of them as the thesis does.
+        folds: in how many turns views are held out; 0 holds none out, 2 half of them as the thesis does. With
+            few views there are as many turns as it takes to leave three of them.
+        without: names of images to leave out.
+        warp: whether to estimate the board's points, too, and to use them if held-out views then fit better.
 
     Yields:
         Progress, before each image.
 
     Raises:
-        InputError: unreadable images, several sizes, or the board in too few of them.
+        InputError: unreadable images, several sizes, the board in too few of them, or an image to leave out
+            that is not there.
         ReconstructionError: the views do not determine the lens.
     """
+    detections, paths, size_px = yield from _detections(files, board)
+    for name in without:
+        if name not in detections:
+            raise InputError(f"{name} is not among the images, so it cannot be left out; check its name")
+    views = [
+        View(name, one.points_px, board.points_m[one.indices])
+        for name, one in detections.items()
+        if one.found and name not in without
+    ]
+    if len(views) < LEAST_VIEWS:
+        raise InputError(_too_few(detections, without, board, len(views)))
+    yield Progress("estimating the camera", 0.7)
+    calibration = calibrate(views, size_px, lens)
+    if board.pattern in ("circles", "circles-asymmetric"):
+        again: list[View] = []
+        for view, fitted in zip(views, calibration.views, strict=True):
+            yield Progress(f"centring circles in {view.name}", 0.7 + 0.2 * len(again) / len(views))
+            gray = cv2.cvtColor(read_color(paths[view.name]), cv2.COLOR_RGB2GRAY)
+            again.append(replace(view, points_px=refined_px(gray, board, fitted, calibration.optics)))
+        better = calibrate(again, size_px, lens)
+        if better.rms_px <= calibration.rms_px:
+            views, calibration = again, better
+    yield Progress("holding views out", 0.9)
+    folds = _folds(folds, len(views))
+    bent = board_warp(views, size_px, board, max(folds, 2), lens) if warp else None
+    if bent is not None and bent.helps:
+        views = [replace(view, board_m=bent.board_m) for view in views]
+        return CameraReport(
+            board, detections, tuple(views), bent.calibration, bent.held_out, tuple(without), bent
+        )
+    unseen = held_out(views, size_px, folds, lens) if folds else ()
+    return CameraReport(board, detections, tuple(views), calibration, unseen, tuple(without), bent)
+
+
+def _detections(
+    files: Sequence[Path], board: Board
+) -> Generator[Progress, None, tuple[dict[str, Detection], dict[str, Path], tuple[int, int]]]:
+    """What is found in each image and where it lies, by its name, and the size of all."""
     detections: dict[str, Detection] = {}
+    paths: dict[str, Path] = {}
     sizes: dict[tuple[int, int], str] = {}
     for index, path in enumerate(files):
-        yield Progress(f"looking for the board in {path.name}", 0.9 * index / len(files))
+        yield Progress(f"looking for the board in {path.name}", 0.7 * index / len(files))
         image = read_color(path)
         sizes.setdefault((image.shape[1], image.shape[0]), path.name)
         if len(sizes) > 1:
             told = " and ".join(f"{name} of {width} x {height}" for (width, height), name in sizes.items())
             raise InputError(f"The images are not of one size: {told}; calibrate each camera by itself")
-        detections[_name(path, detections)] = detect(image, board)
-    yield Progress("estimating the camera", 0.9)
-    views = [
-        View(name, one.points_px, board.points_m[one.indices])
-        for name, one in detections.items()
-        if one.found
-    ]
-    if len(views) < LEAST_VIEWS:
-        reasons = [one.reason for one in detections.values() if one.reason] or [
-            "Take more, tilted differently"
-        ]
-        raise InputError(
-            f"The board ({board.title}) is found in {len(views)} of {len(files)} images, and it takes "
-            f"{LEAST_VIEWS}. {reasons[0]}"
-        )
-    size_px = next(iter(sizes))
-    calibration = calibrate(views, size_px, lens)
-    unseen = held_out(views, size_px, folds, lens) if folds else ()
-    return CameraReport(board, detections, calibration, unseen)
+        name = path.name if path.name not in detections else str(path)
+        detections[name], paths[name] = detect(image, board), path
+    return detections, paths, next(iter(sizes))
 
 
-def _name(path: Path, known: dict[str, Detection]) -> str:
-    return path.name if path.name not in known else str(path)
+def _folds(wanted: int, views: int) -> int:
+    """At least as many as leave enough views for the lens; 0 if none are wanted or there are too few."""
+    if not wanted or views <= LEAST_VIEWS:
+        return 0
+    return next(folds for folds in range(min(wanted, views), views + 1) if _left(views, folds) >= LEAST_VIEWS)
+
+
+def _left(views: int, folds: int) -> int:
+    return views - -(-views // folds)
+
+
+def _too_few(detections: dict[str, Detection], without: Sequence[str], board: Board, found: int) -> str:
+    reasons = [f" {name}: {one.reason}" for name, one in detections.items() if one.reason]
+    besides = f", {len(without)} left out" if without else ""
+    return (
+        f"The board ({board.title}) is found in {found} of {len(detections)} images{besides}, and it takes "
+        f"{LEAST_VIEWS}, tilted differently.{reasons[0] if reasons else ' Take more'}"
+    )

@@ -20,6 +20,7 @@ from pipeline.types import AnyPath, CameraIntrinsics
 COLMAP_MIDDLE, MATLAB_MIDDLE = 0.5, 1.0
 """Of the first pixel."""
 _COLMAP = re.compile(r"^\s*\d+\s+(PINHOLE|OPENCV|FULL_OPENCV)\s+(.*)$", re.MULTILINE)
+_FISHEYE = re.compile(r"\bequidistant\b|\bOPENCV_FISHEYE\b|^fisheye_model:\s*1", re.MULTILINE)
 _KALIBR = re.compile(r"^\s+(intrinsics|distortion_coeffs|resolution):\s*\[([^\]]*)\]", re.MULTILINE)
 _MATLAB = re.compile(
     r"^\s*(FocalLength|PrincipalPoint|ImageSize|RadialDistortion|TangentialDistortion)\s*[:=]\s*\[([^\]]*)\]",
@@ -35,46 +36,46 @@ def opencv_yaml(camera: CameraIntrinsics) -> str:
             "---",
             f"image_width: {camera.width_px}",
             f"image_height: {camera.height_px}",
-            *_opencv_matrix("camera_matrix", camera.matrix),
-            *_opencv_matrix("distortion_coefficients", camera.distortion[None]),
+            *opencv_matrix("camera_matrix", camera.matrix),
+            *opencv_matrix("distortion_coefficients", camera.distortion[None]),
             "",
         )
     )
 
 
-def _opencv_matrix(name: str, values: np.ndarray) -> tuple[str, ...]:
+def opencv_matrix(name: str, values: np.ndarray) -> tuple[str, ...]:
+    """Lines of a matrix in OpenCV's YAML."""
     rows, columns = values.shape
     return (
         f"{name}: !!opencv-matrix",
         f"   rows: {rows}",
         f"   cols: {columns}",
         "   dt: d",
-        f"   data: [{_listed(values.ravel())}]",
+        f"   data: [{listed(values.ravel())}]",
     )
+
+
+def ros_matrix(name: str, values: np.ndarray) -> tuple[str, ...]:
+    """Lines of a matrix in ROS's YAML."""
+    rows, columns = values.shape
+    return f"{name}:", f"  rows: {rows}", f"  cols: {columns}", f"  data: [{listed(values.ravel())}]"
 
 
 def camera_info(camera: CameraIntrinsics) -> str:
     """ROS's camera_info, as ``camera_calibration`` writes it."""
-    projection = np.column_stack([camera.matrix, np.zeros(3)])
-    lines = [f"image_width: {camera.width_px}", f"image_height: {camera.height_px}", "camera_name: camera"]
-    for name, values in (
-        ("camera_matrix", camera.matrix),
-        ("distortion_model", None),
-        ("distortion_coefficients", camera.distortion[None]),
-        ("rectification_matrix", np.eye(3)),
-        ("projection_matrix", projection),
-    ):
-        if values is None:
-            lines.append("distortion_model: plumb_bob")
-        else:
-            rows, columns = values.shape
-            lines += [
-                f"{name}:",
-                f"  rows: {rows}",
-                f"  cols: {columns}",
-                f"  data: [{_listed(values.ravel())}]",
-            ]
-    return "\n".join([*lines, ""])
+    return "\n".join(
+        (
+            f"image_width: {camera.width_px}",
+            f"image_height: {camera.height_px}",
+            "camera_name: camera",
+            *ros_matrix("camera_matrix", camera.matrix),
+            "distortion_model: plumb_bob",
+            *ros_matrix("distortion_coefficients", camera.distortion[None]),
+            *ros_matrix("rectification_matrix", np.eye(3)),
+            *ros_matrix("projection_matrix", np.column_stack([camera.matrix, np.zeros(3)])),
+            "",
+        )
+    )
 
 
 def open3d_json(camera: CameraIntrinsics) -> str:
@@ -100,7 +101,7 @@ def colmap_text(camera: CameraIntrinsics) -> str:
     numbers = (*places, *camera.distortion[:4], *((camera.distortion[4], 0.0, 0.0, 0.0) if whole else ()))
     return (
         "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
-        f"1 {model} {camera.width_px} {camera.height_px} {_listed(np.array(numbers), ' ')}\n"
+        f"1 {model} {camera.width_px} {camera.height_px} {listed(np.array(numbers), ' ')}\n"
     )
 
 
@@ -114,9 +115,9 @@ def kalibr_yaml(camera: CameraIntrinsics) -> str:
     places = np.array([camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px])
     return (
         "cam0:\n  camera_model: pinhole\n"
-        f"  intrinsics: [{_listed(places)}]\n"
+        f"  intrinsics: [{listed(places)}]\n"
         "  distortion_model: radtan\n"
-        f"  distortion_coeffs: [{_listed(camera.distortion[:4])}]\n"
+        f"  distortion_coeffs: [{listed(camera.distortion[:4])}]\n"
         f"  resolution: [{camera.width_px}, {camera.height_px}]\n"
     )
 
@@ -127,11 +128,11 @@ def matlab_text(camera: CameraIntrinsics) -> str:
     middle = np.array([camera.cx_px, camera.cy_px]) + MATLAB_MIDDLE
     radial = (k1, k2, k3) if k3 else (k1, k2)
     return (
-        f"FocalLength: [{_listed(np.array([camera.fx_px, camera.fy_px]), ' ')}]\n"
-        f"PrincipalPoint: [{_listed(middle, ' ')}]\n"
+        f"FocalLength: [{listed(np.array([camera.fx_px, camera.fy_px]), ' ')}]\n"
+        f"PrincipalPoint: [{listed(middle, ' ')}]\n"
         f"ImageSize: [{camera.height_px} {camera.width_px}]\n"
-        f"RadialDistortion: [{_listed(np.array(radial), ' ')}]\n"
-        f"TangentialDistortion: [{_listed(np.array([p1, p2]), ' ')}]\n"
+        f"RadialDistortion: [{listed(np.array(radial), ' ')}]\n"
+        f"TangentialDistortion: [{listed(np.array([p1, p2]), ' ')}]\n"
     )
 
 
@@ -157,6 +158,11 @@ def write_camera(path: AnyPath, camera: CameraIntrinsics, kind: str) -> None:
     text = WRITERS[kind](camera)
     with atomic_path(path) as sibling:
         sibling.write_text(text)
+
+
+def is_fisheye(text: str) -> bool:
+    """Whether a camera file says that its lens is a fisheye, of which the chain knows none."""
+    return _FISHEYE.search(text) is not None
 
 
 def camera_in(text: str) -> CameraIntrinsics | None:
@@ -208,7 +214,7 @@ def _numbers(words: str) -> list[float]:
     return [float(word) for word in re.split(r"[\s,;]+", words.strip()) if word]
 
 
-def _listed(values: np.ndarray, between: str = ", ") -> str:
+def listed(values: np.ndarray, between: str = ", ") -> str:
     """Numbers exact to the last bit."""
     return between.join(repr(float(value)) for value in values)
 

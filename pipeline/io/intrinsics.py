@@ -11,7 +11,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, read_text
-from pipeline.io.camera_files import camera_in
+from pipeline.io.camera_files import camera_in, is_fisheye
 from pipeline.types import AnyPath, CameraIntrinsics
 
 _BROWN_CONRADY = {"", "plumb_bob", "rational_polynomial"}
@@ -32,6 +32,11 @@ def read_intrinsics(path: AnyPath) -> CameraIntrinsics:
         InputError: unreadable, of no known style, or with impossible values.
     """
     text = read_text(path, "intrinsics file")
+    if is_fisheye(text):
+        raise InputError(
+            f"The intrinsics file {path} has the distortion model equidistant, that of a fisheye lens; try a "
+            "calibration with plumb_bob, which has five coefficients, or undistort the images first"
+        )
     values = _parse_json(text, path) if text.lstrip().startswith("{") else _parse_yaml(text)
     try:
         camera = _from_keys(values) or camera_in(text)

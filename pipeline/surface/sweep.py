@@ -51,7 +51,7 @@ def iterate_sweep(
     if truth is not None and not cameras:
         raise InputError("The truth is placed by the cameras and there are none; give the rig's cameras")
     compile_all()  # or the first ball's time would hold it
-    yardstick = None if truth is None else yardstick_of(truth, [camera.intrinsics for camera in cameras])
+    yardstick = None if truth is None else yardstick_of(truth)
     for radius_m in radii_m:
         yield _sweep_point(cloud, float(radius_m), cameras, truth, yardstick)
 

@@ -13,7 +13,7 @@ from pipeline.geometry import apply, inverse
 from pipeline.open3d_runtime import o3d
 from pipeline.rays import Camera, hit_depths, tensor, triangle_areas_m2, triangle_scene
 from pipeline.surface.ray_parts import sight
-from pipeline.types import CameraIntrinsics, FloatArray, IntArray, RigTruth
+from pipeline.types import FloatArray, IntArray, RigTruth
 
 TOLERANCES_M = (0.01, 0.03, 0.05)
 SAMPLES = 20_000
@@ -39,16 +39,10 @@ class Yardstick:
     """As it is after these have been drawn."""
 
 
-def yardstick_of(truth: RigTruth, intrinsics: Sequence[CameraIntrinsics], seed: int = 0) -> Yardstick:
-    """The yardstick of a truth.
-
-    Args:
-        truth: the true surface, poses and depth maps.
-        intrinsics: one for each of the truth's poses.
-        seed: draws the sample points.
-    """
+def yardstick_of(truth: RigTruth, seed: int = 0) -> Yardstick:
+    """The yardstick of a truth; ``seed`` draws the sample points."""
     scene, rng = triangle_scene(truth.vertices_m, truth.triangles), np.random.default_rng(seed)
-    cameras = tuple(Camera(one, T) for one, T in zip(intrinsics, truth.T_world_camera, strict=True))
+    cameras = tuple(Camera(*one) for one in zip(truth.intrinsics, truth.T_world_camera, strict=True))
     points_m = sample_surface(truth.vertices_m, truth.triangles, _DRAWS_A_SAMPLE * SAMPLES, rng)
     seen = np.zeros(len(points_m), dtype=bool)
     for camera in cameras:
@@ -89,7 +83,7 @@ def compare_with_truth(
     if not len(triangles):
         raise InputError("There is no triangle to compare with the truth; try a larger ball radius")
     mesh_m = _in_true_frame(vertices_m, truth, cameras)
-    yardstick = yardstick or yardstick_of(truth, [camera.intrinsics for camera in cameras])
+    yardstick = yardstick or yardstick_of(truth)
     return _surface_measures(mesh_m, triangles, yardstick) | _ray_measures(
         mesh_m, triangles, truth, yardstick.cameras
     )

@@ -23,7 +23,7 @@ def joined(*meshes):
 
 def truth_of(vertices_m, triangles) -> RigTruth:
     depth = tuple(hit_depth(vertices_m, triangles, CAMERA, pose) for pose in POSES)
-    return RigTruth(vertices_m, triangles, POSES, depth)
+    return RigTruth(vertices_m, triangles, POSES, depth, (CAMERA,) * len(POSES))
 
 
 FLOOR = rectangle((-8, 8), (-2, 12))
@@ -81,7 +81,7 @@ def test_the_mesh_may_live_in_a_moved_world():
 
 def test_depth_errors_are_those_along_the_rays():
     """A mesh scaled by 1.04 (1.06) about the camera has every depth 4 % (6 %) too long."""
-    truth = RigTruth(*FLOOR, POSES[:1], (hit_depth(*FLOOR, CAMERA, POSES[0]),))
+    truth = RigTruth(*FLOOR, POSES[:1], (hit_depth(*FLOOR, CAMERA, POSES[0]),), (CAMERA,))
     for scale, share in ((1.04, 1.0), (1.06, 0.0)):
         eye_m = POSES[0][:3, 3]
         result = compare_with_truth(eye_m + scale * (FLOOR[0] - eye_m), FLOOR[1], truth, CAMERAS[:1])
@@ -92,11 +92,11 @@ def test_depth_errors_are_those_along_the_rays():
 
 def test_the_same_seed_gives_the_same_numbers():
     half = rectangle((-8, 0), (-2, 12))
-    truth, intrinsics = truth_of(*FLOOR), [camera.intrinsics for camera in CAMERAS]
-    one, two = yardstick_of(truth, intrinsics, seed=1), yardstick_of(truth, intrinsics, seed=2)
+    truth = truth_of(*FLOOR)
+    one, two = yardstick_of(truth, seed=1), yardstick_of(truth, seed=2)
     first, second, other = (compare_with_truth(*half, truth, CAMERAS, by) for by in (one, one, two))
     assert first == second != other
-    assert compare_with_truth(*half, truth, CAMERAS, yardstick_of(truth, intrinsics)) == compare_with_truth(
+    assert compare_with_truth(*half, truth, CAMERAS, yardstick_of(truth)) == compare_with_truth(
         *half, truth, CAMERAS
     )
     assert first["coverage_3cm"] == pytest.approx(other["coverage_3cm"], abs=0.03)

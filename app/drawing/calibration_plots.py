@@ -1,0 +1,295 @@
+"""A camera's calibration in pictures: each says what it shows, in which unit, in colours that everybody tells
+apart. Positions in an image are pixels, from its upper left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+
+from app.drawing.colors import (
+    BRAND,
+    DELIVERED,
+    DISTANCE_STOPS,
+    LOSS,
+    NEUTRAL,
+    SOURCE,
+    TARGET,
+    css,
+)
+from pipeline.calibration.diagnosis import Coverage, RadialCurve, RadialResiduals
+from pipeline.calibration.estimate import Calibration, FittedView
+from pipeline.calibration.next_view import NextView
+from pipeline.calibration.trust import ErrorMap, HalfDifference
+from pipeline.calibration.verdict import Verdict
+from pipeline.types import FloatArray
+
+RAMP = [(index / 4.0, css(color)) for index, color in enumerate(DISTANCE_STOPS)]
+ARROW_SHARE = 0.03
+"""Of the image's width, about the length of the median residual's arrow."""
+MOST_ARROWS = 1500
+BAND95 = 1.96
+
+
+def views_figure(
+    fitted: Sequence[FittedView], unseen: Sequence[FittedView] = (), outliers: Sequence[str] = ()
+) -> go.Figure:
+    """Bars of every view's error, in the fit and, beside it, when it is held out; outliers are red."""
+    figure = _figure("Error of each view", "", "RMS, px")
+    names = [view.name for view in fitted]
+    colors = [css(LOSS) if name in outliers else css(TARGET) for name in names]
+    figure.add_bar(x=names, y=[view.rms_px for view in fitted], name="in the fit", marker_color=colors)
+    if unseen:
+        figure.add_bar(
+            x=[view.name for view in unseen],
+            y=[view.rms_px for view in unseen],
+            name="held out",
+            marker_color=css(SOURCE),
+        )
+    figure.update_traces(hovertemplate="%{x}: %{y:.3f} px<extra>%{fullData.name}</extra>")
+    figure.update_layout(barmode="group", showlegend=bool(unseen), xaxis={"type": "category"})
+    return figure
+
+
+def distortion_figure(curve: RadialCurve) -> go.Figure:
+    """How far the lens moves a point, over the distance from the principal point, with its 95 % band."""
+    figure = _figure("Distortion of the lens", "distance from the principal point, px", "moved outward, px")
+    low, high = curve.moved_px - BAND95 * curve.sd_px, curve.moved_px + BAND95 * curve.sd_px
+    figure.add_scatter(
+        x=np.concatenate([curve.radius_px, curve.radius_px[::-1]]),
+        y=np.concatenate([high, low[::-1]]),
+        fill="toself",
+        fillcolor=_faint(TARGET),
+        line={"width": 0},
+        name="95 %",
+        hoverinfo="skip",
+    )
+    figure.add_scatter(
+        x=curve.radius_px,
+        y=curve.moved_px,
+        line={"color": css(TARGET)},
+        name="lens",
+        customdata=curve.angle_deg,
+        hovertemplate="%{x:.0f} px, %{customdata:.1f}° off the axis: %{y:+.2f} px<extra></extra>",
+    )
+    if len(curve.radius_px) and curve.seen_to_px < curve.radius_px[-1]:
+        figure.add_vrect(
+            x0=curve.seen_to_px,
+            x1=float(curve.radius_px[-1]),
+            fillcolor=css(NEUTRAL),
+            opacity=0.15,
+            line_width=0,
+            annotation_text="no points",
+            annotation_position="top left",
+        )
+    return figure
+
+
+def residuals_figure(calibration: Calibration) -> go.Figure:
+    """An arrow from where a point is predicted towards where it was seen, drawn longer, for all views."""
+    points_px = np.concatenate([view.points_px for view in calibration.views])
+    residuals_px = np.concatenate([view.residuals_px for view in calibration.views])
+    median_px = float(np.median(np.linalg.norm(residuals_px, axis=1)))
+    times = _round_number(ARROW_SHARE * calibration.size_px[0] / max(median_px, 1e-6))
+    figure = _image_figure(f"What the lens leaves, drawn {times:g} times as long", calibration.size_px)
+    every = max(1, -(-len(points_px) // MOST_ARROWS))
+    begin_px = (points_px - residuals_px)[::every]
+    end_px = begin_px + times * residuals_px[::every]
+    figure.add_scatter(
+        x=begin_px[:, 0],
+        y=begin_px[:, 1],
+        mode="markers",
+        marker={"size": 3, "color": css(TARGET)},
+        name="predicted",
+        customdata=np.linalg.norm(residuals_px[::every], axis=1),
+        hovertemplate="(%{x:.0f}, %{y:.0f}): %{customdata:.2f} px<extra></extra>",
+    )
+    lines = np.full((len(begin_px), 3, 2), np.nan)
+    lines[:, 0], lines[:, 1] = begin_px, end_px
+    figure.add_scatter(
+        x=lines[..., 0].ravel(),
+        y=lines[..., 1].ravel(),
+        mode="lines",
+        line={"color": css(SOURCE), "width": 1},
+        name="towards where it was seen",
+        hoverinfo="skip",
+    )
+    return figure
+
+
+def radial_residuals_figure(told: RadialResiduals) -> go.Figure:
+    """What is left along the radius, with the mean of each band: a wave is a lens of a wrong kind."""
+    figure = _figure("What is left along the radius", "distance from the principal point, px", "outward, px")
+    figure.add_scatter(
+        x=told.radius_px,
+        y=told.outward_px,
+        mode="markers",
+        marker={"size": 3, "color": css(NEUTRAL), "opacity": 0.4},
+        name="points",
+        hoverinfo="skip",
+    )
+    figure.add_scatter(
+        x=0.5 * (told.edges_px[1:] + told.edges_px[:-1]),
+        y=told.mean_px,
+        error_y={"type": "data", "array": BAND95 * told.sd_of_mean_px},
+        mode="lines+markers",
+        line={"color": css(SOURCE)},
+        name="mean, 95 %",
+        hovertemplate="%{x:.0f} px: %{y:+.3f} px<extra></extra>",
+    )
+    return figure
+
+
+def uncertainty_figure(sd: ErrorMap, size_px: tuple[int, int], most_mm: float | None = None) -> go.Figure:
+    """Standard deviation of a point at the range, in millimetres across the ray."""
+    title = f"Uncertainty at {sd.range_m:g} m, one sd"
+    return _map_figure(sd, 1000.0 * sd.error_m, title, size_px, most_mm)
+
+
+def difference_figure(
+    halves: HalfDifference, size_px: tuple[int, int], most_mm: float | None = None
+) -> go.Figure:
+    """How far apart the two halves of the views place a point at the range."""
+    judged = "more than" if halves.beyond_noise else "no more than"
+    title = f"Difference of two halves at {halves.map.range_m:g} m: {judged} noise"
+    return _map_figure(halves.map, 1000.0 * halves.map.error_m, title, size_px, most_mm)
+
+
+def verdict_figure(judged: Verdict, sd: ErrorMap, size_px: tuple[int, int]) -> go.Figure:
+    """Where in the image a point is placed well enough."""
+    title = f"Error at {judged.range_m:g} m (95 %), asked for {1000.0 * judged.accuracy_m:g} mm"
+    figure = _map_figure(sd, 1000.0 * judged.error_m, title, size_px, 2000.0 * judged.accuracy_m)
+    figure.add_contour(
+        x=sd.columns_px,
+        y=sd.rows_px,
+        z=1000.0 * judged.error_m,
+        contours={"coloring": "none", "type": "constraint", "value": 1000.0 * judged.accuracy_m},
+        line={"color": "white", "width": 2},
+        hoverinfo="skip",
+        showlegend=False,
+    )
+    return figure
+
+
+def coverage_figure(told: Coverage, size_px: tuple[int, int], views: Sequence[FittedView] = ()) -> go.Figure:
+    """How many points were seen in each cell of the image; cells without any stay white."""
+    title = f"Points in {100.0 * told.share:.0f} % of the image"
+    figure = _image_figure(title, size_px)
+    figure.add_heatmap(
+        x=told.columns_px,
+        y=told.rows_px,
+        z=np.where(told.counts > 0, told.counts, np.nan),
+        colorscale=RAMP,
+        zmin=0,
+        colorbar={"title": {"text": "points"}},
+        hovertemplate="%{z} points<extra></extra>",
+    )
+    if views:
+        points_px = np.concatenate([view.points_px for view in views])
+        figure.add_scatter(
+            x=points_px[:, 0],
+            y=points_px[:, 1],
+            mode="markers",
+            marker={"size": 2, "color": css(SOURCE)},
+            hoverinfo="skip",
+        )
+    return figure
+
+
+def next_view_figure(
+    following: NextView, size_px: tuple[int, int], views: Sequence[FittedView] = ()
+) -> go.Figure:
+    """Where to hold the board next, over the points that are there already."""
+    title = (
+        f"Next: {following.distance_m:.2f} m away, tilted by {following.tilt_deg:.0f}°; "
+        f"{1000.0 * following.error_before_m:.2g} mm → {1000.0 * following.error_after_m:.2g} mm"
+    )
+    figure = _image_figure(title, size_px)
+    if views:
+        points_px = np.concatenate([view.points_px for view in views])
+        _dots(figure, points_px, NEUTRAL, 2, "so far")
+    outline_px = np.concatenate([following.outline_px, following.outline_px[:1]])
+    figure.add_scatter(
+        x=outline_px[:, 0],
+        y=outline_px[:, 1],
+        mode="lines",
+        line={"color": css(DELIVERED), "width": 2},
+        name="outline",
+        hoverinfo="skip",
+    )
+    _dots(figure, following.points_px, DELIVERED, 4, "next")
+    _dots(figure, following.points_px[:1], LOSS, 8, "first point")
+    return figure
+
+
+def _dots(
+    figure: go.Figure, points_px: FloatArray, color: tuple[int, int, int], size: int, name: str
+) -> None:
+    figure.add_scatter(
+        x=points_px[:, 0],
+        y=points_px[:, 1],
+        mode="markers",
+        marker={"size": size, "color": css(color)},
+        name=name,
+        hoverinfo="skip",
+    )
+
+
+def _map_figure(
+    told: ErrorMap, values_mm: FloatArray, title: str, size_px: tuple[int, int], most_mm: float | None
+) -> go.Figure:
+    """Millimetres over the image; pixels come up under the pointer, too."""
+    figure = _image_figure(title, size_px)
+    known = values_mm[np.isfinite(values_mm)]
+    most_mm = most_mm or (float(np.quantile(known, 0.98)) if len(known) else 1.0)
+    figure.add_heatmap(
+        x=told.columns_px,
+        y=told.rows_px,
+        z=values_mm,
+        customdata=told.error_px,
+        colorscale=RAMP,
+        zmin=0.0,
+        zmax=most_mm,
+        zsmooth="best",
+        colorbar={"title": {"text": "mm"}},
+        hovertemplate="(%{x:.0f}, %{y:.0f}): %{z:.2f} mm, %{customdata:.2f} px<extra></extra>",
+    )
+    return figure
+
+
+def _figure(title: str, x_title: str, y_title: str) -> go.Figure:
+    figure = go.Figure()
+    figure.update_layout(
+        template="plotly_white",
+        title={"text": title, "font": {"size": 13, "color": css(BRAND)}, "x": 0.02},
+        margin={"l": 56, "r": 10, "t": 34, "b": 40},
+        xaxis={"title": x_title},
+        yaxis={"title": y_title},
+        font={"size": 11},
+        legend={"orientation": "h", "y": -0.25},
+    )
+    return figure
+
+
+def _image_figure(title: str, size_px: tuple[int, int]) -> go.Figure:
+    """Axes of an image: its first row is on top, its pixels are square."""
+    width, height = size_px
+    figure = _figure(title, "column, px", "row, px")
+    figure.update_layout(
+        xaxis={"range": [-0.5, width - 0.5], "showgrid": False, "constrain": "domain"},
+        yaxis={"range": [height - 0.5, -0.5], "showgrid": False, "scaleanchor": "x", "constrain": "domain"},
+        showlegend=False,
+    )
+    return figure
+
+
+def _round_number(value: float) -> float:
+    """The largest of 1, 2, 5, 10, 20, ... that is not above a value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))
+
+
+def _faint(color: tuple[int, int, int]) -> str:
+    return "rgba({}, {}, {}, 0.25)".format(*color)

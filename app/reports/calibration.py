@@ -1,0 +1,90 @@
+"""A camera's calibration as one page: numbers, verdict, and pictures that answer the pointer."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+import plotly.graph_objects as go
+
+from app.drawing import calibration_plots as plots
+from app.reports.html import pictures, table, write_page
+from pipeline.calibration.assess import Trust
+from pipeline.calibration.diagnosis import radial_curve, radial_residuals
+from pipeline.calibration.from_images import CameraReport
+
+HEIGHT_PX = 380
+
+
+def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> None:
+    """Write the page, whole or not at all.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    found = report.calibration
+    mark, judged = ("reproduced", "pass") if trust.verdict.passed else ("not-reproduced", "fail")
+    body = (
+        f'<h1>Calibration of a camera: <span class="{mark}">{judged}</span></h1>'
+        f'<p class="lead">{escape(trust.verdict.sentence)}</p>'
+        f'<p class="note">{escape(_made_of(report))}</p>'
+    )
+    errors = found.standard_errors
+    rows = [
+        (name, f"{found.parameters[name]:.6g}", f"{errors[name]:.2g}", f"{low:.6g} to {high:.6g}")
+        for name, (low, high) in found.intervals.items()
+    ]
+    body += "<h2>The lens</h2>" + table(("parameter", "value", "standard error", "95 % interval"), rows)
+    if trust.outliers:
+        proposed = "".join(f"<li>{escape(one.reason)}</li>" for one in trust.outliers)
+        body += f"<h2>Images that one may leave out</h2><ul>{proposed}</ul>"
+    body += "<h2>Pictures</h2>" + _figures(_all(report, trust))
+    missing = [(name, one.reason) for name, one in report.detections.items() if not one.found]
+    if missing:
+        body += "<h2>Images without the board</h2>" + table(("image", "why"), missing)
+    write_page(path, "PacketMesh: calibration", body)
+
+
+def _made_of(report: CameraReport) -> str:
+    found, unseen = report.calibration, report.held_out_rms_px
+    width, height = found.size_px
+    beside = "" if unseen is None else f", {unseen:.3f} px in images that it has not seen"
+    return (
+        f"{len(found.views)} images of {width} x {height} pixels; {report.board.title}; lens {found.lens}; "
+        f"RMS {found.rms_px:.3f} px{beside}."
+    )
+
+
+def _all(report: CameraReport, trust: Trust) -> list[go.Figure]:
+    found = report.calibration
+    size_px, views = found.size_px, found.views
+    figures = [
+        plots.views_figure(views, report.held_out, [one.name for one in trust.outliers]),
+        plots.coverage_figure(trust.coverage, size_px, views),
+        plots.verdict_figure(trust.verdict, trust.sd, size_px),
+        plots.uncertainty_figure(trust.sd, size_px),
+    ]
+    if trust.halves is not None:
+        figures.append(plots.difference_figure(trust.halves, size_px))
+    if trust.following is not None:
+        figures.append(plots.next_view_figure(trust.following, size_px, views))
+    return [
+        *figures,
+        plots.distortion_figure(radial_curve(found)),
+        plots.radial_residuals_figure(radial_residuals(found)),
+        plots.residuals_figure(found),
+    ]
+
+
+def _figures(figures: list[go.Figure]) -> str:
+    """Side by side; the first brings plotly along, so that the page needs no network."""
+    parts = [
+        figure.to_html(
+            full_html=False,
+            include_plotlyjs="inline" if row == 0 else False,
+            default_height=f"{HEIGHT_PX}px",
+            config={"displayModeBar": False},
+        )
+        for row, figure in enumerate(figures)
+    ]
+    return pictures((f'<div style="min-width: 0">{part}</div>' for part in parts), 2)

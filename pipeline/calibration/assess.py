@@ -1,0 +1,111 @@
+"""Everything that tells whether a camera can be trusted at a range, in one record (issue 14)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from packetmesh.errors import ReconstructionError
+from pipeline.calibration.board import Board
+from pipeline.calibration.diagnosis import Coverage, coverage
+from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, View
+from pipeline.calibration.next_view import NextView, next_view
+from pipeline.calibration.outliers import OutlierView, outlier_views
+from pipeline.calibration.trust import ErrorMap, HalfDifference, half_difference_px, projected_sd_px
+from pipeline.calibration.verdict import Verdict, verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Trust:
+    """What a camera is worth at a range."""
+
+    sd: ErrorMap
+    """What noise does."""
+    halves: HalfDifference | None
+    """What two halves of the views say; None if there are too few views, or a half determines no lens."""
+    coverage: Coverage
+    outliers: tuple[OutlierView, ...]
+    following: NextView | None
+    """The view to take next; None if the board fits nowhere into the image."""
+    verdict: Verdict
+
+    def metrics(self) -> dict[str, Any]:
+        """What ``--json`` prints of it."""
+        judged, sd, halves, following = self.verdict, self.sd, self.halves, self.following
+        return {
+            "range_m": judged.range_m,
+            "accuracy_m": judged.accuracy_m,
+            "passed": judged.passed,
+            "sentence": judged.sentence,
+            "share_within": judged.share,
+            "error_of_most_m": judged.error_of_most_m,
+            "uncertainty_px": _summary(sd.error_px),
+            "uncertainty_m": _summary(sd.error_m),
+            "halves": halves
+            and {
+                "ratio": halves.ratio,
+                "most_by_noise": halves.most_by_noise,
+                "beyond_noise": halves.beyond_noise,
+                "difference_px": _summary(halves.map.error_px),
+                "difference_m": _summary(halves.map.error_m),
+            },
+            "coverage": self.coverage.share,
+            "outliers": [
+                {"image": one.name, "rms_px": one.rms_px, "others_px": one.others_px, "reason": one.reason}
+                for one in self.outliers
+            ],
+            "next_view": following
+            and {
+                "T_camera_board": following.T_camera_board.tolist(),
+                "outline_px": following.outline_px.tolist(),
+                "distance_m": following.distance_m,
+                "tilt_deg": following.tilt_deg,
+                "error_before_m": following.error_before_m,
+                "error_after_m": following.error_after_m,
+            },
+        }
+
+
+def assess(
+    calibration: Calibration, views: Sequence[View], board: Board, range_m: float, accuracy_m: float
+) -> Trust:
+    """Judge a camera where it will measure.
+
+    Args:
+        calibration: the camera.
+        views: those that it comes from.
+        board: the one that they show.
+        range_m: of what it will measure, from the camera.
+        accuracy_m: within which a point must be placed.
+
+    Raises:
+        InputError: no range at which anything can be seen, or no accuracy that could be met.
+    """
+    sd = projected_sd_px(calibration, range_m)
+    halves = following = None
+    if len(views) >= 2 * LEAST_VIEWS:
+        try:
+            halves = half_difference_px(views, calibration.size_px, range_m, calibration.lens)
+        except ReconstructionError:
+            halves = None
+    try:
+        following = next_view(calibration, board, range_m)
+    except ReconstructionError:
+        following = None
+    return Trust(
+        sd,
+        halves,
+        coverage(calibration.views, calibration.size_px),
+        outlier_views(calibration, views),
+        following,
+        verdict(calibration, sd, halves, accuracy_m, following),
+    )
+
+
+def _summary(values: np.ndarray) -> dict[str, float]:
+    """Of the part of the image for which the lens has rays."""
+    known = values[np.isfinite(values)]
+    return {"median": float(np.median(known)), "most": float(known.max())} if len(known) else {}

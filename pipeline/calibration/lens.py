@@ -1,0 +1,119 @@
+"""What a lens does: points to pixels, pixels to rays, and how both change with its parameters (SPEC 1.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from pipeline.config import Lens
+from pipeline.types import BoolArray, FloatArray
+
+FLAGS: dict[Lens, int] = {
+    "thesis": cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST,
+    "brown": 0,
+    "rational": cv2.CALIB_RATIONAL_MODEL,
+}
+"""k1 and k2 (SPEC 1.1); with tangential p1, p2 and k3; with the denominator's k4, k5, k6."""
+NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+"""Of the parameters, in OpenCV's order."""
+FREE: dict[Lens, tuple[str, ...]] = {
+    "thesis": NAMES[:6],
+    "brown": NAMES[:9],
+    "rational": NAMES,
+    "fisheye": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
+}
+"""Parameters that a calibration estimates."""
+WIDEST_DEG = 89.0
+"""From the optical axis: beyond it no point lies in front of the camera."""
+_MISSED_PX = 0.01
+"""A ray that comes back farther from its pixel than this does not belong to it: there the lens folds."""
+_PATH = 9
+"""Places from the axis to a ray where the lens is tried for a fold."""
+_NEWTON_STEPS, _LONGEST_STEP = 20, 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """Points as a camera sees them, and how that changes."""
+
+    points_px: FloatArray
+    """(N, 2)"""
+    by_pose: FloatArray
+    """(2 N, 6) derivatives by OpenCV's rotation vector and the translation of the points' pose."""
+    by_lens: FloatArray
+    """(2 N, P) by the lens's free parameters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Optics:
+    """A lens with its numbers."""
+
+    lens: Lens
+    matrix: FloatArray
+    """(3, 3) K."""
+    distortion: FloatArray
+    """k1, k2, p1, p2, k3 and, of a rational lens, k4, k5, k6; of a fisheye k1 to k4 (Kannala and Brandt,
+    "A generic camera model", PAMI 2006)."""
+
+    def project(self, points_m: FloatArray, T_camera_points: FloatArray | None = None) -> FloatArray:
+        """(N, 2) pixels of (N, 3) points, which are moved into the camera's frame first."""
+        return self.linearised(points_m, T_camera_points).points_px
+
+    def linearised(self, points_m: FloatArray, T_camera_points: FloatArray | None = None) -> Projection:
+        """The same with its derivatives."""
+        T = np.eye(4) if T_camera_points is None else T_camera_points
+        turn, move = cv2.Rodrigues(T[:3, :3])[0], np.ascontiguousarray(T[:3, 3], float)
+        points_m = np.ascontiguousarray(points_m, dtype=np.float64)
+        if self.lens == "fisheye":
+            seen, J = cv2.fisheye.projectPoints(points_m[None], turn, move, self.matrix, self.distortion)
+            return Projection(seen.reshape(-1, 2), J[:, 8:14], J[:, :8])
+        seen, J = cv2.projectPoints(points_m, turn, move, self.matrix, self.distortion)
+        columns = [6 + NAMES.index(name) for name in FREE[self.lens]]
+        return Projection(seen.reshape(-1, 2), J[:, :6], J[:, columns])
+
+    def rays(self, points_px: FloatArray) -> FloatArray:
+        """(N, 3) unit directions that (N, 2) pixels look into; NaN where the lens has none for a pixel."""
+        flat = self._flat_fisheye(points_px) if self.lens == "fisheye" else self._flat(points_px)
+        rays = np.column_stack([flat, np.ones(len(flat))])
+        known = np.flatnonzero(np.isfinite(flat).all(axis=1))
+        missed_px = np.linalg.norm(self.project(rays[known]) - points_px[known], axis=1)
+        good = known[(missed_px < _MISSED_PX) & self._unfolded(rays[known])]
+        rays[np.setdiff1d(np.arange(len(rays)), good)] = np.nan
+        return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+    def _unfolded(self, rays: FloatArray) -> BoolArray:
+        """(N,) whether the image grows all the way from the axis to each of (N, 3) rays with z = 1."""
+        grows = np.ones(len(rays), bool)
+        for share in np.linspace(0.0, 1.0, _PATH):
+            grows &= np.linalg.det(self._slopes(rays * (share, share, 1.0))[1]) > 0.0
+        return grows
+
+    def _slopes(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(N, 2) pixels of (N, 3) rays with z = 1, and (N, 2, 2) their derivatives by x and y."""
+        told = self.linearised(rays)
+        return told.points_px, told.by_pose.reshape(-1, 2, 6)[:, :, 3:5]
+
+    def _flat(self, points_px: FloatArray) -> FloatArray:
+        """(N, 2) on the plane z = 1, by Newton's method."""
+        flat = (points_px - self.matrix[:2, 2]) / self.matrix[[0, 1], [0, 1]]
+        for _ in range(_NEWTON_STEPS):
+            seen_px, slopes = self._slopes(np.column_stack([flat, np.ones(len(flat))]))
+            slopes[np.abs(np.linalg.det(slopes)) < 1.0] = self.matrix[:2, :2]
+            step = np.linalg.solve(slopes, (points_px - seen_px)[:, :, None])[:, :, 0]
+            flat = flat + np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
+        return flat
+
+    def _flat_fisheye(self, points_px: FloatArray) -> FloatArray:
+        """(N, 2) on the plane z = 1, by Newton's method for the angle from the axis."""
+        bent = (points_px - self.matrix[:2, 2]) / self.matrix[[0, 1], [0, 1]]
+        reach = np.linalg.norm(bent, axis=1)
+        odd = np.array([1.0, *self.distortion.ravel()])
+        angle = np.minimum(reach, np.radians(WIDEST_DEG))
+        for _ in range(_NEWTON_STEPS):
+            powers = angle[:, None] ** np.arange(0, 10, 2)
+            slope = powers @ (odd * np.arange(1, 10, 2))
+            angle = angle - (angle * (powers @ odd) - reach) / np.where(slope > 1e-6, slope, np.nan)
+        angle[~((angle >= 0.0) & (angle <= np.radians(WIDEST_DEG)))] = np.nan
+        return bent * np.divide(np.tan(angle), reach, out=np.ones_like(reach), where=reach > 0.0)[:, None]

@@ -1,0 +1,146 @@
+"""The view to take next: of many poses of the board, the one that would tell most about the lens where it
+is used (SPEC 1.3 e, read backwards).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from packetmesh.errors import ReconstructionError
+from pipeline.calibration.board import Board
+from pipeline.calibration.estimate import Calibration, coordinate_sd_px, information, informed, inverted
+from pipeline.calibration.lens import Optics
+from pipeline.calibration.trust import Sight, placing, sight
+from pipeline.geometry import apply, rigid, rotation_exp
+from pipeline.types import FloatArray
+
+TILTS_DEG = (0.0, 25.0, 45.0)
+"""Of the board against the camera's view of it; farther tilts blur and are hard to find."""
+SIDES = 8
+"""Directions to tilt to."""
+PLACES = (0.15, 0.32, 0.5, 0.68, 0.85)
+"""Of the board's middle, as shares of the image's width and height."""
+WIDTHS = (0.3, 0.45, 0.65)
+"""Of the board, as shares of the image's: how near it is."""
+RIM = 0.02
+"""Share of the image that stays free around the board's points."""
+NEAREST = 0.02
+"""Of a board's points in front of the camera, as a share of the board's distance."""
+
+
+@dataclass(frozen=True, slots=True)
+class NextView:
+    """A view worth taking."""
+
+    T_camera_board: FloatArray
+    """(4, 4)"""
+    points_px: FloatArray
+    """(N, 2) where the board's points are then."""
+    outline_px: FloatArray
+    """(4, 2) the corners of the area of its points, in order around it."""
+    error_before_m: float
+    """Predicted of a point at the range, root mean square over the image."""
+    error_after_m: float
+    """The same once this view is taken."""
+
+    @property
+    def distance_m(self) -> float:
+        """From the camera to the middle of the board."""
+        return float(np.linalg.norm(self.T_camera_board[:3, 3]))
+
+    @property
+    def tilt_deg(self) -> float:
+        """Of the board against the line of sight."""
+        sight_line = self.T_camera_board[:3, 3] / self.distance_m
+        return float(np.degrees(np.arccos(np.clip(abs(self.T_camera_board[:3, 2] @ sight_line), 0.0, 1.0))))
+
+
+def next_view(calibration: Calibration, board: Board, range_m: float) -> NextView:
+    """Of many views the one that lowers the predicted error at a range most.
+
+    Args:
+        calibration: what is known so far.
+        board: the one that is shown.
+        range_m: where the camera will measure.
+
+    Raises:
+        InputError: no range at which anything can be seen.
+        ReconstructionError: the board fits nowhere into the image.
+    """
+    optics, size_px = calibration.optics, calibration.size_px
+    sd_px = coordinate_sd_px(calibration.views, calibration.lens)
+    known = information(calibration.views, optics)
+    boards = [(view.board_m, view.T_camera_board) for view in calibration.views]
+    cost = _cost_m2(sight(optics, size_px, range_m), placing(boards, optics))
+    best: tuple[float, FloatArray] | None = None
+    points_m = board.points_m
+    for T in candidates(board, optics, size_px):
+        covariance = sd_px**2 * inverted(known + informed(points_m, T, optics))
+        after_m = _error_m(covariance, cost)
+        if best is None or after_m < best[0]:
+            best = after_m, T
+    if best is None:
+        raise ReconstructionError(
+            f"The board ({board.title}) fits nowhere into the image; is its spacing right?"
+        )
+    after_m, T = best
+    points_px = optics.project(points_m, T)
+    corners = [0, board.columns - 1, len(points_px) - 1, len(points_px) - board.columns]
+    before_m = _error_m(calibration.covariance, cost)
+    return NextView(T, points_px, points_px[corners], before_m, after_m)
+
+
+def candidates(board: Board, optics: Optics, size_px: tuple[int, int]) -> Iterator[FloatArray]:
+    """(4, 4) poses of the board, the same ones every time, that are wholly in the image.
+
+    Every place in the image, tilt, side to tilt to, and distance; the upper edge of the board is up.
+    """
+    size, points_m = np.array(size_px, float), board.points_m
+    low_px, high_px = RIM * size - 0.5, (1.0 - RIM) * size - 0.5
+    sides = np.arange(SIDES) * 2.0 * np.pi / SIDES
+    tilts = [
+        rotation_exp(np.radians(tilt) * np.array([np.cos(side), np.sin(side), 0.0]))
+        for tilt in TILTS_DEG
+        for side in (sides if tilt else sides[:1])
+    ]
+    rays = optics.rays(np.array([size * (x, y) for x in PLACES for y in PLACES]))
+    for share in WIDTHS:
+        away_m = float(np.ptp(points_m[:, 0])) / _angle(optics, size, share)
+        for ray in rays[np.isfinite(rays[:, 2])]:
+            facing = _facing(ray)
+            for tilt in tilts:
+                T = rigid(facing @ tilt, away_m * ray)
+                if (apply(T, points_m)[:, 2] <= NEAREST * away_m).any():
+                    continue
+                points_px = optics.project(points_m, T)
+                if ((points_px >= low_px) & (points_px <= high_px)).all():
+                    yield T
+
+
+def _angle(optics: Optics, size: FloatArray, share: float) -> float:
+    """Twice the tangent of half the angle that a share of the image's width spans in its middle."""
+    ends_px = 0.5 * size + np.array([[-0.5 * share * size[0], 0.0], [0.5 * share * size[0], 0.0]])
+    left, right = optics.rays(ends_px)
+    return float(2.0 * np.tan(0.5 * np.arccos(np.clip(left @ right, -1.0, 1.0))))
+
+
+def _facing(ray: FloatArray) -> FloatArray:
+    """(3, 3) of a board that looks along a ray, its rows level."""
+    right = np.cross((0.0, 1.0, 0.0), ray)
+    right /= np.linalg.norm(right)
+    return np.column_stack([right, np.cross(ray, right), ray])
+
+
+def _cost_m2(seen: Sight, place: FloatArray) -> FloatArray:
+    """(P, P) whose product with a lens's covariance has the mean squared error over the image as trace."""
+    change = seen.metres @ (seen.by_lens + seen.by_pose @ place)
+    change = change[np.isfinite(change).all(axis=(1, 2))]
+    return np.einsum("gij,gik->jk", change, change) / len(change)
+
+
+def _error_m(covariance: FloatArray, cost_m2: FloatArray) -> float:
+    """Root mean square over the image."""
+    return float(np.sqrt(np.sum(covariance * cost_m2)))

@@ -1,0 +1,80 @@
+"""Circle centres without the bias of perspective: a tilted circle's image is an ellipse, whose middle is not
+where the circle's is (SPEC 1.2).
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from pipeline.calibration.board import Board
+from pipeline.calibration.estimate import FittedView
+from pipeline.calibration.lens import Optics
+from pipeline.types import ByteArray, FloatArray
+
+REACH = 0.5
+"""Half the side of what is looked at around a circle, over the distance to its nearest neighbour."""
+SAMPLES = (41, 121)
+"""Along that side: least and most."""
+PAPER = 0.86
+"""Share of the reach beyond which there is nothing but paper."""
+MIDDLE = 0.3
+"""Share of the reach that lies within a circle whatever its size."""
+RIM = 1.3
+"""Of what belongs to a circle, over its radius: letters lie beyond it, blur within."""
+LEAST_CONTRAST = 10.0
+"""Grey levels between circle and paper."""
+MOST_SHIFT_PX = 1.0
+"""A centre that moves farther was disturbed, by glare or a shadow's edge, and stays where it was."""
+
+
+def refined_px(gray: ByteArray, board: Board, view: FittedView, optics: Optics) -> FloatArray:
+    """(N, 2) centres of a view's circles, seen as if the camera looked straight at the board.
+
+    Each circle's neighbourhood is rectified by the lens and the pose, its centre is the centre of darkness
+    (or of light, on dark paper) there, and is taken back to the image.
+
+    Args:
+        gray: (H, W) uint8.
+        board: circles.
+        view: where they were found, and how the board lies.
+        optics: the lens.
+    """
+    reach_m = REACH * board.nearest_m
+    steps_m = np.linspace(-reach_m, reach_m, _samples(view, board))
+    around_m = np.stack(np.meshgrid(steps_m, steps_m, [0.0]), axis=-1).reshape(-1, 3)
+    away = np.linalg.norm(around_m, axis=1) / reach_m
+    around_m, away = around_m[away <= 1.0], away[away <= 1.0]
+    places_m = (view.board_m[:, None] + around_m).reshape(-1, 3)
+    at_px = optics.project(places_m, view.T_camera_board).reshape(-1, len(around_m), 2).astype(np.float32)
+    patches = cv2.remap(
+        gray.astype(np.float32), at_px, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    shifts_m = _centres_m(patches, around_m, away)
+    moved_px = optics.project(view.board_m + np.nan_to_num(shifts_m), view.T_camera_board)
+    shift_px = np.linalg.norm(moved_px - view.points_px, axis=1)
+    good = np.isfinite(shifts_m[:, 0]) & (shift_px <= MOST_SHIFT_PX)
+    return np.where(good[:, None], moved_px, view.points_px)
+
+
+def _samples(view: FittedView, board: Board) -> int:
+    """Along the side of a neighbourhood, about one a pixel."""
+    area_px2 = cv2.contourArea(cv2.convexHull(view.points_px.astype(np.float32)))
+    area_m2 = cv2.contourArea(cv2.convexHull(view.board_m[:, :2].astype(np.float32)))
+    side_px = 2.0 * REACH * board.nearest_m * (area_px2 / area_m2) ** 0.5
+    return int(np.clip(round(side_px), *SAMPLES))
+
+
+def _centres_m(patches: FloatArray, around_m: FloatArray, away: FloatArray) -> FloatArray:
+    """(N, 3) centres of what differs from the paper, whose brightness may slope; NaN where nothing does."""
+    base = np.column_stack([around_m[:, :2], np.ones(len(around_m))])
+    paper = away >= PAPER
+    slopes = np.linalg.lstsq(base[paper], patches[:, paper].T, rcond=None)[0]
+    differs = patches - (base @ slopes).T
+    middle = np.median(differs[:, away <= MIDDLE], axis=1, keepdims=True)
+    middle[np.abs(middle) < LEAST_CONTRAST] = np.nan
+    weights = np.clip(differs / middle, 0.0, 1.0) * ~paper
+    covered = weights.sum(axis=1)[np.isfinite(middle[:, 0])] / len(away)
+    if len(covered):
+        weights *= away <= RIM * np.median(covered) ** 0.5
+    return weights @ around_m / weights.sum(axis=1, keepdims=True)

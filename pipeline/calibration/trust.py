@@ -1,0 +1,255 @@
+"""How far a camera can be trusted at the range where it works: what noise does to it, and whether two halves
+of the views agree (SPEC 1.3 e).
+
+Both compare cameras of slightly different lenses, and a camera whose lens changes is placed anew: where it
+sees the boards of the calibration best, which stay where they are. So what a turn or a move makes good is no
+error, and a focal length that is wrong is one as soon as the range is not that of the boards. It is the idea
+of mrcal's uncertainty (Kogan, "mrcal: camera calibrations and more", 2021).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from packetmesh.errors import InputError, ReconstructionError
+from pipeline.calibration.estimate import (
+    LEAST_VIEWS,
+    Calibration,
+    View,
+    calibrate,
+    settle,
+)
+from pipeline.calibration.lens import FREE, Optics
+from pipeline.config import Lens
+from pipeline.geometry import apply
+from pipeline.types import FloatArray
+
+CELLS = 24
+"""Of a map, along the longer side of the image."""
+CIRCLE95 = 2.4477
+"""Radius around the mean of a round normal distribution in the plane that holds 95 % of it, in its sd."""
+MOST_UNSURE = 20.0
+"""Times that a half may be less sure than the whole, and still say something."""
+DRAWS = 2000
+"""Of lenses that noise may make, to tell how much two halves differ by noise alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorMap:
+    """An error over the image, of points at one range."""
+
+    range_m: float
+    """From the camera, along the ray of the pixel."""
+    columns_px: FloatArray
+    """(C,) of the cells' middles."""
+    rows_px: FloatArray
+    """(R,)"""
+    error_px: FloatArray
+    """(R, C) in the image; NaN where the lens has no ray for the pixel."""
+    error_m: FloatArray
+    """(R, C) the same across the ray, at the range."""
+
+
+@dataclass(frozen=True, slots=True)
+class HalfDifference:
+    """What every other view says against what the others say."""
+
+    map: ErrorMap
+    """Lengths of the difference."""
+    ratio: float
+    """The difference over what noise alone lets one expect, root mean square over the image: near 1 if the
+    lens is right."""
+    most_by_noise: float
+    """Noise alone makes a smaller ``ratio`` in 95 of 100 cases."""
+
+    @property
+    def beyond_noise(self) -> bool:
+        """Whether there is more than noise: a lens of the wrong kind, a board that is not flat."""
+        return self.ratio > self.most_by_noise
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """Points at a range in all pixels of a grid, and how their images change with the lens."""
+
+    range_m: float
+    columns_px: FloatArray
+    rows_px: FloatArray
+    points_m: FloatArray
+    """(G, 3) row by row, in the camera's frame; NaN where the lens has no ray."""
+    by_pose: FloatArray
+    """(G, 2, 6) derivatives of their pixels by the pose of all of them."""
+    by_lens: FloatArray
+    """(G, 2, P) by the lens."""
+    metres: FloatArray
+    """(G, 2, 2) metres across the ray for pixels."""
+
+    def map_of(self, error_px: FloatArray, error_m: FloatArray) -> ErrorMap:
+        """(G,) values in the picture's order."""
+        shape = len(self.rows_px), len(self.columns_px)
+        return ErrorMap(
+            self.range_m, self.columns_px, self.rows_px, error_px.reshape(shape), error_m.reshape(shape)
+        )
+
+
+def sight(optics: Optics, size_px: tuple[int, int], range_m: float) -> Sight:
+    """The grid of a map.
+
+    Raises:
+        InputError: no range at which anything can be seen.
+    """
+    if not 0.0 < range_m < 1e4:
+        raise InputError(f"A range of {range_m:g} m cannot be judged; try the distance of what is measured")
+    cell_px = max(size_px) / CELLS
+    columns_px, rows_px = (
+        (np.arange(round(size / cell_px)) + 0.5) * size / round(size / cell_px) - 0.5 for size in size_px
+    )
+    grid_px = np.stack(np.meshgrid(columns_px, rows_px), axis=-1).reshape(-1, 2)
+    rays = optics.rays(grid_px)
+    known = np.isfinite(rays[:, 2])
+    points_m = range_m * rays
+    by_pose = np.full((len(rays), 2, 6), np.nan)
+    by_lens = np.full((len(rays), 2, len(FREE[optics.lens])), np.nan)
+    told = optics.linearised(points_m[known])
+    by_pose[known] = told.by_pose.reshape(-1, 2, 6)
+    by_lens[known] = told.by_lens.reshape(-1, 2, by_lens.shape[2])
+    across = _across(rays[known])
+    metres = np.full((len(rays), 2, 2), np.nan)
+    metres[known] = np.linalg.inv(by_pose[known][:, :, 3:] @ across.transpose(0, 2, 1))
+    return Sight(range_m, columns_px, rows_px, points_m, by_pose, by_lens, metres)
+
+
+def projected_covariance_px2(seen: Sight, covariance: FloatArray, placing: FloatArray) -> FloatArray:
+    """(G, 2, 2) of the pixels of a grid's points.
+
+    Args:
+        seen: the grid.
+        covariance: (P, P) of the lens.
+        placing: (6, P) how the camera is placed anew when the lens changes.
+    """
+    return _carried(seen.by_lens + seen.by_pose @ placing, covariance)
+
+
+def placing(views: Sequence[tuple[FloatArray, FloatArray]], optics: Optics) -> FloatArray:
+    """(6, P) how the camera is placed anew, by the boards that stay where they are, when its lens changes.
+
+    Args:
+        views: (N, 3) points of each board and its (4, 4) pose in the camera's frame.
+        optics: the lens.
+    """
+    told = optics.linearised(_in_camera(views))
+    return -np.linalg.lstsq(told.by_pose, told.by_lens, rcond=None)[0]
+
+
+def projected_sd_px(calibration: Calibration, range_m: float) -> ErrorMap:
+    """Standard deviation, in the worst direction, of where points at a range are seen.
+
+    It comes of noise in the views alone: of a lens that is wrong in kind it knows nothing, for which there is
+    ``half_difference_px``. The poses of the boards are parameters like the lens's own.
+
+    Args:
+        calibration: a camera.
+        range_m: of the points.
+
+    Raises:
+        InputError: no range at which anything can be seen.
+    """
+    optics = calibration.optics
+    seen = sight(optics, calibration.size_px, range_m)
+    boards = [(view.board_m, view.T_camera_board) for view in calibration.views]
+    return sd_map(seen, projected_covariance_px2(seen, calibration.covariance, placing(boards, optics)))
+
+
+def sd_map(seen: Sight, covariance_px2: FloatArray) -> ErrorMap:
+    """The worst direction of (G, 2, 2) covariances."""
+    covariance_m2 = seen.metres @ covariance_px2 @ seen.metres.transpose(0, 2, 1)
+    return seen.map_of(_worst_sd(covariance_px2), _worst_sd(covariance_m2))
+
+
+def half_difference_px(
+    views: Sequence[View], size_px: tuple[int, int], range_m: float, lens: Lens = "thesis"
+) -> HalfDifference:
+    """Calibrate with every other view, and with the others, and tell how far apart both see a point.
+
+    A lens of the wrong kind fits each half by other parameters, so that both differ by more than noise.
+
+    Args:
+        views: six or more.
+        size_px: width and height of the images.
+        range_m: of the points.
+        lens: of both halves.
+
+    Raises:
+        InputError: too few views, or no range at which anything can be seen.
+        ReconstructionError: a half does not determine the lens.
+    """
+    if len(views) < 2 * LEAST_VIEWS:
+        raise InputError(
+            f"{len(views)} views cannot be halved, for each half takes {LEAST_VIEWS}; take more images"
+        )
+    whole, *halves = (calibrate(some, size_px, lens) for some in (views, views[0::2], views[1::2]))
+    seen = sight(whole.optics, size_px, range_m)
+    boards = [(view.board_m, view.T_camera_board) for view in whole.views]
+    known = np.isfinite(seen.points_m[:, 2])
+    change = (seen.by_lens + seen.by_pose @ placing(boards, whole.optics))[known]
+    sds_px = [np.median(_worst_sd(_carried(change, one.covariance))) for one in (whole, *halves)]
+    if max(sds_px) > MOST_UNSURE * sds_px[0]:
+        raise ReconstructionError(
+            "Half of the views do not determine this lens, so the halves cannot be compared; take more "
+            "images, or a lens with fewer parameters"
+        )
+    boards_m = _in_camera(boards)
+    boards_px = whole.optics.project(boards_m)
+    difference_px = np.full((len(known), 2), np.nan)
+    one_px, other_px = (
+        half.optics.project(seen.points_m[known], settle(boards_m, boards_px, np.eye(4), half.optics))
+        for half in halves
+    )
+    difference_px[known] = other_px - one_px
+    across_m = (seen.metres @ difference_px[:, :, None])[:, :, 0]
+    told = seen.map_of(np.linalg.norm(difference_px, axis=1), np.linalg.norm(across_m, axis=1))
+    ratio, most = _over_noise(difference_px[known], change, halves[0].covariance + halves[1].covariance)
+    return HalfDifference(told, ratio, most)
+
+
+def _over_noise(difference_px: FloatArray, change: FloatArray, covariance: FloatArray) -> tuple[float, float]:
+    """(G, 2) differences over their own predicted sd, root mean square, and what noise stays below.
+
+    Args:
+        difference_px: of two lenses.
+        change: (G, 2, P) of the pixels with the lens.
+        covariance: (P, P) of the difference of two lenses.
+    """
+    values, turns = np.linalg.eigh(covariance)
+    root = change @ (turns * np.sqrt(np.maximum(values, 0.0)))
+    spread = np.linalg.inv(root @ root.transpose(0, 2, 1))
+    ratio = np.sqrt(np.mean(np.einsum("gi,gij,gj->g", difference_px, spread, difference_px)) / 2.0)
+    weights = np.linalg.eigvalsh(np.einsum("gip,gij,gjq->pq", root, spread, root) / (2.0 * len(root)))
+    draws = np.random.default_rng(0).standard_normal((DRAWS, len(weights)))
+    return float(ratio), float(np.sqrt(np.percentile(draws**2 @ np.maximum(weights, 0.0), 95.0)))
+
+
+def _in_camera(views: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    return np.concatenate([apply(T, points_m) for points_m, T in views])
+
+
+def _across(rays: FloatArray) -> FloatArray:
+    """(N, 2, 3) two directions across each of (N, 3) rays."""
+    first = np.cross(rays, (0.0, 1.0, 0.0))
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(rays, first)], axis=1)
+
+
+def _carried(change: FloatArray, covariance: FloatArray) -> FloatArray:
+    """(G, 2, 2) covariance of pixels of (P, P) that of the lens, by (G, 2, P) derivatives."""
+    return change @ covariance @ change.transpose(0, 2, 1)
+
+
+def _worst_sd(covariances: FloatArray) -> FloatArray:
+    """(G,) along the longer axis of (G, 2, 2) ellipses."""
+    half = 0.5 * (covariances[:, 0, 0] + covariances[:, 1, 1])
+    apart = np.hypot(0.5 * (covariances[:, 0, 0] - covariances[:, 1, 1]), covariances[:, 0, 1])
+    return np.sqrt(half + apart)

@@ -1,0 +1,109 @@
+"""Pass or fail in plain words, at the range and accuracy that somebody needs (SPEC 1.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.calibration.estimate import Calibration
+from pipeline.calibration.next_view import NextView
+from pipeline.calibration.trust import CIRCLE95, ErrorMap, HalfDifference
+from pipeline.config import Lens
+from pipeline.types import FloatArray
+
+LEAST_SHARE = 0.95
+"""Of the image in which points must be placed well enough."""
+RICHER: dict[Lens, Lens] = {"thesis": "brown", "brown": "rational"}
+"""Lenses with more freedom."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether a camera is good enough."""
+
+    passed: bool
+    range_m: float
+    accuracy_m: float
+    error_m: FloatArray
+    """(R, C) of the map's cells, within which a point is placed 95 times in 100; NaN where it cannot be."""
+    share: float
+    """Of the image in which that is at most ``accuracy_m``."""
+    error_of_most_m: float
+    """It is not more over ``LEAST_SHARE`` of the image; infinite if more of it cannot be placed at all."""
+    sentence: str
+    """All this, and what to do."""
+
+
+def verdict(
+    calibration: Calibration,
+    sd: ErrorMap,
+    halves: HalfDifference | None,
+    accuracy_m: float,
+    following: NextView | None = None,
+) -> Verdict:
+    """Judge a camera at the range of its maps.
+
+    The error of a cell is that of noise; if both halves of the views differ by more than noise explains, it
+    is at least their difference.
+
+    Args:
+        calibration: the camera.
+        sd: its ``projected_sd_px``.
+        halves: its ``half_difference_px``; None if there are too few views for halves.
+        accuracy_m: within which a point must be placed.
+        following: the view to take next, for the advice.
+
+    Raises:
+        InputError: no accuracy that could be met.
+    """
+    if not accuracy_m > 0.0:
+        raise InputError(f"An accuracy of {1000.0 * accuracy_m:g} mm cannot be met; try 5")
+    error_m = CIRCLE95 * sd.error_m
+    differ = halves is not None and halves.beyond_noise
+    if halves is not None and differ:
+        error_m = np.maximum(error_m, halves.map.error_m)
+    placed = np.where(np.isfinite(error_m), error_m, np.inf)
+    share = float((placed <= accuracy_m).mean())
+    of_most_m = float(np.quantile(placed, LEAST_SHARE, method="higher"))
+    passed = share >= LEAST_SHARE
+    told = (
+        f"At {sd.range_m:g} m a point is placed within {_mm(accuracy_m)} (95 %) over {100.0 * share:.0f} % "
+        f"of the image, {_over_most(placed, of_most_m)}: {'pass' if passed else 'fail'}."
+    )
+    advice = [] if passed else _advice(calibration, halves, following)
+    return Verdict(passed, sd.range_m, accuracy_m, error_m, share, of_most_m, " ".join([told, *advice]))
+
+
+def _advice(calibration: Calibration, halves: HalfDifference | None, following: NextView | None) -> list[str]:
+    if halves is not None and halves.beyond_noise:
+        richer = RICHER.get(calibration.lens)
+        lens = f"--lens {richer}, " if richer else ""
+        return [
+            f"Two halves of the views differ by {halves.ratio:.1f} times what noise explains (by chance up "
+            f"to {halves.most_by_noise:.1f}): try {lens}--board-warp, or leave out views that stand out."
+        ]
+    if following is None:
+        return ["Take more views, near the edges of the image."]
+    x, y = following.points_px.mean(axis=0) / calibration.size_px
+    where = " ".join(dict.fromkeys((_third(y, "upper", "lower"), _third(x, "left", "right"))))
+    return [
+        f"Next, hold the board {following.distance_m:.2f} m away in the {where} of the image, tilted by "
+        f"{following.tilt_deg:.0f}°: that is predicted to bring the error over the whole "
+        f"image from {_mm(following.error_before_m)} to {_mm(following.error_after_m)}."
+    ]
+
+
+def _over_most(placed_m: FloatArray, of_most_m: float) -> str:
+    if np.isfinite(of_most_m):
+        return f"and within {_mm(of_most_m)} over {100.0 * LEAST_SHARE:.0f} % of it"
+    return f"and nowhere in {100.0 * np.isinf(placed_m).mean():.0f} % of it, where the lens folds back"
+
+
+def _third(share: float, low: str, high: str) -> str:
+    return low if share < 0.4 else high if share > 0.6 else "middle"
+
+
+def _mm(length_m: float) -> str:
+    return f"{1000.0 * length_m:.2g} mm" if length_m < 0.1 else f"{length_m:.2g} m"

@@ -1,0 +1,128 @@
+"""A board that is not flat: its points are estimated with the lens (Strobl and Hirzinger, "More accurate
+pinhole camera calibration with imperfect planar target", ICCV workshops 2011).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from packetmesh.errors import InputError, ReconstructionError
+from pipeline.calibration.board import Board
+from pipeline.calibration.estimate import (
+    Calibration,
+    FittedView,
+    View,
+    calibration_of,
+    held_out,
+    place,
+    pose_of,
+    rms_px,
+)
+from pipeline.calibration.lens import FLAGS, Optics
+from pipeline.config import Lens
+from pipeline.types import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class BoardWarp:
+    """A board as the views have it."""
+
+    board_m: FloatArray
+    """(N, 3) its points; the first, the last and the upper right corner tell where it is and how large."""
+    off_plane_m: FloatArray
+    """(N,) of them above or below the plane that lies best in them, along z."""
+    calibration: Calibration
+    """Of the camera with this board; its covariance takes the board as known."""
+    held_out: tuple[FittedView, ...]
+    """Views that had no part in lens and board, with this board."""
+    flat_rms_px: float
+    """Held out, with a flat board."""
+
+    @property
+    def warp_m(self) -> float:
+        """From the deepest point of the board to the highest."""
+        return float(np.ptp(self.off_plane_m))
+
+    @property
+    def rms_px(self) -> float:
+        """Held out, with this board."""
+        return rms_px(np.concatenate([view.residuals_px for view in self.held_out]))
+
+    @property
+    def helps(self) -> bool:
+        """Whether views that had no part in it are predicted better."""
+        return self.rms_px < self.flat_rms_px
+
+
+def board_warp(
+    views: Sequence[View], size_px: tuple[int, int], board: Board, folds: int, lens: Lens = "thesis"
+) -> BoardWarp:
+    """Estimate the board's points with the lens, and what held-out views say of them.
+
+    Args:
+        views: all points of the board in each.
+        size_px: width and height of the images.
+        board: as it was printed.
+        folds: in how many turns views are held out, 2 or more.
+        lens: which distortions the camera may have.
+
+    Raises:
+        InputError: a fisheye lens, views of parts of the board, or too few views for the folds.
+        ReconstructionError: the views do not determine lens and board.
+    """
+    if lens == "fisheye":
+        raise InputError("A board's warp cannot be found with a fisheye lens; try the lens 'rational'")
+    if any(len(view.points_px) != board.columns * board.rows for view in views):
+        raise InputError("A board's warp takes views of the whole board; leave out those of a part of it")
+    flat = held_out(views, size_px, folds, lens)
+    calibration, board_m = _released(views, size_px, board, lens)
+    told: dict[int, FittedView] = {}
+    for fold in range(folds):
+        rest, rest_board_m = _released(
+            [view for row, view in enumerate(views) if row % folds != fold], size_px, board, lens
+        )
+        for row in range(fold, len(views), folds):
+            unseen = replace(views[row], board_m=rest_board_m)
+            told[row] = place(unseen, rest.matrix, rest.distortion, lens)
+    return BoardWarp(
+        board_m,
+        _off_plane_m(board_m),
+        calibration,
+        tuple(told[row] for row in range(len(views))),
+        rms_px(np.concatenate([view.residuals_px for view in flat])),
+    )
+
+
+def _released(
+    views: Sequence[View], size_px: tuple[int, int], board: Board, lens: Lens
+) -> tuple[Calibration, FloatArray]:
+    """The camera, and (N, 3) points of the board."""
+    upper_right = board.columns - 1
+    try:
+        _, matrix, distortion, turns, moves, board_m, *_ = cv2.calibrateCameraROExtended(
+            [view.board_m.astype(np.float32) for view in views],
+            [view.points_px.astype(np.float32).reshape(-1, 1, 2) for view in views],
+            size_px,
+            upper_right,
+            None,
+            None,
+            flags=FLAGS[lens] | cv2.CALIB_USE_LU,
+        )
+    except cv2.error:
+        raise ReconstructionError(
+            "The views do not determine lens and board together; take more, tilted to all sides, or do "
+            "without --board-warp"
+        ) from None
+    board_m = np.asarray(board_m, float).reshape(-1, 3)
+    bent = [replace(view, board_m=board_m) for view in views]
+    poses = [pose_of(turn, move) for turn, move in zip(turns, moves, strict=True)]
+    return calibration_of(bent, poses, Optics(lens, matrix, distortion.ravel()), size_px), board_m
+
+
+def _off_plane_m(board_m: FloatArray) -> FloatArray:
+    base = np.column_stack([board_m[:, :2], np.ones(len(board_m))])
+    return board_m[:, 2] - base @ np.linalg.lstsq(base, board_m[:, 2], rcond=None)[0]
