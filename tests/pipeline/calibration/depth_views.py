@@ -75,7 +75,7 @@ def samples(bias, seed, count=16, range_m=(0.5, 1.8), tilt_deg=(10.0, 45.0), noi
 def quick_samples(
     bias, seed, count=16, range_m=(0.5, 1.8), lens_share=0.001, pose_share=0.0003, of_a_view=300
 ):
-    """Without images: each view's pose is off by a share of its distance, all by a focal length that is off."""
+    """Without images: boards are off by a share of their distance each, and by one of the lens."""
     rng = np.random.default_rng(seed)
     focal_off = lens_share * rng.standard_normal()
     parts = []
