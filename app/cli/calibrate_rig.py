@@ -22,7 +22,7 @@ def several_cameras(images: Sequence[str]) -> tuple[NodeShots, ...]:
     """The nodes whose folders are named; none where one camera's images are.
 
     Raises:
-        InputError: folders that hold no images, more than a rig has cameras, or only one camera below a folder.
+        InputError: folders without images, more than a rig has cameras, or only one camera below a folder.
     """
     from packetmesh.errors import InputError
     from pipeline.calibration.shots import node_folders, node_shots
