@@ -22,15 +22,21 @@ def several_cameras(images: Sequence[str]) -> tuple[NodeShots, ...]:
     """The nodes whose folders are named; none where one camera's images are.
 
     Raises:
-        InputError: folders that hold no images, or more than a rig has cameras.
+        InputError: folders without images, more than a rig has cameras, or only one camera below a folder.
     """
+    from packetmesh.errors import InputError
     from pipeline.calibration.shots import node_folders, node_shots
 
-    if not all(Path(word).is_dir() for word in images):
+    folders = [Path(word) for word in images]
+    if not all(folder.is_dir() for folder in folders):
         return ()
-    if len(images) == 1 and not node_folders(Path(images[0])):
+    below = [one for folder in folders for one in (*node_folders(folder), *folder.glob("infrared_*"))]
+    if len(folders) == 1 and not below:
         return ()
-    return node_shots(images)
+    nodes = node_shots(images)
+    if len(nodes) == 1 and not any(shot.infrared for shot in nodes[0].shots):
+        raise InputError(f"{folders[0]} holds one camera only; give {nodes[0].folder} to calibrate it alone")
+    return nodes
 
 
 def calibrate_cameras(

@@ -169,7 +169,7 @@ def calibrate_rig(
     names = tuple(cameras)
     if not LEAST_CAMERAS <= len(names) <= MOST_CAMERAS:
         raise InputError(
-            f"{len(names)} cameras are given; a rig has two to six, each with one for depth at most"
+            f"A rig has two to six cameras, each with one for depth at most, and {len(names)} are given"
         )
     optics = tuple(one.optics for one in cameras.values())
     moments = tuple(dict.fromkeys(moment for name in names for moment in seen[name]))

@@ -197,5 +197,5 @@ def test_one_moment_without_a_mark_does_not_tell_which_way_up():
 
 def test_one_camera_or_very_many_are_no_rig():
     given = session(cameras=2)
-    with pytest.raises(InputError, match="1 cameras are given"):
+    with pytest.raises(InputError, match="and 1 are given"):
         calibrate_rig(dict(list(given.lenses().items())[:1]), given.seen, BOARD)
