@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from pipeline.deliver import Delivery, deliver
     from pipeline.delivery.moments import Moment
     from pipeline.io.clouds import read_cloud, write_cloud
-    from pipeline.io.demos import DEMO_SCENES, load_demo
+    from pipeline.io.demos import DEMO_SCENES, board_views_of, load_demo
     from pipeline.io.meshes import read_mesh, write_mesh
     from pipeline.io.rigs import load_frame, load_rig, save_rig
     from pipeline.reconstruct import Reconstruction, reconstruct
@@ -93,7 +93,7 @@ _NAMES = {
     "pipeline.deliver": "Delivery deliver",
     "pipeline.delivery.moments": "Moment",
     "pipeline.io.clouds": "read_cloud write_cloud",
-    "pipeline.io.demos": "DEMO_SCENES load_demo",
+    "pipeline.io.demos": "DEMO_SCENES board_views_of load_demo",
     "pipeline.io.meshes": "read_mesh write_mesh",
     "pipeline.io.rigs": "load_frame load_rig save_rig",
     "pipeline.reconstruct": "Reconstruction reconstruct",
@@ -121,10 +121,10 @@ __all__ = [
     "Progress", "RadioConfig", "Reconstruction", "ReconstructionError", "RegistrationConfig",
     "RegistrationResult", "RegistrationStep", "RgbdFrame", "Rig", "RigTruth", "RunConfig", "SchemeConfig",
     "StreetConfig", "Surface", "SurfaceConfig", "SurfaceQuality", "SurfaceResult", "UplinkConfig", "arrivals",
-    "back_project", "deliver", "drain", "estimate_normals", "image_delays_s", "iterate_ball",
-    "iterate_registration", "iterate_simulation", "load_demo", "load_frame", "load_rig", "network_metrics",
-    "point_error_m", "read_cloud", "read_mesh", "reconstruct", "register", "roll_ball", "save_rig",
-    "simulate", "spacing", "with_settings", "write_cloud", "write_mesh",
+    "back_project", "board_views_of", "deliver", "drain", "estimate_normals", "image_delays_s",
+    "iterate_ball", "iterate_registration", "iterate_simulation", "load_demo", "load_frame", "load_rig",
+    "network_metrics", "point_error_m", "read_cloud", "read_mesh", "reconstruct", "register", "roll_ball",
+    "save_rig", "simulate", "spacing", "with_settings", "write_cloud", "write_mesh",
 ]  # fmt: skip
 
 

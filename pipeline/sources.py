@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from pipeline.types import Rig
+
+if TYPE_CHECKING:
+    from pipeline.io.calibrations import NodeFiles
 
 MILLIMETRES = 1000.0
 """Depth units in one metre where nothing else is said."""
@@ -47,9 +50,13 @@ class Demo:
         return self.name
 
     def load(self) -> Rig:
+        return self.load_with(None)
+
+    def load_with(self, calibration: str | None) -> Rig:
+        """The rig with a calibration's folder laid over it."""
         from pipeline.io.demos import load_demo
 
-        return load_demo(self.name)
+        return load_demo(self.name, calibration)
 
     def arguments(self) -> list[str]:
         return ["--scene", self.name]
@@ -66,9 +73,13 @@ class RigFolder:
         return self.path
 
     def load(self) -> Rig:
+        return self.load_with(None)
+
+    def load_with(self, calibration: str | None) -> Rig:
+        """The rig with a calibration's folder laid over it."""
         from pipeline.io.rigs import load_rig
 
-        return load_rig(self.path)
+        return load_rig(self.path, calibration)
 
     def arguments(self) -> list[str]:
         return ["--rig", self.path]
@@ -76,13 +87,16 @@ class RigFolder:
 
 @dataclass(frozen=True, slots=True)
 class ImagePair:
-    """One registered colour and depth image with the camera's intrinsics."""
+    """One colour and depth image with the camera's intrinsics."""
 
     color: str
     depth: str
     intrinsics: str
     depth_scale: float = MILLIMETRES
     """Depth image units in one metre."""
+    depth_intrinsics: str | None = None
+    """Of the depth camera, if the depth image is not registered to the colour image; then with extrinsics."""
+    extrinsics: str | None = None
 
     @property
     def title(self) -> str:
@@ -90,16 +104,53 @@ class ImagePair:
         return f"{color.parent.name}/{color.name}"
 
     def load(self) -> Rig:
+        return self.load_with(None)
+
+    def load_with(self, calibration: str | None) -> Rig:
+        """The pair with the node_00 of a calibration's folder laid over it."""
+        from pipeline.io.calibrations import calibration_files
         from pipeline.io.rigs import load_frame
 
-        frame = load_frame(self.color, self.depth, self.intrinsics, self.depth_scale)
-        return Rig(self.title, (frame,))
+        files = self._files()
+        if calibration is not None:
+            files |= calibration_files(calibration, ["node_00"])["node_00"]
+        return Rig(self.title, (load_frame(self.color, self.depth, depth_scale=self.depth_scale, **files),))
+
+    def _files(self) -> NodeFiles:
+        """Beside the images."""
+        files: NodeFiles = {"intrinsics": self.intrinsics}
+        if self.depth_intrinsics is not None:
+            files["depth_intrinsics"] = self.depth_intrinsics
+        if self.extrinsics is not None:
+            files["extrinsics"] = self.extrinsics
+        return files
 
     def arguments(self) -> list[str]:
-        files = ["--color", self.color, "--depth", self.depth, "--intrinsics", self.intrinsics]
+        words = ["--color", self.color, "--depth", self.depth]
+        for name, path in self._files().items():
+            words += [f"--{name.replace('_', '-')}", str(path)]
         return (
-            files if self.depth_scale == MILLIMETRES else [*files, "--depth-scale", f"{self.depth_scale:g}"]
+            words if self.depth_scale == MILLIMETRES else [*words, "--depth-scale", f"{self.depth_scale:g}"]
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrated:
+    """Another source with a calibration laid over it."""
+
+    source: Demo | RigFolder | ImagePair
+    folder: str
+    """A rig folder without images: node_00/{intrinsics.json, pose.txt, ...} and so on."""
+
+    @property
+    def title(self) -> str:
+        return f"{self.source.title}, calibrated by {Path(self.folder).name}"
+
+    def load(self) -> Rig:
+        return self.source.load_with(self.folder)
+
+    def arguments(self) -> list[str]:
+        return [*self.source.arguments(), "--calibration", self.folder]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,5 +170,5 @@ class LoadedRig:
         return ["--rig", self.rig.name]
 
 
-FileSource: TypeAlias = Demo | RigFolder | ImagePair
+FileSource: TypeAlias = Demo | RigFolder | ImagePair | Calibrated
 """The sources that a command line can name."""

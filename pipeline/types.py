@@ -86,6 +86,22 @@ class DepthMap:
 
 
 @dataclass(frozen=True, slots=True)
+class DepthNoise:
+    """How uncertain a depth sensor's measurement is: max(s0, s1 z^p) / cos(angle)^q (SPEC 1.5)."""
+
+    s0_m: float
+    s1_m: float
+    """At a distance of 1 m."""
+    p: float
+    q: float
+
+    def sd_m(self, z_m: FloatArray, cosine: FloatArray | float = 1.0) -> FloatArray:
+        """Standard deviation at depth ``z_m``, of surfaces at that cosine of incidence."""
+        along_m = np.maximum(self.s0_m, self.s1_m * np.asarray(z_m, float) ** self.p)
+        return along_m / np.asarray(cosine, float) ** self.q
+
+
+@dataclass(frozen=True, slots=True)
 class RgbdFrame:
     """One registered colour and depth image of one camera node."""
 
@@ -101,6 +117,8 @@ class RgbdFrame:
     """(H, W) where ``rgb`` has arrived, if the images came over a network; None is everywhere."""
     coarse: DepthMap | None = None
     """(H, W) depth known only coarsely, where ``depth`` is unknown: a guess, as inferred depth is."""
+    noise: DepthNoise | None = None
+    """Of ``depth`` as its sensor's calibration found it; None is that of a Kinect."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +132,9 @@ class RigTruth:
     T_world_camera: tuple[FloatArray, ...]
     """True pose of every node."""
     depth: tuple[DepthMap, ...]
-    """True, hole-free depth of every node."""
+    """True, hole-free depth of every node, on the pixels of its true camera."""
+    intrinsics: tuple[CameraIntrinsics, ...]
+    """True camera of every node."""
 
 
 @dataclass(frozen=True, slots=True)

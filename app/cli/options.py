@@ -12,7 +12,7 @@ from app.cli.text import wrong_use
 from pipeline.config import PRESETS
 
 if TYPE_CHECKING:
-    from pipeline.sources import FileSource
+    from pipeline.sources import Demo, FileSource, ImagePair, RigFolder
 
 Settings = Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="KEY=VALUE")]
 PresetName = Annotated[str, tyro.conf.arg(metavar="{" + "|".join(PRESETS) + "|FILE.json}")]
@@ -29,15 +29,27 @@ class SourceOptions:
     color: Path | None = None
     """Colour image of a single RGB-D pair."""
     depth: Path | None = None
-    """Its registered 16-bit depth image."""
+    """Its 16-bit depth image."""
     intrinsics: Path | None = None
     """Its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info."""
     depth_scale: float = 1000.0
     """Depth units per metre in the depth image."""
+    depth_intrinsics: Path | None = None
+    """The camera of a depth image that is not registered to the colour image."""
+    extrinsics: Path | None = None
+    """Where that camera stands: JSON with T_color_depth, four rows of four numbers, metres."""
+    calibration: Path | None = None
+    """A calibration's folder: its node_00/{intrinsics.json, pose.txt, ...} take the place of the own."""
 
     def source(self) -> FileSource:
         """What they name; exits where they name nothing, or more than one thing."""
-        pair = (self.color, self.depth, self.intrinsics)
+        from pipeline.sources import Calibrated
+
+        source = self._images()
+        return source if self.calibration is None else Calibrated(source, str(self.calibration))
+
+    def _images(self) -> Demo | RigFolder | ImagePair:
+        pair = (self.color, self.depth, self.intrinsics, self.depth_intrinsics, self.extrinsics)
         ways = [self.scene is not None, self.rig is not None, any(part is not None for part in pair)]
         if sum(ways) != 1:
             wrong_use(
@@ -51,7 +63,11 @@ class SourceOptions:
             return RigFolder(str(self.rig))
         if self.color is None or self.depth is None or self.intrinsics is None:
             wrong_use("a single pair needs all of --color, --depth and --intrinsics")
-        return ImagePair(str(self.color), str(self.depth), str(self.intrinsics), self.depth_scale)
+        if (self.depth_intrinsics is None) != (self.extrinsics is None):
+            wrong_use("a depth image that is not registered needs both --depth-intrinsics and --extrinsics")
+        beside = (None if part is None else str(part) for part in (self.depth_intrinsics, self.extrinsics))
+        images = str(self.color), str(self.depth), str(self.intrinsics)
+        return ImagePair(*images, self.depth_scale, *beside)
 
 
 Images = Annotated[SourceOptions, tyro.conf.arg(name="")]

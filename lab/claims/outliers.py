@@ -7,7 +7,7 @@ import numpy as np
 from lab.claims.claim import Claim, Outcome, bootstrap_ci95
 from pipeline.acquisition import back_project, filter_outliers
 from pipeline.config import AcquisitionConfig, OutlierMode
-from pipeline.io.demos import DEMO_SCENES, load_demo
+from pipeline.io.demos import CALIBRATED_SCENES, load_demo
 from pipeline.types import FloatArray, PointCloud
 
 OUTLIER_SHARE = 0.01
@@ -35,7 +35,7 @@ def _experiment() -> Outcome:
     found: dict[str, list[float]] = {
         name: [] for name in (*names, *(f"outliers_caught_share_{mode}" for mode in MODES))
     }
-    for name in DEMO_SCENES:
+    for name in CALIBRATED_SCENES:
         for index, frame in enumerate(load_demo(name).frames):
             cloud = back_project(frame)
             focal_px = frame.intrinsics.fx_px

@@ -15,7 +15,7 @@ from lab.results.record import Record, committed_code, new_record
 from lab.trials import ROOT
 from packetmesh.errors import InputError, PacketMeshError
 from pipeline.config import PRESETS
-from pipeline.io.demos import DEMO_SCENES
+from pipeline.io.demos import CALIBRATED_SCENES
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "calibration_claims": (
@@ -83,7 +83,7 @@ def measure(name: str, runs: Path = Path("runs/results")) -> Record:
 
 def _reconstructions(runs: Path) -> dict[str, Any]:
     """Every demo scene and every real frame there is, by both presets."""
-    sources = {scene: ["--scene", scene] for scene in DEMO_SCENES}
+    sources = {scene: ["--scene", scene] for scene in CALIBRATED_SCENES}
     for folder in real_folders():
         files = {"color": "color.png", "depth": "depth.png", "intrinsics": "intrinsics.json"}
         place = f"${DATA_VARIABLE}/{folder.name}"

@@ -14,7 +14,7 @@ from pipeline.config import AlignmentMode
 from pipeline.depth.alignment import align_depth
 from pipeline.depth.inference import DepthNetwork
 from pipeline.depth.metrics import depth_errors
-from pipeline.io.demos import DEMO_SCENES, load_demo
+from pipeline.io.demos import CALIBRATED_SCENES, load_demo
 from pipeline.io.rigs import load_frame
 from pipeline.types import ByteArray, DepthMap, FloatArray
 
@@ -50,7 +50,7 @@ def evaluate(model: Path | None, real: Path | None, rooms: int) -> Iterator[str]
     seeds = range(FIRST_TEST_ROOM, FIRST_TEST_ROOM + rooms)
     examples = list(held_out_rooms(seeds, views=1))
     yield from rows(f"{rooms} held-out rooms", examples, network)
-    for name in DEMO_SCENES:
+    for name in CALIBRATED_SCENES:
         yield from rows(f"demo {name}", list(demo(name)), network)
     for folder in sorted(real.iterdir()) if real else ():
         if (folder / "depth.png").exists():

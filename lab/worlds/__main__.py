@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import sys
 
-from lab.worlds.demos import DEMOS, render_demo
-from pipeline.io.demos import SCENES
+from lab.worlds.board_files import save_board_views
+from lab.worlds.demos import DEMOS, render_demo, render_demo_boards
+from pipeline.io.demos import BOARDS, SCENES
 from pipeline.io.rigs import save_rig
 
 
 def main(names: list[str]) -> None:
-    """Write the rigs of the demos named, or of all, with their truth."""
+    """Write the rigs of the demos named, or of all, with their truth and board views."""
     for name in names or DEMOS:
         rig = render_demo(name)
         save_rig(SCENES / name, rig)
+        if boards := render_demo_boards(name):
+            save_board_views(SCENES / name / BOARDS, boards)
         shares = ", ".join(f"{frame.depth.coverage:.0%}" for frame in rig.frames)
         print(f"{name}: sensor depth covers {shares}")
 

@@ -7,8 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from lab.worlds.board_views import BoardCamera, BoardViews
 from lab.worlds.box_on_table import box_on_table
 from lab.worlds.living_room import living_room
+from lab.worlds.moving_day import moving_day, render_boards, true_nodes
 from lab.worlds.office import office
 from lab.worlds.raycast import world_mesh
 from lab.worlds.render import Renderer
@@ -24,11 +26,14 @@ POSE_ERROR_RAD = np.radians(3.0)
 POSE_ERROR_M = 0.06
 """How wrong every node but the first is about its pose."""
 
+UNCALIBRATED = "uncalibrated"
+
 DEMOS: dict[str, Callable[[], Scene]] = {
     "living-room": living_room,
     "office": office,
     "workshop": workshop,
     "box-on-table": box_on_table,
+    UNCALIBRATED: moving_day,
 }
 """The builder of each demo; its ``scene.json`` describes it and holds its seed."""
 
@@ -49,14 +54,34 @@ def render_demo(name: str) -> Rig:
     scene = build_demo(name)
     renderer = Renderer(scene)
     frames, depth = [], []
-    for node, T in enumerate(scene.cameras):
-        rng = np.random.default_rng([DEMO_SCENES[name].seed, zlib.crc32(name.encode()), node])
-        view = renderer.view(scene.intrinsics, T, "photo", rng)
-        sensed = sense_depth(view, scene.intrinsics, rng)
-        believed = T if node == 0 else disturbed(T, rng)
-        frames.append(RgbdFrame(f"node_{node:02d}", view.rgb, sensed, scene.intrinsics, believed))
-        depth.append(DepthMap(renderer.depth(scene.intrinsics, T)))
-    return Rig(name, tuple(frames), RigTruth(*world_mesh(scene), scene.cameras, tuple(depth)))
+    nodes = nodes_of(name)
+    for index, node in enumerate(nodes):
+        camera, T = node.intrinsics, node.T_world_camera
+        rng = np.random.default_rng([DEMO_SCENES[name].seed, zlib.crc32(name.encode()), index])
+        view = renderer.view(camera, T, "photo", rng)
+        sensed = node.bias.measured(sense_depth(view, camera, rng))
+        believed = T if index == 0 else disturbed(T, rng)
+        frames.append(RgbdFrame(f"node_{index:02d}", view.rgb, sensed, scene.intrinsics, believed))
+        depth.append(DepthMap(renderer.depth(camera, T)))
+    lenses = tuple(node.intrinsics for node in nodes)
+    return Rig(name, tuple(frames), RigTruth(*world_mesh(scene), scene.cameras, tuple(depth), lenses))
+
+
+def nodes_of(name: str) -> tuple[BoardCamera, ...]:
+    """The nodes of a demo as they truly are.
+
+    Raises:
+        InputError: there is no demo of that name.
+    """
+    if name == UNCALIBRATED:
+        return true_nodes()
+    scene = build_demo(name)
+    return tuple(BoardCamera(scene.intrinsics, T) for T in scene.cameras)
+
+
+def render_demo_boards(name: str) -> BoardViews | None:
+    """The board views beside a demo whose nodes need calibration; None beside the others."""
+    return render_boards(DEMO_SCENES[name].seed) if name == UNCALIBRATED else None
 
 
 def disturbed(T_world_camera: FloatArray, rng: np.random.Generator) -> FloatArray:

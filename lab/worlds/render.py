@@ -37,6 +37,25 @@ class View:
 
 
 @dataclass(frozen=True, slots=True)
+class Exposure:
+    """A view before the film is developed."""
+
+    radiance: FloatArray
+    """(H, W, 3) float32 linear light."""
+    z_m: FloatArray
+    normals: FloatArray
+    infrared: FloatArray
+    gloss: FloatArray
+    T_world_camera: FloatArray
+    """These as in ``View``."""
+
+    def developed(self, film: Film, rng: np.random.Generator) -> View:
+        """The photograph, and what is really there."""
+        rgb = develop(self.radiance, film, rng)
+        return View(rgb, self.z_m, self.normals, self.infrared, self.gloss, self.T_world_camera)
+
+
+@dataclass(frozen=True, slots=True)
 class _Sampling:
     """How many rays a quality spends."""
 
@@ -93,6 +112,16 @@ class Renderer:
         rng: np.random.Generator,
     ) -> View:
         """Renders one view (H, W of ``intrinsics``)."""
+        return self.exposure(intrinsics, T_world_camera, quality, rng).developed(_SAMPLING[quality].film, rng)
+
+    def exposure(
+        self,
+        intrinsics: CameraIntrinsics,
+        T_world_camera: FloatArray,
+        quality: Quality,
+        rng: np.random.Generator,
+    ) -> Exposure:
+        """The light of one view (H, W of ``intrinsics``)."""
         sampling = _SAMPLING[quality]
         shape = (intrinsics.height_px, intrinsics.width_px)
         center = self._caster.cast(camera_rays(intrinsics, T_world_camera))
@@ -105,8 +134,8 @@ class Renderer:
             else:
                 radiance += self._radiance(center, albedo, shape, sampling, rng)
         seen = center.part >= 0
-        return View(
-            rgb=develop(radiance / len(sampling.offsets_px), sampling.film, rng),
+        return Exposure(
+            radiance=radiance / len(sampling.offsets_px),
             z_m=np.where(seen, center.t, np.float32(np.nan)).reshape(shape),
             normals=center.normals.reshape(*shape, 3),
             infrared=np.clip(_luminance(albedo) * self._infrared[center.part], 0.0, 1.0).reshape(shape),
@@ -126,6 +155,27 @@ class Renderer:
         shape = (intrinsics.height_px, intrinsics.width_px)
         z_m = np.where(hits.part >= 0, hits.t, np.float32(np.nan))
         return z_m.reshape(shape), hits.part.reshape(shape)
+
+    def irradiance(
+        self, positions_m: FloatArray, normals: FloatArray, rng: np.random.Generator, rays: int = 4
+    ) -> FloatArray:
+        """(H, W, 3) light that falls on places (H, W, 3) of something that is not in the scene.
+
+        Args:
+            positions_m: world frame.
+            normals: (H, W, 3) unit, towards the side that is lit.
+            rng: draws the rays.
+            rays: shadow rays a light and place, and sky rays a place.
+        """
+        shape = positions_m.shape[:2]
+        places, up = (array.reshape(-1, 3).astype(np.float32) for array in (positions_m, normals))
+        count = len(places)
+        hits = Hits(np.ones(count, np.float32), places, up, -up, np.full(count, -1))
+        light, shine = np.zeros((2, count, 3), np.float32)
+        for _ in range(rays):
+            self._add_lights(hits, np.zeros(count, np.float32), dither(shape, rng), light, shine)
+            light += self._sky(hits, dither(shape, rng), bounce=True)
+        return (light / rays).reshape(*shape, 3)
 
     def _albedo(self, hits: Hits) -> FloatArray:
         """(N, 3) albedo from the parts' textures, black for misses."""

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from packetmesh.errors import InputError
-from pipeline.types import Rig
+from pipeline.types import AnyPath, Rig
 
 SCENES = Path(__file__).resolve().parents[2] / "assets" / "scenes"
+BOARDS = "board"
+"""Folder of a scene whose nodes need calibration: what they see of a board."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,14 +37,29 @@ DEMO_SCENES: dict[str, DemoScene] = _described()
 """By name; the living room first, which opens by itself."""
 
 
-def load_demo(name: str) -> Rig:
+def board_views_of(scene: str) -> Path | None:
+    """The folder with views of a board by a demo's nodes, from which they can be calibrated; None without.
+
+    It holds node_00/{color_00.jpg, depth_00.png, ...}, node_01/..., board.json and truth.json; images of
+    the same number are of the same moment.
+    """
+    folder = SCENES / scene / BOARDS
+    return folder if scene in DEMO_SCENES and folder.is_dir() else None
+
+
+CALIBRATED_SCENES = tuple(name for name in DEMO_SCENES if board_views_of(name) is None)
+"""Those whose nodes' intrinsics and depth are right, on which claims and benchmarks are measured."""
+
+
+def load_demo(name: str, calibration: AnyPath | None = None) -> Rig:
     """The shipped rig of a demo, with its truth: the scene's mesh, the nodes' poses and hole-free depth.
 
     Args:
         name: a key of ``DEMO_SCENES``.
+        calibration: a folder that is laid over it, as ``load_rig`` does.
 
     Raises:
-        InputError: there is no demo of that name, or its files are missing.
+        InputError: there is no demo of that name, its files are missing, or the calibration is not its own.
 
     >>> import packetmesh as pm
     >>> rig = pm.load_demo("office")
@@ -53,4 +70,4 @@ def load_demo(name: str) -> Rig:
         raise InputError(f"There is no demo scene {name!r}; try one of {', '.join(DEMO_SCENES)}")
     from pipeline.io.rigs import load_rig  # large libraries; a list of the scenes needs none
 
-    return load_rig(SCENES / name)
+    return load_rig(SCENES / name, calibration)

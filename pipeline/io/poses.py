@@ -26,13 +26,22 @@ def read_pose(path: AnyPath) -> FloatArray:
         T = np.empty(0)
     if T.shape != (4, 4) or not np.isfinite(T).all():
         raise InputError(f"The pose file {path} does not hold 4 x 4 numbers; try four lines of four numbers")
-    rotation = T[:3, :3]
-    orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), atol=_RIGID_TOLERANCE)
-    if not orthonormal or np.linalg.det(rotation) < 0 or not np.allclose(T[3], (0, 0, 0, 1)):
+    if rigid_or_none(T) is None:
         raise InputError(
             f"The pose file {path} is not a rigid transform; try a rotation and a translation in metres, "
             "with 0 0 0 1 as the last line"
         )
+    return T
+
+
+def rigid_or_none(T: FloatArray) -> FloatArray | None:
+    """``T`` if it is a (4, 4) rotation and translation."""
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        return None
+    rotation = T[:3, :3]
+    orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), atol=_RIGID_TOLERANCE)
+    if not orthonormal or np.linalg.det(rotation) < 0 or not np.allclose(T[3], (0, 0, 0, 1)):
+        return None
     return T
 
 

@@ -1,4 +1,9 @@
-"""Camera nodes on disk: ``RIG/node_00/{color.png, depth.png, intrinsics.json, pose.txt}`` and so on."""
+"""Camera nodes on disk: ``RIG/node_00/{color.png, depth.png, intrinsics.json, pose.txt}`` and so on.
+
+A node may also hold ``depth_correction.json``, by which its depth is corrected. Where ``depth.png`` is of a
+camera of its own, not registered to the colour image, the node has ``depth_intrinsics.json`` and
+``extrinsics.json``, too.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +12,16 @@ from pathlib import Path
 import numpy as np
 
 from packetmesh.errors import InputError
+from pipeline.depth_to_color import register_depth
 from pipeline.geometry import look_at
+from pipeline.io.calibrations import NodeFiles, calibration_files, node_files
+from pipeline.io.depth_correction import read_depth_correction
+from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import read_color, read_depth, write_color, write_depth_mm
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.io.poses import read_pose, write_pose
 from pipeline.io.truth import read_truth, write_truth
-from pipeline.types import AnyPath, RgbdFrame, Rig
+from pipeline.types import AnyPath, CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
 MAX_NODES = 6
 LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
@@ -20,16 +29,29 @@ LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
 
 
 def load_frame(
-    color: AnyPath, depth: AnyPath, intrinsics: AnyPath, depth_scale: float = 1000.0, name: str = "node_00"
+    color: AnyPath,
+    depth: AnyPath,
+    intrinsics: AnyPath,
+    depth_scale: float = 1000.0,
+    name: str = "node_00",
+    *,
+    pose: AnyPath | None = None,
+    depth_intrinsics: AnyPath | None = None,
+    extrinsics: AnyPath | None = None,
+    depth_correction: AnyPath | None = None,
 ) -> RgbdFrame:
-    """One registered RGB-D pair, at the origin, upright, looking along +y.
+    """One RGB-D pair; without a pose at the origin, upright, looking along +y.
 
     Args:
         color: (H, W) image.
-        depth: (H, W) 16-bit image, 0 where the depth is unknown.
+        depth: (H, W) 16-bit image, 0 where the depth is unknown; of another size if it is not registered.
         intrinsics: JSON with fx, fy, cx and cy, Open3D JSON or ROS camera_info, pixels.
         depth_scale: depth units in a metre.
         name: what the node is called.
+        pose: 4 x 4 T_world_camera, metres.
+        depth_intrinsics: of the depth camera, if the depth image is not registered to the colour image.
+        extrinsics: JSON with ``T_color_depth``, where the depth camera stands; both of these or none.
+        depth_correction: of the depth sensor's own bias, applied before anything else (SPEC 1.5).
 
     Raises:
         InputError: a file that cannot be used, or images and intrinsics of different sizes.
@@ -43,29 +65,75 @@ def load_frame(
     """
     camera = read_intrinsics(intrinsics)
     rgb = read_color(color)
-    depth_map = read_depth(depth, depth_scale)
-    size_px = (rgb.shape[1], rgb.shape[0])
-    for path, what, other_px in (
-        (depth, "depth image", depth_map.z_m.shape[::-1]),
-        (intrinsics, "intrinsics file", (camera.width_px, camera.height_px)),
-    ):
-        if other_px != size_px:
-            raise InputError(
-                f"The {what} {path} is for {other_px[0]} x {other_px[1]} pixels but the colour image {color} "
-                f"has {size_px[0]} x {size_px[1]}; try files of one size, registered to one camera"
-            )
-    return RgbdFrame(name, rgb, depth_map, camera, LEVEL_POSE.copy())
+    sensed, noise = read_depth(depth, depth_scale), None
+    if depth_correction is not None:
+        correction = read_depth_correction(depth_correction)
+        sensed, noise = correction.apply(sensed), correction.noise
+    if depth_intrinsics is None and extrinsics is None:
+        _check_size("depth image", depth, sensed.z_m.shape, "colour image", color, rgb.shape)
+    else:
+        sensed = _registered(sensed, depth, camera, depth_intrinsics, extrinsics)
+    shape = (camera.height_px, camera.width_px)
+    _check_size("intrinsics file", intrinsics, shape, "colour image", color, rgb.shape)
+    T_world_camera = LEVEL_POSE.copy() if pose is None else read_pose(pose)
+    return RgbdFrame(name, rgb, sensed, camera, T_world_camera, noise=noise)
 
 
-def load_rig(directory: AnyPath) -> Rig:
+def _registered(
+    sensed: DepthMap,
+    depth: AnyPath,
+    color_camera: CameraIntrinsics,
+    depth_intrinsics: AnyPath | None,
+    extrinsics: AnyPath | None,
+) -> DepthMap:
+    if depth_intrinsics is None or extrinsics is None:
+        given, missing = "extrinsics", "depth intrinsics"
+        if extrinsics is None:
+            given, missing = missing, given
+        raise InputError(
+            f"The depth image {depth} comes with {given} but without {missing}; give both if it is not "
+            "registered to the colour image, none if it is"
+        )
+    depth_camera = read_intrinsics(depth_intrinsics)
+    shape = (depth_camera.height_px, depth_camera.width_px)
+    _check_size("intrinsics file", depth_intrinsics, shape, "depth image", depth, sensed.z_m.shape)
+    seen = register_depth(sensed, depth_camera, color_camera, read_extrinsics(extrinsics))
+    if not seen.valid.any():
+        raise InputError(
+            f"The colour camera sees nothing of the depth image {depth}; check that {extrinsics} is in "
+            "metres and leads from the depth camera's frame to the colour camera's"
+        )
+    return seen
+
+
+def _check_size(
+    what: str,
+    path: AnyPath,
+    shape: tuple[int, ...],
+    of_what: str,
+    of_path: AnyPath,
+    of_shape: tuple[int, ...],
+) -> None:
+    (height, width), (of_height, of_width) = shape, of_shape[:2]
+    if (height, width) != (of_height, of_width):
+        raise InputError(
+            f"The {what} {path} is for {width} x {height} pixels but the {of_what} {of_path} has {of_width} "
+            f"x {of_height}; try files of one size, registered to one camera"
+        )
+
+
+def load_rig(directory: AnyPath, calibration: AnyPath | None = None) -> Rig:
     """The nodes below ``directory`` in the order of their folders' names.
 
     Args:
         directory: holds node_00/{color.png, depth.png, intrinsics.json}, node_01/... and, where the poses
             are known, node_NN/pose.txt with a 4 x 4 T_world_camera, metres.
+        calibration: a folder whose node_NN/intrinsics.json, pose.txt and so on take the place of the rig's
+            own; what is true of a rendered rig stays.
 
     Raises:
-        InputError: no folder, no node or more than six, or a file of a node that cannot be used.
+        InputError: no folder, no node or more than six, a file of a node that cannot be used, or the
+            calibration of another rig.
 
     >>> import packetmesh as pm
     >>> pm.save_rig("office", pm.load_demo("office"))
@@ -86,8 +154,9 @@ def load_rig(directory: AnyPath) -> Rig:
             f"The rig folder {directory} holds {len(folders)} nodes; try to move some away, so that at most "
             f"{MAX_NODES} remain"
         )
-    frames = tuple(_load_node(folder) for folder in folders)
-    return Rig(directory.resolve().name, frames, read_truth(directory, frames))
+    over = {} if calibration is None else calibration_files(calibration, [folder.name for folder in folders])
+    frames = tuple(_load_node(folder, over.get(folder.name, NodeFiles())) for folder in folders)
+    return Rig(directory.resolve().name, frames, read_truth(directory, [frame.name for frame in frames]))
 
 
 def save_rig(directory: AnyPath, rig: Rig) -> None:
@@ -113,18 +182,13 @@ def save_rig(directory: AnyPath, rig: Rig) -> None:
         write_intrinsics(folder / "intrinsics.json", frame.intrinsics)
         write_pose(folder / "pose.txt", frame.T_world_camera)
     if rig.truth is not None:
-        write_truth(directory, names, rig.truth)
+        write_truth(directory, dict(zip(names, rig.frames, strict=True)), rig.truth)
 
 
 def _node_folders(directory: Path) -> list[Path]:
     return sorted(folder for folder in directory.glob("node_*") if folder.is_dir())
 
 
-def _load_node(folder: Path) -> RgbdFrame:
-    frame = load_frame(
-        folder / "color.png", folder / "depth.png", folder / "intrinsics.json", name=folder.name
-    )
-    pose = folder / "pose.txt"
-    if not pose.exists():
-        return frame
-    return RgbdFrame(frame.name, frame.rgb, frame.depth, frame.intrinsics, read_pose(pose))
+def _load_node(folder: Path, over: NodeFiles) -> RgbdFrame:
+    files: NodeFiles = {"intrinsics": folder / "intrinsics.json", **node_files(folder), **over}
+    return load_frame(folder / "color.png", folder / "depth.png", name=folder.name, **files)

@@ -1,22 +1,28 @@
-"""The true surface and poses of a rig: ``RIG/truth.ply`` and ``RIG/node_NN/true_pose.txt``."""
+"""What is true of a rig: ``RIG/truth.ply``, ``RIG/node_NN/true_pose.txt`` and ``true_intrinsics.json``, which
+is there where the node's own intrinsics are not right.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from packetmesh.errors import InputError
+from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.io.poses import read_pose, write_pose
 from pipeline.rays import Camera, hit_depths
-from pipeline.types import RgbdFrame, RigTruth, Surface
+from pipeline.types import CameraIntrinsics, RgbdFrame, RigTruth, Surface
 
 MESH_NAME = "truth.ply"
 POSE_NAME = "true_pose.txt"
+INTRINSICS_NAME = "true_intrinsics.json"
 
 
-def read_truth(directory: Path, frames: Sequence[RgbdFrame]) -> RigTruth | None:
-    """The true surface and poses beside ``frames``, with the depth that the true cameras see of it.
+def read_truth(directory: Path, names: Sequence[str]) -> RigTruth | None:
+    """The true surface and poses of a rig's nodes, with the depth that the true cameras see of it.
 
     Raises:
         InputError: there is a true surface, but it cannot be read, or a node has no true pose.
@@ -24,26 +30,41 @@ def read_truth(directory: Path, frames: Sequence[RgbdFrame]) -> RigTruth | None:
     if not (directory / MESH_NAME).exists():
         return None
     mesh = read_mesh(directory / MESH_NAME)
-    poses = []
-    for frame in frames:
-        path = directory / frame.name / POSE_NAME
+    cameras = []
+    for name in names:
+        path = directory / name / POSE_NAME
         if not path.exists():
             raise InputError(
-                f"The rig {directory} has a true surface, but {frame.name} has no {POSE_NAME}; add it, or "
-                f"remove {MESH_NAME}"
+                f"The rig {directory} has a true surface, but {name} has no {POSE_NAME}; add it, or remove "
+                f"{MESH_NAME}"
             )
-        poses.append(read_pose(path))
-    cameras = [Camera(frame.intrinsics, T) for frame, T in zip(frames, poses, strict=True)]
+        lens = directory / name / INTRINSICS_NAME
+        known = lens if lens.exists() else lens.with_name("intrinsics.json")
+        cameras.append(Camera(read_intrinsics(known), read_pose(path)))
     depth = tuple(hit_depths(mesh.vertices_m, mesh.triangles, cameras))
-    return RigTruth(mesh.vertices_m, mesh.triangles, tuple(poses), depth)
+    poses = tuple(camera.T_world_camera for camera in cameras)
+    lenses = tuple(camera.intrinsics for camera in cameras)
+    return RigTruth(mesh.vertices_m, mesh.triangles, poses, depth, lenses)
 
 
-def write_truth(directory: Path, names: Sequence[str], truth: RigTruth) -> None:
-    """Write the true surface and the true pose of every node in ``names``.
+def write_truth(directory: Path, frames: Mapping[str, RgbdFrame], truth: RigTruth) -> None:
+    """Write the true surface, and what is true of every node.
+
+    Args:
+        directory: of the rig.
+        frames: by the names of the nodes' folders; their true intrinsics are written where they differ.
+        truth: what to write.
 
     Raises:
         InputError: the folder cannot be written.
     """
     write_mesh(directory / MESH_NAME, Surface(truth.vertices_m, truth.triangles))
-    for name, T_world_camera in zip(names, truth.T_world_camera, strict=True):
+    nodes = zip(frames.items(), truth.T_world_camera, truth.intrinsics, strict=True)
+    for (name, frame), T_world_camera, true in nodes:
         write_pose(directory / name / POSE_NAME, T_world_camera)
+        if not _same(true, frame.intrinsics):
+            write_intrinsics(directory / name / INTRINSICS_NAME, true)
+
+
+def _same(one: CameraIntrinsics, other: CameraIntrinsics) -> bool:
+    return np.array_equal(one.matrix, other.matrix) and np.array_equal(one.distortion, other.distortion)

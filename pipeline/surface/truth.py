@@ -51,9 +51,7 @@ def compare_with_truth(
     if not len(triangles):
         raise InputError("There is no triangle to compare with the truth; try a larger ball radius")
     mesh_m = _in_true_frame(vertices_m, truth, cameras)
-    true_cameras = [
-        Camera(camera.intrinsics, T) for camera, T in zip(cameras, truth.T_world_camera, strict=True)
-    ]
+    true_cameras = [Camera(*camera) for camera in zip(truth.intrinsics, truth.T_world_camera, strict=True)]
     rng = np.random.default_rng(seed)
     return _surface_measures(mesh_m, triangles, truth, true_cameras, rng) | _ray_measures(
         mesh_m, triangles, truth, true_cameras

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.config import PRESETS
-from pipeline.io.demos import DEMO_SCENES, load_demo
+from pipeline.io.demos import CALIBRATED_SCENES, load_demo
 from pipeline.io.rigs import load_frame
 from pipeline.rays import Camera, hit_depths
 from pipeline.reconstruct import reconstruct
@@ -23,7 +23,7 @@ def shares(rig, **settings):
     return result, (result.before.quality.kept_measurement_share, result.after.quality.kept_measurement_share)
 
 
-@pytest.mark.parametrize("scene", DEMO_SCENES)
+@pytest.mark.parametrize("scene", CALIBRATED_SCENES)
 def test_fusion_keeps_what_a_rig_has_measured(scene):
     _, (before, after) = shares(load_demo(scene))
     assert after >= before > 0.85

@@ -10,9 +10,9 @@ from lab.claims.delivery.trials import Loss, LossTask
 from network_sim.config import PRESETS
 from pipeline.config import AlignmentMode
 from pipeline.delivery.sending import packet_bytes_of
-from pipeline.io.demos import DEMO_SCENES
+from pipeline.io.demos import CALIBRATED_SCENES
 
-RIGS = tuple(DEMO_SCENES)
+RIGS = CALIBRATED_SCENES
 CODINGS = ("raw", "raw-rows", "raw-tiles", "png", "jpeg", "tiles", "layered")
 EXACT = ("raw", "raw-rows", "raw-tiles", "png")
 """Those that give the very images back: without losses all of them are one trial."""

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lab.training.evaluate import FIRST_TEST_ROOM, Example, demo, held_out_rooms
-from pipeline.io.demos import DEMO_SCENES
+from pipeline.io.demos import CALIBRATED_SCENES
 from pipeline.io.rigs import load_frame
 from pipeline.types import DepthMap, RgbdFrame
 
@@ -60,7 +60,7 @@ def held_out_scenes(rooms: int = ROOMS_PER_SCENE, views: int = VIEWS_PER_ROOM) -
 
 def demo_scenes() -> tuple[Site, ...]:
     """The nodes of every demo scene."""
-    return tuple(Site(name, "demo scenes", partial(demo, name)) for name in DEMO_SCENES)
+    return tuple(Site(name, "demo scenes", partial(demo, name)) for name in CALIBRATED_SCENES)
 
 
 def real_frames() -> tuple[Site, ...]:

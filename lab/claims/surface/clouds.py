@@ -12,7 +12,7 @@ from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import run
 from pipeline.surface import Camera, reconstruct_surface
-from pipeline.types import DepthMap, Rig, RigTruth, SurfaceResult
+from pipeline.types import DepthMap, Rig, SurfaceResult
 
 CHAINS = {"thesis": "the thesis's union", "packetmesh": "filling only the holes"}
 """The presets, and what each does with the inferred points."""
@@ -39,7 +39,12 @@ def single_node(rig: Rig, index: int) -> Rig:
     assert rig.truth is not None
     pose = rig.truth.T_world_camera[index]
     frame = replace(rig.frames[index], T_world_camera=pose)
-    truth = RigTruth(rig.truth.vertices_m, rig.truth.triangles, (pose,), (rig.truth.depth[index],))
+    truth = replace(
+        rig.truth,
+        T_world_camera=(pose,),
+        depth=(rig.truth.depth[index],),
+        intrinsics=(rig.truth.intrinsics[index],),
+    )
     return Rig(f"{rig.name}/{frame.name}", (frame,), truth)
 
 

@@ -18,7 +18,7 @@ from lab.trials import iterate_trials
 from packetmesh.progress import Progress
 from pipeline.config import PRESETS
 from pipeline.depth.inference import SHIPPED_MODEL
-from pipeline.io.demos import DEMO_SCENES, SCENES, load_demo
+from pipeline.io.demos import CALIBRATED_SCENES, SCENES, load_demo
 from pipeline.surface import hit_depth
 from pipeline.surface.radii import SIGMAS
 from pipeline.types import FloatArray
@@ -91,7 +91,7 @@ def node_trial(node: tuple[str, int]) -> list[dict[str, Any]]:
 
 def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Measured]:
     """Every node of the demo scenes as a rig of its own."""
-    nodes = [(scene, index) for scene in DEMO_SCENES for index in range(len(load_demo(scene).frames))]
+    nodes = [(scene, index) for scene in CALIBRATED_SCENES for index in range(len(load_demo(scene).frames))]
     found = yield from iterate_trials(
         "C22, holes", node_trial, nodes, folder, scheduler, data=(SHIPPED_MODEL, SCENES)
     )
@@ -104,7 +104,7 @@ def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Meas
 
 def figures() -> tuple[Exhibit, ...]:
     """The thesis's figures on the first node of the first scene, by both chains."""
-    rig = load_demo(next(iter(DEMO_SCENES)))
+    rig = load_demo(CALIBRATED_SCENES[0])
     return tuple(thesis_figures(chain_clouds(rig, 0, PRESETS[preset]), how) for preset, how in CHAINS.items())
 
 

@@ -10,7 +10,7 @@ from lab.claims.claim import Claim, Outcome
 from lab.claims.exhibits import Table
 from lab.claims.surface.clouds import CHAINS, chain_clouds
 from pipeline.config import PRESETS
-from pipeline.io.demos import DEMO_SCENES, load_demo
+from pipeline.io.demos import CALIBRATED_SCENES, load_demo
 from pipeline.surface import radii, spacing
 from pipeline.surface.radii import SIGMAS
 
@@ -67,7 +67,7 @@ def readings_table() -> Table:
 def scenes_table() -> Table:
     """Our own r_F, sigma_D and radii, before and after fusion, of the first node of each scene."""
     rows: list[tuple[str | float, ...]] = []
-    for scene in DEMO_SCENES:
+    for scene in CALIBRATED_SCENES:
         rig = load_demo(scene)
         for preset, how in CHAINS.items():
             merged = chain_clouds(rig, 0, PRESETS[preset]).merged

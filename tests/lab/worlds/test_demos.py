@@ -5,15 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lab.worlds.board_files import load_board_views
 from lab.worlds.box_on_table import BOX_M
-from lab.worlds.demos import POSE_ERROR_M, POSE_ERROR_RAD, build_demo, disturbed
+from lab.worlds.demos import POSE_ERROR_M, POSE_ERROR_RAD, UNCALIBRATED, build_demo, disturbed, nodes_of
 from lab.worlds.raycast import world_mesh
 from lab.worlds.render import render
 from lab.worlds.sensor import axial_sigma_m
 from lab.worlds.staging import VGA
 from packetmesh.errors import InputError
 from pipeline.geometry import apply, inverse, pixel_rays, project, rotation_angle_rad
-from pipeline.io.demos import DEMO_SCENES, load_demo
+from pipeline.io.demos import CALIBRATED_SCENES, DEMO_SCENES, board_views_of, load_demo
+from pipeline.io.rigs import load_rig, save_rig
 from pipeline.open3d_runtime import o3d
 from pipeline.types import CameraIntrinsics, Rig
 
@@ -73,12 +75,12 @@ def test_nodes_stand_apart_and_look_at_the_same_place(rig: Rig) -> None:
 
 def _shared(rig: Rig, before: int, after: int) -> float:
     """Share of one node's true points that another sees."""
-    rays = pixel_rays(rig.frames[after].intrinsics)
+    rays = pixel_rays(rig.truth.intrinsics[after])
     points = (rays * rig.truth.depth[after].z_m[..., None])[::4, ::4].reshape(-1, 3)
     T_before_after = inverse(rig.truth.T_world_camera[before]) @ rig.truth.T_world_camera[after]
     points = apply(T_before_after, points)
     points = points[points[:, 2] > 0.1]
-    u, v = np.rint(project(rig.frames[before].intrinsics, points)).astype(int).T
+    u, v = np.rint(project(rig.truth.intrinsics[before], points)).astype(int).T
     inside = (u >= 0) & (u < 640) & (v >= 0) & (v < 480)
     seen_m = rig.truth.depth[before].z_m[v[inside], u[inside]]
     return float((np.abs(seen_m - points[inside, 2]) < 0.02 * seen_m).sum() / (rays[::4, ::4].size / 3))
@@ -93,14 +95,15 @@ def test_believed_poses_are_as_wrong_as_the_specification_says(rig: Rig) -> None
 
 
 def test_shipped_depth_has_holes_and_otherwise_the_sensor_noise(rig: Rig) -> None:
-    for frame, truth in zip(rig.frames, rig.truth.depth, strict=True):
+    for frame, truth, node in zip(rig.frames, rig.truth.depth, nodes_of(rig.name), strict=True):
         assert 0.65 < frame.depth.coverage < 0.95
         valid = frame.depth.valid
         true_m = truth.z_m[valid].astype(float)
+        biased_m = node.bias.measured(truth).z_m[valid].astype(float)
         # Quantisation adds about 3 mm at 3 m (z^2 / (f b) x 1/8 px / sqrt(12)).
         quantum_m = true_m**2 / (525.0 * 0.075) * 0.125
         sigma_m = np.hypot(axial_sigma_m(true_m), quantum_m / np.sqrt(12.0))
-        pull = (frame.depth.z_m[valid] - true_m) / sigma_m
+        pull = (frame.depth.z_m[valid] - biased_m) / sigma_m
         assert abs(np.median(pull)) < 0.1
         assert np.median(np.abs(pull)) == pytest.approx(0.6745, rel=0.15)
         assert np.mean(np.abs(pull) > 6.0) < 0.03  # jitter and flying pixels at edges
@@ -118,6 +121,43 @@ def test_shipped_files_are_small(name: str) -> None:
     pictures = sorted((SHIPPED / name).glob("node_*/color.png"))
     assert len(pictures) == NODES
     assert all(picture.stat().st_size < 700_000 for picture in pictures)
+
+
+def test_only_one_demo_needs_calibration_and_its_boards_are_beside_it() -> None:
+    assert set(DEMO_SCENES) - set(CALIBRATED_SCENES) == {UNCALIBRATED}
+    assert all(board_views_of(name) is None for name in CALIBRATED_SCENES)
+    assert board_views_of("kitchen") is None
+    folder = board_views_of(UNCALIBRATED)
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    assert sum(path.stat().st_size for path in files) < 6_000_000
+    views = load_board_views(folder)
+    assert len(views.images) >= 10
+    for node, truth in zip(views.cameras, nodes_of(UNCALIBRATED), strict=True):
+        np.testing.assert_array_equal(node.intrinsics.matrix, truth.intrinsics.matrix)
+        np.testing.assert_array_equal(node.T_world_camera, truth.T_world_camera)
+
+
+def test_what_the_uncalibrated_nodes_say_of_themselves_is_wrong() -> None:
+    rig = load_demo(UNCALIBRATED)
+    for frame, lens, truth in zip(rig.frames, rig.truth.intrinsics, rig.truth.depth, strict=True):
+        assert 0.02 < abs(lens.fx_px / frame.intrinsics.fx_px - 1.0) < 0.05
+        assert np.any(lens.distortion)
+        assert not np.any(frame.intrinsics.distortion)
+        off_m = np.nanmedian(np.abs(frame.depth.z_m - truth.z_m))
+        assert 0.005 < off_m < 0.05
+
+
+def test_the_truth_of_the_other_demos_is_what_they_say(tmp_path) -> None:
+    rig = load_demo("box-on-table")
+    for frame, lens in zip(rig.frames, rig.truth.intrinsics, strict=True):
+        np.testing.assert_array_equal(frame.intrinsics.matrix, lens.matrix)
+    save_rig(tmp_path, rig)
+    assert not list(tmp_path.rglob("true_intrinsics.json"))
+    save_rig(tmp_path / "wrong", load_demo(UNCALIBRATED))
+    again = load_rig(tmp_path / "wrong")
+    np.testing.assert_array_equal(
+        again.truth.intrinsics[2].matrix, nodes_of(UNCALIBRATED)[2].intrinsics.matrix
+    )
 
 
 def test_photographs_depend_on_the_seed_alone() -> None:

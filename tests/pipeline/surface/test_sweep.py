@@ -28,7 +28,7 @@ def wall(side=61, lift_m=0.0):
 def wall_truth():
     vertices_m, triangles = rectangle((-3.0, 3.0), (-3.0, 3.0), 1.0)
     depth = DepthMap(np.ones((48, 64), np.float32))
-    return RigTruth(vertices_m, triangles, (np.eye(4),), (depth,))
+    return RigTruth(vertices_m, triangles, (np.eye(4),), (depth,), (EYE.intrinsics,))
 
 
 def test_twelve_radii_in_equal_ratios_and_others_between_them():

@@ -23,7 +23,7 @@ def joined(*meshes):
 
 def truth_of(vertices_m, triangles) -> RigTruth:
     depth = tuple(hit_depth(vertices_m, triangles, CAMERA, pose) for pose in POSES)
-    return RigTruth(vertices_m, triangles, POSES, depth)
+    return RigTruth(vertices_m, triangles, POSES, depth, (CAMERA,) * len(POSES))
 
 
 FLOOR = rectangle((-8, 8), (-2, 12))
@@ -81,7 +81,7 @@ def test_the_mesh_may_live_in_a_moved_world():
 
 def test_depth_errors_are_those_along_the_rays():
     """A mesh scaled by 1.04 (1.06) about the camera has every depth 4 % (6 %) too long."""
-    truth = RigTruth(*FLOOR, POSES[:1], (hit_depth(*FLOOR, CAMERA, POSES[0]),))
+    truth = RigTruth(*FLOOR, POSES[:1], (hit_depth(*FLOOR, CAMERA, POSES[0]),), (CAMERA,))
     for scale, share in ((1.04, 1.0), (1.06, 0.0)):
         eye_m = POSES[0][:3, 3]
         result = compare_with_truth(eye_m + scale * (FLOOR[0] - eye_m), FLOOR[1], truth, CAMERAS[:1])

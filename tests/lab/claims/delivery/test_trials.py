@@ -40,7 +40,7 @@ def rig():
         intrinsics=scaled(frame.intrinsics, 1 / EVERY),
     )
     depth = DepthMap(np.ascontiguousarray(alone.truth.depth[0].z_m[few, few]))
-    return Rig("small", (small,), replace(alone.truth, depth=(depth,)))
+    return Rig("small", (small,), replace(alone.truth, depth=(depth,), intrinsics=(small.intrinsics,)))
 
 
 def scores(values):

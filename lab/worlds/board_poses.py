@@ -1,0 +1,162 @@
+"""Where to hold a board so that the cameras of a rig learn the most from it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable, Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from lab.worlds.board_views import BoardCamera
+from packetmesh.errors import InputError
+from pipeline.calibration.board import Board
+from pipeline.geometry import apply, inverse, project, rigid, rotation_exp
+from pipeline.types import FloatArray
+
+DISTANCES_M = (0.6, 2.5)
+MOST_TILT_DEG = 45.0
+MARGIN_PX = 8.0
+LEAST_SPACING_PX = 11.0
+"""Between neighbours on the board; smaller circles are not found."""
+TRIES = 60
+"""Random poses for each that is wanted."""
+CELLS = {(8, 6): 0.25, (4, 3): 4.0}
+"""Parts of an image, across and down, and what a new one is worth; the large ones are those of the depth
+sensor's map."""
+
+
+def propose_poses(
+    board: Board,
+    cameras: Sequence[BoardCamera],
+    count: int,
+    seed: int,
+    free_m: Sequence[FloatArray] | None = None,
+    distances_m: tuple[float, float] = DISTANCES_M,
+) -> tuple[FloatArray, ...]:
+    """T_world_board of ``count`` moments: of many random ones, always the one that shows the most new.
+
+    New are parts of an image, a distance or a tilt for a camera, and a pair of cameras that see the board
+    together; the second time counts half of the first.
+
+    Args:
+        board: what is held.
+        cameras: who looks; every board proposed is seen whole by one of them at least.
+        count: number of moments.
+        seed: of the random poses.
+        free_m: (H, W) depth of what stands before each camera, which must not hide the board; None is
+            nothing.
+        distances_m: nearest and farthest from a camera.
+
+    Raises:
+        InputError: there is no place where a camera sees the whole board.
+    """
+    rng = np.random.default_rng(seed)
+    pool: list[tuple[FloatArray, dict[Hashable, float]]] = []
+    for _ in range(TRIES * count):
+        T = _random_pose(cameras, rng, distances_m)
+        seen = [
+            node
+            for node, camera in enumerate(cameras)
+            if sees(board, camera, T, None if free_m is None else free_m[node])
+        ]
+        if seen:
+            pool.append((T, dict(_shown(board, cameras, seen, T, distances_m))))
+    if len(pool) < count:
+        raise InputError(
+            f"Only {len(pool)} places were found where a camera sees the whole board; take a smaller board, "
+            "or let it be farther away"
+        )
+    told: Counter[Hashable] = Counter()
+    chosen = []
+    for _ in range(count):
+        gains = [sum(worth / 2.0 ** told[what] for what, worth in shown.items()) for _, shown in pool]
+        T, shown = pool.pop(int(np.argmax(gains)))
+        told.update(shown.keys())
+        chosen.append(T)
+    return tuple(chosen)
+
+
+def sees(
+    board: Board, camera: BoardCamera, T_world_board: FloatArray, free_m: FloatArray | None = None
+) -> bool:
+    """Whether a camera has all of the board in its picture, from its front, large enough and not hidden.
+
+    Args:
+        board: the board.
+        camera: who looks.
+        T_world_board: (4, 4).
+        free_m: (H, W) depth of what stands before the camera.
+    """
+    T = inverse(camera.T_world_camera) @ T_world_board
+    points_m = apply(T, board.points_m)
+    if points_m[:, 2].min() < 0.3 or _tilt_rad(T) > np.radians(MOST_TILT_DEG):
+        return False
+    seen_px = project(camera.intrinsics, points_m)
+    high_px = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px]) - 1.0
+    grid = seen_px.reshape(board.rows, board.columns, 2)
+    spacing_px = min(float(np.linalg.norm(np.diff(grid, axis=axis), axis=2).min()) for axis in (0, 1))
+    rim_px = MARGIN_PX + 0.5 * spacing_px
+    if ((seen_px < rim_px) | (seen_px > high_px - rim_px)).any() or spacing_px < LEAST_SPACING_PX:
+        return False
+    if free_m is None:
+        return True
+    column, row = np.rint(seen_px).astype(int).T
+    return bool((points_m[:, 2] < 0.98 * free_m[row, column]).all())
+
+
+def _tilt_rad(T_camera_board: FloatArray) -> float:
+    """Between the board's normal and the way to it; beyond a right angle it is seen from behind."""
+    way = T_camera_board[:3, 3] / np.linalg.norm(T_camera_board[:3, 3])
+    return float(np.arccos(np.clip(T_camera_board[:3, 2] @ way, -1.0, 1.0)))
+
+
+def _random_pose(
+    cameras: Sequence[BoardCamera], rng: np.random.Generator, distances_m: tuple[float, float]
+) -> FloatArray:
+    """(4, 4) somewhere in the view of one camera, towards that or to the middle of several."""
+    camera = cameras[int(rng.integers(len(cameras)))]
+    size = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
+    at_px = rng.uniform(0.1, 0.9, 2) * size
+    focal_px = np.array([camera.intrinsics.fx_px, camera.intrinsics.fy_px])
+    flat = (at_px - (camera.intrinsics.cx_px, camera.intrinsics.cy_px)) / focal_px
+    away_m = np.exp(rng.uniform(*np.log(distances_m)))
+    place_m = apply(camera.T_world_camera, away_m * np.array([*flat, 1.0]))
+
+    towards = rng.choice(len(cameras), int(rng.integers(1, len(cameras) + 1)), replace=False)
+    eye_m = np.mean([cameras[node].T_world_camera[:3, 3] for node in towards], axis=0)
+    forward = (place_m - eye_m) / np.linalg.norm(place_m - eye_m)
+    right = camera.T_world_camera[:3, 0] - (camera.T_world_camera[:3, 0] @ forward) * forward
+    right /= np.linalg.norm(right)
+    facing = np.stack([right, np.cross(forward, right), forward], axis=1)
+    axis, tilt = rng.uniform(0.0, 2.0 * np.pi), np.radians(rng.uniform(0.0, 0.9 * MOST_TILT_DEG))
+    roll = np.radians(rng.uniform(-25.0, 25.0))
+    turned = rotation_exp(tilt * np.array([np.cos(axis), np.sin(axis), 0.0]))
+    return rigid(facing @ turned @ rotation_exp(np.array([0.0, 0.0, roll])), place_m)
+
+
+def _shown(
+    board: Board,
+    cameras: Sequence[BoardCamera],
+    seen: Sequence[int],
+    T_world_board: FloatArray,
+    distances_m: tuple[float, float],
+) -> Iterator[tuple[Hashable, float]]:
+    """What a moment shows to the cameras that see it, and what that is worth."""
+    far = {}
+    for node in seen:
+        camera = cameras[node].intrinsics
+        T = inverse(cameras[node].T_world_camera) @ T_world_board
+        at = project(camera, apply(T, board.points_m)) / (camera.width_px, camera.height_px)
+        for cells, worth in CELLS.items():
+            for cell in {tuple(one) for one in (at * cells).astype(int).tolist()}:
+                yield ("cell", node, cells, cell), worth
+        share = np.log(np.linalg.norm(T[:3, 3]) / distances_m[0]) / np.log(distances_m[1] / distances_m[0])
+        far[node] = int(np.clip(4.0 * share, 0.0, 3.0))
+        yield ("far", node, far[node]), 2.0
+        aside = T[:2, 2] - T[:2, 3] / T[2, 3]
+        tilted = _tilt_rad(T) > np.radians(15.0)
+        side = int(np.arctan2(aside[1], aside[0]) // (0.5 * np.pi)) if tilted else None
+        yield ("tilt", node, side), 2.0
+    for pair in combinations(seen, 2):
+        yield ("pair", pair, far[pair[0]]), 2.0

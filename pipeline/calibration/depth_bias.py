@@ -1,0 +1,189 @@
+"""A depth sensor's own bias, from the boards that calibrate its camera: offset, scale, curvature, a map over
+the image, and the noise, with as many terms as held-out views justify (SPEC 1.5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.calibration.depth_noise import NoisePoints, noise_ci95, noise_law, noise_points
+from pipeline.calibration.depth_samples import DepthSamples
+from pipeline.calibration.depth_terms import (
+    GROUPS,
+    Problem,
+    chosen_terms,
+    columns_of,
+    map_directions,
+    robust_problem,
+    rows_of_views,
+    separable,
+)
+from pipeline.io.depth_correction import MAP_SHAPE, DepthCorrection
+from pipeline.types import DepthNoise, FloatArray
+
+LEAST_VIEWS = 4
+ROUNDS = 3
+"""Of noise after bias after noise."""
+WIDTH = sum(len(columns) for columns in GROUPS.values())
+"""Of the design."""
+
+
+@dataclass(frozen=True, slots=True)
+class DepthFit:
+    """A correction and what speaks for it."""
+
+    correction: DepthCorrection
+    terms: tuple[str, ...]
+    """Those that held-out views justify."""
+    covariance: FloatArray
+    """(p, p) of the terms' parameters: of those of offset, scale and curvature that are there, and of the
+    map's eleven, which are the coefficients' along ``depth_terms.map_directions``."""
+    held_out_m: Mapping[str, float]
+    """RMS depth error in views that had no part in the fit, by the terms of each model that was tried."""
+    rms_before_m: float
+    """Of the measured depth: root of the mean over views of the mean square."""
+    rms_after_m: float
+    scale_focal_correlation: float | None
+    """Of the scale's error with the focal length's; None without a scale."""
+    noise_points: NoisePoints
+    """What the noise law goes through."""
+    ink_offset_m: tuple[float, float] | None
+    """Mean of measured less true depth on black less that on white, corrected, and its standard error."""
+    note: str
+    """Which terms the views cannot tell apart, and what to take; empty if they can."""
+
+    def metrics(self) -> dict[str, Any]:
+        """The block ``depth`` of ``packetmesh calibrate --json``."""
+        correction = self.correction
+        values: dict[str, Any] = {
+            "offset_m": correction.offset_m,
+            "scale": correction.scale,
+            "curvature_per_m": correction.curvature_per_m,
+            "map_coefficients": correction.map_coefficients.tolist(),
+        }
+        return {
+            "terms": list(self.terms),
+            "values": values,
+            "ci95": {name: interval.tolist() for name, interval in correction.ci95.items()},
+            "noise_law": None if correction.noise is None else asdict(correction.noise),
+            "range_m": list(correction.range_m),
+            "rms_before_m": self.rms_before_m,
+            "rms_after_m": self.rms_after_m,
+            "held_out_rms_m": dict(self.held_out_m),
+            "scale_focal_correlation": self.scale_focal_correlation,
+            "ink_offset_m": None if self.ink_offset_m is None else list(self.ink_offset_m),
+            "note": self.note,
+        }
+
+
+def fit_depth(samples: DepthSamples) -> DepthFit:
+    """Estimate a sensor's bias and noise.
+
+    Weights are 1/sd^2 of the noise law, Huber's at 3 sd, and every view counts once: within a view errors go
+    together, since the board's pose is off by something. A term is kept only while the error in views that
+    are left out, one after another, falls by more than its standard error. Standard errors are those of the
+    jackknife over views, and what the lens's own uncertainty moves beside.
+
+    Args:
+        samples: of at least four views; pixels on ink are left out.
+
+    Raises:
+        InputError: fewer views.
+    """
+    paper = samples.select(~samples.ink)
+    count = len(rows_of_views(paper))
+    if count < LEAST_VIEWS:
+        raise InputError(
+            f"{count} views have depth on the board, and it takes {LEAST_VIEWS} from near to far to find the "
+            "bias of depth; take more"
+        )
+    choice = separable(paper)
+    bias_m: FloatArray = np.zeros(len(paper))
+    for _ in range(ROUNDS):
+        points = noise_points(paper, paper.true_m - paper.measured_m - bias_m)
+        noise = noise_law(points)
+        sd_m = noise.sd_m(paper.true_m, paper.cosine)
+        problem = robust_problem(paper, paper.true_m - bias_m, sd_m, choice)
+        bias_m = problem.y_m - problem.residuals_m(columns_of(choice.richest))
+    terms, held_out_m = chosen_terms(problem, choice)
+    columns = columns_of(terms)
+    correction = _correction(paper, problem, terms, noise, noise_ci95(points))
+    return DepthFit(
+        correction=correction,
+        terms=terms,
+        covariance=problem.covariance(columns),
+        held_out_m=held_out_m,
+        rms_before_m=problem.rms_m(problem.y_m),
+        rms_after_m=problem.rms_m(problem.residuals_m(columns)),
+        scale_focal_correlation=_with_focal(problem, terms, samples.lens_focal),
+        noise_points=points,
+        ink_offset_m=_ink_offset_m(samples, correction),
+        note=choice.note,
+    )
+
+
+def _with_focal(problem: Problem, terms: tuple[str, ...], lens_focal: FloatArray) -> float | None:
+    """Correlation of the scale's error with the focal length's."""
+    if "scale" not in terms:
+        return None
+    columns = columns_of(terms)
+    row = terms.index("scale")
+    spread = float(np.sqrt(problem.covariance(columns)[row, row])) * float(np.linalg.norm(lens_focal))
+    return float(problem.lens_shifts(columns)[row] @ lens_focal) / spread if spread > 0.0 else 0.0
+
+
+def _correction(
+    samples: DepthSamples,
+    problem: Problem,
+    terms: tuple[str, ...],
+    noise: DepthNoise,
+    intervals: Mapping[str, FloatArray],
+) -> DepthCorrection:
+    """The terms as a record, with intervals."""
+    columns = columns_of(terms)
+    values, spread = np.zeros(WIDTH), np.zeros((WIDTH, WIDTH))
+    values[columns], spread[np.ix_(columns, columns)] = problem.solve(columns), problem.covariance(columns)
+    on_map = list(GROUPS["map"])
+    directions = map_directions()
+    coefficients = (directions @ values[on_map]).reshape(MAP_SHAPE)
+    map_variance = np.einsum("ij,jk,ik->i", directions, spread[np.ix_(on_map, on_map)], directions)
+    middle = {
+        "offset_m": (values[0], spread[0, 0]),
+        "scale": (1.0 + values[1], spread[1, 1]),
+        "curvature_per_m": (values[2], spread[2, 2]),
+        "map_coefficients": (coefficients, map_variance.reshape(MAP_SHAPE)),
+    }
+    wide = problem.wide()
+    ci95 = {
+        name: np.stack([value - wide * np.sqrt(variance), value + wide * np.sqrt(variance)], axis=-1)
+        for (name, (value, variance)), term in zip(middle.items(), GROUPS, strict=True)
+        if term in terms
+    }
+    return DepthCorrection(
+        size_px=samples.size_px,
+        offset_m=float(values[0]),
+        scale=float(1.0 + values[1]),
+        curvature_per_m=float(values[2]),
+        map_coefficients=coefficients,
+        noise=noise,
+        range_m=(float(samples.measured_m.min()), float(samples.measured_m.max())),
+        ci95={**ci95, **intervals},
+    )
+
+
+def _ink_offset_m(samples: DepthSamples, correction: DepthCorrection) -> tuple[float, float] | None:
+    """Mean over views, and its standard error; None where fewer than two views show both."""
+    off_m = correction.corrected_m(samples.measured_m, samples.pixels) - samples.true_m
+    apart = [
+        float(np.median(off_m[rows[ink]]) - np.median(off_m[rows[~ink]]))
+        for rows in rows_of_views(samples)
+        if (ink := samples.ink[rows]).any() and not ink.all()
+    ]
+    if len(apart) < 2:
+        return None
+    return float(np.mean(apart)), float(np.std(apart, ddof=1) / np.sqrt(len(apart)))

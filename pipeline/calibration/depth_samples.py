@@ -1,0 +1,229 @@
+"""What a depth sensor says of a board beside where the board is (SPEC 1.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.calibration.board import Board
+from pipeline.calibration.estimate import Calibration, FittedView, settle
+from pipeline.calibration.lens import Optics
+from pipeline.geometry import apply, inverse
+from pipeline.types import BoolArray, DepthMap, FloatArray, IntArray
+
+RIM_PX = 3
+"""So near to the rim of the board's points no pixel is taken: there a sensor mixes board and background."""
+INK_PX = 1.0
+"""Black is taken to be wider by so much: at its border a pixel has some of both."""
+MOST_PER_VIEW, FEWEST = 1500, 100
+"""Pixels of one view that are used, evenly spread, and those without which a view is none."""
+GATE_SDS, LEAST_GATE_M = 6.0, 0.02
+"""Beyond so many robust standard deviations from its view's median a pixel shows a hand or the background."""
+MOST_SHARE = 0.25
+"""Depth that is off by more than this share has another unit, or shows another place."""
+MAD_TO_SD = 1.4826
+
+
+@dataclass(frozen=True, slots=True)
+class DepthSamples:
+    """Pixels on the board: N of them, over all views."""
+
+    size_px: tuple[int, int]
+    """Width and height of the images."""
+    pixels: IntArray
+    """(N, 2) u, v."""
+    measured_m: FloatArray
+    """(N,) depth of the sensor."""
+    true_m: FloatArray
+    """(N,) depth of the board's plane along the pixel's ray."""
+    cosine: FloatArray
+    """(N,) of the angle between the ray and the board's normal."""
+    view: IntArray
+    """(N,) index into ``names``."""
+    ink: BoolArray
+    """(N,) on or beside what is printed black, where infrared comes back otherwise."""
+    names: tuple[str, ...]
+    """Of the views."""
+    lens_m: FloatArray
+    """(P, N) what ``true_m`` gains by one standard deviation of each of P independent errors of the lens."""
+    lens_focal: FloatArray
+    """(P,) what the focal length gains by the same, as a share of it."""
+
+    def __len__(self) -> int:
+        return len(self.measured_m)
+
+    def select(self, rows: BoolArray | IntArray) -> DepthSamples:
+        """The pixels at ``rows``; the views keep their numbers."""
+        return replace(
+            self,
+            pixels=self.pixels[rows],
+            measured_m=self.measured_m[rows],
+            true_m=self.true_m[rows],
+            cosine=self.cosine[rows],
+            view=self.view[rows],
+            ink=self.ink[rows],
+            lens_m=self.lens_m[:, rows],
+        )
+
+
+def board_depth_samples(
+    calibration: Calibration, depths: Sequence[DepthMap | None], board: Board
+) -> DepthSamples:
+    """Measured and true depth of a board.
+
+    The board's plane n . X = d of a view has the depth d / (n . K^-1 [u v 1]) at every pixel: a whole plane,
+    since the middle of a tilted board alone would turn an error of the pose into a bias. Pixels lie between
+    the outermost points, at least ``RIM_PX`` inside, so that none mixes the board with what is behind it.
+    Those on black are marked: their infrared comes back weaker, and the fit leaves them out.
+
+    Args:
+        calibration: the lens, how sure it is, and its views.
+        depths: (H, W) metric depth of each view on the image's pixel grid; None where there is none.
+        board: what the views show.
+
+    Raises:
+        InputError: no depth where the board is, depth images of another size or in another unit.
+    """
+    parts: list[DepthSamples] = []
+    lenses = _lenses(calibration)
+    for view, depth in zip(calibration.views, depths, strict=True):
+        if depth is None:
+            continue
+        part = _samples_of(view, depth, calibration.size_px, lenses, board, len(parts))
+        if len(part) >= FEWEST:
+            parts.append(part)
+    if not parts:
+        raise InputError(
+            "No depth image has depth where the board is; are they of the same moments and registered to "
+            "the colour images?"
+        )
+    return DepthSamples(
+        size_px=parts[0].size_px,
+        pixels=np.concatenate([part.pixels for part in parts]),
+        measured_m=np.concatenate([part.measured_m for part in parts]),
+        true_m=np.concatenate([part.true_m for part in parts]),
+        cosine=np.concatenate([part.cosine for part in parts]),
+        view=np.concatenate([part.view for part in parts]),
+        ink=np.concatenate([part.ink for part in parts]),
+        names=tuple(name for part in parts for name in part.names),
+        lens_m=np.concatenate([part.lens_m for part in parts], axis=1),
+        lens_focal=parts[0].lens_focal,
+    )
+
+
+def _lenses(calibration: Calibration) -> list[Optics]:
+    """The lens, then the same with one standard deviation of each independent error."""
+    variances, directions = np.linalg.eigh(calibration.covariance)
+    steps = directions * np.sqrt(np.maximum(variances, 0.0))
+    names, known = list(calibration.parameters), calibration.distortion.ravel()
+    rows = [names.index(name) for name in calibration.names]
+    lenses = []
+    for step in (np.zeros(len(rows)), *steps.T):
+        values = np.array([*calibration.parameters.values()])
+        values[rows] += step
+        matrix = np.array([[values[0], 0.0, values[2]], [0.0, values[1], values[3]], [0.0, 0.0, 1.0]])
+        distortion = np.concatenate([values[4 : 4 + len(known)], known[len(values) - 4 :]])
+        lenses.append(Optics(calibration.lens, matrix, distortion))
+    return lenses
+
+
+def _samples_of(
+    view: FittedView,
+    depth: DepthMap,
+    size_px: tuple[int, int],
+    lenses: Sequence[Optics],
+    board: Board,
+    index: int,
+) -> DepthSamples:
+    """Of one view."""
+    if depth.z_m.shape != size_px[::-1]:
+        raise InputError(
+            f"The depth image of {view.name} has {depth.z_m.shape[1]} x {depth.z_m.shape[0]} pixels and its "
+            f"colour image {size_px[0]} x {size_px[1]}; give depth that is registered to the colour images"
+        )
+    lens, T = lenses[0], view.T_camera_board
+    pixels = _pixels_on_board(board, T, lens, depth)
+    measured_m = depth.z_m[pixels[:, 1], pixels[:, 0]].astype(np.float64)
+    rays = _rays(lens, pixels)
+    true_m = _plane_m(T, rays)
+    kept = _gate(view.name, measured_m, true_m)
+    pixels, measured_m, rays, true_m = pixels[kept], measured_m[kept], rays[kept], true_m[kept]
+    moved_m = [
+        _plane_m(settle(view.board_m, view.points_px, T, one), _rays(one, pixels)) - true_m
+        for one in lenses[1:]
+    ]
+    focal_px = float(lens.matrix[0, 0])
+    return DepthSamples(
+        size_px=size_px,
+        pixels=pixels,
+        measured_m=measured_m,
+        true_m=true_m,
+        cosine=np.abs(rays @ T[:3, 2]) / np.linalg.norm(rays, axis=1),
+        view=np.full(len(pixels), index),
+        ink=_on_ink(board, T, rays * true_m[:, None], INK_PX / focal_px),
+        names=(view.name,),
+        lens_m=np.array(moved_m).reshape(len(moved_m), len(pixels)),
+        lens_focal=np.array([float(one.matrix[0, 0]) / focal_px - 1.0 for one in lenses[1:]]),
+    )
+
+
+def _rays(lens: Optics, pixels: IntArray) -> FloatArray:
+    """(N, 3) through pixels, scaled to z = 1."""
+    rays = lens.rays(pixels.astype(np.float64))
+    return rays / rays[:, 2:]
+
+
+def _pixels_on_board(board: Board, T: FloatArray, lens: Optics, depth: DepthMap) -> IntArray:
+    """(N, 2) pixels with depth inside the board's points and off their rim."""
+    low_m, high_m = board.points_m[:, :2].min(axis=0), board.points_m[:, :2].max(axis=0)
+    corners_m = np.array([low_m, (high_m[0], low_m[1]), high_m, (low_m[0], high_m[1])])
+    along = np.linspace(0.0, 1.0, 16, endpoint=False)[:, None]
+    sides = zip(corners_m, np.roll(corners_m, -1, axis=0), strict=True)
+    rim_m = np.concatenate([start + along * (end - start) for start, end in sides])
+    rim_px = lens.project(np.column_stack([rim_m, np.zeros(len(rim_m))]), T)
+    inside = np.zeros(depth.z_m.shape, np.uint8)
+    cv2.fillPoly(inside, [np.rint(rim_px).astype(np.int32).reshape(-1, 1, 2)], 1)
+    kernel = np.ones((2 * RIM_PX + 1, 2 * RIM_PX + 1), np.uint8)
+    inside = cv2.erode(inside, kernel, borderValue=0)
+    v, u = np.nonzero((inside > 0) & depth.valid & (depth.z_m > 0.0))
+    return np.stack([u, v], axis=1)
+
+
+def _gate(name: str, measured_m: FloatArray, true_m: FloatArray) -> IntArray:
+    """Rows of one view without what lies before or behind the board, evenly thinned."""
+    if len(measured_m) < FEWEST:
+        return np.zeros(0, np.int64)
+    ratio = float(np.median(measured_m / true_m))
+    if abs(ratio - 1.0) > MOST_SHARE:
+        raise InputError(
+            f"In {name} the board is {np.median(true_m):.2f} m away and the depth image says "
+            f"{np.median(measured_m):.4g} m; check the unit of the depth images and the board's spacing"
+        )
+    off_m = measured_m - true_m
+    off_m = off_m - np.median(off_m)
+    gate_m = max(GATE_SDS * MAD_TO_SD * float(np.median(np.abs(off_m))), LEAST_GATE_M)
+    rows = np.flatnonzero(np.abs(off_m) <= gate_m)
+    return rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_PER_VIEW)).round().astype(int)]
+
+
+def _plane_m(T_camera_board: FloatArray, rays: FloatArray) -> FloatArray:
+    """(N,) depth at which (N, 3) rays of z = 1 meet the board."""
+    normal = T_camera_board[:3, 2]
+    return (normal @ T_camera_board[:3, 3]) / (rays @ normal)
+
+
+def _on_ink(board: Board, T_camera_board: FloatArray, points_m: FloatArray, px: float) -> BoolArray:
+    """(N,) whether points on the board are black or beside it."""
+    flat = apply(inverse(T_camera_board), points_m)
+    rim_m = px * points_m[:, 2]
+    if board.pattern.startswith("circles"):
+        apart_m = np.linalg.norm(flat[:, None, :2] - board.points_m[None, :, :2], axis=2).min(axis=1)
+        return apart_m <= board.radius_m + rim_m
+    squares = (flat[:, :2] - board.points_m[0, :2]) / board.spacing_m
+    black = np.floor(squares).sum(axis=1) % 2 == 0
+    beside = np.abs(squares - np.rint(squares)).min(axis=1) <= rim_m / board.spacing_m
+    return black | beside

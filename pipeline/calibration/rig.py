@@ -1,0 +1,266 @@
+"""Several cameras at once: where they stand, from a board that they see at shared moments (SPEC 1.2, 1.3)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.calibration.board import Board
+from pipeline.calibration.bundle import Adjusted, Bundle, Sighting, adjust, place_boards
+from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, FittedView, View, rms_px
+from pipeline.calibration.rig_start import look, start
+from pipeline.geometry import inverse, rigid, rotation_angle_rad, rotation_exp
+from pipeline.types import FloatArray
+
+LEAST_CAMERAS, MOST_CAMERAS = 2, 12
+"""Six nodes, of which each may have a separate depth camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """The board as one image shows it, and whether a mark tells which way up."""
+
+    view: View
+    oriented: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class RelativePose:
+    """Where one camera stands to another, and how sure that is."""
+
+    camera: str
+    reference: str
+    T_reference_camera: FloatArray
+    """(4, 4), metres."""
+    covariance: FloatArray
+    """(6, 6) of a small turn (radians) and of the camera's position (metres), along the reference's axes."""
+    moments: int
+    """At which both see the board."""
+
+    @property
+    def rotation_deg(self) -> float:
+        """Angle between the cameras."""
+        return float(np.degrees(rotation_angle_rad(self.T_reference_camera[:3, :3])))
+
+    @property
+    def baseline_m(self) -> float:
+        """Distance between the cameras."""
+        return float(np.linalg.norm(self.T_reference_camera[:3, 3]))
+
+    @property
+    def rotation_sd_deg(self) -> float:
+        """Root mean square angle by which the rotation is off."""
+        return float(np.degrees(np.sqrt(np.trace(self.covariance[:3, :3]))))
+
+    @property
+    def position_sd_m(self) -> float:
+        """Root mean square distance by which the position is off."""
+        return float(np.sqrt(np.trace(self.covariance[3:, 3:])))
+
+    @property
+    def baseline_sd_m(self) -> float:
+        """Standard error of the distance."""
+        along = self.T_reference_camera[:3, 3] / max(self.baseline_m, 1e-12)
+        return float(np.sqrt(along @ self.covariance[3:, 3:] @ along))
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOutRig:
+    """Moments that had no part in the poses by which they are predicted."""
+
+    views: Mapping[str, tuple[FittedView, ...]]
+    """By camera; the board's pose alone is fitted, to all cameras that see it."""
+    rotation_deg: Mapping[str, float]
+    """By camera, the largest difference of its pose without a fold of the moments from that with all."""
+    position_m: Mapping[str, float]
+
+    @property
+    def rms_px(self) -> float:
+        """Over all points."""
+        return rms_px(np.concatenate([one.residuals_px for views in self.views.values() for one in views]))
+
+
+@dataclass(frozen=True, slots=True)
+class RigCalibration:
+    """Cameras and boards in one frame."""
+
+    cameras: Mapping[str, Calibration]
+    """The lenses as all cameras together have them."""
+    moments: tuple[str, ...]
+    adjusted: Adjusted
+    sightings: tuple[Sighting, ...]
+    held_out: HeldOutRig | None
+    """None if none was held out, or too few moments link the cameras for that."""
+
+    @property
+    def rms_px(self) -> float:
+        """Over all points that any camera sees."""
+        return rms_px(np.concatenate(self.adjusted.residuals_px))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the cameras, the first of which is the others' reference."""
+        return tuple(self.cameras)
+
+    @property
+    def T_first_camera(self) -> dict[str, FloatArray]:
+        """(4, 4) pose of every camera in the frame of the first."""
+        placed = self.adjusted.bundle.T_camera_first
+        return {name: inverse(T) for name, T in zip(self.names, placed, strict=True)}
+
+    def moments_of(self, name: str) -> set[str]:
+        """At which a camera sees the board."""
+        camera = self.names.index(name)
+        return {self.moments[one.moment] for one in self.sightings if one.camera == camera}
+
+    def relative(self, camera: str, reference: str | None = None) -> RelativePose:
+        """Where one camera stands to another, by default to the first."""
+        reference = self.names[0] if reference is None else reference
+        a, b = self.names.index(reference), self.names.index(camera)
+        placed = self.adjusted.bundle.T_camera_first
+        T_a_b = placed[a] @ inverse(placed[b])
+        x, y, z = T_a_b[:3, 3]
+        by_a, by_b = np.eye(6), np.zeros((6, 6))
+        by_a[3:, :3] = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        by_b[:3, :3] = by_b[3:, 3:] = -T_a_b[:3, :3]
+        J = np.zeros((6, len(self.names) * 6))
+        J[:, 6 * a : 6 * a + 6] += by_a
+        J[:, 6 * b : 6 * b + 6] += by_b
+        covariance = J[:, 6:] @ self.adjusted.camera_covariance @ J[:, 6:].T
+        both = self.moments_of(camera) & self.moments_of(reference)
+        return RelativePose(camera, reference, T_a_b, covariance, len(both))
+
+    def pairs(self) -> list[RelativePose]:
+        """Of every two cameras, the later to the earlier."""
+        return [self.relative(b, a) for a, b in combinations(self.names, 2)]
+
+
+def calibrate_rig(
+    cameras: Mapping[str, Calibration],
+    seen: Mapping[str, Mapping[str, Seen]],
+    board: Board,
+    folds: int = 0,
+) -> RigCalibration:
+    """Place cameras, and refine their lenses, which a rig sees better than each camera alone.
+
+    Lenses and all poses of cameras and boards are adjusted together to the points in all images; two cameras
+    need not see the board together if a third links them. A board without a mark is turned as the other
+    cameras have it (SPEC 1.2).
+
+    OpenCV's ``calibrateMultiviewExtended`` finds the same poses for the same lenses, but it leaves each lens
+    as its camera alone has it, which more than doubles the error of the poses; it takes every board as held
+    the right way up, and tells nothing of how sure it is (tests/pipeline/calibration/test_rig.py).
+
+    Args:
+        cameras: every camera by its name, as its own views have it, the reference first.
+        seen: by camera and moment, also moments of one camera alone.
+        board: which is seen.
+        folds: in how many turns moments are held out; 0 holds none out.
+
+    Raises:
+        InputError: too few cameras or too many, or some that never see the board together.
+        ReconstructionError: the moments do not determine the poses.
+    """
+    names = tuple(cameras)
+    if not LEAST_CAMERAS <= len(names) <= MOST_CAMERAS:
+        raise InputError(
+            f"{len(names)} cameras are given; a rig has two to six, each with one for depth at most"
+        )
+    optics = tuple(one.optics for one in cameras.values())
+    moments = tuple(dict.fromkeys(moment for name in names for moment in seen[name]))
+    looks = [
+        look(
+            Sighting(camera, moments.index(moment), one.view.points_px, one.view.board_m),
+            optics[camera],
+            one.oriented,
+        )
+        for camera, name in enumerate(names)
+        for moment, one in seen[name].items()
+    ]
+    begun, sightings = start(looks, optics, names, _turns(board))
+    adjusted = adjust(sightings, begun)
+    titles = [seen[names[one.camera]][moments[one.moment]].view.name for one in sightings]
+    views = _views(names, titles, sightings, adjusted.bundle)
+    lenses = {
+        name: replace(
+            cameras[name],
+            matrix=lens.matrix,
+            distortion=lens.distortion,
+            covariance=covariance,
+            views=views[name],
+        )
+        for name, lens, covariance in zip(
+            names, adjusted.bundle.optics, adjusted.lens_covariances, strict=True
+        )
+    }
+    unseen = _held_out(names, titles, sightings, adjusted.bundle, folds) if folds else None
+    return RigCalibration(lenses, moments, adjusted, sightings, unseen)
+
+
+def _views(
+    names: Sequence[str], titles: Sequence[str], sightings: Sequence[Sighting], bundle: Bundle
+) -> dict[str, tuple[FittedView, ...]]:
+    """By camera, in the order of the sightings."""
+    views: dict[str, list[FittedView]] = {name: [] for name in names}
+    for title, one, off_px in zip(titles, sightings, bundle.residuals_px(sightings), strict=True):
+        fitted = FittedView(title, bundle.T_camera_board(one), off_px, one.points_px, one.board_m)
+        views[names[one.camera]].append(fitted)
+    return {name: tuple(some) for name, some in views.items()}
+
+
+def _turns(board: Board) -> list[FloatArray]:
+    """(4, 4) motions in its plane after which the points of a board lie where they lay."""
+    quarters = [0]
+    if board.ambiguous:
+        quarters = [0, 1, 2, 3] if board.columns == board.rows else [0, 2]
+    return [rigid(rotation_exp(np.array([0.0, 0.0, 0.5 * np.pi * k])), np.zeros(3)) for k in quarters]
+
+
+def _held_out(
+    names: Sequence[str], titles: Sequence[str], sightings: Sequence[Sighting], whole: Bundle, folds: int
+) -> HeldOutRig | None:
+    """Every moment by cameras from the others; None where these do not link the cameras."""
+    views: dict[str, tuple[FittedView, ...]] = dict.fromkeys(names, ())
+    turned_deg, moved_m = dict.fromkeys(names[1:], 0.0), dict.fromkeys(names[1:], 0.0)
+    for fold in range(folds):
+        left = [index for index, one in enumerate(sightings) if one.moment % folds == fold]
+        rest, begun = _alone([one for one in sightings if one.moment % folds != fold], whole)
+        if not left or not _determined(rest, len(names)):
+            return None
+        found = adjust(rest, begun).bundle
+        for name, T, T_whole in zip(
+            names[1:], found.T_camera_first[1:], whole.T_camera_first[1:], strict=True
+        ):
+            apart = np.degrees(rotation_angle_rad(T[:3, :3] @ T_whole[:3, :3].T))
+            turned_deg[name] = max(turned_deg[name], float(apart))
+            off_m = inverse(T)[:3, 3] - inverse(T_whole)[:3, 3]
+            moved_m[name] = max(moved_m[name], float(np.linalg.norm(off_m)))
+        unseen, boards = _alone([sightings[index] for index in left], whole)
+        placed = place_boards(unseen, replace(found, T_first_board=boards.T_first_board))
+        for name, some in _views(names, [titles[index] for index in left], unseen, placed).items():
+            views[name] += some
+    return HeldOutRig(views, turned_deg, moved_m)
+
+
+def _alone(some: Sequence[Sighting], whole: Bundle) -> tuple[list[Sighting], Bundle]:
+    """Sightings with their moments numbered anew, and the bundle with only these boards."""
+    kept = sorted({one.moment for one in some})
+    numbered = [replace(one, moment=kept.index(one.moment)) for one in some]
+    return numbered, replace(whole, T_first_board=tuple(whole.T_first_board[moment] for moment in kept))
+
+
+def _determined(sightings: Sequence[Sighting], cameras: int) -> bool:
+    """Whether shared moments link all cameras, and each has enough views for its lens."""
+    counts = Counter(one.camera for one in sightings)
+    together = [
+        {one.camera for one in sightings if one.moment == moment} for moment in {s.moment for s in sightings}
+    ]
+    linked = {0}
+    for _ in range(cameras):
+        linked |= set().union(*(some for some in together if some & linked))
+    return len(linked) == cameras and min(counts[camera] for camera in range(cameras)) >= LEAST_VIEWS

@@ -1,0 +1,164 @@
+"""A first guess of where cameras stand: those that see the board together are linked to each other, and a
+board without a mark is turned as they agree (SPEC 1.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from packetmesh.errors import InputError, ReconstructionError
+from pipeline.calibration.bundle import Bundle, Sighting
+from pipeline.calibration.estimate import View, place, rms_px
+from pipeline.calibration.lens import Optics
+from pipeline.geometry import apply, inverse, rotation_angle_rad
+from pipeline.types import FloatArray
+
+MOST_TRIED = 12
+"""Moments whose pose of one camera to another is tried on all that both see."""
+APART_RAD = np.radians(20.0)
+TELLING = 1.5
+"""By this factor the error of a board turned the other way must be larger, or nothing tells them apart."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A sighting by itself."""
+
+    sighting: Sighting
+    T_camera_board: FloatArray
+    """(4, 4) as this one image has it."""
+    oriented: bool
+    """Whether a mark tells which way up the board is."""
+
+
+def look(sighting: Sighting, optics: Optics, oriented: bool) -> Look:
+    """Where one image has the board.
+
+    Raises:
+        ReconstructionError: no pose explains it.
+    """
+    view = View(f"moment {sighting.moment}", sighting.points_px, sighting.board_m)
+    placed = place(view, optics.matrix, optics.distortion, optics.lens)
+    return Look(sighting, placed.T_camera_board, oriented)
+
+
+def start(
+    looks: Sequence[Look], optics: Sequence[Optics], names: Sequence[str], turns: Sequence[FloatArray]
+) -> tuple[Bundle, tuple[Sighting, ...]]:
+    """Where cameras and boards are, roughly, and the sightings with the board of a moment the same way up.
+
+    Cameras are linked in the order of how many moments they share with those that are linked already.
+
+    Args:
+        looks: of all cameras; every moment from 0 on is in one at least.
+        optics: of every camera.
+        names: of every camera, for what is said about them.
+        turns: (4, 4) motions after which the board looks the same, the identity first.
+
+    Raises:
+        InputError: cameras that no shared moments link.
+        ReconstructionError: nothing tells which way up boards were held.
+    """
+    count = len(optics)
+    of: list[dict[int, Look]] = [
+        {one.sighting.moment: one for one in looks if one.sighting.camera == camera}
+        for camera in range(count)
+    ]
+    T_camera_first = {0: np.eye(4)}
+    while len(T_camera_first) < count:
+        links = [(a, b) for a in T_camera_first for b in range(count) if b not in T_camera_first]
+        a, b = max(links, key=lambda link: len(of[link[0]].keys() & of[link[1]].keys()))
+        pairs = [(of[a][moment], of[b][moment]) for moment in sorted(of[a].keys() & of[b].keys())]
+        if not pairs:
+            raise InputError(_unlinked(sorted(T_camera_first), names))
+        T_a_b = _linked(pairs, optics[b], turns, f"{names[a]} and {names[b]}")
+        T_camera_first[b] = inverse(T_a_b) @ T_camera_first[a]
+    cameras = [T_camera_first[camera] for camera in range(count)]
+    moments = 1 + max(one.sighting.moment for one in looks)
+    boards, sightings = [], []
+    for moment in range(moments):
+        T_first_board, turned = _agreed([one[moment] for one in of if moment in one], optics, cameras, turns)
+        boards.append(T_first_board)
+        sightings += turned
+    return Bundle(tuple(optics), tuple(cameras), tuple(boards)), tuple(sightings)
+
+
+def _unlinked(linked: Sequence[int], names: Sequence[str]) -> str:
+    others = " and ".join(name for index, name in enumerate(names) if index not in linked)
+    never = "never sees" if len(names) - len(linked) == 1 else "never see"
+    those = " or ".join(names[index] for index in linked)
+    return (
+        f"{others} {never} the board at a moment at which {those} does; hold it where their views overlap, "
+        "and give images of the same moment the same number"
+    )
+
+
+def _linked(
+    pairs: Sequence[tuple[Look, Look]], optics_b: Optics, turns: Sequence[FloatArray], who: str
+) -> FloatArray:
+    """(4, 4) T_a_b of the moment and turn that explain all moments best."""
+    every = -(-len(pairs) // MOST_TRIED)
+    tried = [
+        a.T_camera_board @ turn @ inverse(b.T_camera_board)
+        for a, b in pairs[::every]
+        for turn in _possible((a, b), turns)
+    ]
+    errors_px = np.array([_error_px(T_a_b, pairs, optics_b, turns) for T_a_b in tried])
+    best = tried[int(errors_px.argmin())]
+    apart = np.array([rotation_angle_rad(T[:3, :3].T @ best[:3, :3]) > APART_RAD for T in tried])
+    if (errors_px[apart] < TELLING * errors_px.min()).any():
+        raise ReconstructionError(
+            f"{who} see the board together too rarely to tell which way up it was held; show it to both more "
+            "often, tilted differently, or use a board with a mark (packetmesh target)"
+        )
+    return best
+
+
+def _possible(seen: Sequence[Look], turns: Sequence[FloatArray]) -> Sequence[FloatArray]:
+    """Turns of the board between these looks."""
+    return turns[:1] if all(one.oriented for one in seen) else turns
+
+
+def _error_px(
+    T_a_b: FloatArray, pairs: Sequence[tuple[Look, Look]], optics_b: Optics, turns: Sequence[FloatArray]
+) -> float:
+    """Median over moments of how far camera b is from seeing the board where camera a has it."""
+    told = [
+        min(
+            _off_px(b.sighting, optics_b, inverse(T_a_b) @ a.T_camera_board @ turn)
+            for turn in _possible((a, b), turns)
+        )
+        for a, b in pairs
+    ]
+    return float(np.median(told))
+
+
+def _off_px(sighting: Sighting, optics: Optics, T_camera_board: FloatArray) -> float:
+    return rms_px(sighting.points_px - optics.project(sighting.board_m, T_camera_board))
+
+
+def _agreed(
+    seen: Sequence[Look],
+    optics: Sequence[Optics],
+    T_camera_first: Sequence[FloatArray],
+    turns: Sequence[FloatArray],
+) -> tuple[FloatArray, list[Sighting]]:
+    """(4, 4) T_first_board of a moment, and its sightings on a board that is held the same way up in all."""
+    best: tuple[float, FloatArray, list[Sighting]] | None = None
+    for anchor in [one for one in seen if one.oriented] or seen:
+        T_first_board = inverse(T_camera_first[anchor.sighting.camera]) @ anchor.T_camera_board
+        turned, squares = [], 0.0
+        for one in seen:
+            camera = one.sighting.camera
+            T = T_camera_first[camera] @ T_first_board
+            errors_px = [_off_px(one.sighting, optics[camera], T @ turn) for turn in _possible([one], turns)]
+            turn = turns[int(np.argmin(errors_px))]
+            turned.append(replace(one.sighting, board_m=apply(turn, one.sighting.board_m)))
+            squares += min(errors_px) ** 2
+        if best is None or squares < best[0]:
+            best = squares, T_first_board, turned
+    assert best is not None
+    return best[1:]

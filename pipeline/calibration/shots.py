@@ -1,0 +1,168 @@
+"""A session with a board on disk: which images of which camera were taken at the same moment.
+
+``BOARD/node_00/{color_00.png, depth_00.png, infrared_00.png}``, ``BOARD/node_01/...``, or one folder of
+photographs for each camera. The last number in an image's name is its moment, or else the whole name.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from packetmesh.errors import InputError
+from packetmesh.files import read_text
+from pipeline.calibration.board import Board
+from pipeline.config import Pattern
+from pipeline.types import AnyPath
+
+ENDINGS = (".png", ".jpg", ".jpeg", ".pgm", ".ppm")
+MOST_CAMERAS = 6
+BOARD_FILE = "board.json"
+_LAST_NUMBER = re.compile(r"(\d+)\D*$")
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """What one node took at one moment."""
+
+    moment: str
+    color: Path
+    depth: Path | None = None
+    """16-bit image on the pixel grid of ``infrared`` where there is one, else of ``color``."""
+    infrared: Path | None = None
+    """Of a separate depth camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeShots:
+    """The images of one node."""
+
+    name: str
+    """node_00 and so on."""
+    folder: Path
+    shots: tuple[Shot, ...]
+    """In the order of their moments."""
+
+
+def node_shots(folders: Sequence[AnyPath]) -> tuple[NodeShots, ...]:
+    """The images of every node of a session.
+
+    Args:
+        folders: one that holds node_00, node_01 and so on, or one for each camera.
+
+    Raises:
+        InputError: no images, more nodes than a rig has, a folder twice, or two images of one moment.
+    """
+    paths = [Path(folder) for folder in folders]
+    for path in paths:
+        if not path.is_dir():
+            raise InputError(
+                f"{path} is no folder; several cameras take a folder each, or one with node_00, node_01"
+            )
+    if len(paths) == 1:
+        paths = node_folders(paths[0]) or paths
+    if len({path.resolve() for path in paths}) < len(paths):
+        raise InputError("A folder is given twice; give each camera's own")
+    if len(paths) > MOST_CAMERAS:
+        raise InputError(
+            f"{len(paths)} folders of images are given; a rig has at most {MOST_CAMERAS} cameras"
+        )
+    named = all(path.name.startswith("node_") for path in paths) and len(
+        {path.name for path in paths}
+    ) == len(paths)
+    return tuple(
+        NodeShots(path.name if named else f"node_{index:02d}", path, _shots(path))
+        for index, path in enumerate(paths)
+    )
+
+
+def node_folders(folder: Path) -> list[Path]:
+    """The folders node_00, node_01 and so on below a session's folder; none in one of photographs."""
+    return sorted(one for one in folder.glob("node_*") if one.is_dir())
+
+
+def board_beside(
+    images: Sequence[AnyPath],
+    pattern: Pattern | None = None,
+    columns: int | None = None,
+    rows: int | None = None,
+    spacing_mm: float | None = None,
+) -> Board:
+    """The board that images show: what is given, else what a board.json in or above their folder says, else
+    the thesis's.
+
+    Raises:
+        InputError: that file lacks pattern, columns, rows or spacing_mm, or no board is like that.
+    """
+    known = Board()
+    for path in (one / BOARD_FILE for word in images for one in (Path(word), Path(word).parent)):
+        if path.is_file():
+            known = read_board(path)
+            break
+    return Board(
+        pattern or known.pattern,
+        known.columns if columns is None else columns,
+        known.rows if rows is None else rows,
+        known.spacing_m if spacing_mm is None else spacing_mm / 1000.0,
+    )
+
+
+def read_board(path: AnyPath) -> Board:
+    """The board that a file describes.
+
+    Raises:
+        InputError: the file lacks pattern, columns, rows or spacing_mm, or no board is like that.
+    """
+    try:
+        values = json.loads(read_text(path, "board file"))
+        pattern, columns, rows = values["pattern"], int(values["columns"]), int(values["rows"])
+        spacing_m = float(values["spacing_mm"]) / 1000.0
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise InputError(
+            f"The board file {path} does not say what the board is; try pattern, columns, rows and spacing_mm"
+        ) from None
+    return Board(pattern, columns, rows, spacing_m)
+
+
+def photographs(folder: Path) -> list[Path]:
+    """The colour images in a folder, by name; neither depth_00.png nor infrared_00.png."""
+    return [path for path in _images(folder) if path.stem.partition("_")[0] not in ("depth", "infrared")]
+
+
+def _images(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.suffix.lower() in ENDINGS)
+
+
+def _shots(folder: Path) -> tuple[Shot, ...]:
+    color = _by_moment(photographs(folder))
+    if not color:
+        raise InputError(f"{folder} holds no image of a camera; try color_00.png, color_01.png and so on")
+    depth, infrared = (
+        _by_moment(path for path in _images(folder) if path.stem.startswith(f"{kind}_"))
+        for kind in ("depth", "infrared")
+    )
+    return tuple(
+        Shot(moment, path, depth.get(moment), infrared.get(moment)) for moment, path in color.items()
+    )
+
+
+def _by_moment(images: Iterable[Path]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for path in images:
+        moment = _moment(path.stem)
+        if moment in found:
+            raise InputError(
+                f"{found[moment]} and {path.name} are both of moment {moment}; keep to the images of one "
+                "camera, numbered by moments"
+            )
+        found[moment] = path
+    return found
+
+
+def _moment(stem: str) -> str:
+    """The last number without leading zeros, or all of it."""
+    number = _LAST_NUMBER.search(stem)
+    return stem if number is None else number[1].lstrip("0") or "0"
