@@ -44,7 +44,7 @@ def views(noise_px, seed, count=10, distortion=None, lens="brown"):
 @pytest.fixture(scope="module")
 def many():
     """Calibrations of the same boards with other noise each."""
-    return [calibrate(views(0.2, seed), SIZE) for seed in range(160)]
+    return [calibrate(views(0.2, seed), SIZE) for seed in range(240)]
 
 
 @pytest.mark.parametrize("range_m", [0.6, 3.0])
