@@ -10,7 +10,7 @@ from packetmesh.errors import InputError
 Pattern = Literal["circles", "circles-asymmetric", "chessboard", "charuco"]
 """What is printed on a calibration board."""
 Lens = Literal["thesis", "brown", "rational", "fisheye"]
-"""Distortion that a camera may have: k1, k2 (SPEC 1.1); also p1, p2, k3; also k4 to k6."""
+"""Distortion that a camera may have: k1, k2 (SPEC 1.1); also p1, p2, k3; also k4 to k6; or a fisheye's."""
 OutlierMode = Literal["thesis", "depth_normalised", "robust"]
 AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]
 ModelKind = Literal["metric", "relative", "inverse"]

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import get_args
 
@@ -12,6 +13,7 @@ import cv2
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
+from pipeline.calibration.fisheye import estimate_fisheye
 from pipeline.calibration.lens import FLAGS, FREE, NAMES, Optics
 from pipeline.config import Lens
 from pipeline.geometry import rigid
@@ -21,6 +23,8 @@ LEAST_VIEWS = 3
 LEAST_POINTS = 4
 """Of a view that is placed."""
 SETTLE_STEPS = 30
+MOST_RMS_SHARE = 0.1
+"""RMS over the image's longer side, from which on the numbers say nothing of the camera."""
 LEAST_INFORMATION = 1e-14
 """Of a combination of parameters, over that of each alone: below it there is but rounding."""
 LEAST_TILT_DEG = 5.0
@@ -145,7 +149,10 @@ def calibrate(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "the
         raise ReconstructionError(_DEGENERATE)
     if _tilt_deg(poses) < LEAST_TILT_DEG:
         raise ReconstructionError(_DEGENERATE)
-    return calibration_of(views, poses, optics, size_px)
+    found = calibration_of(views, poses, optics, size_px)
+    if not found.rms_px < MOST_RMS_SHARE * max(size_px):
+        raise ReconstructionError(_UNEXPLAINED)
+    return found
 
 
 def calibration_of(
@@ -174,19 +181,18 @@ def _brown(views: Sequence[View], size_px: tuple[int, int], lens: Lens) -> tuple
 
 
 def _fisheye(views: Sequence[View], size_px: tuple[int, int]) -> tuple[Optics, list[FloatArray]]:
-    """OpenCV's fisheye lens, and the boards' poses."""
-    own = cv2.fisheye if hasattr(cv2.fisheye, "CALIB_FIX_SKEW") else cv2  # OpenCV 5 moved the flags
-    _, matrix, distortion, turns, moves = cv2.fisheye.calibrate(
-        [view.board_m.astype(np.float64)[None] for view in views],
-        [view.points_px.astype(np.float64)[None] for view in views],
-        size_px,
-        np.eye(3),
-        np.zeros((4, 1)),
-        flags=own.CALIB_RECOMPUTE_EXTRINSIC | own.CALIB_FIX_SKEW,
-        criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-9),
-    )
-    poses = [pose_of(turn, move) for turn, move in zip(turns, moves, strict=True)]
-    return Optics("fisheye", matrix, distortion.ravel()), poses
+    """A fisheye lens, and the boards' poses."""
+
+    def placed(row: int, optics: Optics) -> FloatArray | None:
+        try:
+            return place(views[row], optics.matrix, optics.distortion, "fisheye").T_camera_board
+        except ReconstructionError:
+            return None
+
+    found = estimate_fisheye([(view.board_m, view.points_px) for view in views], size_px, placed)
+    if found is None:
+        raise ReconstructionError(_UNEXPLAINED)
+    return found
 
 
 _DEGENERATE = (
@@ -227,7 +233,8 @@ def place(view: View, matrix: FloatArray, distortion: FloatArray, lens: Lens = "
     found = False
     if known.sum() >= LEAST_POINTS:
         flat = rays[known, :2] / rays[known, 2:]
-        found, turn, move = cv2.solvePnP(view.board_m[known], flat, np.eye(3), None)
+        with suppress(cv2.error):
+            found, turn, move = cv2.solvePnP(view.board_m[known], flat, np.eye(3), None)
     if not found:
         raise ReconstructionError(f"No place of the board explains {view.name}; is it the same board?")
     return _fitted(view, settle(view.board_m, view.points_px, pose_of(turn, move), optics), optics)

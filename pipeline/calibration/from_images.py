@@ -90,6 +90,7 @@ class CameraReport:
             "distortion": found.distortion.tolist(),
             "standard_errors": found.standard_errors,
             "ci95": {name: list(interval) for name, interval in found.intervals.items()},
+            "board_distance_m": list(self.distances_m),
             "left_out": list(self.left_out),
             "board_warp": self._warp_metrics(),
             "views": [

@@ -63,6 +63,8 @@ class Optics:
 
     def linearised(self, points_m: FloatArray, T_camera_points: FloatArray | None = None) -> Projection:
         """The same with its derivatives."""
+        if not len(points_m):
+            return Projection(np.empty((0, 2)), np.empty((0, 6)), np.empty((0, len(FREE[self.lens]))))
         T = np.eye(4) if T_camera_points is None else T_camera_points
         turn, move = cv2.Rodrigues(T[:3, :3])[0], np.ascontiguousarray(T[:3, 3], float)
         points_m = np.ascontiguousarray(points_m, dtype=np.float64)

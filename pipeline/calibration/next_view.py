@@ -25,6 +25,8 @@ PLACES = (0.15, 0.32, 0.5, 0.68, 0.85)
 """Of the board's middle, as shares of the image's width and height."""
 WIDTHS = (0.3, 0.45, 0.65)
 """Of the board, as shares of the image's: how near it is."""
+WIDEST = 1.0
+"""The board's width over its distance: nearer it is not sharp."""
 RIM = 0.02
 """Share of the image that stays free around the board's points."""
 NEAREST = 0.02
@@ -108,7 +110,7 @@ def candidates(board: Board, optics: Optics, size_px: tuple[int, int]) -> Iterat
     ]
     rays = optics.rays(np.array([size * (x, y) for x in PLACES for y in PLACES]))
     for share in WIDTHS:
-        away_m = float(np.ptp(points_m[:, 0])) / _angle(optics, size, share)
+        away_m = float(np.ptp(points_m[:, 0])) / min(_angle(optics, size, share), WIDEST)
         for ray in rays[np.isfinite(rays[:, 2])]:
             facing = _facing(ray)
             for tilt in tilts:

@@ -98,7 +98,7 @@ def _advice(calibration: Calibration, halves: HalfDifference | None, following: 
 def _over_most(placed_m: FloatArray, of_most_m: float) -> str:
     if np.isfinite(of_most_m):
         return f"and within {_mm(of_most_m)} over {100.0 * LEAST_SHARE:.0f} % of it"
-    return f"and nowhere in {100.0 * np.isinf(placed_m).mean():.0f} % of it, where the lens folds back"
+    return f"and not at all in {100.0 * np.isinf(placed_m).mean():.0f} % of it, where this lens has no rays"
 
 
 def _third(share: float, low: str, high: str) -> str:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from packetmesh.errors import ReconstructionError
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import View, calibrate, held_out, place, rms_px
 from pipeline.calibration.lens import FREE, Optics
@@ -15,6 +16,7 @@ LENSES = {
     "rational": [0.4, 0.1, 1e-3, 0.0, 0.0, 0.5, 0.05, 0.01],
     "fisheye": [-0.02, 0.01, -0.004, 0.001],
 }
+FISHEYE = np.array(LENSES["fisheye"])
 BOARD = Board("circles", 7, 5, 0.035)
 POSE = rigid(rotation_exp(np.array([0.3, -0.2, 0.1])), np.array([0.02, -0.01, 0.4]))
 
@@ -90,3 +92,30 @@ def test_a_board_is_placed_with_every_lens(lens):
     found = place(view, MATRIX, np.array(LENSES[lens]), lens)
     np.testing.assert_allclose(found.T_camera_board, POSE, atol=1e-6)
     assert found.rms_px < 1e-6
+
+
+@pytest.mark.parametrize("f_px", [160.0, 220.0, 500.0])
+def test_a_fisheye_that_sees_boards_at_80_degrees_is_found_exactly(f_px):
+    wide = Optics("fisheye", np.array([[f_px, 0.0, 318.0], [0.0, f_px, 243.0], [0.0, 0.0, 1.0]]), FISHEYE)
+    rng, given = np.random.default_rng(0), []
+    while len(given) < 10:
+        ray = wide.rays(rng.uniform((0.0, 0.0), (639.0, 479.0))[None])[0]
+        if np.isnan(ray[2]):
+            continue
+        turn = np.cross((0.0, 0.0, 1.0), ray)
+        facing = rotation_exp(turn / np.linalg.norm(turn) * np.arccos(ray[2]))
+        T = rigid(facing @ rotation_exp(rng.uniform(-0.5, 0.5, 3)), ray * rng.uniform(0.2, 0.4))
+        in_camera = BOARD.points_m @ T[:3, :3].T + T[:3, 3]
+        if np.degrees(np.arccos(in_camera[:, 2] / np.linalg.norm(in_camera, axis=1))).max() < 80.0:
+            given.append(View("", wide.project(BOARD.points_m, T), BOARD.points_m))
+    found = calibrate(given, (640, 480), "fisheye")
+    np.testing.assert_allclose(found.matrix, wide.matrix, atol=1e-4)
+    np.testing.assert_allclose(found.distortion, wide.distortion, atol=1e-4)
+
+
+def test_views_that_no_lens_explains_give_no_camera():
+    rng = np.random.default_rng(0)
+    given = [View("", rng.uniform(0.0, 480.0, (35, 2)), BOARD.points_m) for _ in range(5)]
+    for lens in ("thesis", "fisheye"):
+        with pytest.raises(ReconstructionError, match=r"No lens of this kind|nearly the same"):
+            calibrate(given, (640, 480), lens)

@@ -65,7 +65,7 @@ def test_where_the_lens_has_no_ray_no_point_is_placed(found):
     error_m[:4] = np.nan
     judged = verdict(found, replace(sd, error_m=error_m), None, 1.0)
     assert not judged.passed
-    assert "nowhere in 22 % of it, where the lens folds back" in judged.sentence
+    assert "not at all in 22 % of it, where this lens has no rays" in judged.sentence
 
 
 def test_with_few_views_there_are_no_halves_and_still_a_verdict():
