@@ -50,8 +50,8 @@ def table_4_5(study: BoxStudy) -> Table:
         "Table 4.5 beside ours: mean absolute error, cm",
         ("position", "camera", *DIMENSIONS),
         tuple(rows),
-        f"{TRIALS} cameras and {len(SIZES_M)} boxes (SPEC 7), one view each from 0.8 to 1.2 m. The thesis has "
-        "no uncalibrated camera and does not describe its object. What is left with a camera that is known "
+        f"{TRIALS} cameras and {len(SIZES_M)} boxes (SPEC 7), one view each from 0.8 to 1.2 m. The thesis "
+        "has no uncalibrated camera and does not describe its object. What is left with a camera known "
         "exactly is the sensor's noise, and the band along the box's far edges in which it sees nothing.",
     )
 
@@ -77,8 +77,8 @@ def judge(study: BoxStudy) -> Outcome:
         ci95,
         worst_m <= MOST_M and ci95["gain_m"][0] > 0.0,
         f"a calibrated camera measures a box to {means_cm[CALIBRATED]:.2f} cm, at the worst position "
-        f"{100.0 * worst_m:.2f}; as it was bought to {means_cm[RAW]:.2f} cm, with its lens alone calibrated to "
-        f"{means_cm[LENS]:.2f} and known exactly to {means_cm[EXACT]:.2f}: calibration gains "
+        f"{100.0 * worst_m:.2f}; as it was bought to {means_cm[RAW]:.2f} cm, with its lens alone calibrated "
+        f"to {means_cm[LENS]:.2f} and known exactly to {means_cm[EXACT]:.2f}: calibration gains "
         f"{low_cm:.2f} to {high_cm:.2f} cm",
         (table_4_5(study),),
     )

@@ -17,7 +17,7 @@ SOME = 4000
 """Points on which planes are tried."""
 ABOVE_M = 0.015
 """What lies so far above the ground is not the ground."""
-CELL_M = 0.01
+CELL_M = 0.025
 """Things with so much between them are two."""
 LEAST_FACE = 0.1
 """Share of the box's points without which a plane is no face."""

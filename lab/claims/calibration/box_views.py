@@ -95,9 +95,8 @@ def box_depth(
     """What the camera's own sensor has of a box, and what one without bias would have."""
     scene = box_scene(size_m, int(rng.integers(1 << 30)))
     azimuth, elevation = np.radians(position_deg - 90.0), np.radians(ELEVATION_DEG)
-    way = np.array(
-        [np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)]
-    )
+    flat, up = np.cos(elevation), np.sin(elevation)
+    way = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), up])
     middle_m = np.array([0.0, 0.0, 0.5 * size_m[2]])
     pose = look_at(middle_m + rng.uniform(*AWAY_M) * way, middle_m)
     view = Renderer(scene, threads=1).view(camera.intrinsics, pose, "fast", rng)
