@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.claims import outliers
+from lab.claims.calibration.box_claim import C25
 from lab.claims.calibration.claims import CLAIMS as CALIBRATION
 from lab.claims.claim import Claim, Verdict
 from lab.claims.delivery import cameras, pieces
@@ -28,6 +29,7 @@ _ALL: tuple[Claim, ...] = (
     *DEPTH,
     *REGISTRATION,
     *(rule.C21, holes.C22, detail.C23, growth.C24),
+    C25,
     *(*link.CLAIMS, *street.CLAIMS, *radio.CLAIMS, *selection.CLAIMS),
     *(*DELIVERY, pieces.D07, cameras.D08),
 )
