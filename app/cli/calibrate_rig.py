@@ -115,6 +115,8 @@ def _lines(report: RigReport, trust: Mapping[str, Trust]) -> Iterator[str]:
     for name, fit in report.depth.items():
         yield f"{name}: {depth_line(fit)}"
     for name, worth in trust.items():
+        for odd in worth.outliers:
+            yield f"Perhaps leave out: {odd.reason} (--without {name}/{odd.name})"
         yield f"{name}: {worth.verdict.sentence}"
     unseen = report.rig.held_out
     beside = "" if unseen is None else f"; {unseen.rms_px:.3f} px at moments that it has not seen"
