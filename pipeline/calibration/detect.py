@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from packetmesh.errors import InputError
 from pipeline.calibration.board import RING, Board
@@ -22,6 +23,10 @@ SIZES = 4.0
 CORNER_WINDOW_PX = 5
 MARK_STEP = 0.25
 """Least brightness, over that of the paper around, by which the white ring tells its circle from others."""
+LINK = 2.0
+"""Blobs farther from the others than so many times the usual distance of neighbours are not the board's."""
+MOST_BEND = 0.5
+"""Of the step between neighbours: by so much it may change from one to the next along a row or column."""
 NEAR, MOST_OF_A_SIDE = 0.3, 0.8
 """A grid goes on where so much of a further row or column has a blob so near its place, in pitches."""
 FEW_CHARUCO = 6
@@ -86,7 +91,7 @@ def _circles(gray: ByteArray, board: Board) -> Detection:
     grid = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
     most: FloatArray = np.zeros((0, 2))
     for picture, detector in _blob_detectors(gray):
-        blobs_px, sizes_px = _alike(detector.detect(picture))
+        blobs_px, sizes_px = _together(*_alike(detector.detect(picture)), board)
         if len(blobs_px) > len(most):
             most = blobs_px
         if len(blobs_px) < board.columns * board.rows:
@@ -99,7 +104,7 @@ def _circles(gray: ByteArray, board: Board) -> Detection:
             if found:
                 apart_px = np.linalg.norm(blobs_px[:, None] - rough.reshape(1, -1, 2), axis=2)
                 chosen = apart_px.argmin(axis=0)
-                if len(np.unique(chosen)) == len(chosen):
+                if len(np.unique(chosen)) == len(chosen) and _even(blobs_px[chosen], board):
                     if _goes_on(board, blobs_px[chosen], blobs_px):
                         return _nothing(_more_circles(board), blobs_px)
                     return _upright(gray, board, blobs_px[chosen])
@@ -129,6 +134,30 @@ def _alike(blobs: Sequence[cv2.KeyPoint]) -> tuple[FloatArray, FloatArray]:
         return np.zeros((0, 2)), sizes_px
     group = max(((sizes_px >= one) & (sizes_px <= SIZES * one) for one in sizes_px), key=np.sum)
     return np.array([blob.pt for blob in blobs], float)[group], sizes_px[group]
+
+
+def _together(blobs_px: FloatArray, sizes_px: FloatArray, board: Board) -> tuple[FloatArray, FloatArray]:
+    """The blobs of the largest group that goes on from neighbour to neighbour; the room's own stand apart."""
+    if len(blobs_px) <= board.columns * board.rows:
+        return blobs_px, sizes_px
+    apart_px = np.linalg.norm(blobs_px[:, None] - blobs_px, axis=2)
+    pitch_px = np.median(np.sort(apart_px, axis=1)[:, 1])
+    _, group = connected_components(apart_px < LINK * pitch_px)
+    mine = group == np.bincount(group).argmax()
+    return blobs_px[mine], sizes_px[mine]
+
+
+def _even(points_px: FloatArray, board: Board) -> bool:
+    """Whether every point lies where the two beside it in its row and in its column lead to."""
+    grid = points_px.reshape(board.rows, board.columns, 2)
+    alike = 2 if board.pattern == "circles-asymmetric" else 1  # whose every second row is shifted
+    for lines in (grid, *(grid[first::alike].swapaxes(0, 1) for first in range(alike))):
+        steps = np.diff(lines, axis=1)
+        pitch_px = np.linalg.norm(steps, axis=2)
+        bend_px = np.linalg.norm(np.diff(steps, axis=1), axis=2)
+        if (bend_px > MOST_BEND * np.minimum(pitch_px[:, 1:], pitch_px[:, :-1])).any():
+            return False
+    return True
 
 
 def _only(blobs_px: FloatArray, sizes_px: FloatArray, shape: tuple[int, ...]) -> ByteArray:
