@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from app.cli.calibrate_depth import depth_lines
 from app.cli.calibrate_rig import calibrate_cameras, several_cameras
 from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
@@ -63,6 +64,7 @@ def calibrate(
     from packetmesh.errors import InputError
     from packetmesh.files import writable_folder
     from pipeline.calibration.assess import assess
+    from pipeline.calibration.depth_from_images import depth_beside, with_depth
     from pipeline.calibration.from_images import image_files, iterate_calibration
     from pipeline.calibration.report import metrics, write_camera_folder
     from pipeline.calibration.shots import board_beside
@@ -76,6 +78,7 @@ def calibrate(
         return
     files = image_files(images)
     report = drain(iterate_calibration(files, board, lens, held_out, without, board_warp), say_progress)
+    report = with_depth(report, depth_beside(files))
     trust = assess(report.calibration, report.views, board, range_m, accuracy_mm / 1000.0)
     writable_folder(out)
     for sentence in write_camera_folder(report, out, trust):
@@ -84,7 +87,7 @@ def calibrate(
     if json:
         print_json(metrics(report, trust))
     else:
-        say("\n".join((*_camera_lines(report), *_trust_lines(trust))))
+        say("\n".join((*_camera_lines(report), *depth_lines(report), *_trust_lines(trust))))
 
 
 def _camera_lines(report: CameraReport) -> Iterator[str]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.cli.calibrate_depth import depth_lines
 from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
 
@@ -83,6 +84,8 @@ def _lines(report: RigReport) -> Iterator[str]:
             f"{pose.rotation_sd_deg:.2g}°, {1000.0 * pose.baseline_m:.1f} ± "
             f"{1000.0 * pose.position_sd_m:.2g} mm away; {pose.moments} moments in common"
         )
+    for name, one in report.cameras.items():
+        yield from (f"{name}: {line}" for line in depth_lines(one))
     unseen = report.rig.held_out
     beside = "" if unseen is None else f"; {unseen.rms_px:.3f} px at moments that it has not seen"
     yield f"RMS {report.rig.rms_px:.3f} px over {len(report.rig.moments)} moments{beside}"

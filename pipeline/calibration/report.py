@@ -11,6 +11,7 @@ from packetmesh.files import atomic_path, finite
 from pipeline.calibration.assess import Trust
 from pipeline.calibration.from_images import CameraReport
 from pipeline.io.camera_files import WRITERS, write_camera
+from pipeline.io.depth_correction import DEPTH_CORRECTION, write_depth_correction
 from pipeline.io.fisheye_files import FISHEYE_WRITERS, write_fisheye
 from pipeline.io.intrinsics import write_intrinsics
 
@@ -21,7 +22,7 @@ def metrics(report: CameraReport, trust: Trust | None = None) -> dict[str, Any]:
 
 
 def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None = None) -> list[str]:
-    """Write metrics.json, intrinsics.json and the files of other programs.
+    """Write metrics.json, intrinsics.json, depth_correction.json if there is one, and other programs' files.
 
     Returns:
         A sentence for each file that cannot hold the lens.
@@ -31,6 +32,8 @@ def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None 
     """
     with atomic_path(folder / "metrics.json") as sibling:
         sibling.write_text(json.dumps(finite(metrics(report, trust)), indent=1, allow_nan=False) + "\n")
+    if report.depth is not None:
+        write_depth_correction(folder / DEPTH_CORRECTION, report.depth.correction)
     found = report.calibration
     if found.lens == "fisheye":
         for name in FISHEYE_WRITERS:

@@ -10,6 +10,7 @@ from typing import Any
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import Progress, part
 from pipeline.calibration.board import Board
+from pipeline.calibration.depth_from_images import with_depth
 from pipeline.calibration.from_images import CameraReport, iterate_calibration
 from pipeline.calibration.rig import RelativePose, RigCalibration, Seen, calibrate_rig
 from pipeline.calibration.shots import NodeShots
@@ -135,7 +136,18 @@ def iterate_rig_calibration(
         )
         for name, one in reports.items()
     }
-    return RigReport(board, together, rig)
+    return RigReport(board, together | _with_depth(nodes, together), rig)
+
+
+def _with_depth(nodes: Sequence[NodeShots], reports: Mapping[str, CameraReport]) -> dict[str, CameraReport]:
+    """The nodes with the bias of their depth sensors, which is that of the separate camera where there is one."""
+    made = {}
+    for node in nodes:
+        own = reports.get(node.name + INFRARED)
+        grids = ((shot.color if own is None else shot.infrared, shot.depth) for shot in node.shots)
+        depths = {image.name: depth for image, depth in grids if image is not None and depth is not None}
+        made[node.name] = with_depth(reports[node.name], depths, own)
+    return made
 
 
 def _moments(nodes: Sequence[NodeShots]) -> dict[str, dict[Path, str]]:
