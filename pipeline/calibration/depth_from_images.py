@@ -16,7 +16,7 @@ from pipeline.io.images import read_depth
 
 
 def depth_beside(images: Iterable[Path]) -> dict[str, Path]:
-    """depth_00.png beside color_00.png or color_00.jpg, and so on, by the image's name, where there is one."""
+    """depth_00.png beside color_00.png or color_00.jpg and so on, where it is, by the image's name."""
     beside = {path.name: path.with_name(f"depth_{path.stem.partition('_')[2]}.png") for path in images}
     return {name: path for name, path in beside.items() if path.is_file()}
 
@@ -29,7 +29,7 @@ def with_depth(
     Args:
         report: of the camera to which the depth belongs.
         depths: 16-bit images in millimetres, by the name of the photograph of the same moment.
-        depth_camera: the camera on whose pixels the depth is, if not ``report``'s; its names are in ``depths``.
+        depth_camera: the camera on whose pixels the depth is, if another; ``depths`` has its images' names.
     """
     if not depths:
         return report

@@ -140,7 +140,7 @@ def iterate_rig_calibration(
 
 
 def _with_depth(nodes: Sequence[NodeShots], reports: Mapping[str, CameraReport]) -> dict[str, CameraReport]:
-    """The nodes with the bias of their depth sensors, which is that of the separate camera where there is one."""
+    """The nodes with the bias of their depth sensors, by the separate cameras of those that have them."""
     made = {}
     for node in nodes:
         own = reports.get(node.name + INFRARED)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lab.claims.calibration.photograph import seen_px
-from lab.claims.registration.cases import NODE_REACH_M, Case, wrong_start
+from lab.claims.registration.cases import NODE_REACH_M, Case, random_subset, wrong_start
 from lab.claims.registration.entrants import Entrant
 from lab.claims.registration.setup import MAX_POINTS, tuned
 from lab.claims.registration.trials import run_entrant
