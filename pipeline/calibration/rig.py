@@ -211,7 +211,8 @@ def _check_fit(together_px: float, alone_px: float) -> None:
     if together_px > max(MISFIT * alone_px, MISFIT_PX):
         raise ReconstructionError(
             f"The cameras do not fit together: points are off by {together_px:.1f} px, but by "
-            f"{alone_px:.2f} px in each by itself; are images of the same number of the same moment, and did no camera move?"
+            f"{alone_px:.2f} px in each by itself; are images of the same number of the same moment, and did "
+            "no camera move?"
         )
 
 
