@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.calibrate_rig import calibrate_cameras, depth_line, several_cameras
+from app.cli.calibrate_depth import depth_lines
+from app.cli.calibrate_rig import calibrate_cameras, several_cameras
 from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
 from pipeline.config import Lens, Pattern
@@ -63,9 +64,9 @@ def calibrate(
     from packetmesh.errors import InputError
     from packetmesh.files import writable_folder
     from pipeline.calibration.assess import assess
+    from pipeline.calibration.depth_from_images import depth_beside, with_depth
     from pipeline.calibration.from_images import image_files, iterate_calibration
     from pipeline.calibration.report import metrics, write_camera_folder
-    from pipeline.calibration.session_depth import depth_beside, fit_session_depth
     from pipeline.calibration.shots import board_beside
 
     board = board_beside(images, pattern, columns, rows, spacing_mm)
@@ -78,21 +79,16 @@ def calibrate(
         return
     files = image_files(images)
     report = drain(iterate_calibration(files, board, lens, held_out, without, board_warp), say_progress)
+    report = with_depth(report, depth_beside(files))
     trust = assess(report.calibration, report.views, board, range_m, accuracy_mm / 1000.0)
-    depth = None
-    try:
-        depth = fit_session_depth(report, beside) if (beside := depth_beside(files)) else None
-    except InputError as error:
-        say(f"depth_correction.json is not written: {error}")
     writable_folder(out)
-    for sentence in write_camera_folder(report, out, trust, depth):
+    for sentence in write_camera_folder(report, out, trust):
         say(sentence)
     write_calibration_report(report, trust, out / "report.html")
     if json:
-        print_json(metrics(report, trust, depth))
+        print_json(metrics(report, trust))
     else:
-        of_depth = () if depth is None else (f"Its {depth_line(depth)}",)
-        say("\n".join((*_camera_lines(report), *of_depth, *_trust_lines(trust))))
+        say("\n".join((*_camera_lines(report), *depth_lines(report), *_trust_lines(trust))))
 
 
 def _camera_lines(report: CameraReport) -> Iterator[str]:

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.cli.calibrate_depth import depth_lines
 from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
 
 if TYPE_CHECKING:
     from pipeline.calibration.assess import Trust
     from pipeline.calibration.board import Board
-    from pipeline.calibration.depth_bias import DepthFit
     from pipeline.calibration.rig_from_images import RigReport
     from pipeline.calibration.shots import NodeShots
     from pipeline.config import Lens
@@ -88,15 +88,6 @@ def calibrate_cameras(
         say("\n".join(_lines(report, trust)))
 
 
-def depth_line(fit: DepthFit) -> str:
-    """A depth sensor's bias in a sentence."""
-    terms = " + ".join(fit.terms) or "nothing"
-    return (
-        f"depth is off by {1000.0 * fit.rms_before_m:.1f} mm, and by {1000.0 * fit.rms_after_m:.1f} mm "
-        f"corrected by {terms}"
-    )
-
-
 def _lines(report: RigReport, trust: Mapping[str, Trust]) -> Iterator[str]:
     """Each camera in a line, then each pair."""
     for name, one in report.cameras.items():
@@ -112,9 +103,11 @@ def _lines(report: RigReport, trust: Mapping[str, Trust]) -> Iterator[str]:
             f"{pose.rotation_sd_deg:.2g}°, {1000.0 * pose.baseline_m:.1f} ± "
             f"{1000.0 * pose.position_sd_m:.2g} mm away; {pose.moments} moments in common"
         )
-    for name, fit in report.depth.items():
-        yield f"{name}: {depth_line(fit)}"
+    for name, one in report.cameras.items():
+        yield from (f"{name}: {line}" for line in depth_lines(one))
     for name, worth in trust.items():
+        for odd in worth.outliers:
+            yield f"Perhaps leave out: {odd.reason} (--without {name}/{odd.name})"
         yield f"{name}: {worth.verdict.sentence}"
     unseen = report.rig.held_out
     beside = "" if unseen is None else f"; {unseen.rms_px:.3f} px at moments that it has not seen"

@@ -178,7 +178,7 @@ def _rays(lens: Optics, pixels: IntArray) -> FloatArray:
 
 
 def _pixels_on_board(board: Board, T: FloatArray, lens: Optics, depth: DepthMap) -> IntArray:
-    """(N, 2) pixels with depth inside the board's points and off their rim."""
+    """(N, 2) pixels with depth inside the board's points and off their rim, evenly thinned."""
     low_m, high_m = board.points_m[:, :2].min(axis=0), board.points_m[:, :2].max(axis=0)
     corners_m = np.array([low_m, (high_m[0], low_m[1]), high_m, (low_m[0], high_m[1])])
     along = np.linspace(0.0, 1.0, 16, endpoint=False)[:, None]
@@ -190,7 +190,12 @@ def _pixels_on_board(board: Board, T: FloatArray, lens: Optics, depth: DepthMap)
     kernel = np.ones((2 * RIM_PX + 1, 2 * RIM_PX + 1), np.uint8)
     inside = cv2.erode(inside, kernel, borderValue=0)
     v, u = np.nonzero((inside > 0) & depth.valid & (depth.z_m > 0.0))
-    return np.stack([u, v], axis=1)
+    return np.stack([u, v], axis=1)[_evenly(len(u), 2 * MOST_PER_VIEW)]
+
+
+def _evenly(count: int, most: int) -> IntArray:
+    """At most so many of so many rows."""
+    return np.linspace(0, count - 1, min(count, most)).round().astype(int)
 
 
 def _gate(name: str, measured_m: FloatArray, true_m: FloatArray) -> IntArray:
@@ -207,7 +212,7 @@ def _gate(name: str, measured_m: FloatArray, true_m: FloatArray) -> IntArray:
     off_m = off_m - np.median(off_m)
     gate_m = max(GATE_SDS * MAD_TO_SD * float(np.median(np.abs(off_m))), LEAST_GATE_M)
     rows = np.flatnonzero(np.abs(off_m) <= gate_m)
-    return rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_PER_VIEW)).round().astype(int)]
+    return rows[_evenly(len(rows), MOST_PER_VIEW)]
 
 
 def _plane_m(T_camera_board: FloatArray, rays: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.calibration.board import Board
+from pipeline.calibration.depth_bias import DepthFit
 from pipeline.calibration.detect import Detection, detect
 from pipeline.calibration.estimate import (
     LEAST_VIEWS,
@@ -47,6 +48,10 @@ class CameraReport:
     """Images that somebody wanted left out."""
     warp: BoardWarp | None = None
     """Of the board, where it was asked for."""
+    depth: DepthFit | None = None
+    """The bias of the depth sensor, where there are depth images."""
+    depth_reason: str = ""
+    """Why that is not known, though there are depth images."""
 
     @property
     def held_out_rms_px(self) -> float | None:
@@ -93,6 +98,7 @@ class CameraReport:
             "board_distance_m": list(self.distances_m),
             "left_out": list(self.left_out),
             "board_warp": self._warp_metrics(),
+            "depth": None if self.depth is None else self.depth.metrics(),
             "views": [
                 {
                     "image": name,

@@ -10,10 +10,9 @@ from typing import Any
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import Progress, part
 from pipeline.calibration.board import Board
-from pipeline.calibration.depth_bias import DepthFit
+from pipeline.calibration.depth_from_images import with_depth
 from pipeline.calibration.from_images import CameraReport, iterate_calibration
 from pipeline.calibration.rig import RelativePose, RigCalibration, Seen, calibrate_rig
-from pipeline.calibration.session_depth import fit_session_depth
 from pipeline.calibration.shots import NodeShots
 from pipeline.config import Lens
 from pipeline.io.calibrations import CalibratedNode
@@ -35,10 +34,6 @@ class RigReport:
     """By name, node_00 and so on, with the lenses as all cameras together have them; the separate depth
     camera of a node is node_00/infrared."""
     rig: RigCalibration
-    depth: Mapping[str, DepthFit]
-    """By node, the bias of its depth, where its images tell it."""
-    without_depth: Mapping[str, str]
-    """By node, why its depth images tell no bias."""
 
     def nodes(self, T_world_first: FloatArray = LEVEL_POSE) -> dict[str, CalibratedNode]:
         """What a calibration's folder says of every node.
@@ -63,10 +58,11 @@ class RigReport:
         return made
 
     def metrics(self) -> dict[str, Any]:
-        """Beside those of each camera."""
+        """What ``--json`` prints."""
         held_out = self.rig.held_out
         return {
             "board": self.board.title,
+            "cameras": {name: report.metrics() for name, report in self.cameras.items()},
             "extrinsics": [self._pose_metrics(pose) for pose in self.rig.pairs()],
             "rms_px": self.rig.rms_px,
             "held_out_rms_px": None if held_out is None else held_out.rms_px,
@@ -97,7 +93,7 @@ def iterate_rig_calibration(
     board: Board,
     lens: Lens = "thesis",
     folds: int = 0,
-    leave_out: Sequence[str] = (),
+    without: Sequence[str] = (),
 ) -> Generator[Progress, None, RigReport]:
     """Find the board in every image, estimate each camera, then all lenses and poses together.
 
@@ -106,7 +102,7 @@ def iterate_rig_calibration(
         board: what they show.
         lens: which distortions the cameras may have.
         folds: in how many turns moments are held out; 0 holds none out.
-        leave_out: images to leave out, as node_01/color_03.png.
+        without: images to leave out, as node_01/color_03.png.
 
     Yields:
         Progress, before each image.
@@ -117,12 +113,12 @@ def iterate_rig_calibration(
         ReconstructionError: the views do not determine a lens or the poses.
     """
     moments = _moments(nodes)
-    strange = [word for word in leave_out if not any(word.startswith(f"{name}/") for name in moments)]
+    strange = [word for word in without if not any(word.startswith(f"{name}/") for name in moments)]
     if strange:
         raise InputError(f"{strange[0]} is none of the cameras' images; name it as {next(iter(moments))}/...")
     reports: dict[str, CameraReport] = {}
     for index, (name, files) in enumerate(moments.items()):
-        left_out = [word.removeprefix(f"{name}/") for word in leave_out if word.startswith(f"{name}/")]
+        left_out = [word.removeprefix(f"{name}/") for word in without if word.startswith(f"{name}/")]
         steps = iterate_calibration(list(files), board, lens, 0, left_out)
         begin, end = (ALONE * share / len(moments) for share in (index, index + 1))
         try:
@@ -140,29 +136,19 @@ def iterate_rig_calibration(
         )
         for name, one in reports.items()
     }
-    depth: dict[str, DepthFit] = {}
-    without: dict[str, str] = {}
-    for index, node in enumerate(nodes):
-        share = DEPTH + (1.0 - DEPTH) * index / len(nodes)
-        yield Progress(f"comparing depth with the board in {node.name}", share)
-        try:
-            depth |= _depth(node, together)
-        except InputError as error:
-            without[node.name] = str(error)
-    return RigReport(board, together, rig, depth, without)
+    yield Progress("comparing depth with the board", DEPTH)
+    return RigReport(board, together | _with_depth(nodes, together), rig)
 
 
-def _depth(node: NodeShots, cameras: Mapping[str, CameraReport]) -> dict[str, DepthFit]:
-    """Of one node; empty without depth images."""
-    beside = cameras.get(node.name + INFRARED)
-    files = {
-        (shot.color if beside is None or shot.infrared is None else shot.infrared).name: shot.depth
-        for shot in node.shots
-        if shot.depth is not None
-    }
-    if not files:
-        return {}
-    return {node.name: fit_session_depth(cameras[node.name] if beside is None else beside, files)}
+def _with_depth(nodes: Sequence[NodeShots], reports: Mapping[str, CameraReport]) -> dict[str, CameraReport]:
+    """The nodes with the bias of their depth sensors, by the separate cameras of those that have them."""
+    made = {}
+    for node in nodes:
+        own = reports.get(node.name + INFRARED)
+        grids = ((shot.color if own is None else shot.infrared, shot.depth) for shot in node.shots)
+        depths = {image.name: depth for image, depth in grids if image is not None and depth is not None}
+        made[node.name] = with_depth(reports[node.name], depths, own)
+    return made
 
 
 def _moments(nodes: Sequence[NodeShots]) -> dict[str, dict[Path, str]]:

@@ -27,10 +27,8 @@ def rig_metrics(report: RigReport, trust: Mapping[str, Trust] = NO_TRUST) -> dic
         report: of all cameras.
         trust: by camera, what it is worth.
     """
-    cameras = {
-        name: metrics(one, trust.get(name), report.depth.get(name)) for name, one in report.cameras.items()
-    }
-    return {"cameras": cameras} | report.metrics()
+    cameras = {name: metrics(one, trust.get(name)) for name, one in report.cameras.items()}
+    return report.metrics() | {"cameras": cameras}
 
 
 def write_rig_folder(
@@ -56,12 +54,10 @@ def write_rig_folder(
     """
     with atomic_path(folder / "metrics.json") as sibling:
         sibling.write_text(json.dumps(finite(rig_metrics(report, trust)), indent=1, allow_nan=False) + "\n")
-    sentences = [
-        f"{name}: depth_correction.json is not written: {why}" for name, why in report.without_depth.items()
-    ]
+    sentences = []
     for name, one in report.cameras.items():
         if not name.endswith(INFRARED):
-            told = write_camera_folder(one, folder / name, trust.get(name), report.depth.get(name))
+            told = write_camera_folder(one, folder / name, trust.get(name))
             sentences += [f"{name}: {sentence}" for sentence in told]
     write_calibration(folder, report.nodes(T_world_first))
     return sentences

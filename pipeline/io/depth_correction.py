@@ -15,7 +15,7 @@ from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, read_text
 from pipeline.types import AnyPath, DepthMap, DepthNoise, FloatArray, IntArray
 
-FILE_NAME = "depth_correction.json"
+DEPTH_CORRECTION = "depth_correction.json"
 FORMAT = "packetmesh depth correction 1"
 MAP_SHAPE = (3, 4)
 """Rows and columns of the map's coefficients."""

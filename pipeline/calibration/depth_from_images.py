@@ -1,0 +1,55 @@
+"""The bias of a depth sensor from depth images beside the photographs of a board (SPEC 1.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from packetmesh.errors import InputError
+from pipeline.calibration.board import Board
+from pipeline.calibration.depth_bias import DepthFit, fit_depth
+from pipeline.calibration.depth_samples import board_depth_samples
+from pipeline.calibration.estimate import Calibration
+from pipeline.calibration.from_images import CameraReport
+from pipeline.io.images import read_depth
+
+
+def depth_beside(images: Iterable[Path]) -> dict[str, Path]:
+    """depth_00.png beside color_00.png or color_00.jpg and so on, where it is, by the image's name."""
+    beside = {path.name: path.with_name(f"depth_{path.stem.partition('_')[2]}.png") for path in images}
+    return {name: path for name, path in beside.items() if path.is_file()}
+
+
+def with_depth(
+    report: CameraReport, depths: Mapping[str, Path], depth_camera: CameraReport | None = None
+) -> CameraReport:
+    """A report to which the depth sensor's bias is added, or why it is not known.
+
+    Args:
+        report: of the camera to which the depth belongs.
+        depths: 16-bit images in millimetres, by the name of the photograph of the same moment.
+        depth_camera: the camera on whose pixels the depth is, if another; ``depths`` has its images' names.
+    """
+    if not depths:
+        return report
+    try:
+        found = depth_fit((depth_camera or report).calibration, depths, report.board)
+    except InputError as error:
+        return replace(report, depth_reason=str(error))
+    return replace(report, depth=found)
+
+
+def depth_fit(calibration: Calibration, depths: Mapping[str, Path], board: Board) -> DepthFit:
+    """The bias of depth images on a camera's pixels.
+
+    Args:
+        calibration: of the camera, with its views.
+        depths: 16-bit images in millimetres, by the name of their view.
+        board: what the views show.
+
+    Raises:
+        InputError: images that cannot be read, are not on the camera's pixels or show no board, or too few.
+    """
+    measured = [read_depth(depths[view.name]) if view.name in depths else None for view in calibration.views]
+    return fit_depth(board_depth_samples(calibration, measured, board))
