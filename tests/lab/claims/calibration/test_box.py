@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
+from lab.claims.calibration import box_views
 from lab.claims.calibration.box_claim import STATES, TABLE_4_5_CM, BoxStudy, judge
 from lab.claims.calibration.box_size import box_size_m
-from lab.claims.calibration.box_views import SIZES_M, bought, box_depth, measured_m
+from lab.claims.calibration.box_views import SIZES_M, bought, box_depth, calibrated, measured_m
 from lab.claims.registry import CLAIMS
 from lab.worlds.primitives import box, merged, moved
 from packetmesh.errors import ReconstructionError
 from pipeline.geometry import apply, inverse, look_at, pixel_rays, rigid, rotation_exp
 from pipeline.rays import hit_depth
-from pipeline.types import CameraIntrinsics
+from pipeline.types import CameraIntrinsics, DepthMap
 
 LENS = CameraIntrinsics.pinhole(525.0, 525.0, 319.5, 239.5, 640, 480)
 
@@ -75,3 +76,14 @@ def test_the_verdict_follows_the_numbers(raw_m, calibrated_m, verdict):
 
 def test_it_is_a_claim():
     assert CLAIMS["C25"].judge(study(dict.fromkeys(STATES, 0.001))).verdict == "not reproduced"
+
+
+def test_what_is_calibrated_is_calibrated_from_photographs(monkeypatch):
+    monkeypatch.setattr(box_views, "MOMENTS", 6)
+    camera = bought(np.random.default_rng(8))
+    lens, correction = calibrated(camera, seed=8)
+    assert lens.fx_px == pytest.approx(camera.intrinsics.fx_px, rel=0.003)
+    flat = DepthMap(np.full((480, 640), 1.0, np.float32))
+    biased = camera.bias.measured(flat)
+    off_m = [float(np.abs(depth.z_m - 1.0).mean()) for depth in (biased, correction.apply(biased))]
+    assert off_m[1] < 0.5 * off_m[0]
