@@ -37,6 +37,11 @@ if TYPE_CHECKING:
     from packetmesh.progress import Progress, drain
     from packetmesh.settings import with_settings
     from pipeline.acquisition import back_project
+    from pipeline.calibration.board import Board
+    from pipeline.calibration.calls import calibrate, calibrate_cameras
+    from pipeline.calibration.from_images import CameraReport
+    from pipeline.calibration.rig import RelativePose
+    from pipeline.calibration.rig_from_images import RigReport
     from pipeline.config import (
         PRESETS,
         AcquisitionConfig,
@@ -48,6 +53,7 @@ if TYPE_CHECKING:
     )
     from pipeline.deliver import Delivery, deliver
     from pipeline.delivery.moments import Moment
+    from pipeline.io.calibrations import CalibratedNode, write_calibration
     from pipeline.io.clouds import read_cloud, write_cloud
     from pipeline.io.demos import DEMO_SCENES, board_views_of, load_demo
     from pipeline.io.meshes import read_mesh, write_mesh
@@ -87,11 +93,17 @@ _NAMES = {
     "packetmesh.progress": "Progress drain",
     "packetmesh.settings": "with_settings",
     "pipeline.acquisition": "back_project",
+    "pipeline.calibration.board": "Board",
+    "pipeline.calibration.calls": "calibrate calibrate_cameras",
+    "pipeline.calibration.from_images": "CameraReport",
+    "pipeline.calibration.rig": "RelativePose",
+    "pipeline.calibration.rig_from_images": "RigReport",
     "pipeline.config": (
         "PRESETS AcquisitionConfig DepthConfig FusionConfig PipelineConfig RegistrationConfig SurfaceConfig"
     ),
     "pipeline.deliver": "Delivery deliver",
     "pipeline.delivery.moments": "Moment",
+    "pipeline.io.calibrations": "CalibratedNode write_calibration",
     "pipeline.io.clouds": "read_cloud write_cloud",
     "pipeline.io.demos": "DEMO_SCENES board_views_of load_demo",
     "pipeline.io.meshes": "read_mesh write_mesh",
@@ -114,17 +126,18 @@ _PLACES = {name: (module, name) for module, names in _NAMES.items() for name in 
 """Module and attribute of every public name."""
 
 __all__ = [
-    "DEMO_SCENES", "NETWORK_PRESETS", "PRESETS", "AcquisitionConfig", "Arrivals", "BallPivotStep",
-    "CameraIntrinsics", "Cause", "Delivery", "DepthConfig", "DepthMap", "EnergyConfig", "EventKind", "Events",
-    "FusionConfig", "InputError", "LossConfig", "MacConfig", "Metric", "Moment", "NetworkConfig",
-    "NetworkTrace", "NodesConfig", "PacketMeshError", "PipelineConfig", "PointCloud", "PointSource",
-    "Progress", "RadioConfig", "Reconstruction", "ReconstructionError", "RegistrationConfig",
-    "RegistrationResult", "RegistrationStep", "RgbdFrame", "Rig", "RigTruth", "RunConfig", "SchemeConfig",
-    "StreetConfig", "Surface", "SurfaceConfig", "SurfaceQuality", "SurfaceResult", "UplinkConfig", "arrivals",
-    "back_project", "board_views_of", "deliver", "drain", "estimate_normals", "image_delays_s",
+    "DEMO_SCENES", "NETWORK_PRESETS", "PRESETS", "AcquisitionConfig", "Arrivals", "BallPivotStep", "Board",
+    "CalibratedNode", "CameraIntrinsics", "CameraReport", "Cause", "Delivery", "DepthConfig", "DepthMap",
+    "EnergyConfig", "EventKind", "Events", "FusionConfig", "InputError", "LossConfig", "MacConfig", "Metric",
+    "Moment", "NetworkConfig", "NetworkTrace", "NodesConfig", "PacketMeshError", "PipelineConfig",
+    "PointCloud", "PointSource", "Progress", "RadioConfig", "Reconstruction", "ReconstructionError",
+    "RegistrationConfig", "RegistrationResult", "RegistrationStep", "RelativePose", "RgbdFrame", "Rig",
+    "RigReport", "RigTruth", "RunConfig", "SchemeConfig", "StreetConfig", "Surface", "SurfaceConfig",
+    "SurfaceQuality", "SurfaceResult", "UplinkConfig", "arrivals", "back_project", "board_views_of",
+    "calibrate", "calibrate_cameras", "deliver", "drain", "estimate_normals", "image_delays_s",
     "iterate_ball", "iterate_registration", "iterate_simulation", "load_demo", "load_frame", "load_rig",
     "network_metrics", "point_error_m", "read_cloud", "read_mesh", "reconstruct", "register", "roll_ball",
-    "save_rig", "simulate", "spacing", "with_settings", "write_cloud", "write_mesh",
+    "save_rig", "simulate", "spacing", "with_settings", "write_calibration", "write_cloud", "write_mesh",
 ]  # fmt: skip
 
 

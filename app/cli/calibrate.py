@@ -74,7 +74,8 @@ def calibrate(
         raise InputError(f"--held-out {held_out} leaves no view to predict; try 2, or 0 for none")
     nodes = several_cameras(images)
     if nodes:
-        calibrate_cameras(nodes, out, board, lens, held_out, without, like, json)
+        accuracy_m = accuracy_mm / 1000.0
+        calibrate_cameras(nodes, out, board, lens, held_out, range_m, accuracy_m, without, like, json)
         return
     files = image_files(images)
     report = drain(iterate_calibration(files, board, lens, held_out, without, board_warp), say_progress)

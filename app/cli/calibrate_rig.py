@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
 
 if TYPE_CHECKING:
+    from pipeline.calibration.assess import Trust
     from pipeline.calibration.board import Board
     from pipeline.calibration.rig_from_images import RigReport
     from pipeline.calibration.shots import NodeShots
@@ -21,15 +22,21 @@ def several_cameras(images: Sequence[str]) -> tuple[NodeShots, ...]:
     """The nodes whose folders are named; none where one camera's images are.
 
     Raises:
-        InputError: folders that hold no images, or more than a rig has cameras.
+        InputError: folders without images, more than a rig has cameras, or only one camera below a folder.
     """
+    from packetmesh.errors import InputError
     from pipeline.calibration.shots import node_folders, node_shots
 
-    if not all(Path(word).is_dir() for word in images):
+    folders = [Path(word) for word in images]
+    if not all(folder.is_dir() for folder in folders):
         return ()
-    if len(images) == 1 and not node_folders(Path(images[0])):
+    below = [one for folder in folders for one in (*node_folders(folder), *folder.glob("infrared_*"))]
+    if len(folders) == 1 and not below:
         return ()
-    return node_shots(images)
+    nodes = node_shots(images)
+    if len(nodes) == 1 and not any(shot.infrared for shot in nodes[0].shots):
+        raise InputError(f"{folders[0]} holds one camera only; give {nodes[0].folder} to calibrate it alone")
+    return nodes
 
 
 def calibrate_cameras(
@@ -38,6 +45,8 @@ def calibrate_cameras(
     board: Board,
     lens: Lens,
     held_out: int,
+    range_m: float,
+    accuracy_m: float,
     without: Sequence[str],
     like: Path | None,
     json: bool,
@@ -50,26 +59,36 @@ def calibrate_cameras(
         board: What they show.
         lens: Distortion of all cameras.
         held_out: In so many turns moments are left out and predicted; 0 leaves out none.
+        range_m: Where the cameras will measure.
+        accuracy_m: Within what a point must be placed there.
         without: Images to leave out, as node_01/color_03.png.
         like: A rig in whose world the cameras are placed, by the pose of its first node.
         json: Print everything as one JSON object.
     """
+    from app.reports.calibration import write_calibration_report
     from packetmesh.files import writable_folder
+    from pipeline.calibration.assess import assess
     from pipeline.calibration.rig_from_images import iterate_rig_calibration
-    from pipeline.calibration.rig_report import pose_like, write_rig_folder
+    from pipeline.calibration.rig_report import pose_like, rig_metrics, write_rig_folder
 
     T_world_first = pose_like(like, nodes[0].name)
     report = drain(iterate_rig_calibration(nodes, board, lens, held_out, without), say_progress)
+    trust = {
+        name: assess(one.calibration, one.views, board, range_m, accuracy_m)
+        for name, one in report.cameras.items()
+    }
     writable_folder(out)
-    for sentence in write_rig_folder(report, out, T_world_first):
+    for sentence in write_rig_folder(report, out, T_world_first, trust):
         say(sentence)
+    for name, one in report.cameras.items():
+        write_calibration_report(one, trust[name], out / name / "report.html")
     if json:
-        print_json(report.metrics())
+        print_json(rig_metrics(report, trust))
     else:
-        say("\n".join(_lines(report)))
+        say("\n".join(_lines(report, trust)))
 
 
-def _lines(report: RigReport) -> Iterator[str]:
+def _lines(report: RigReport, trust: Mapping[str, Trust]) -> Iterator[str]:
     """Each camera in a line, then each pair."""
     for name, one in report.cameras.items():
         found = one.calibration
@@ -86,6 +105,10 @@ def _lines(report: RigReport) -> Iterator[str]:
         )
     for name, one in report.cameras.items():
         yield from (f"{name}: {line}" for line in depth_lines(one))
+    for name, worth in trust.items():
+        for odd in worth.outliers:
+            yield f"Perhaps leave out: {odd.reason} (--without {name}/{odd.name})"
+        yield f"{name}: {worth.verdict.sentence}"
     unseen = report.rig.held_out
     beside = "" if unseen is None else f"; {unseen.rms_px:.3f} px at moments that it has not seen"
     yield f"RMS {report.rig.rms_px:.3f} px over {len(report.rig.moments)} moments{beside}"

@@ -15,14 +15,15 @@ from pipeline.geometry import apply, inverse, project, rigid, rotation_exp
 from pipeline.types import FloatArray
 
 DISTANCES_M = (0.6, 2.5)
-MOST_TILT_DEG = 50.0
+MOST_TILT_DEG = 45.0
 MARGIN_PX = 8.0
 LEAST_SPACING_PX = 11.0
 """Between neighbours on the board; smaller circles are not found."""
 TRIES = 60
 """Random poses for each that is wanted."""
-CELLS = (8, 6)
-"""Parts of an image that a board may cover, across and down."""
+CELLS = {(8, 6): 0.25, (4, 3): 4.0}
+"""Parts of an image, across and down, and what a new one is worth; the large ones are those of the depth
+sensor's map."""
 
 
 def propose_poses(
@@ -147,8 +148,9 @@ def _shown(
         camera = cameras[node].intrinsics
         T = inverse(cameras[node].T_world_camera) @ T_world_board
         at = project(camera, apply(T, board.points_m)) / (camera.width_px, camera.height_px)
-        for cell in {tuple(one) for one in (at * CELLS).astype(int).tolist()}:
-            yield ("cell", node, cell), 0.25
+        for cells, worth in CELLS.items():
+            for cell in {tuple(one) for one in (at * cells).astype(int).tolist()}:
+                yield ("cell", node, cells, cell), worth
         share = np.log(np.linalg.norm(T[:3, 3]) / distances_m[0]) / np.log(distances_m[1] / distances_m[0])
         far[node] = int(np.clip(4.0 * share, 0.0, 3.0))
         yield ("far", node, far[node]), 2.0

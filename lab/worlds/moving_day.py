@@ -27,7 +27,7 @@ WINDOW = (0.35, 0.9, 1.3, 1.3)
 CORNER_M = (SIZE_M[0] - 0.4, SIZE_M[1] - 0.36)
 """Of the stacked boxes."""
 BOARD = Board("circles", 11, 9, 0.05)
-MOMENTS = 12
+MOMENTS = 14
 AROUND_PX = 16
 """The depth images end so far beyond the board, which keeps the files small."""
 

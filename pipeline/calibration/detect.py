@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from packetmesh.errors import InputError
 from pipeline.calibration.board import RING, Board
@@ -22,6 +23,12 @@ SIZES = 4.0
 CORNER_WINDOW_PX = 5
 MARK_STEP = 0.25
 """Least brightness, over that of the paper around, by which the white ring tells its circle from others."""
+LINK = 2.0
+"""Blobs farther from the others than so many times the usual distance of neighbours are not the board's."""
+MOST_BEND = 0.5
+"""Of the step between neighbours: by so much it may change from one to the next along a row or column."""
+NEAR, MOST_OF_A_SIDE = 0.3, 0.8
+"""A grid goes on where so much of a further row or column has a blob so near its place, in pitches."""
 FEW_CHARUCO = 6
 """Corners of a ChArUco board from which on a view counts."""
 
@@ -67,6 +74,11 @@ def detect(image: ByteArray, board: Board) -> Detection:
     return _circles(gray, board)
 
 
+def _nothing(reason: str, blobs_px: FloatArray | None = None) -> Detection:
+    blobs_px = np.zeros((0, 2)) if blobs_px is None else blobs_px
+    return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), reason, blobs_px)
+
+
 def _all(board: Board, points_px: FloatArray, oriented: bool) -> Detection:
     return Detection(points_px, np.arange(len(points_px)), oriented=oriented)
 
@@ -79,7 +91,7 @@ def _circles(gray: ByteArray, board: Board) -> Detection:
     grid = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
     most: FloatArray = np.zeros((0, 2))
     for picture, detector in _blob_detectors(gray):
-        blobs_px, sizes_px = _alike(detector.detect(picture))
+        blobs_px, sizes_px = _together(*_alike(detector.detect(picture)), board)
         if len(blobs_px) > len(most):
             most = blobs_px
         if len(blobs_px) < board.columns * board.rows:
@@ -92,9 +104,11 @@ def _circles(gray: ByteArray, board: Board) -> Detection:
             if found:
                 apart_px = np.linalg.norm(blobs_px[:, None] - rough.reshape(1, -1, 2), axis=2)
                 chosen = apart_px.argmin(axis=0)
-                if len(np.unique(chosen)) == len(chosen):
+                if len(np.unique(chosen)) == len(chosen) and _even(blobs_px[chosen], board):
+                    if _goes_on(board, blobs_px[chosen], blobs_px):
+                        return _nothing(_more_circles(board), blobs_px)
                     return _upright(gray, board, blobs_px[chosen])
-    return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), _why_no_circles(board, most), most)
+    return _nothing(_why_no_circles(board, most), most)
 
 
 def _blob_detectors(gray: ByteArray) -> Iterator[tuple[ByteArray, cv2.SimpleBlobDetector]]:
@@ -122,6 +136,30 @@ def _alike(blobs: Sequence[cv2.KeyPoint]) -> tuple[FloatArray, FloatArray]:
     return np.array([blob.pt for blob in blobs], float)[group], sizes_px[group]
 
 
+def _together(blobs_px: FloatArray, sizes_px: FloatArray, board: Board) -> tuple[FloatArray, FloatArray]:
+    """The blobs of the largest group that goes on from neighbour to neighbour; the room's own stand apart."""
+    if len(blobs_px) <= board.columns * board.rows:
+        return blobs_px, sizes_px
+    apart_px = np.linalg.norm(blobs_px[:, None] - blobs_px, axis=2)
+    pitch_px = np.median(np.sort(apart_px, axis=1)[:, 1])
+    _, group = connected_components(apart_px < LINK * pitch_px)
+    mine = group == np.bincount(group).argmax()
+    return blobs_px[mine], sizes_px[mine]
+
+
+def _even(points_px: FloatArray, board: Board) -> bool:
+    """Whether every point lies where the two beside it in its row and in its column lead to."""
+    grid = points_px.reshape(board.rows, board.columns, 2)
+    alike = 2 if board.pattern == "circles-asymmetric" else 1  # whose every second row is shifted
+    for lines in (grid, *(grid[first::alike].swapaxes(0, 1) for first in range(alike))):
+        steps = np.diff(lines, axis=1)
+        pitch_px = np.linalg.norm(steps, axis=2)
+        bend_px = np.linalg.norm(np.diff(steps, axis=1), axis=2)
+        if (bend_px > MOST_BEND * np.minimum(pitch_px[:, 1:], pitch_px[:, :-1])).any():
+            return False
+    return True
+
+
 def _only(blobs_px: FloatArray, sizes_px: FloatArray, shape: tuple[int, ...]) -> ByteArray:
     """A picture of nothing but these blobs, in which no shadow or letter keeps a grid from being found."""
     picture = np.full(shape, 255, np.uint8)
@@ -140,6 +178,29 @@ def _why_no_circles(board: Board, blobs_px: FloatArray) -> str:
         f"{len(blobs_px)} blobs are seen, but no grid of {board.columns} x {board.rows} among them; check "
         "columns and rows, and that nothing round lies beside the board"
     )
+
+
+def _goes_on(board: Board, points_px: FloatArray, blobs_px: FloatArray) -> bool:
+    """Whether the grid has a further row or column on the board, so that only a part of it was taken."""
+    if board.pattern == "circles-asymmetric":  # whose rows do not fit if there are more
+        return False
+    columns, rows = board.size
+    grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(float)
+    image_of, _ = cv2.findHomography(grid, points_px)
+    across, down = np.arange(columns), np.arange(rows)
+    for x, y in ((across, -1), (across, rows), (-1, down), (columns, down)):
+        x, y = np.broadcast_arrays(x, y)
+        beyond = np.column_stack([x, y]).astype(float)[:, None]
+        inward = np.clip(beyond, 0, (columns - 1, rows - 1))
+        beyond_px, inward_px = (cv2.perspectiveTransform(one, image_of)[:, 0] for one in (beyond, inward))
+        apart_px = np.linalg.norm(blobs_px[:, None] - beyond_px, axis=2).min(axis=0)
+        if np.mean(apart_px < NEAR * np.linalg.norm(beyond_px - inward_px, axis=1)) >= MOST_OF_A_SIDE:
+            return True
+    return False
+
+
+def _more_circles(board: Board) -> str:
+    return f"The board has more circles than {board.columns} x {board.rows}; count its columns and rows"
 
 
 def _upright(gray: ByteArray, board: Board, points_px: FloatArray) -> Detection:
@@ -210,9 +271,9 @@ def _chessboard(gray: ByteArray, board: Board) -> Detection:
             return _dark_first(gray, board, points_px[order])
     reason = (
         f"No chessboard of {board.columns} x {board.rows} inner corners is seen; count the corners between "
-        "four squares, and have the whole board with its white rim in the picture"
+        "four squares, and have the whole board with its white rim in the picture, sharp and evenly lit"
     )
-    return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), reason)
+    return _nothing(reason)
 
 
 def _refined(gray: ByteArray, board: Board) -> tuple[bool, FloatArray | None]:
@@ -245,5 +306,5 @@ def _charuco(gray: ByteArray, board: Board) -> Detection:
             f"{markers} markers and {seen} corners of the ChArUco board are seen, and it takes "
             f"{FEW_CHARUCO}; check columns and rows, and hold it nearer or lit better"
         )
-        return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), reason)
+        return _nothing(reason)
     return Detection(np.asarray(corners, float).reshape(-1, 2), np.asarray(ids).ravel().astype(np.int64))

@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from packetmesh.errors import InputError
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.board import Board
 from pipeline.calibration.bundle import Adjusted, Bundle, Sighting, adjust, place_boards
 from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, FittedView, View, rms_px
@@ -19,6 +19,9 @@ from pipeline.types import FloatArray
 
 LEAST_CAMERAS, MOST_CAMERAS = 2, 12
 """Six nodes, of which each may have a separate depth camera."""
+
+MISFIT, MISFIT_PX = 5.0, 2.0
+"""Error of all cameras together over that of the worst alone, and in pixels, that no rigid rig has."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,12 +167,12 @@ def calibrate_rig(
 
     Raises:
         InputError: too few cameras or too many, or some that never see the board together.
-        ReconstructionError: the moments do not determine the poses.
+        ReconstructionError: the moments do not determine the poses, or no rigid rig explains them.
     """
     names = tuple(cameras)
     if not LEAST_CAMERAS <= len(names) <= MOST_CAMERAS:
         raise InputError(
-            f"{len(names)} cameras are given; a rig has two to six, each with one for depth at most"
+            f"A rig has two to six cameras, each with one for depth at most, and {len(names)} are given"
         )
     optics = tuple(one.optics for one in cameras.values())
     moments = tuple(dict.fromkeys(moment for name in names for moment in seen[name]))
@@ -184,6 +187,7 @@ def calibrate_rig(
     ]
     begun, sightings = start(looks, optics, names, _turns(board))
     adjusted = adjust(sightings, begun)
+    _check_fit(rms_px(np.concatenate(adjusted.residuals_px)), max(one.rms_px for one in cameras.values()))
     titles = [seen[names[one.camera]][moments[one.moment]].view.name for one in sightings]
     views = _views(names, titles, sightings, adjusted.bundle)
     lenses = {
@@ -200,6 +204,16 @@ def calibrate_rig(
     }
     unseen = _held_out(names, titles, sightings, adjusted.bundle, folds) if folds else None
     return RigCalibration(lenses, moments, adjusted, sightings, unseen)
+
+
+def _check_fit(together_px: float, alone_px: float) -> None:
+    """Raise ReconstructionError where no rigid rig explains what each camera explains."""
+    if together_px > max(MISFIT * alone_px, MISFIT_PX):
+        raise ReconstructionError(
+            f"The cameras do not fit together: points are off by {together_px:.1f} px, but by "
+            f"{alone_px:.2f} px in each by itself; are images of the same number of the same moment, and did "
+            "no camera move?"
+        )
 
 
 def _views(

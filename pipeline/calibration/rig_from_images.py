@@ -19,8 +19,8 @@ from pipeline.io.calibrations import CalibratedNode
 from pipeline.io.rigs import LEVEL_POSE
 from pipeline.types import CameraIntrinsics, FloatArray
 
-ALONE = 0.9
-"""Share of the work that finds boards and each camera's own lens."""
+ALONE, DEPTH = 0.7, 0.85
+"""Shares of the work before which boards and each camera's own lens are found, and after which depth is."""
 INFRARED = "/infrared"
 """After a node's name: its separate depth camera."""
 
@@ -136,6 +136,7 @@ def iterate_rig_calibration(
         )
         for name, one in reports.items()
     }
+    yield Progress("comparing depth with the board", DEPTH)
     return RigReport(board, together | _with_depth(nodes, together), rig)
 
 

@@ -19,6 +19,8 @@ from pipeline.types import FloatArray
 MOST_TRIED = 12
 """Moments whose pose of one camera to another is tried on all that both see."""
 APART_RAD = np.radians(20.0)
+LOST_PX = 20.0
+"""An error that no turn of the board explains."""
 TELLING = 1.5
 """By this factor the error of a board turned the other way must be larger, or nothing tells them apart."""
 
@@ -109,7 +111,8 @@ def _linked(
     errors_px = np.array([_error_px(T_a_b, pairs, optics_b, turns) for T_a_b in tried])
     best = tried[int(errors_px.argmin())]
     apart = np.array([rotation_angle_rad(T[:3, :3].T @ best[:3, :3]) > APART_RAD for T in tried])
-    if (errors_px[apart] < TELLING * errors_px.min()).any():
+    told = all(a.oriented and b.oriented for a, b in pairs) or errors_px.min() > LOST_PX
+    if not told and (errors_px[apart] < TELLING * errors_px.min()).any():
         raise ReconstructionError(
             f"{who} see the board together too rarely to tell which way up it was held; show it to both more "
             "often, tilted differently, or use a board with a mark (packetmesh target)"

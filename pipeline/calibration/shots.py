@@ -18,7 +18,7 @@ from pipeline.calibration.board import Board
 from pipeline.config import Pattern
 from pipeline.types import AnyPath
 
-ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
+ENDINGS = (".png", ".jpg", ".jpeg", ".pgm", ".ppm")
 MOST_CAMERAS = 6
 BOARD_FILE = "board.json"
 _LAST_NUMBER = re.compile(r"(\d+)\D*$")

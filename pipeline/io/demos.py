@@ -42,6 +42,10 @@ def board_views_of(scene: str) -> Path | None:
 
     It holds node_00/{color_00.jpg, depth_00.png, ...}, node_01/..., board.json and truth.json; images of
     the same number are of the same moment.
+
+    >>> import packetmesh as pm
+    >>> (pm.board_views_of("uncalibrated") / "node_00" / "color_00.jpg").is_file()
+    True
     """
     folder = SCENES / scene / BOARDS
     return folder if scene in DEMO_SCENES and folder.is_dir() else None

@@ -9,6 +9,7 @@ import pytest
 from app.cli import main
 from pipeline.calibration.board import Board
 from pipeline.io.intrinsics import read_intrinsics
+from pipeline.io.poses import read_pose
 from tests.pipeline.calibration.views import CAMERA, photograph, poses
 
 BOARD = Board("chessboard", 9, 6, 0.025)
@@ -193,3 +194,70 @@ def test_a_wrong_spacing_cannot_be_seen_but_the_distances_can_be_checked(circles
         assert "if that is wrong, so is --spacing-mm" in capsys.readouterr().err
     cameras = [read_intrinsics(tmp_path / mm / "intrinsics.json") for mm in ("35", "70")]
     assert cameras[0].fx_px == pytest.approx(cameras[1].fx_px, rel=1e-4)
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    """Photographs of two cameras of one size, the second 3 cm to the right."""
+    session = tmp_path_factory.mktemp("pair")
+    beside = np.eye(4)
+    beside[0, 3] = -0.03
+    for index, T in enumerate(poses(BOARD, 6)):
+        T[:3, 3] *= 1.25
+        for name, T_camera_first in (("left", np.eye(4)), ("right", beside)):
+            (session / name).mkdir(exist_ok=True)
+            picture = photograph(BOARD, T_camera_first @ T)
+            cv2.imwrite(str(session / name / f"{name}{index}.png"), picture)
+    (session / "board.json").write_text(
+        '{"pattern": "chessboard", "columns": 9, "rows": 6, "spacing_mm": 25}'
+    )
+    return session
+
+
+def test_two_folders_are_two_cameras_and_their_calibration_is_laid_over_a_rig(pair, tmp_path, capsys):
+    out = tmp_path / "cal"
+    main(["calibrate", str(pair / "left"), str(pair / "right"), "--out", str(out), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert told == json.loads((out / "metrics.json").read_text())
+    assert {"cameras", "extrinsics", "rms_px", "held_out_rms_px"} <= told.keys()
+    assert list(told["cameras"]) == ["node_00", "node_01"]
+    assert {"rms_px", "matrix", "standard_errors", "views", "trust"} <= told["cameras"]["node_01"].keys()
+    (pose,) = told["extrinsics"]
+    assert (pose["camera"], pose["reference"], pose["moments"]) == ("node_01", "node_00", 6)
+    assert pose["baseline_m"] == pytest.approx(0.03, abs=0.001)
+    assert pose["rotation_deg"] < 0.1
+    first, second = (read_pose(out / name / "pose.txt") for name in ("node_00", "node_01"))
+    np.testing.assert_allclose((np.linalg.inv(first) @ second)[:3, 3], (0.03, 0.0, 0.0), atol=0.001)
+    assert read_intrinsics(out / "node_01" / "intrinsics.json").fx_px == pytest.approx(CAMERA.fx_px, rel=0.01)
+    assert (out / "node_01" / "report.html").is_file()
+
+
+def test_two_cameras_in_words(pair, tmp_path, capsys):
+    main(["calibrate", str(pair / "left"), str(pair / "right"), "--out", str(tmp_path / "cal")])
+    said = capsys.readouterr().err
+    assert "node_01 from node_00: turned by" in said
+    assert "6 moments in common" in said
+    assert "at moments that it has not seen" in said
+
+
+def test_cameras_that_cannot_be_placed_are_one_sentence_and_leave_no_folder(pair, tmp_path, capsys):
+    out = ["--out", str(tmp_path / "cal")]
+    session = tmp_path / "session"
+    for name, first in (("left", 0), ("right", 10)):
+        (session / name).mkdir(parents=True)
+        for index in range(4):
+            picture = (pair / name / f"{name}{index}.png").read_bytes()
+            (session / name / f"{first + index}.png").write_bytes(picture)
+    folders = [str(session / "left"), str(session / "right")]
+    assert "node_01 never sees the board at a moment" in failure(
+        ["calibrate", *folders, *ASKED, *out], capsys
+    )
+    (session / "empty").mkdir()
+    empty = ["calibrate", folders[0], str(session / "empty"), *ASKED, *out]
+    assert "holds no image of a camera" in failure(empty, capsys)
+    (session / "node_00").mkdir()
+    (session / "node_00" / "0.png").write_bytes((session / "left" / "0.png").read_bytes())
+    assert "holds one camera only" in failure(["calibrate", str(session), *ASKED, *out], capsys)
+    like = ["calibrate", *folders, *ASKED, "--like", str(tmp_path), *out]
+    assert "has no node_00/pose.txt" in failure(like, capsys)
+    assert not (tmp_path / "cal").exists()

@@ -7,12 +7,10 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
+from lab.worlds.printed import printed, sheet_px
 from pipeline.calibration.board import Board
-from pipeline.calibration.target import picture_of, place_of_first_mm, sheet
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
-PIXEL_MM = 0.25
-"""Of the print that is looked at."""
 OVER = 3
 """Rays along either side of a pixel, which is their mean."""
 DESK = 205
@@ -30,23 +28,15 @@ def seen_px(board: Board, T_camera_board: FloatArray, camera: CameraIntrinsics) 
 
 def photograph(board: Board, T_camera_board: FloatArray, camera: CameraIntrinsics) -> ByteArray:
     """(H, W) grey picture of the printed sheet on a desk."""
-    print_ = _print(board)
     T = T_camera_board
     plane = np.column_stack([T[:3, 0], T[:3, 1], T[:3, 3]])
     lens = (*camera.matrix.ravel().tolist(), *camera.distortion.tolist())
     on_board = np.linalg.solve(plane, _rays(lens, camera.width_px, camera.height_px))
-    flat_mm = 1000.0 * (on_board[:2] / on_board[2]).T
-    first_mm = 1000.0 * board.points_m[0, :2]
-    at_px = (flat_mm - first_mm + place_of_first_mm(board)) / PIXEL_MM - 0.5
+    at_px = sheet_px(board, (on_board[:2] / on_board[2]).T)
     shape = (OVER * camera.height_px, OVER * camera.width_px)
     x, y = (column.reshape(shape).astype(np.float32) for column in at_px.T)
-    fine = cv2.remap(print_, x, y, cv2.INTER_LINEAR, borderValue=DESK)
+    fine = cv2.remap(printed(board), x, y, cv2.INTER_LINEAR, borderValue=DESK)
     return cv2.resize(fine, (camera.width_px, camera.height_px), interpolation=cv2.INTER_AREA)
-
-
-@lru_cache(4)
-def _print(board: Board) -> ByteArray:
-    return picture_of(sheet(board), PIXEL_MM)
 
 
 @lru_cache(2)

@@ -3,17 +3,22 @@
 import numpy as np
 import pytest
 
+from lab.claims.calibration.photograph import photograph
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
+from pipeline.calibration.board import Board
 from pipeline.calibration.rig_from_images import iterate_rig_calibration
-from pipeline.calibration.rig_report import pose_like, write_rig_folder
+from pipeline.calibration.rig_report import pose_like, rig_metrics, write_rig_folder
 from pipeline.calibration.shots import board_beside, node_shots
-from pipeline.geometry import inverse, rotation_angle_rad
+from pipeline.geometry import inverse, rigid, rotation_angle_rad, rotation_exp
+from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import write_color
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.poses import read_pose
 from pipeline.io.rigs import LEVEL_POSE, load_rig
+from pipeline.types import CameraIntrinsics
 from tests.paths import ASSETS
+from tests.pipeline.calibration.views import CAMERA, poses
 
 RIG = ASSETS / "scenes" / "uncalibrated"
 SESSION = RIG / "board"
@@ -43,7 +48,7 @@ def test_their_lenses_are_those_that_took_the_photographs(report):
 
 
 def test_moments_that_were_held_out_are_predicted(report):
-    metrics = report.metrics()
+    metrics = rig_metrics(report)
     assert metrics["rms_px"] < metrics["held_out_rms_px"] < 1.5 * metrics["rms_px"] < 0.1
     for name, camera in metrics["cameras"].items():
         assert camera["held_out_rms_px"] < 0.1, name
@@ -73,6 +78,21 @@ def test_the_folder_is_laid_over_the_rig_in_its_own_world(report, tmp_path):
     )
 
 
+def test_depth_is_corrected_by_the_same_boards(report, tmp_path):
+    write_rig_folder(report, tmp_path, pose_like(RIG, "node_00"))
+    assert all(one.depth is not None for one in report.cameras.values())
+
+    def off_m(rig):
+        return [
+            abs(float(np.nanmedian(frame.depth.z_m - true.z_m)))
+            for frame, true in zip(rig.frames, rig.truth.depth, strict=True)
+        ]
+
+    before_m, after_m = off_m(load_rig(RIG)), off_m(load_rig(RIG, tmp_path))
+    assert max(before_m) > 0.02
+    assert max(after_m) < 0.3 * max(before_m)
+
+
 def test_without_a_rig_the_first_camera_stands_level(report, tmp_path):
     write_rig_folder(report, tmp_path)
     np.testing.assert_array_equal(read_pose(tmp_path / "node_00" / "pose.txt"), LEVEL_POSE)
@@ -92,3 +112,29 @@ def test_what_is_wrong_with_one_camera_names_it(tmp_path):
         drain(iterate_rig_calibration(node_shots([tmp_path]), board))
     with pytest.raises(InputError, match=r"^node_09/color_00\.jpg is none of the cameras' images"):
         drain(iterate_rig_calibration(node_shots([tmp_path]), board, without=["node_09/color_00.jpg"]))
+
+
+def test_a_separate_depth_camera_is_placed_beside_its_colour_camera(tmp_path):
+    """A colour camera, and 4 cm to its left an infrared one of half the size."""
+    board = Board("chessboard", 9, 6, 0.025)
+    half = CameraIntrinsics.pinhole(300.0, 302.0, 159.0, 121.0, 320, 240)
+    T_infrared_color = rigid(rotation_exp(np.array([0.0, 0.02, 0.0])), np.array([0.04, 0.0, 0.0]))
+    node = tmp_path / "node_00"
+    for index, T in enumerate(poses(board, 6)):
+        T[:3, 3] *= 1.3
+        for kind, picture in (
+            ("color", photograph(board, T, CAMERA)),
+            ("infrared", photograph(board, T_infrared_color @ T, half)),
+        ):
+            write_color(node / f"{kind}_{index:02d}.png", np.repeat(picture[..., None], 3, axis=2))
+    report = drain(iterate_rig_calibration(node_shots([tmp_path]), board))
+    assert list(report.cameras) == ["node_00", "node_00/infrared"]
+    write_rig_folder(report, tmp_path / "cal")
+    names = {path.name for path in (tmp_path / "cal" / "node_00").iterdir()}
+    assert {"intrinsics.json", "depth_intrinsics.json", "extrinsics.json", "pose.txt"} <= names
+    assert read_intrinsics(tmp_path / "cal/node_00/depth_intrinsics.json").fx_px == pytest.approx(
+        300.0, rel=0.01
+    )
+    T = read_extrinsics(tmp_path / "cal/node_00/extrinsics.json") @ T_infrared_color
+    assert np.degrees(rotation_angle_rad(T[:3, :3])) < 0.2
+    assert np.linalg.norm(T[:3, 3]) < 0.002

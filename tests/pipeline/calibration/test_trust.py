@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from packetmesh.errors import InputError
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import View, calibrate, settle
 from pipeline.calibration.lens import Optics
@@ -106,3 +106,8 @@ def test_impossible_ranges_and_too_few_views_are_told():
             projected_sd_px(found, range_m)
     with pytest.raises(InputError, match="5 views cannot be halved"):
         half_difference_px(views(0.2, 0, 5), SIZE, 2.0)
+
+
+def test_halves_that_determine_no_lens_say_nothing():
+    with pytest.raises(ReconstructionError, match="Half of the views do not determine this lens"):
+        half_difference_px(views(0.2, 1, 7), SIZE, 2.0, "rational")

@@ -1,0 +1,66 @@
+"""Calibration in one call: of one camera, and of several."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from packetmesh.progress import drain
+from pipeline.calibration.board import Board
+from pipeline.calibration.from_images import CameraReport, image_files, iterate_calibration
+from pipeline.calibration.rig_from_images import RigReport, iterate_rig_calibration
+from pipeline.calibration.shots import board_beside, node_shots
+from pipeline.config import Lens
+from pipeline.types import AnyPath
+
+
+def calibrate(
+    images: Sequence[AnyPath], board: Board | None = None, lens: Lens = "thesis", held_out: int = 2
+) -> CameraReport:
+    """Estimate one camera from images of a board.
+
+    Args:
+        images: three or more, the board tilted to all sides: files, folders, or patterns such as "left*.jpg".
+        board: what they show; None is that of a board.json beside them, or else the thesis's.
+        lens: which distortions the camera may have.
+        held_out: in how many turns images are left out and predicted; 0 leaves out none.
+
+    Raises:
+        InputError: unreadable images, several sizes, or the board in too few of them.
+        ReconstructionError: the images do not determine the lens.
+
+    >>> import packetmesh as pm
+    >>> report = pm.calibrate([pm.board_views_of("uncalibrated") / "node_00"], held_out=0)
+    >>> round(report.intrinsics.fx_px), report.calibration.rms_px < 0.1
+    (542, True)
+    """
+    files = image_files([str(word) for word in images])
+    asked = board_beside(images) if board is None else board
+    return drain(iterate_calibration(files, asked, lens, held_out))
+
+
+def calibrate_cameras(
+    folders: Sequence[AnyPath], board: Board | None = None, lens: Lens = "thesis", held_out: int = 2
+) -> RigReport:
+    """Estimate several cameras, and where they stand, from images of a board at shared moments.
+
+    Args:
+        folders: one with node_00, node_01 and so on, or one for each camera; images of the same number are of
+            the same moment.
+        board: what they show; None is that of a board.json beside them, or else the thesis's.
+        lens: which distortions the cameras may have.
+        held_out: in how many turns moments are left out and predicted; 0 leaves out none.
+
+    Raises:
+        InputError: as ``calibrate``, too many cameras, or some that never see the board together.
+        ReconstructionError: the images do not determine the lenses or the poses.
+
+    >>> import packetmesh as pm
+    >>> boards = pm.board_views_of("uncalibrated")
+    >>> report = pm.calibrate_cameras([boards / "node_00", boards / "node_01"], held_out=0)
+    >>> pose = report.rig.relative("node_01")
+    >>> round(pose.rotation_deg), round(pose.baseline_m, 2)
+    (25, 0.93)
+    >>> pm.write_calibration("calibration", report.nodes())
+    """
+    asked = board_beside(folders) if board is None else board
+    return drain(iterate_rig_calibration(node_shots(folders), asked, lens, held_out))
