@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.claims import outliers
+from lab.claims.calibration import biased_sensors
 from lab.claims.calibration.box_claim import C25
 from lab.claims.calibration.claims import CLAIMS as CALIBRATION
 from lab.claims.claim import Claim, Verdict
@@ -32,6 +33,7 @@ _ALL: tuple[Claim, ...] = (
     C25,
     *(*link.CLAIMS, *street.CLAIMS, *radio.CLAIMS, *selection.CLAIMS),
     *(*DELIVERY, pieces.D07, cameras.D08),
+    biased_sensors.D09,
 )
 CLAIMS = {claim.id: claim for claim in sorted(_ALL, key=lambda claim: claim.id)}
 """By number in SPEC 8, in its order."""

@@ -34,6 +34,18 @@ WIDTH = sum(len(columns) for columns in GROUPS.values())
 
 
 @dataclass(frozen=True, slots=True)
+class BiasPoints:
+    """What each of V views says of the bias, on paper."""
+
+    z_m: FloatArray
+    """(V,) mean measured depth."""
+    before_m: FloatArray
+    """(V,) mean of measured less true depth."""
+    after_m: FloatArray
+    """(V,) the same when corrected."""
+
+
+@dataclass(frozen=True, slots=True)
 class DepthFit:
     """A correction and what speaks for it."""
 
@@ -50,12 +62,24 @@ class DepthFit:
     rms_after_m: float
     scale_focal_correlation: float | None
     """Of the scale's error with the focal length's; None without a scale."""
+    points: BiasPoints
+    """What the terms go through."""
     noise_points: NoisePoints
     """What the noise law goes through."""
     ink_offset_m: tuple[float, float] | None
     """Mean of measured less true depth on black less that on white, corrected, and its standard error."""
     note: str
     """Which terms the views cannot tell apart, and what to take; empty if they can."""
+
+    def bias_m(self, z_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(N,) measured less true depth at (N,) measured ones, the map aside, and its standard error."""
+        powers = {"offset": np.ones_like(z_m), "scale": z_m, "curvature": z_m**2}
+        used = [powers[term] for term in self.terms if term in powers]
+        columns = np.array(used).reshape(len(used), len(z_m))
+        variance_m2 = np.einsum("in,ij,jn->n", columns, self.covariance[: len(used), : len(used)], columns)
+        plain = self.correction
+        off_m = plain.offset_m + (plain.scale - 1.0) * z_m + plain.curvature_per_m * z_m**2
+        return -off_m, np.sqrt(variance_m2)
 
     def metrics(self) -> dict[str, Any]:
         """The block ``depth`` of ``packetmesh calibrate --json``."""
@@ -121,9 +145,19 @@ def fit_depth(samples: DepthSamples) -> DepthFit:
         rms_before_m=problem.rms_m(problem.y_m),
         rms_after_m=problem.rms_m(problem.residuals_m(columns)),
         scale_focal_correlation=_with_focal(problem, terms, samples.lens_focal),
+        points=_points(paper, problem, correction),
         noise_points=points,
         ink_offset_m=_ink_offset_m(samples, correction),
         note=choice.note,
+    )
+
+
+def _points(samples: DepthSamples, problem: Problem, correction: DepthCorrection) -> BiasPoints:
+    corrected_m = correction.corrected_m(samples.measured_m, samples.pixels)
+    return BiasPoints(
+        problem.mean_by_view(samples.measured_m),
+        problem.mean_by_view(samples.measured_m - samples.true_m),
+        problem.mean_by_view(corrected_m - samples.true_m),
     )
 
 

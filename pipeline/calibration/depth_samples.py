@@ -19,7 +19,7 @@ RIM_PX = 3
 """So near to the rim of the board's points no pixel is taken: there a sensor mixes board and background."""
 INK_PX = 1.0
 """Black is taken to be wider by so much: at its border a pixel has some of both."""
-MOST_PER_VIEW, FEWEST = 1500, 100
+MOST_PER_VIEW, FEWEST = 600, 100
 """Pixels of one view that are used, evenly spread, and those without which a view is none."""
 GATE_SDS, LEAST_GATE_M = 6.0, 0.02
 """Beyond so many robust standard deviations from its view's median a pixel shows a hand or the background."""

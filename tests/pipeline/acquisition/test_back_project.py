@@ -5,8 +5,10 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.acquisition import back_project, depth_sigma_m
+from pipeline.config import RegistrationConfig
 from pipeline.geometry import project
-from pipeline.types import CameraIntrinsics, DepthMap, PointSource, RgbdFrame
+from pipeline.registration.ceicp import CeicpA
+from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, PointSource, RgbdFrame
 
 WIDTH_PX, HEIGHT_PX = 64, 48
 
@@ -82,3 +84,13 @@ def test_relative_depth_is_refused():
     frame = _frame(_holed_depth())
     with pytest.raises(InputError, match="relative"):
         back_project(frame, replace(frame.depth, kind="relative"))
+
+
+def test_a_calibrated_sensor_s_noise_is_that_of_its_points_and_widens_the_last_scale_of_registration():
+    frame = _frame(_holed_depth())
+    noise = DepthNoise(0.004, 0.05, 2.0, 0.5)
+    cloud = back_project(replace(frame, noise=noise))
+    np.testing.assert_allclose(cloud.sigma_m, noise.sd_m(cloud.points_m[:, 2]))
+    np.testing.assert_array_equal(cloud.points_m, back_project(frame).points_m)
+    smallest_m = CeicpA.starting(RegistrationConfig(), cloud, cloud).sigma_min_m
+    assert smallest_m == np.median(cloud.sigma_m)
