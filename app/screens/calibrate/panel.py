@@ -53,7 +53,7 @@ class CalibratePanel(Panel):
         """Verdict, camera, bars, views, the split picture, the stage; numbers; the rest in folders."""
         gui, ui = self.gui, self.ui
         self._source = inner(self.session.spec.source)
-        self._here, self._own = False, False
+        self._here = self._had_views = False
         self._view: CalibrationView | None = None
         self._whole: dict[str, CameraView] = {}
         """Every camera before a view of it was dropped."""
@@ -131,9 +131,8 @@ class CalibratePanel(Panel):
         self._here = False
 
     def _use_own(self, views: BoardViews | None) -> None:
-        """Take the photographs of the person, or those of the scene."""
-        self._own = views is not None
-        if views is None and isinstance(self._source, Demo):
+        """Take the photographs of the person, or those of the scene, once somebody looks."""
+        if views is None and self._here and isinstance(self._source, Demo):
             folder = board_views_of(self._source.name)
             views = None if folder is None else views_in(folder)
         self._want(views)
@@ -144,18 +143,21 @@ class CalibratePanel(Panel):
     def _want(self, views: BoardViews | None) -> None:
         if views is not None:
             views = replace(views, lens=self._lens.value)
-        self.session.want(replace(self.session.spec, views=views))
+        if views != self.session.spec.views:
+            self.session.want(replace(self.session.spec, views=views))
         self._show_camera()
 
     def on_spec(self, spec: Spec) -> None:
         """Another scene has other cameras; what is replayed belongs to the views before."""
-        if inner(spec.source) != self._source:
-            self._source = inner(spec.source)
+        moved, taken = inner(spec.source) != self._source, self._had_views and spec.views is None
+        self._had_views = spec.views is not None
+        if moved or taken:
             self._view, self._whole = None, {}
+        if moved:
+            self._source = inner(spec.source)
             self._use.forget()
-            self.ui.post(self._want, None)
-        if spec.views is None and self._here:
-            self.ui.post(self.on_show)
+        if moved or taken:
+            self.ui.post(self._use_own, None)
         if not self.session.results.fresh("calibrate", spec):
             self._noise.forget()
 
