@@ -71,7 +71,7 @@ def calibrated(camera: BoardCamera, seed: int) -> tuple[CameraIntrinsics, DepthC
         save_board_views(Path(folder), views)
         found = drain(iterate_calibration(image_files([f"{folder}/node_00/color_*.jpg"]), BOARD))
     depths = [_depth_of(views, view.name) for view in found.views]
-    samples = board_depth_samples(found.views, depths, found.calibration, BOARD)
+    samples = board_depth_samples(found.calibration, depths, BOARD)
     return found.intrinsics, fit_depth(samples).correction
 
 
