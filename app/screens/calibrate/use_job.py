@@ -14,7 +14,7 @@ from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.io.calibrations import CalibratedNode, write_calibration
-from pipeline.io.depth_correction import FILE_NAME, write_depth_correction
+from pipeline.io.depth_correction import DEPTH_CORRECTION, write_depth_correction
 from pipeline.sources import Calibrated
 from pipeline.types import CameraIntrinsics, FloatArray, Rig
 
@@ -50,7 +50,7 @@ def use_job(store: Store, spec: Spec, folder: str) -> Generator[Progress, None, 
     for index, camera in enumerate(cameras):
         found = yield from bias_of(store, views, camera, index / len(cameras))
         if not isinstance(found, str):
-            write_depth_correction(Path(folder) / camera.name / FILE_NAME, found.correction)
+            write_depth_correction(Path(folder) / camera.name / DEPTH_CORRECTION, found.correction)
     return folder
 
 
