@@ -10,7 +10,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
-from pipeline.calibration.estimate import Calibration, FittedView, settle
+from pipeline.calibration.estimate import Calibration, FittedView, pose_of
 from pipeline.calibration.lens import Optics
 from pipeline.geometry import apply, inverse
 from pipeline.types import BoolArray, DepthMap, FloatArray, IntArray
@@ -89,11 +89,11 @@ def board_depth_samples(
         InputError: no depth where the board is, depth images of another size or in another unit.
     """
     parts: list[DepthSamples] = []
-    lenses = _lenses(calibration)
+    lenses, errors = _lenses(calibration), _errors(calibration)
     for view, depth in zip(calibration.views, depths, strict=True):
         if depth is None:
             continue
-        part = _samples_of(view, depth, calibration.size_px, lenses, board, len(parts))
+        part = _samples_of(view, depth, calibration.size_px, lenses, errors, board, len(parts))
         if len(part) >= FEWEST:
             parts.append(part)
     if not parts:
@@ -115,14 +115,18 @@ def board_depth_samples(
     )
 
 
+def _errors(calibration: Calibration) -> FloatArray:
+    """(P, P) one standard deviation of each independent error of the lens, by the row of its parameters."""
+    variances, directions = np.linalg.eigh(calibration.covariance)
+    return directions * np.sqrt(np.maximum(variances, 0.0))
+
+
 def _lenses(calibration: Calibration) -> list[Optics]:
     """The lens, then the same with one standard deviation of each independent error."""
-    variances, directions = np.linalg.eigh(calibration.covariance)
-    steps = directions * np.sqrt(np.maximum(variances, 0.0))
     names, known = list(calibration.parameters), calibration.distortion.ravel()
     rows = [names.index(name) for name in calibration.names]
     lenses = []
-    for step in (np.zeros(len(rows)), *steps.T):
+    for step in (np.zeros(len(rows)), *_errors(calibration).T):
         values = np.array([*calibration.parameters.values()])
         values[rows] += step
         matrix = np.array([[values[0], 0.0, values[2]], [0.0, values[1], values[3]], [0.0, 0.0, 1.0]])
@@ -136,6 +140,7 @@ def _samples_of(
     depth: DepthMap,
     size_px: tuple[int, int],
     lenses: Sequence[Optics],
+    errors: FloatArray,
     board: Board,
     index: int,
 ) -> DepthSamples:
@@ -153,8 +158,8 @@ def _samples_of(
     kept = _gate(view.name, measured_m, true_m)
     pixels, measured_m, rays, true_m = pixels[kept], measured_m[kept], rays[kept], true_m[kept]
     moved_m = [
-        _plane_m(settle(view.board_m, view.points_px, T, one), _rays(one, pixels)) - true_m
-        for one in lenses[1:]
+        _plane_m(moved, _rays(one, pixels)) - true_m
+        for one, moved in zip(lenses[1:], _moved_boards(view, lens, errors), strict=True)
     ]
     focal_px = float(lens.matrix[0, 0])
     return DepthSamples(
@@ -169,6 +174,14 @@ def _samples_of(
         lens_m=np.array(moved_m).reshape(len(moved_m), len(pixels)),
         lens_focal=np.array([float(one.matrix[0, 0]) / focal_px - 1.0 for one in lenses[1:]]),
     )
+
+
+def _moved_boards(view: FittedView, lens: Optics, errors: FloatArray) -> list[FloatArray]:
+    """(4, 4) where the board seems to be by each error of the lens, to first order."""
+    told = lens.linearised(view.board_m, view.T_camera_board)
+    steps = -np.linalg.lstsq(told.by_pose, told.by_lens @ errors, rcond=None)[0]
+    turn, move = cv2.Rodrigues(view.T_camera_board[:3, :3])[0].ravel(), view.T_camera_board[:3, 3]
+    return [pose_of(turn + step[:3], move + step[3:]) for step in steps.T]
 
 
 def _rays(lens: Optics, pixels: IntArray) -> FloatArray:

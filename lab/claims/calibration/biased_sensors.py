@@ -47,7 +47,7 @@ VIEWS, CORNER_PX, AWAY_M = 24, 0.2, (0.5, 1.7)
 BEHIND_M, WALL = 0.7, 0.6
 """How far behind the board's middle there is a wall, and what share of infrared it gives back."""
 METHOD = tuned(Entrant("ceicp-a", "plane"))
-DRAWS = 4
+DRAWS = 8
 """Random subsets of the points that are registered in each room: which ones are drawn moves the error of a
 room from a quarter of a centimetre to more than one, whatever the sensors."""
 CASES = ("unbiased", "unbiased, calibrated", "biased", "biased, calibrated")
