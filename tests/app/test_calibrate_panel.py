@@ -116,7 +116,6 @@ def test_both_cameras_are_found_within_their_intervals(screen):
         found = camera.calibration
         for name, value in (("fx", true.fx_px), ("cx", true.cx_px), ("k1", true.distortion[0])):
             assert abs(found.parameters[name] - value) < 5.0 * found.standard_errors[name]
-        assert camera.truth["fx"] == true.fx_px
     placed = view.rig.cameras[1].T_first_camera
     true = np.linalg.inv(T_WORLD_CAMERA[0]) @ T_WORLD_CAMERA[1]
     assert np.abs(placed - true).max() < 0.003
@@ -255,9 +254,9 @@ def test_an_upload_that_cannot_be_used_is_a_sentence(server, store, rig, tmp_pat
 
 def test_a_zip_does_not_reach_out_of_its_folder(server, store, rig, boards, tmp_path):
     bench = empty(server, store, rig, tmp_path)
-    content = io.BytesIO()
+    content, picture = io.BytesIO(), (boards / "node_00/color_00.png").read_bytes()
     with zipfile.ZipFile(content, "w") as archive:
-        archive.write(boards / "node_00/color_00.png", "../../node_01/../evil.png")
+        archive.writestr(zipfile.ZipInfo("../../node_01/../evil.png"), picture)
     bench.gui.upload("Photograph or ZIP …", "evil.zip", content.getvalue())
     written = [path.relative_to(tmp_path) for path in tmp_path.rglob("*.png")]
     assert [str(path) for path in written] == ["photographs_000/node_01/evil.png"]

@@ -73,7 +73,8 @@ def noise_job(
     empty = NoiseView(request, true.names, np.array([true.parameters[name] for name in true.names]))
     trials, told_s = _Trials(), time.monotonic()
     for trial in range(request.trials):
-        _repeat(trials, true, _with_noise(exact, request.sigma_px, trial), trial % HALVED == 0)
+        halves = request.sigma_px > 0.0 and trial % HALVED == 0
+        _repeat(trials, true, _with_noise(exact, request.sigma_px, trial), halves)
         if time.monotonic() - told_s > SHOW_S:
             told_s = time.monotonic()
             yield Progress(f"trial {trial + 1} of {request.trials}", (trial + 1) / request.trials)
@@ -112,7 +113,7 @@ def _repeat(trials: _Trials, true: Calibration, noisy: Sequence[View], halves: b
     trials.found.append([one.parameters[name] for name in one.names])
     trials.covariances.append(one.covariance)
     trials.rms_px.append(one.rms_px)
-    if halves and one.rms_px > 1e-6:
+    if halves:
         try:
             apart = half_difference_px(noisy, true.size_px, AT_M, true.lens)
         except PacketMeshError:  # too few views for halves

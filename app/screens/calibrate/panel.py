@@ -346,8 +346,7 @@ class CalibratePanel(Panel):
         with self.ui.atomic():
             self._area.set(look.pair, look.split_share)
             self._around.value = next(name for name, key in AROUND.items() if key == look.around)
-            if look.range_m is not None:
-                self._judge.set(look.range_m)
+            self._judge.set(look.range_m)
             if self._lens.value != look.lens:
                 self._lens.value, self._whole = look.lens, {}
             self._noise.forget()

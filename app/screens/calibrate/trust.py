@@ -14,7 +14,8 @@ from app.tables import number, table
 from app.ui import Ui
 
 REST_S = 0.3
-WAITING = "Judging …"
+OWN_M = 2.0
+"""Range until a scene says another."""
 CURVES = {"distortion": "How far the lens moves a point", "left": "What it leaves along the radius"}
 
 
@@ -24,12 +25,13 @@ class TrustFolder:
     def __init__(self, ui: Ui, on_ask: Callable[[], None]) -> None:
         """Add the folder; ``on_ask`` is called when the camera is to be judged anew."""
         self._view: TrustView | None = None
+        self._own_m = OWN_M
         self._resting = ui.debounce(REST_S, on_ask)
         gui = ui.gui
         with gui.add_folder("Good enough for what?", expand_by_default=False):
             gui.add_markdown("Say how far away things will be, and how well they are to be placed there.")
             self._range = gui.add_slider(
-                "Range (m)", 0.3, 6.0, 0.1, 2.0, hint="Distance of what will be measured, from the camera."
+                "Range (m)", 0.3, 6.0, 0.1, OWN_M, hint="Distance of what will be measured, from the camera."
             )
             self._accuracy = gui.add_slider(
                 "Accuracy (mm)",
@@ -57,11 +59,12 @@ class TrustFolder:
 
     def at_range(self, ranges_m: Sequence[float]) -> None:
         """Ask for the middle of these distances."""
-        self._range.value = round(sum(ranges_m) / len(ranges_m), 1)
+        self._own_m = round(sum(ranges_m) / len(ranges_m), 1)
+        self.set(None)
 
-    def set(self, range_m: float) -> None:
-        """Choose for the person."""
-        self._range.value = range_m
+    def set(self, range_m: float | None) -> None:
+        """Choose for the person; None takes the scene's own distance."""
+        self._range.value = self._own_m if range_m is None else range_m
 
     def load(self, view: TrustView | None) -> None:
         """Show the answer; None where there is none."""
