@@ -18,6 +18,7 @@ from app.drawing.colors import BRAND
 from app.jobs import warm_up
 from app.origin import only_own_page
 from app.pool import ComputePool
+from app.screens.calibrate.panel import CalibratePanel
 from app.screens.depth.panel import DepthPanel
 from app.screens.export.panel import ExportPanel
 from app.screens.fuse.panel import FusePanel
@@ -32,7 +33,7 @@ from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Demo, RigFolder
 
 PANEL_WIDTH_PX = 440
-PANELS = (ScenePanel, DepthPanel, FusePanel, SurfacePanel, NetworkPanel, ExportPanel)
+PANELS = (ScenePanel, CalibratePanel, DepthPanel, FusePanel, SurfacePanel, NetworkPanel, ExportPanel)
 """The steps of the app, in their order."""
 
 

@@ -74,6 +74,7 @@ class Session:
         self.folder = Path(tempfile.mkdtemp(prefix="upload-", dir=store.folder))
         self._tracks = (
             _Track(LatestWins(pool, self), CHAIN),
+            _Track(LatestWins(pool, object()), ("calibrate",)),
             _Track(LatestWins(pool, object()), ("network",)),
         )
         self._side = LatestWins(pool, self)

@@ -11,13 +11,14 @@ from typing import Any, Literal
 from app.records import Shown
 from network_sim.config import NetworkConfig
 from pipeline import spec
+from pipeline.config import Lens, Pattern
 from pipeline.spec import StageName
 
-Step = Literal["scene", "depth", "fuse", "surface", "network"]
+Step = Literal["scene", "depth", "fuse", "surface", "calibrate", "network"]
 CHAIN: tuple[Step, ...] = ("scene", "depth", "fuse", "surface")
 """The steps of the chain, each computed from the one before it."""
-STEPS: tuple[Step, ...] = (*CHAIN, "network")
-"""All steps that compute; the network waits for nothing of the chain."""
+STEPS: tuple[Step, ...] = (*CHAIN, "calibrate", "network")
+"""All steps that compute; calibration and network wait for nothing of the chain."""
 StepStatus = Literal["fresh", "stale", "running", "failed", "missing"]
 
 STAGE_OF: Mapping[Step, StageName] = {
@@ -41,6 +42,23 @@ class Sent:
 
 
 @dataclass(frozen=True, slots=True)
+class BoardViews:
+    """Photographs of a board, and what is to be made of them."""
+
+    folder: str
+    """``node_00/color_00.png`` and so on below it, or the photographs of one camera."""
+    edition: int = 0
+    """Counts what was added to the folder."""
+    pattern: Pattern = "circles"
+    columns: int = 11
+    rows: int = 9
+    spacing_m: float = 0.035
+    lens: Lens = "thesis"
+    dropped: tuple[tuple[str, str], ...] = ()
+    """Camera and view of those that are left out, in order."""
+
+
+@dataclass(frozen=True, slots=True)
 class Spec(spec.Spec):
     """Everything that a session asks for."""
 
@@ -50,9 +68,19 @@ class Spec(spec.Spec):
     """Runs of a camera network of its own, beside each other; none until somebody looks."""
     sent: Sent | None = None
     """A delivery of the rig's own images; None until somebody looks."""
+    views: BoardViews | None = None
+    """Photographs to calibrate from; None until somebody looks, or where there are none."""
+
+    def asks_for(self, step: Step) -> bool:
+        """Whether anybody wants the step: those beside the chain wait until somebody looks."""
+        if step == "calibrate":
+            return self.views is not None
+        return step != "network" or bool(self.networks) or self.sent is not None
 
     def key(self, step: Step) -> tuple[Hashable, ...]:
         """What a step's result depends on; equal keys mean equal results."""
+        if step == "calibrate":
+            return (step, self.views)
         if step == "network":
             chain = () if self.sent is None else spec.key(self, "truth")
             return (step, self.networks, self.sent, chain)
@@ -119,7 +147,7 @@ class Results:
     def first_stale(self, spec: Spec, steps: Sequence[Step] = CHAIN) -> Step | None:
         """The next of ``steps`` to compute; None if all are fresh, one failed, or nobody asks for it."""
         for step in steps:
-            if step == "network" and not spec.networks and spec.sent is None:
+            if not spec.asks_for(step):
                 return None
             if not self.fresh(step, spec):
                 return None if self.failure(step, spec) else step

@@ -49,8 +49,9 @@ def _style(current: int, statuses: Sequence[StepStatus | None]) -> str:
     row = "div:has(> .packetmesh-steps) + div"
     rules = [
         f"{row} > div > div:first-child {{ display: none; }}",
+        f"{row} > div > div:last-child > div {{ flex-wrap: nowrap !important; gap: 3px !important; }}",
         f"canvas[data-engine] {{ background: {css(BACKGROUND)} }}",
-        f"{row} button {{ height: 2.2em; padding: 0 0.3em; font-size: 12px; }}",
+        f"{row} button {{ height: 2.2em; padding: 0 0.15em; font-size: 11.5px; }}",
     ]
     for index, status in enumerate(statuses):
         color = COLORS[status] if status is not None else css(BRAND)

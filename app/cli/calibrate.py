@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from app.cli.calibrate_rig import calibrate_cameras, depth_line, several_cameras
 from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
 from pipeline.config import Lens, Pattern
@@ -20,27 +21,30 @@ if TYPE_CHECKING:
 def calibrate(
     images: Annotated[tuple[str, ...], tyro.conf.Positional],
     out: Path,
-    pattern: Pattern = "circles",
-    columns: int = 11,
-    rows: int = 9,
-    spacing_mm: float = 35.0,
+    pattern: Pattern | None = None,
+    columns: int | None = None,
+    rows: int | None = None,
+    spacing_mm: float | None = None,
     lens: Lens = "thesis",
     held_out: int = 2,
     range_m: float = 2.0,
     accuracy_mm: float = 5.0,
     without: tuple[str, ...] = (),
     board_warp: bool = False,
+    like: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Estimate a camera from images of a board, with how sure each number is.
+    """Estimate cameras from images of a board, with how sure each number is.
 
     Args:
         images: Three or more of one camera, the board tilted to all sides: files, a folder, or a pattern in
-            quotes such as "left*.jpg".
+            quotes such as "left*.jpg". Several cameras: a folder each, or one with node_00, node_01 and so
+            on, where images of the same number show the same moment.
         out: Folder for intrinsics.json, which the other commands take, report.html with pictures of all that
             follows, metrics.json, and the same camera as OpenCV, ROS, COLMAP, Kalibr, MATLAB and Open3D have
             it, where they can hold it.
-        pattern: What is printed on the board.
+        pattern: What is printed on the board; this and the next three are, where they are not given, those of
+            a board.json beside the images, or else 11 x 9 circles at 35 mm.
         columns: Circles, or inner corners, in a row.
         rows: How many rows of them.
         spacing_mm: Pitch of the circles, or side of a square; half the pitch in a row if rows are shifted.
@@ -52,30 +56,43 @@ def calibrate(
         accuracy_mm: Within how many millimetres a point must be placed there.
         without: Names of images to leave out, such as those that the command proposes.
         board_warp: Whether to estimate the board's shape, too, and to use it if that predicts images better.
+        like: Several cameras: a rig in whose world they are placed, by the pose of its first node.
         json: Print everything as one JSON object.
     """
     from app.reports.calibration import write_calibration_report
     from packetmesh.errors import InputError
     from packetmesh.files import writable_folder
     from pipeline.calibration.assess import assess
-    from pipeline.calibration.board import Board
     from pipeline.calibration.from_images import image_files, iterate_calibration
     from pipeline.calibration.report import metrics, write_camera_folder
+    from pipeline.calibration.session_depth import depth_beside, fit_session_depth
+    from pipeline.calibration.shots import board_beside
 
-    board = Board(pattern, columns, rows, spacing_mm / 1000.0)
+    board = board_beside(images, pattern, columns, rows, spacing_mm)
     if held_out < 0 or held_out == 1:
         raise InputError(f"--held-out {held_out} leaves no view to predict; try 2, or 0 for none")
+    nodes = several_cameras(images)
+    if nodes:
+        accuracy_m = accuracy_mm / 1000.0
+        calibrate_cameras(nodes, out, board, lens, held_out, range_m, accuracy_m, without, like, json)
+        return
     files = image_files(images)
     report = drain(iterate_calibration(files, board, lens, held_out, without, board_warp), say_progress)
     trust = assess(report.calibration, report.views, board, range_m, accuracy_mm / 1000.0)
+    depth = None
+    try:
+        depth = fit_session_depth(report, beside) if (beside := depth_beside(files)) else None
+    except InputError as error:
+        say(f"depth_correction.json is not written: {error}")
     writable_folder(out)
-    for sentence in write_camera_folder(report, out, trust):
+    for sentence in write_camera_folder(report, out, trust, depth):
         say(sentence)
     write_calibration_report(report, trust, out / "report.html")
     if json:
-        print_json(metrics(report, trust))
+        print_json(metrics(report, trust, depth))
     else:
-        say("\n".join((*_camera_lines(report), *_trust_lines(trust))))
+        of_depth = () if depth is None else (f"Its {depth_line(depth)}",)
+        say("\n".join((*_camera_lines(report), *of_depth, *_trust_lines(trust))))
 
 
 def _camera_lines(report: CameraReport) -> Iterator[str]:

@@ -13,10 +13,9 @@ import numpy as np
 
 from lab.datasets.netpbm import read_netpbm
 from lab.datasets.pair import Load, Pair
-from lab.datasets.projection import nearest_per_pixel
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes, read_text
-from pipeline.geometry import project
+from pipeline.depth_to_color import carried
 from pipeline.types import CameraIntrinsics, FloatArray
 
 METRES_PER_UNIT = 0.000124986647
@@ -49,30 +48,8 @@ def _load(extrinsics: Path, picture: Path, depth: Path) -> Pair:
 def registered(
     z_m: FloatArray, depth_camera: CameraIntrinsics, color_camera: CameraIntrinsics, T_color_depth: FloatArray
 ) -> FloatArray:
-    """(H, W) depth as the colour camera sees it, NaN where it sees no depth pixel.
-
-    Each depth pixel is a small square that covers the colour pixels between its projected corners
-    (librealsense's align): the colour camera's pixels are finer, so that points would leave gaps.
-    """
-    rows, columns = np.nonzero(np.isfinite(z_m))
-    pixels, depths_m = np.stack([columns, rows], axis=1), z_m[rows, columns]
-
-    def seen(offset_px: float) -> FloatArray:
-        points_m = rays(depth_camera, pixels + offset_px) * depths_m[:, None]
-        return points_m @ T_color_depth[:3, :3].T + T_color_depth[:3, 3]
-
-    first, last = (np.ceil(project(color_camera, seen(offset))).astype(int) for offset in (-0.5, 0.5))
-    centre_z_m = seen(0.0)[:, 2]
-    covered, seen_z_m = [], []
-    for du in range(int((last - first)[:, 0].max(initial=0))):
-        for dv in range(int((last - first)[:, 1].max(initial=0))):
-            here = (first[:, 0] + du < last[:, 0]) & (first[:, 1] + dv < last[:, 1])
-            covered.append(first[here] + (du, dv))
-            seen_z_m.append(centre_z_m[here])
-    shape = color_camera.height_px, color_camera.width_px
-    if not covered:
-        return np.full(shape, np.nan, dtype=np.float32)
-    return nearest_per_pixel(np.concatenate(covered), np.concatenate(seen_z_m), shape)
+    """(H, W) depth as the colour camera sees it, NaN where it sees no depth pixel."""
+    return carried(z_m, lambda pixels: rays(depth_camera, pixels), color_camera, T_color_depth)
 
 
 def rays(camera: CameraIntrinsics, pixels: FloatArray) -> FloatArray:

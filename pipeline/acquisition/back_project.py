@@ -43,9 +43,14 @@ def back_project(
         points_m=undistorted_rays(frame.intrinsics, pixels.astype(np.float64)) * z_m[:, None],
         colors=frame.rgb[v, u],
         pixels=pixels,
-        sigma_m=depth_sigma_m(z_m) if source == PointSource.SENSOR else None,
+        sigma_m=_sigma_m(frame, z_m) if source == PointSource.SENSOR else None,
         source=np.full(len(z_m), source, dtype=np.uint8),
     )
+
+
+def _sigma_m(frame: RgbdFrame, z_m: FloatArray) -> FloatArray:
+    """(N,) by the noise that the sensor was found to have, of surfaces seen straight on; else a Kinect's."""
+    return depth_sigma_m(z_m) if frame.noise is None else frame.noise.sd_m(z_m)
 
 
 def depth_sigma_m(z_m: FloatArray) -> FloatArray:

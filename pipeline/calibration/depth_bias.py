@@ -5,14 +5,13 @@ the image, and the noise, with as many terms as held-out views justify (SPEC 1.5
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
 
 from packetmesh.errors import InputError
-from pipeline.calibration.depth_noise import FittedNoise, NoisePoints, fit_noise
+from pipeline.calibration.depth_noise import NoisePoints, noise_ci95, noise_law, noise_points
 from pipeline.calibration.depth_samples import DepthSamples
 from pipeline.calibration.depth_terms import (
     GROUPS,
@@ -23,16 +22,15 @@ from pipeline.calibration.depth_terms import (
     robust_problem,
     rows_of_views,
     separable,
-    solved,
 )
 from pipeline.io.depth_correction import MAP_SHAPE, DepthCorrection
-from pipeline.types import FloatArray, IntArray
+from pipeline.types import DepthNoise, FloatArray
 
 LEAST_VIEWS = 4
-ROUNDS = 2
+ROUNDS = 3
 """Of noise after bias after noise."""
-SCALE, WIDTH = GROUPS["scale"][0], sum(len(columns) for columns in GROUPS.values())
-"""Its column in the design, and how many there are."""
+WIDTH = sum(len(columns) for columns in GROUPS.values())
+"""Of the design."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +60,6 @@ class DepthFit:
     def metrics(self) -> dict[str, Any]:
         """The block ``depth`` of ``packetmesh calibrate --json``."""
         correction = self.correction
-        noise = correction.noise
         values: dict[str, Any] = {
             "offset_m": correction.offset_m,
             "scale": correction.scale,
@@ -73,7 +70,7 @@ class DepthFit:
             "terms": list(self.terms),
             "values": values,
             "ci95": {name: interval.tolist() for name, interval in correction.ci95.items()},
-            "noise_law": None if noise is None else {name: getattr(noise, name) for name in noise.__slots__},
+            "noise_law": None if correction.noise is None else asdict(correction.noise),
             "range_m": list(correction.range_m),
             "rms_before_m": self.rms_before_m,
             "rms_after_m": self.rms_after_m,
@@ -106,57 +103,51 @@ def fit_depth(samples: DepthSamples) -> DepthFit:
             "bias of depth; take more"
         )
     choice = separable(paper)
-    richest = columns_of(choice.richest)
-    residuals_m: FloatArray = paper.true_m - paper.measured_m
+    bias_m: FloatArray = np.zeros(len(paper))
     for _ in range(ROUNDS):
-        noise = fit_noise(paper, residuals_m)
-        problem = robust_problem(paper, noise.law.sd_m(paper.true_m, paper.cosine), richest)
-        residuals_m = problem.residuals_m(richest, problem.solve(richest))
+        points = noise_points(paper, paper.true_m - paper.measured_m - bias_m)
+        noise = noise_law(points)
+        sd_m = noise.sd_m(paper.true_m, paper.cosine)
+        problem = robust_problem(paper, paper.true_m - bias_m, sd_m, choice)
+        bias_m = problem.y_m - problem.residuals_m(columns_of(choice.richest))
     terms, held_out_m = chosen_terms(problem, choice)
     columns = columns_of(terms)
-    x = problem.solve(columns)
-    covariance, correlation = _covariance(paper, problem, columns)
-    correction = _correction(paper, terms, x, covariance, noise)
+    correction = _correction(paper, problem, terms, noise, noise_ci95(points))
     return DepthFit(
         correction=correction,
         terms=terms,
-        covariance=covariance,
+        covariance=problem.covariance(columns),
         held_out_m=held_out_m,
         rms_before_m=problem.rms_m(problem.y_m),
-        rms_after_m=problem.rms_m(problem.residuals_m(columns, x)),
-        scale_focal_correlation=correlation,
-        noise_points=noise.points,
+        rms_after_m=problem.rms_m(problem.residuals_m(columns)),
+        scale_focal_correlation=_with_focal(problem, terms, samples.lens_focal),
+        noise_points=points,
         ink_offset_m=_ink_offset_m(samples, correction),
         note=choice.note,
     )
 
 
-def _covariance(
-    samples: DepthSamples, problem: Problem, columns: IntArray
-) -> tuple[FloatArray, float | None]:
-    """(p, p) of the parameters by the jackknife over views and the lens, and how the scale goes with it."""
-    each = problem.without_each(columns)
-    off = each - each.mean(axis=0)
-    covariance = (len(each) - 1) / len(each) * off.T @ off
-    left, _ = problem.normal(columns)
-    pulls = problem.X[:, columns].T @ (problem.weights[:, None] * samples.lens_m.T)
-    moved = solved(left.sum(axis=0), pulls)
-    covariance = covariance + moved @ moved.T
-    if SCALE not in columns:
-        return covariance, None
-    row = int(np.flatnonzero(columns == SCALE)[0])
-    focal = float(np.linalg.norm(samples.lens_focal))
-    spread = float(np.sqrt(covariance[row, row])) * focal
-    return covariance, float(moved[row] @ samples.lens_focal) / spread if spread > 0.0 else 0.0
+def _with_focal(problem: Problem, terms: tuple[str, ...], lens_focal: FloatArray) -> float | None:
+    """Correlation of the scale's error with the focal length's."""
+    if "scale" not in terms:
+        return None
+    columns = columns_of(terms)
+    row = terms.index("scale")
+    spread = float(np.sqrt(problem.covariance(columns)[row, row])) * float(np.linalg.norm(lens_focal))
+    return float(problem.lens_shifts(columns)[row] @ lens_focal) / spread if spread > 0.0 else 0.0
 
 
 def _correction(
-    samples: DepthSamples, terms: tuple[str, ...], x: FloatArray, covariance: FloatArray, noise: FittedNoise
+    samples: DepthSamples,
+    problem: Problem,
+    terms: tuple[str, ...],
+    noise: DepthNoise,
+    intervals: Mapping[str, FloatArray],
 ) -> DepthCorrection:
     """The terms as a record, with intervals."""
     columns = columns_of(terms)
     values, spread = np.zeros(WIDTH), np.zeros((WIDTH, WIDTH))
-    values[columns], spread[np.ix_(columns, columns)] = x, covariance
+    values[columns], spread[np.ix_(columns, columns)] = problem.solve(columns), problem.covariance(columns)
     on_map = list(GROUPS["map"])
     directions = map_directions()
     coefficients = (directions @ values[on_map]).reshape(MAP_SHAPE)
@@ -167,7 +158,7 @@ def _correction(
         "curvature_per_m": (values[2], spread[2, 2]),
         "map_coefficients": (coefficients, map_variance.reshape(MAP_SHAPE)),
     }
-    wide = float(student.ppf(0.975, len(rows_of_views(samples)) - 1))
+    wide = problem.wide()
     ci95 = {
         name: np.stack([value - wide * np.sqrt(variance), value + wide * np.sqrt(variance)], axis=-1)
         for (name, (value, variance)), term in zip(middle.items(), GROUPS, strict=True)
@@ -179,9 +170,9 @@ def _correction(
         scale=float(1.0 + values[1]),
         curvature_per_m=float(values[2]),
         map_coefficients=coefficients,
-        noise=noise.law,
+        noise=noise,
         range_m=(float(samples.measured_m.min()), float(samples.measured_m.max())),
-        ci95=ci95 | dict(noise.ci95),
+        ci95={**ci95, **intervals},
     )
 
 

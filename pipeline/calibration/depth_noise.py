@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from dataclasses import astuple, dataclass, fields
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from pipeline.calibration.depth_samples import DepthSamples
 from pipeline.types import DepthNoise, FloatArray
 
 PARTS, FEWEST = 4, 60
 """Each view gives so many points to the law, nearest to farthest, of at least so many pixels."""
-MOST_EXPONENT = 5.0
+BENDS = 24
+"""Places along the measured distances where the law may bend."""
+STEEPEST = 4.0
+"""Exponent of the distance: where few distances were measured, a steep law fits noise."""
 CLIP_SDS = 4.0
-RESAMPLES = 200
+RESAMPLES = 100
 LEAST_M = 1e-5
-NAMES = ("s0_m", "s1_m", "p", "q")
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,18 +35,8 @@ class NoisePoints:
     """(K,) of which view."""
 
 
-@dataclass(frozen=True, slots=True)
-class FittedNoise:
-    """A law, and how sure it is."""
-
-    law: DepthNoise
-    ci95: Mapping[str, FloatArray]
-    """(2,) by name: views are drawn anew with repetition."""
-    points: NoisePoints
-
-
-def fit_noise(samples: DepthSamples, residuals_m: FloatArray) -> FittedNoise:
-    """The law max(s0, s1 z^p) / cos(angle)^q.
+def noise_points(samples: DepthSamples, residuals_m: FloatArray) -> NoisePoints:
+    """The noise of each view's parts, nearest to farthest.
 
     Each view's own plane is taken out of its residuals: what the board's pose is off by is no noise.
 
@@ -53,19 +44,6 @@ def fit_noise(samples: DepthSamples, residuals_m: FloatArray) -> FittedNoise:
         samples: the pixels.
         residuals_m: (N,) true less corrected depth.
     """
-    points = _points(samples, residuals_m)
-    law = _law(points)
-    views = np.unique(points.view)
-    rng = np.random.default_rng(0)
-    drawn = []
-    for _ in range(RESAMPLES):
-        rows = np.concatenate([np.flatnonzero(points.view == one) for one in rng.choice(views, len(views))])
-        drawn.append(_values(_law(_select(points, rows))))
-    low, high = np.percentile(drawn, (2.5, 97.5), axis=0)
-    return FittedNoise(law, {name: np.array([low[k], high[k]]) for k, name in enumerate(NAMES)}, points)
-
-
-def _points(samples: DepthSamples, residuals_m: FloatArray) -> NoisePoints:
     rows = []
     for view in np.unique(samples.view):
         mine = np.flatnonzero(samples.view == view)
@@ -89,25 +67,42 @@ def _clipped_sd_m(values_m: FloatArray) -> float:
     return max(float(kept.std()), LEAST_M)
 
 
-def _select(points: NoisePoints, rows: FloatArray) -> NoisePoints:
-    return NoisePoints(points.z_m[rows], points.cosine[rows], points.sd_m[rows], points.view[rows])
+def noise_law(points: NoisePoints) -> DepthNoise:
+    """The law max(s0, s1 z^p) / cos(angle)^q by least squares on its logarithm: near and far count alike.
 
-
-def _law(points: NoisePoints) -> DepthNoise:
-    """Least squares on the logarithm, robust, so that near and far count alike."""
+    It has a bend where s1 z^p reaches s0. For each place that the bend may have it is linear; the one
+    with the smallest squares is taken.
+    """
     log_z, log_cos, log_sd = np.log(points.z_m), np.log(points.cosine), np.log(points.sd_m)
-
-    def errors(x: FloatArray) -> FloatArray:
-        return np.maximum(x[0], x[1] + x[2] * log_z) - x[3] * log_cos - log_sd
-
-    least, middle = float(log_sd.min()), float(np.median(log_sd))
-    start = np.array([least, middle - 2.0 * float(np.median(log_z)), 2.0, 0.5])
-    low = np.array([np.log(LEAST_M), -np.inf, 0.0, 0.0])
-    high = np.array([np.inf, np.inf, MOST_EXPONENT, MOST_EXPONENT])
-    start = np.clip(start, low + 1e-9, high)
-    x = least_squares(errors, start, bounds=(low, high), loss="soft_l1", f_scale=0.2).x
-    return DepthNoise(float(np.exp(x[0])), float(np.exp(x[1])), float(x[2]), float(x[3]))
+    best, least = DepthNoise(LEAST_M, LEAST_M, 0.0, 0.0), np.inf
+    for bend in np.linspace(log_z.min(), log_z.max(), BENDS, endpoint=False):
+        columns = np.column_stack([np.ones(len(log_z)), np.maximum(log_z - bend, 0.0), -log_cos])
+        (log_s0, p, q), squares = _not_negative(columns, log_sd)
+        if squares < least and (p <= STEEPEST or math.isinf(least)):
+            best, least = DepthNoise(math.exp(log_s0), math.exp(log_s0 - p * bend), p, q), squares
+    return best
 
 
-def _values(law: DepthNoise) -> tuple[float, ...]:
-    return law.s0_m, law.s1_m, law.p, law.q
+def _not_negative(columns: FloatArray, values: FloatArray) -> tuple[list[float], float]:
+    """Parameters of (K, 3) columns with the last two not below 0, and what they leave squared."""
+    used = [0, 1, 2]
+    while True:
+        found = np.linalg.lstsq(columns[:, used], values, rcond=None)[0]
+        if found[1:].min(initial=0.0) >= 0.0:
+            x = np.zeros(3)
+            x[used] = found
+            return x.tolist(), float(((values - columns @ x) ** 2).sum())
+        del used[1 + int(np.argmin(found[1:]))]
+
+
+def noise_ci95(points: NoisePoints) -> dict[str, FloatArray]:
+    """(2,) 95 % intervals of the law's parameters by name: views are drawn anew with repetition."""
+    of_views = [np.flatnonzero(points.view == one) for one in np.unique(points.view)]
+    rng = np.random.default_rng(0)
+    drawn = []
+    for _ in range(RESAMPLES):
+        rows = np.concatenate([of_views[one] for one in rng.integers(0, len(of_views), len(of_views))])
+        some = NoisePoints(points.z_m[rows], points.cosine[rows], points.sd_m[rows], points.view[rows])
+        drawn.append(astuple(noise_law(some)))
+    low, high = np.percentile(drawn, (2.5, 97.5), axis=0)
+    return {one.name: np.array([low[k], high[k]]) for k, one in enumerate(fields(DepthNoise))}

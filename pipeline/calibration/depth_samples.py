@@ -10,9 +10,10 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
-from pipeline.calibration.estimate import NAMES, Calibration, View, place
-from pipeline.geometry import inverse, undistorted_rays
-from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, FloatArray, IntArray
+from pipeline.calibration.estimate import Calibration, FittedView, settle
+from pipeline.calibration.lens import Optics
+from pipeline.geometry import apply, inverse
+from pipeline.types import BoolArray, DepthMap, FloatArray, IntArray
 
 RIM_PX = 3
 """So near to the rim of the board's points no pixel is taken: there a sensor mixes board and background."""
@@ -70,7 +71,7 @@ class DepthSamples:
 
 
 def board_depth_samples(
-    views: Sequence[View], depths: Sequence[DepthMap | None], calibration: Calibration, board: Board
+    calibration: Calibration, depths: Sequence[DepthMap | None], board: Board
 ) -> DepthSamples:
     """Measured and true depth of a board.
 
@@ -80,21 +81,19 @@ def board_depth_samples(
     Those on black are marked: their infrared comes back weaker, and the fit leaves them out.
 
     Args:
-        views: the board's points in each image.
-        depths: (H, W) metric depth of each on the image's pixel grid; None where there is none.
-        calibration: the lens, and how sure it is.
+        calibration: the lens, how sure it is, and its views.
+        depths: (H, W) metric depth of each view on the image's pixel grid; None where there is none.
         board: what the views show.
 
     Raises:
         InputError: no depth where the board is, depth images of another size or in another unit.
-        ReconstructionError: no pose of the board explains a view.
     """
     parts: list[DepthSamples] = []
     lenses = _lenses(calibration)
-    for view, depth in zip(views, depths, strict=True):
+    for view, depth in zip(calibration.views, depths, strict=True):
         if depth is None:
             continue
-        part = _samples_of(view, depth, lenses, board, len(parts))
+        part = _samples_of(view, depth, calibration.size_px, lenses, board, len(parts))
         if len(part) >= FEWEST:
             parts.append(part)
     if not parts:
@@ -116,50 +115,48 @@ def board_depth_samples(
     )
 
 
-def _lenses(calibration: Calibration) -> list[CameraIntrinsics]:
+def _lenses(calibration: Calibration) -> list[Optics]:
     """The lens, then the same with one standard deviation of each independent error."""
     variances, directions = np.linalg.eigh(calibration.covariance)
-    steps = (directions * np.sqrt(np.maximum(variances, 0.0))).T
-    columns = [NAMES.index(name) for name in calibration.names]
-    best = np.zeros(len(NAMES))
-    values = list(calibration.parameters.values())
-    best[: len(values)] = values
-    lenses = [best]
-    for step in steps:
-        moved = best.copy()
-        moved[columns] += step
-        lenses.append(moved)
-    return [_camera(one, calibration) for one in lenses]
-
-
-def _camera(values: FloatArray, calibration: Calibration) -> CameraIntrinsics:
-    fx, fy, cx, cy = values[:4]
-    matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-    return CameraIntrinsics(matrix, values[4 : 4 + calibration.distortion.size], *calibration.size_px)
+    steps = directions * np.sqrt(np.maximum(variances, 0.0))
+    names, known = list(calibration.parameters), calibration.distortion.ravel()
+    rows = [names.index(name) for name in calibration.names]
+    lenses = []
+    for step in (np.zeros(len(rows)), *steps.T):
+        values = np.array([*calibration.parameters.values()])
+        values[rows] += step
+        matrix = np.array([[values[0], 0.0, values[2]], [0.0, values[1], values[3]], [0.0, 0.0, 1.0]])
+        distortion = np.concatenate([values[4 : 4 + len(known)], known[len(values) - 4 :]])
+        lenses.append(Optics(calibration.lens, matrix, distortion))
+    return lenses
 
 
 def _samples_of(
-    view: View, depth: DepthMap, lenses: Sequence[CameraIntrinsics], board: Board, index: int
+    view: FittedView,
+    depth: DepthMap,
+    size_px: tuple[int, int],
+    lenses: Sequence[Optics],
+    board: Board,
+    index: int,
 ) -> DepthSamples:
     """Of one view."""
-    lens = lenses[0]
-    size_px = (lens.width_px, lens.height_px)
     if depth.z_m.shape != size_px[::-1]:
         raise InputError(
             f"The depth image of {view.name} has {depth.z_m.shape[1]} x {depth.z_m.shape[0]} pixels and its "
             f"colour image {size_px[0]} x {size_px[1]}; give depth that is registered to the colour images"
         )
-    T = place(view, lens.matrix, lens.distortion).T_camera_board
+    lens, T = lenses[0], view.T_camera_board
     pixels = _pixels_on_board(board, T, lens, depth)
     measured_m = depth.z_m[pixels[:, 1], pixels[:, 0]].astype(np.float64)
-    rays = undistorted_rays(lens, pixels)
+    rays = _rays(lens, pixels)
     true_m = _plane_m(T, rays)
     kept = _gate(view.name, measured_m, true_m)
     pixels, measured_m, rays, true_m = pixels[kept], measured_m[kept], rays[kept], true_m[kept]
-    moved = [
-        _plane_m(place(view, one.matrix, one.distortion).T_camera_board, undistorted_rays(one, pixels))
+    moved_m = [
+        _plane_m(settle(view.board_m, view.points_px, T, one), _rays(one, pixels)) - true_m
         for one in lenses[1:]
     ]
+    focal_px = float(lens.matrix[0, 0])
     return DepthSamples(
         size_px=size_px,
         pixels=pixels,
@@ -167,26 +164,29 @@ def _samples_of(
         true_m=true_m,
         cosine=np.abs(rays @ T[:3, 2]) / np.linalg.norm(rays, axis=1),
         view=np.full(len(pixels), index),
-        ink=_on_ink(board, T, rays * true_m[:, None], INK_PX / lens.fx_px),
+        ink=_on_ink(board, T, rays * true_m[:, None], INK_PX / focal_px),
         names=(view.name,),
-        lens_m=np.array([one - true_m for one in moved]).reshape(len(moved), len(pixels)),
-        lens_focal=np.array([one.fx_px / lens.fx_px - 1.0 for one in lenses[1:]]),
+        lens_m=np.array(moved_m).reshape(len(moved_m), len(pixels)),
+        lens_focal=np.array([float(one.matrix[0, 0]) / focal_px - 1.0 for one in lenses[1:]]),
     )
 
 
-def _pixels_on_board(board: Board, T: FloatArray, lens: CameraIntrinsics, depth: DepthMap) -> IntArray:
-    """(N, 2) pixels with depth inside the board's points and off their rim, evenly thinned."""
+def _rays(lens: Optics, pixels: IntArray) -> FloatArray:
+    """(N, 3) through pixels, scaled to z = 1."""
+    rays = lens.rays(pixels.astype(np.float64))
+    return rays / rays[:, 2:]
+
+
+def _pixels_on_board(board: Board, T: FloatArray, lens: Optics, depth: DepthMap) -> IntArray:
+    """(N, 2) pixels with depth inside the board's points and off their rim."""
     low_m, high_m = board.points_m[:, :2].min(axis=0), board.points_m[:, :2].max(axis=0)
-    along = np.linspace(0.0, 1.0, 16)[:-1]
-    corners = np.array([[low_m[0], low_m[1]], [high_m[0], low_m[1]], high_m, [low_m[0], high_m[1]]])
-    rim = np.concatenate(
-        [a + along[:, None] * (b - a) for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)]
-    )
-    turn = cv2.Rodrigues(T[:3, :3])[0]
-    outline_m = np.column_stack([rim, np.zeros(len(rim))])
-    outline_px, _ = cv2.projectPoints(outline_m, turn, T[:3, 3], lens.matrix, lens.distortion)
+    corners_m = np.array([low_m, (high_m[0], low_m[1]), high_m, (low_m[0], high_m[1])])
+    along = np.linspace(0.0, 1.0, 16, endpoint=False)[:, None]
+    sides = zip(corners_m, np.roll(corners_m, -1, axis=0), strict=True)
+    rim_m = np.concatenate([start + along * (end - start) for start, end in sides])
+    rim_px = lens.project(np.column_stack([rim_m, np.zeros(len(rim_m))]), T)
     inside = np.zeros(depth.z_m.shape, np.uint8)
-    cv2.fillPoly(inside, [np.rint(outline_px).astype(np.int32).reshape(-1, 1, 2)], 1)
+    cv2.fillPoly(inside, [np.rint(rim_px).astype(np.int32).reshape(-1, 1, 2)], 1)
     kernel = np.ones((2 * RIM_PX + 1, 2 * RIM_PX + 1), np.uint8)
     inside = cv2.erode(inside, kernel, borderValue=0)
     v, u = np.nonzero((inside > 0) & depth.valid & (depth.z_m > 0.0))
@@ -218,7 +218,7 @@ def _plane_m(T_camera_board: FloatArray, rays: FloatArray) -> FloatArray:
 
 def _on_ink(board: Board, T_camera_board: FloatArray, points_m: FloatArray, px: float) -> BoolArray:
     """(N,) whether points on the board are black or beside it."""
-    flat = points_m @ inverse(T_camera_board)[:3, :3].T + inverse(T_camera_board)[:3, 3]
+    flat = apply(inverse(T_camera_board), points_m)
     rim_m = px * points_m[:, 2]
     if board.pattern.startswith("circles"):
         apart_m = np.linalg.norm(flat[:, None, :2] - board.points_m[None, :, :2], axis=2).min(axis=1)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import null_space
+from scipy.stats import t as student
 
 from pipeline.calibration.depth_samples import DepthSamples
 from pipeline.io.depth_correction import MAP_SHAPE, map_basis, map_means
@@ -44,9 +45,8 @@ def map_directions() -> FloatArray:
     return null_space(map_means().reshape(1, -1))
 
 
-def design(samples: DepthSamples) -> FloatArray:
-    """(N, 14) what the true depth gains by each parameter: 1, z, z^2 and z s."""
-    z_m = samples.measured_m
+def design(samples: DepthSamples, z_m: FloatArray) -> FloatArray:
+    """(N, 14) what the true depth gains by each parameter at (N,) depth z: 1, z, z^2 and z s."""
     rows, columns = map_basis(samples.size_px, samples.pixels)
     both = np.einsum("nr,nc->nrc", rows, columns).reshape(len(z_m), -1)
     return np.column_stack([np.ones(len(z_m)), z_m, z_m**2, z_m[:, None] * (both @ map_directions())])
@@ -111,18 +111,26 @@ def rows_of_views(samples: DepthSamples) -> list[IntArray]:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """y = X x, with weights: each view is one witness, however large its board appears."""
+    """y = X x + L e with weights, where e are the errors of the lens, of mean 0 and variance 1.
+
+    Each view is one witness, however large its board appears: the pose of its board is off by something, so
+    that the errors of its pixels go together.
+    """
 
     X: FloatArray
     """(N, 14)"""
     y_m: FloatArray
     """(N,) true less measured depth."""
+    L_m: FloatArray
+    """(N, P) what ``y_m`` gains by each independent error of the lens."""
     sd_m: FloatArray
     """(N,) of the noise."""
     trust: FloatArray
     """(N,) Huber's weight, 1 for what is no outlier."""
     views: list[IntArray]
     """Rows of each view."""
+    witness: float = 1.0
+    """Standard deviation of a view's mean error, over that of a pixel's."""
 
     @property
     def weights(self) -> FloatArray:
@@ -132,39 +140,63 @@ class Problem:
             weights[rows] /= len(rows)
         return weights
 
-    def normal(self, columns: IntArray) -> tuple[FloatArray, FloatArray]:
-        """(V, p, p) and (V, p) each view's part of the normal equations in some columns."""
-        weights = self.weights
-        parts = [(self.X[np.ix_(rows, columns)], rows) for rows in self.views]
-        left = np.array([X.T @ (weights[rows, None] * X) for X, rows in parts])
-        return left, np.array([X.T @ (weights[rows] * self.y_m[rows]) for X, rows in parts])
+    def _normal(self, columns: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(V, p + P, p + P) and (V, p + P) of each view, and (p + P, p + P) of what is known of the lens."""
+        Z = np.column_stack([self.X[:, columns], self.L_m])
+        weighted = self.weights[:, None] * Z
+        left = np.array([Z[rows].T @ weighted[rows] for rows in self.views])
+        right = np.array([self.y_m[rows] @ weighted[rows] for rows in self.views])
+        lens = [self.witness**2] * self.L_m.shape[1]
+        return left, right, np.diag([*[0.0] * len(columns), *lens])
 
     def solve(self, columns: IntArray) -> FloatArray:
         """(p,) parameters."""
-        left, right = self.normal(columns)
-        return solved(left.sum(axis=0), right.sum(axis=0))
+        left, right, lens = self._normal(columns)
+        return solved(left.sum(axis=0) + lens, right.sum(axis=0))[: len(columns)]
 
-    def without_each(self, columns: IntArray) -> FloatArray:
-        """(V, p) parameters without each view in turn."""
-        left, right = self.normal(columns)
-        whole, total = left.sum(axis=0), right.sum(axis=0)
-        pairs = zip(left, right, strict=True)
-        return np.array([solved(whole - A, total - b) for A, b in pairs]).reshape(len(left), len(columns))
+    def _without_each(self, columns: IntArray) -> FloatArray:
+        """(V, p + P) parameters and errors of the lens without each view in turn."""
+        left, right, lens = self._normal(columns)
+        whole, total = left.sum(axis=0) + lens, right.sum(axis=0)
+        return np.array([solved(whole - A, total - b) for A, b in zip(left, right, strict=True)])
 
-    def residuals_m(self, columns: IntArray, x: FloatArray) -> FloatArray:
-        """(N,)"""
-        return self.y_m - self.X[:, columns] @ x
+    def lens_cost(self, columns: IntArray) -> float:
+        """How unlikely the lens is by which the parameters explain the views, as squared errors of a view."""
+        left, right, lens = self._normal(columns)
+        x = solved(left.sum(axis=0) + lens, right.sum(axis=0))
+        return float(x @ lens @ x) / len(self.views)
+
+    def lens_shifts(self, columns: IntArray) -> FloatArray:
+        """(p, P) what the parameters gain by each independent error of the lens."""
+        left, _, lens = self._normal(columns)
+        whole = left.sum(axis=0)
+        return solved(whole + lens, whole[:, len(columns) :])[: len(columns)]
+
+    def covariance(self, columns: IntArray) -> FloatArray:
+        """(p, p) of the parameters: the jackknife's over views, and the lens's."""
+        each = self._without_each(columns)[:, : len(columns)]
+        off, shifts = each - each.mean(axis=0), self.lens_shifts(columns)
+        return (len(each) - 1) / len(each) * off.T @ off + shifts @ shifts.T
+
+    def wide(self, together: int = 1) -> float:
+        """Standard errors of a 95 % interval of so many parameters together, by Student."""
+        return float(student.ppf(1.0 - 0.025 / together, len(self.views) - 1))
+
+    def residuals_m(self, columns: IntArray) -> FloatArray:
+        """(N,) true less corrected depth."""
+        return self.y_m - self.X[:, columns] @ self.solve(columns)
 
     def unseen_m(self, columns: IntArray) -> FloatArray:
-        """(N,) residuals of each view by the parameters without it."""
+        """(N,) residuals of each view by parameters, and a lens, without it."""
+        Z = np.column_stack([self.X[:, columns], self.L_m])
         residuals_m = np.empty_like(self.y_m)
-        for rows, x in zip(self.views, self.without_each(columns), strict=True):
-            residuals_m[rows] = self.y_m[rows] - self.X[np.ix_(rows, columns)] @ x
+        for rows, x in zip(self.views, self._without_each(columns), strict=True):
+            residuals_m[rows] = self.y_m[rows] - Z[rows] @ x
         return residuals_m
 
-    def mean_by_view(self, squares: FloatArray) -> FloatArray:
-        """(V,) of (N,) squares, outliers counting less."""
-        return np.array([np.average(squares[rows], weights=self.trust[rows]) for rows in self.views])
+    def mean_by_view(self, values: FloatArray) -> FloatArray:
+        """(V,) of (N,) values, outliers counting less."""
+        return np.array([np.average(values[rows], weights=self.trust[rows]) for rows in self.views])
 
     def rms_m(self, residuals_m: FloatArray) -> float:
         """Root of the mean over views of the mean square."""
@@ -172,41 +204,57 @@ class Problem:
 
 
 def solved(left: FloatArray, right: FloatArray) -> FloatArray:
-    """(p,) of normal equations, the smallest where they leave something open."""
+    """Of normal equations, the smallest solution where they leave something open."""
     return np.linalg.lstsq(left, right, rcond=1e-12)[0]
 
 
-def robust_problem(samples: DepthSamples, sd_m: FloatArray, columns: IntArray) -> Problem:
-    """With Huber's weights at 3 sd about the model of these columns, the richest that the views allow."""
+def robust_problem(
+    samples: DepthSamples, expected_m: FloatArray, sd_m: FloatArray, choice: Choice
+) -> Problem:
+    """With Huber's weights at 3 sd about the richest model that the views allow.
+
+    Args:
+        samples: the pixels.
+        expected_m: (N,) what the sensor measures but for its noise. The terms are taken there: at the
+            measured depth itself noise would be on both sides and pull the scale towards 0.
+        sd_m: (N,) of the noise.
+        choice: the models.
+    """
     y_m = samples.true_m - samples.measured_m
-    problem = Problem(design(samples), y_m, sd_m, np.ones(len(y_m)), rows_of_views(samples))
+    views, plain = rows_of_views(samples), columns_of(choice.ladder[-1])
+    problem = Problem(design(samples, expected_m), y_m, samples.lens_m.T, sd_m, np.ones(len(y_m)), views)
     for _ in range(HUBER_ROUNDS):
-        off_sds = np.abs(problem.residuals_m(columns, problem.solve(columns))) / sd_m
-        trust = HUBER_SDS / np.maximum(off_sds, HUBER_SDS)
-        problem = Problem(problem.X, y_m, sd_m, trust, problem.views)
-    return problem
+        off_sds = np.abs(problem.residuals_m(columns_of(choice.richest))) / sd_m
+        problem = replace(problem, trust=HUBER_SDS / np.maximum(off_sds, HUBER_SDS))
+    off = problem.mean_by_view(problem.residuals_m(plain) / sd_m)
+    freedom = max(len(views) - len(plain), 1)
+    return replace(problem, witness=float(np.sqrt((off**2).sum() / freedom)))
 
 
 def chosen_terms(problem: Problem, choice: Choice) -> tuple[tuple[str, ...], dict[str, float]]:
     """The terms that views held out justify, and the RMS error there by the terms of every model tried.
 
     A richer model takes the place of a simpler one if its error in sd, squared, is lower by more than the
-    standard error of that difference over the views.
+    standard error of that difference over the views, and if the interval of what it adds leaves out 0. Every
+    model may explain what it sees by an error of the lens, and pays for an unlikely one: all views share the
+    lens, so that no view that is held out can tell a wrong focal length from a scale of the sensor.
     """
     tried: dict[str, float] = {}
 
     def errors(model: tuple[str, ...]) -> FloatArray:
         unseen_m = problem.unseen_m(columns_of(model))
         tried[title_of(model)] = problem.rms_m(unseen_m)
-        return problem.mean_by_view((unseen_m / problem.sd_m) ** 2)
+        return problem.mean_by_view((unseen_m / problem.sd_m) ** 2) + problem.lens_cost(columns_of(model))
 
     terms: tuple[str, ...] = ()
     least = errors(terms)
-    for model in choice.ladder[1:]:
-        if _falls(least, error := errors(model)):
+    mapped = [(*model, "map") for model in choice.ladder] if choice.may_map else []
+    for model in (*choice.ladder[1:], *mapped):
+        if "map" in model and not set(terms) <= set(model):
+            continue
+        error = errors(model)
+        if _falls(least, error) and _certain(problem, model, set(model) - set(terms)):
             terms, least = model, error
-    if choice.may_map and _falls(least, errors((*terms, "map"))):
-        terms = (*terms, "map")
     return terms, tried
 
 
@@ -214,3 +262,13 @@ def _falls(before: FloatArray, after: FloatArray) -> bool:
     """Whether the mean of (V,) paired errors falls by more than its standard error."""
     gain = before - after
     return bool(gain.mean() > gain.std(ddof=1) / np.sqrt(len(gain)))
+
+
+def _certain(problem: Problem, model: tuple[str, ...], added: Iterable[str]) -> bool:
+    """Whether every term that a model adds has a parameter whose interval leaves out 0: of 95 % together."""
+    columns = columns_of(model)
+    sds = np.abs(problem.solve(columns)) / np.sqrt(np.diag(problem.covariance(columns)))
+    by_column = dict(zip(columns.tolist(), sds.tolist(), strict=True))
+    return all(
+        max(by_column[column] for column in GROUPS[term]) > problem.wide(len(GROUPS[term])) for term in added
+    )

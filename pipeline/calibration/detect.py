@@ -27,6 +27,8 @@ LINK = 2.0
 """Blobs farther from the others than so many times the usual distance of neighbours are not the board's."""
 MOST_BEND = 0.5
 """Of the step between neighbours: by so much it may change from one to the next along a row or column."""
+NEAR, MOST_OF_A_SIDE = 0.3, 0.8
+"""A grid goes on where so much of a further row or column has a blob so near its place, in pitches."""
 FEW_CHARUCO = 6
 """Corners of a ChArUco board from which on a view counts."""
 
@@ -72,6 +74,11 @@ def detect(image: ByteArray, board: Board) -> Detection:
     return _circles(gray, board)
 
 
+def _nothing(reason: str, blobs_px: FloatArray | None = None) -> Detection:
+    blobs_px = np.zeros((0, 2)) if blobs_px is None else blobs_px
+    return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), reason, blobs_px)
+
+
 def _all(board: Board, points_px: FloatArray, oriented: bool) -> Detection:
     return Detection(points_px, np.arange(len(points_px)), oriented=oriented)
 
@@ -98,8 +105,10 @@ def _circles(gray: ByteArray, board: Board) -> Detection:
                 apart_px = np.linalg.norm(blobs_px[:, None] - rough.reshape(1, -1, 2), axis=2)
                 chosen = apart_px.argmin(axis=0)
                 if len(np.unique(chosen)) == len(chosen) and _even(blobs_px[chosen], board):
+                    if _goes_on(board, blobs_px[chosen], blobs_px):
+                        return _nothing(_more_circles(board), blobs_px)
                     return _upright(gray, board, blobs_px[chosen])
-    return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), _why_no_circles(board, most), most)
+    return _nothing(_why_no_circles(board, most), most)
 
 
 def _blob_detectors(gray: ByteArray) -> Iterator[tuple[ByteArray, cv2.SimpleBlobDetector]]:
@@ -171,6 +180,29 @@ def _why_no_circles(board: Board, blobs_px: FloatArray) -> str:
     )
 
 
+def _goes_on(board: Board, points_px: FloatArray, blobs_px: FloatArray) -> bool:
+    """Whether the grid has a further row or column on the board, so that only a part of it was taken."""
+    if board.pattern == "circles-asymmetric":  # whose rows do not fit if there are more
+        return False
+    columns, rows = board.size
+    grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(float)
+    image_of, _ = cv2.findHomography(grid, points_px)
+    across, down = np.arange(columns), np.arange(rows)
+    for x, y in ((across, -1), (across, rows), (-1, down), (columns, down)):
+        x, y = np.broadcast_arrays(x, y)
+        beyond = np.column_stack([x, y]).astype(float)[:, None]
+        inward = np.clip(beyond, 0, (columns - 1, rows - 1))
+        beyond_px, inward_px = (cv2.perspectiveTransform(one, image_of)[:, 0] for one in (beyond, inward))
+        apart_px = np.linalg.norm(blobs_px[:, None] - beyond_px, axis=2).min(axis=0)
+        if np.mean(apart_px < NEAR * np.linalg.norm(beyond_px - inward_px, axis=1)) >= MOST_OF_A_SIDE:
+            return True
+    return False
+
+
+def _more_circles(board: Board) -> str:
+    return f"The board has more circles than {board.columns} x {board.rows}; count its columns and rows"
+
+
 def _upright(gray: ByteArray, board: Board, points_px: FloatArray) -> Detection:
     """In the board's own order: right-handed always, and begun at the mark where there is one."""
     orders = [order for order in _orders(board) if _right_handed(points_px[order], board)]
@@ -239,9 +271,9 @@ def _chessboard(gray: ByteArray, board: Board) -> Detection:
             return _dark_first(gray, board, points_px[order])
     reason = (
         f"No chessboard of {board.columns} x {board.rows} inner corners is seen; count the corners between "
-        "four squares, and have the whole board with its white rim in the picture"
+        "four squares, and have the whole board with its white rim in the picture, sharp and evenly lit"
     )
-    return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), reason)
+    return _nothing(reason)
 
 
 def _refined(gray: ByteArray, board: Board) -> tuple[bool, FloatArray | None]:
@@ -274,5 +306,5 @@ def _charuco(gray: ByteArray, board: Board) -> Detection:
             f"{markers} markers and {seen} corners of the ChArUco board are seen, and it takes "
             f"{FEW_CHARUCO}; check columns and rows, and hold it nearer or lit better"
         )
-        return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), reason)
+        return _nothing(reason)
     return Detection(np.asarray(corners, float).reshape(-1, 2), np.asarray(ids).ravel().astype(np.int64))

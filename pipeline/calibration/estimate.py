@@ -21,6 +21,8 @@ LEAST_VIEWS = 3
 LEAST_POINTS = 4
 """Of a view that is placed."""
 SETTLE_STEPS = 30
+LEAST_INFORMATION = 1e-14
+"""Of a combination of parameters, over that of each alone: below it there is but rounding."""
 LEAST_TILT_DEG = 5.0
 """Between the two views that differ most: views of a board held ever alike fit many lenses."""
 Z95 = 1.959964
@@ -151,7 +153,7 @@ def calibration_of(
 ) -> Calibration:
     """The record of a lens and of (4, 4) poses that were estimated together."""
     fitted = tuple(_fitted(view, pose, optics) for view, pose in zip(views, poses, strict=True))
-    covariance = coordinate_sd_px(fitted, optics.lens) ** 2 * np.linalg.pinv(information(fitted, optics))
+    covariance = coordinate_sd_px(fitted, optics.lens) ** 2 * inverted(information(fitted, optics))
     return Calibration(
         optics.lens, size_px, optics.matrix, optics.distortion, FREE[optics.lens], covariance, fitted
     )
@@ -299,6 +301,14 @@ def information(fitted: Sequence[FittedView], optics: Optics) -> FloatArray:
         (informed(view.board_m, view.T_camera_board, optics) for view in fitted),
         start=np.zeros((len(FREE[optics.lens]),) * 2),
     )
+
+
+def inverted(told: FloatArray) -> FloatArray:
+    """(P, P) covariance of (P, P) information; what the views hardly tell is very unsure, never sure."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(told), LEAST_INFORMATION))
+    values, turns = np.linalg.eigh(told * np.outer(scale, scale))
+    root = scale[:, None] * turns / np.sqrt(np.maximum(values, LEAST_INFORMATION))
+    return root @ root.T
 
 
 def informed(board_m: FloatArray, T_camera_board: FloatArray, optics: Optics) -> FloatArray:

@@ -25,11 +25,10 @@ from pipeline.calibration.estimate import (
     rms_px,
 )
 from pipeline.calibration.refine import refined_px
+from pipeline.calibration.shots import photographs
 from pipeline.calibration.warp import BoardWarp, board_warp
 from pipeline.io.images import read_color
 from pipeline.types import CameraIntrinsics
-
-ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +126,7 @@ def image_files(given: Sequence[str]) -> list[Path]:
     for word in given:
         path = Path(word)
         if path.is_dir():
-            named = sorted(one for one in path.iterdir() if one.suffix.lower() in ENDINGS)
+            named = photographs(path)
         elif any(sign in word for sign in "*?["):
             named = sorted(Path(path.anchor or ".").glob(str(path.relative_to(path.anchor))))
         else:

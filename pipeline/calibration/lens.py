@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from pipeline.config import Lens
-from pipeline.types import FloatArray
+from pipeline.types import BoolArray, FloatArray
 
 FLAGS: dict[Lens, int] = {
     "thesis": cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST,
@@ -29,6 +29,9 @@ WIDEST_DEG = 89.0
 """From the optical axis: beyond it no point lies in front of the camera."""
 _MISSED_PX = 0.01
 """A ray that comes back farther from its pixel than this does not belong to it: there the lens folds."""
+_PATH = 9
+"""Places from the axis to a ray where the lens is tried for a fold."""
+_NEWTON_STEPS, _LONGEST_STEP = 20, 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,17 +77,33 @@ class Optics:
         """(N, 3) unit directions that (N, 2) pixels look into; NaN where the lens has none for a pixel."""
         flat = self._flat_fisheye(points_px) if self.lens == "fisheye" else self._flat(points_px)
         rays = np.column_stack([flat, np.ones(len(flat))])
-        known = np.isfinite(flat).all(axis=1)
-        missed_px = np.full(len(flat), np.inf)
-        missed_px[known] = np.linalg.norm(self.project(rays[known]) - points_px[known], axis=1)
-        rays[~(missed_px < _MISSED_PX)] = np.nan
+        known = np.flatnonzero(np.isfinite(flat).all(axis=1))
+        missed_px = np.linalg.norm(self.project(rays[known]) - points_px[known], axis=1)
+        good = known[(missed_px < _MISSED_PX) & self._unfolded(rays[known])]
+        rays[np.setdiff1d(np.arange(len(rays)), good)] = np.nan
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
+    def _unfolded(self, rays: FloatArray) -> BoolArray:
+        """(N,) whether the image grows all the way from the axis to each of (N, 3) rays with z = 1."""
+        grows = np.ones(len(rays), bool)
+        for share in np.linspace(0.0, 1.0, _PATH):
+            grows &= np.linalg.det(self._slopes(rays * (share, share, 1.0))[1]) > 0.0
+        return grows
+
+    def _slopes(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(N, 2) pixels of (N, 3) rays with z = 1, and (N, 2, 2) their derivatives by x and y."""
+        told = self.linearised(rays)
+        return told.points_px, told.by_pose.reshape(-1, 2, 6)[:, :, 3:5]
+
     def _flat(self, points_px: FloatArray) -> FloatArray:
-        """(N, 2) on the plane z = 1."""
-        until = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-10)
-        pixels = np.ascontiguousarray(points_px, dtype=np.float64).reshape(-1, 1, 2)
-        return cv2.undistortPoints(pixels, self.matrix, self.distortion, criteria=until).reshape(-1, 2)
+        """(N, 2) on the plane z = 1, by Newton's method."""
+        flat = (points_px - self.matrix[:2, 2]) / self.matrix[[0, 1], [0, 1]]
+        for _ in range(_NEWTON_STEPS):
+            seen_px, slopes = self._slopes(np.column_stack([flat, np.ones(len(flat))]))
+            slopes[np.abs(np.linalg.det(slopes)) < 1.0] = self.matrix[:2, :2]
+            step = np.linalg.solve(slopes, (points_px - seen_px)[:, :, None])[:, :, 0]
+            flat = flat + np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
+        return flat
 
     def _flat_fisheye(self, points_px: FloatArray) -> FloatArray:
         """(N, 2) on the plane z = 1, by Newton's method for the angle from the axis."""
@@ -92,7 +111,7 @@ class Optics:
         reach = np.linalg.norm(bent, axis=1)
         odd = np.array([1.0, *self.distortion.ravel()])
         angle = np.minimum(reach, np.radians(WIDEST_DEG))
-        for _ in range(30):
+        for _ in range(_NEWTON_STEPS):
             powers = angle[:, None] ** np.arange(0, 10, 2)
             slope = powers @ (odd * np.arange(1, 10, 2))
             angle = angle - (angle * (powers @ odd) - reach) / np.where(slope > 1e-6, slope, np.nan)

@@ -11,7 +11,7 @@ import numpy as np
 
 from packetmesh.errors import ReconstructionError
 from pipeline.calibration.board import Board
-from pipeline.calibration.estimate import Calibration, coordinate_sd_px, information, informed
+from pipeline.calibration.estimate import Calibration, coordinate_sd_px, information, informed, inverted
 from pipeline.calibration.lens import Optics
 from pipeline.calibration.trust import Sight, placing, sight
 from pipeline.geometry import apply, rigid, rotation_exp
@@ -78,7 +78,7 @@ def next_view(calibration: Calibration, board: Board, range_m: float) -> NextVie
     best: tuple[float, FloatArray] | None = None
     points_m = board.points_m
     for T in candidates(board, optics, size_px):
-        covariance = sd_px**2 * np.linalg.pinv(known + informed(points_m, T, optics))
+        covariance = sd_px**2 * inverted(known + informed(points_m, T, optics))
         after_m = _error_m(covariance, cost)
         if best is None or after_m < best[0]:
             best = after_m, T

@@ -74,6 +74,7 @@ def _centres_m(patches: FloatArray, around_m: FloatArray, away: FloatArray) -> F
     middle = np.median(differs[:, away <= MIDDLE], axis=1, keepdims=True)
     middle[np.abs(middle) < LEAST_CONTRAST] = np.nan
     weights = np.clip(differs / middle, 0.0, 1.0) * ~paper
-    covered = np.nanmedian(weights.sum(axis=1)) / len(away)
-    weights *= away <= RIM * covered**0.5
+    covered = weights.sum(axis=1)[np.isfinite(middle[:, 0])] / len(away)
+    if len(covered):
+        weights *= away <= RIM * np.median(covered) ** 0.5
     return weights @ around_m / weights.sum(axis=1, keepdims=True)

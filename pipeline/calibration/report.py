@@ -9,19 +9,26 @@ from typing import Any
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, finite
 from pipeline.calibration.assess import Trust
+from pipeline.calibration.depth_bias import DepthFit
 from pipeline.calibration.from_images import CameraReport
 from pipeline.io.camera_files import WRITERS, write_camera
+from pipeline.io.depth_correction import FILE_NAME, write_depth_correction
 from pipeline.io.fisheye_files import FISHEYE_WRITERS, write_fisheye
 from pipeline.io.intrinsics import write_intrinsics
 
 
-def metrics(report: CameraReport, trust: Trust | None = None) -> dict[str, Any]:
-    """What ``--json`` prints: the camera, and under ``trust`` what it is worth."""
-    return report.metrics() | ({} if trust is None else {"trust": trust.metrics()})
+def metrics(
+    report: CameraReport, trust: Trust | None = None, depth: DepthFit | None = None
+) -> dict[str, Any]:
+    """What ``--json`` prints: the camera, under ``trust`` what it is worth, and its sensor's ``depth``."""
+    beside = {"trust": trust, "depth": depth}
+    return report.metrics() | {name: part.metrics() for name, part in beside.items() if part is not None}
 
 
-def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None = None) -> list[str]:
-    """Write metrics.json, intrinsics.json and the files of other programs.
+def write_camera_folder(
+    report: CameraReport, folder: Path, trust: Trust | None = None, depth: DepthFit | None = None
+) -> list[str]:
+    """Write metrics.json, intrinsics.json, depth_correction.json and the files of other programs.
 
     Returns:
         A sentence for each file that cannot hold the lens.
@@ -30,7 +37,11 @@ def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None 
         InputError: the folder cannot be written.
     """
     with atomic_path(folder / "metrics.json") as sibling:
-        sibling.write_text(json.dumps(finite(metrics(report, trust)), indent=1, allow_nan=False) + "\n")
+        sibling.write_text(
+            json.dumps(finite(metrics(report, trust, depth)), indent=1, allow_nan=False) + "\n"
+        )
+    if depth is not None:
+        write_depth_correction(folder / FILE_NAME, depth.correction)
     found = report.calibration
     if found.lens == "fisheye":
         for name in FISHEYE_WRITERS:

@@ -152,9 +152,9 @@ def calibrate_rig(
     need not see the board together if a third links them. A board without a mark is turned as the other
     cameras have it (SPEC 1.2).
 
-    OpenCV's ``calibrateMultiviewExtended`` finds the same poses for the same lenses, but it leaves each lens as
-    its camera alone has it, which more than doubles the error of the poses; it takes every board as held the
-    right way up, and tells nothing of how sure it is (tests/pipeline/calibration/test_rig.py).
+    OpenCV's ``calibrateMultiviewExtended`` finds the same poses for the same lenses, but it leaves each lens
+    as its camera alone has it, which more than doubles the error of the poses; it takes every board as held
+    the right way up, and tells nothing of how sure it is (tests/pipeline/calibration/test_rig.py).
 
     Args:
         cameras: every camera by its name, as its own views have it, the reference first.

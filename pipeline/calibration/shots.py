@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from packetmesh.errors import InputError
 from packetmesh.files import read_text
 from pipeline.calibration.board import Board
+from pipeline.config import Pattern
 from pipeline.types import AnyPath
 
-ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
+ENDINGS = (".png", ".jpg", ".jpeg", ".pgm", ".ppm")
 MOST_CAMERAS = 6
 BOARD_FILE = "board.json"
 _LAST_NUMBER = re.compile(r"(\d+)\D*$")
@@ -83,15 +84,38 @@ def node_folders(folder: Path) -> list[Path]:
     return sorted(one for one in folder.glob("node_*") if one.is_dir())
 
 
-def read_board(folder: AnyPath) -> Board | None:
-    """The board that ``board.json`` describes; None without that file.
+def board_beside(
+    images: Sequence[AnyPath],
+    pattern: Pattern | None = None,
+    columns: int | None = None,
+    rows: int | None = None,
+    spacing_mm: float | None = None,
+) -> Board:
+    """The board that images show: what is given, else what a board.json in or above their folder says, else
+    the thesis's.
+
+    Raises:
+        InputError: that file lacks pattern, columns, rows or spacing_mm, or no board is like that.
+    """
+    known = Board()
+    for path in (one / BOARD_FILE for word in images for one in (Path(word), Path(word).parent)):
+        if path.is_file():
+            known = read_board(path)
+            break
+    return Board(
+        pattern or known.pattern,
+        known.columns if columns is None else columns,
+        known.rows if rows is None else rows,
+        known.spacing_m if spacing_mm is None else spacing_mm / 1000.0,
+    )
+
+
+def read_board(path: AnyPath) -> Board:
+    """The board that a file describes.
 
     Raises:
         InputError: the file lacks pattern, columns, rows or spacing_mm, or no board is like that.
     """
-    path = Path(folder) / BOARD_FILE
-    if not path.exists():
-        return None
     try:
         values = json.loads(read_text(path, "board file"))
         pattern, columns, rows = values["pattern"], int(values["columns"]), int(values["rows"])
@@ -103,30 +127,39 @@ def read_board(folder: AnyPath) -> Board | None:
     return Board(pattern, columns, rows, spacing_m)
 
 
+def photographs(folder: Path) -> list[Path]:
+    """The colour images in a folder, by name; neither depth_00.png nor infrared_00.png."""
+    return [path for path in _images(folder) if path.stem.partition("_")[0] not in ("depth", "infrared")]
+
+
+def _images(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.suffix.lower() in ENDINGS)
+
+
 def _shots(folder: Path) -> tuple[Shot, ...]:
-    images = sorted(path for path in folder.iterdir() if path.suffix.lower() in ENDINGS)
-    depth = {moment: path for path in images if (moment := _moment_of(path, "depth")) is not None}
-    infrared = {moment: path for path in images if (moment := _moment_of(path, "infrared")) is not None}
-    color: dict[str, Path] = {}
-    for path in images:
-        if path in depth.values() or path in infrared.values():
-            continue
-        moment = _moment(path.stem)
-        if moment in color:
-            raise InputError(
-                f"{color[moment]} and {path.name} are both of moment {moment}; keep to the images of one camera, "
-                "numbered by moments"
-            )
-        color[moment] = path
+    color = _by_moment(photographs(folder))
     if not color:
         raise InputError(f"{folder} holds no image of a camera; try color_00.png, color_01.png and so on")
+    depth, infrared = (
+        _by_moment(path for path in _images(folder) if path.stem.startswith(f"{kind}_"))
+        for kind in ("depth", "infrared")
+    )
     return tuple(
         Shot(moment, path, depth.get(moment), infrared.get(moment)) for moment, path in color.items()
     )
 
 
-def _moment_of(path: Path, kind: str) -> str | None:
-    return _moment(path.stem) if path.stem.startswith(f"{kind}_") else None
+def _by_moment(images: Iterable[Path]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for path in images:
+        moment = _moment(path.stem)
+        if moment in found:
+            raise InputError(
+                f"{found[moment]} and {path.name} are both of moment {moment}; keep to the images of one "
+                "camera, numbered by moments"
+            )
+        found[moment] = path
+    return found
 
 
 def _moment(stem: str) -> str:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from packetmesh.errors import InputError
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.estimate import (
     LEAST_VIEWS,
     Calibration,
@@ -31,6 +31,8 @@ CELLS = 24
 """Of a map, along the longer side of the image."""
 CIRCLE95 = 2.4477
 """Radius around the mean of a round normal distribution in the plane that holds 95 % of it, in its sd."""
+MOST_UNSURE = 20.0
+"""Times that a half may be less sure than the whole, and still say something."""
 DRAWS = 2000
 """Of lenses that noise may make, to tell how much two halves differ by noise alone."""
 
@@ -128,8 +130,7 @@ def projected_covariance_px2(seen: Sight, covariance: FloatArray, placing: Float
         covariance: (P, P) of the lens.
         placing: (6, P) how the camera is placed anew when the lens changes.
     """
-    change = seen.by_lens + seen.by_pose @ placing
-    return change @ covariance @ change.transpose(0, 2, 1)
+    return _carried(seen.by_lens + seen.by_pose @ placing, covariance)
 
 
 def placing(views: Sequence[tuple[FloatArray, FloatArray]], optics: Optics) -> FloatArray:
@@ -189,21 +190,27 @@ def half_difference_px(
         raise InputError(
             f"{len(views)} views cannot be halved, for each half takes {LEAST_VIEWS}; take more images"
         )
-    whole = calibrate(views, size_px, lens)
-    halves = [calibrate(views[start::2], size_px, lens) for start in (0, 1)]
+    whole, *halves = (calibrate(some, size_px, lens) for some in (views, views[0::2], views[1::2]))
     seen = sight(whole.optics, size_px, range_m)
-    boards_m = _in_camera([(view.board_m, view.T_camera_board) for view in whole.views])
-    boards_px = whole.optics.project(boards_m)
+    boards = [(view.board_m, view.T_camera_board) for view in whole.views]
     known = np.isfinite(seen.points_m[:, 2])
-    told_px = np.full((2, len(known), 2), np.nan)
-    for row, half in enumerate(halves):
-        T_half_whole = settle(boards_m, boards_px, np.eye(4), half.optics)
-        told_px[row, known] = half.optics.project(seen.points_m[known], T_half_whole)
-    difference_px = told_px[1] - told_px[0]
+    change = (seen.by_lens + seen.by_pose @ placing(boards, whole.optics))[known]
+    sds_px = [np.median(_worst_sd(_carried(change, one.covariance))) for one in (whole, *halves)]
+    if max(sds_px) > MOST_UNSURE * sds_px[0]:
+        raise ReconstructionError(
+            "Half of the views do not determine this lens, so the halves cannot be compared; take more "
+            "images, or a lens with fewer parameters"
+        )
+    boards_m = _in_camera(boards)
+    boards_px = whole.optics.project(boards_m)
+    difference_px = np.full((len(known), 2), np.nan)
+    one_px, other_px = (
+        half.optics.project(seen.points_m[known], settle(boards_m, boards_px, np.eye(4), half.optics))
+        for half in halves
+    )
+    difference_px[known] = other_px - one_px
     across_m = (seen.metres @ difference_px[:, :, None])[:, :, 0]
     told = seen.map_of(np.linalg.norm(difference_px, axis=1), np.linalg.norm(across_m, axis=1))
-    boards = [(view.board_m, view.T_camera_board) for view in whole.views]
-    change = (seen.by_lens + seen.by_pose @ placing(boards, whole.optics))[known]
     ratio, most = _over_noise(difference_px[known], change, halves[0].covariance + halves[1].covariance)
     return HalfDifference(told, ratio, most)
 
@@ -234,6 +241,11 @@ def _across(rays: FloatArray) -> FloatArray:
     first = np.cross(rays, (0.0, 1.0, 0.0))
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(rays, first)], axis=1)
+
+
+def _carried(change: FloatArray, covariance: FloatArray) -> FloatArray:
+    """(G, 2, 2) covariance of pixels of (P, P) that of the lens, by (G, 2, P) derivatives."""
+    return change @ covariance @ change.transpose(0, 2, 1)
 
 
 def _worst_sd(covariances: FloatArray) -> FloatArray:

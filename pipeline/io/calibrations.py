@@ -48,7 +48,8 @@ def node_files(folder: Path) -> NodeFiles:
 class CalibratedNode:
     """What a calibration says of a node."""
 
-    intrinsics: CameraIntrinsics
+    intrinsics: CameraIntrinsics | None
+    """None leaves the rig's own."""
     T_world_camera: FloatArray | None = None
     """(4, 4), metres; None leaves the rig's own pose."""
     depth_intrinsics: CameraIntrinsics | None = None
@@ -73,7 +74,8 @@ def write_calibration(folder: AnyPath, nodes: Mapping[str, CalibratedNode]) -> N
     """
     for name, node in nodes.items():
         own = Path(folder) / name
-        write_intrinsics(own / "intrinsics.json", node.intrinsics)
+        if node.intrinsics is not None:
+            write_intrinsics(own / "intrinsics.json", node.intrinsics)
         if node.T_world_camera is not None:
             write_pose(own / "pose.txt", node.T_world_camera)
         if node.depth_intrinsics is not None and node.T_color_depth is not None:

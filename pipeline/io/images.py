@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 
 import cv2
@@ -18,13 +19,17 @@ _TYPICAL_DEPTH_M = 2.0
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _JPEG_SIGNATURE = b"\xff\xd8"
 _JPEG_END = b"\xff\xd9"
+_PNM_SIGNATURES = (b"P5", b"P6")
+_PNM_SPACE = rb"(?:\s|#[^\n]*+\n)++"
+_PNM_HEADER = re.compile(rb"P[56]" + (_PNM_SPACE + rb"(\d{1,9})") * 3 + rb"\s")
+"""Width, height and largest value, with comments between them."""
 
 
 def read_color(path: AnyPath) -> ByteArray:
-    """(H, W, 3) RGB of a PNG or JPEG file; grey images get three equal channels.
+    """(H, W, 3) RGB of a PNG, JPEG, PGM or PPM file; grey images get three equal channels.
 
     Raises:
-        InputError: missing, truncated, too large, or neither PNG nor JPEG.
+        InputError: missing, truncated, too large, or none of these.
     """
     bgr = _decode(path, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION, "colour image")
     return np.ascontiguousarray(bgr[..., ::-1])
@@ -87,9 +92,9 @@ def write_depth_mm(path: AnyPath, depth: DepthMap) -> None:
 
 def _decode(path: AnyPath, flags: int, what: str) -> np.ndarray:
     data = read_bytes(path, MAX_IMAGE_BYTES, what)
-    if not data.startswith((_PNG_SIGNATURE, _JPEG_SIGNATURE)):
+    if not data.startswith((_PNG_SIGNATURE, _JPEG_SIGNATURE, *_PNM_SIGNATURES)):
         raise InputError(f"The {what} {path} is neither a PNG nor a JPEG file; try to convert it to PNG")
-    complete = _png_is_whole(data) if data.startswith(_PNG_SIGNATURE) else data.rfind(_JPEG_END) >= 0
+    complete = _is_whole(data)
     width_px, height_px = _size_px(data)
     if complete and width_px * height_px > MAX_IMAGE_PIXELS:
         raise InputError(
@@ -100,6 +105,20 @@ def _decode(path: AnyPath, flags: int, what: str) -> np.ndarray:
     if image is None:
         raise InputError(f"The {what} {path} is truncated or damaged; try to copy or export it again")
     return image
+
+
+def _is_whole(data: bytes) -> bool:
+    """Whether nothing is missing at the end of a file."""
+    if data.startswith(_PNG_SIGNATURE):
+        return _png_is_whole(data)
+    if data.startswith(_PNM_SIGNATURES):
+        header = _PNM_HEADER.match(data)
+        if header is None:
+            return False
+        width, height, most = map(int, header.groups())
+        channels, value_bytes = 3 if data.startswith(b"P6") else 1, 1 if most < 256 else 2
+        return len(data) - header.end() >= width * height * channels * value_bytes
+    return data.rfind(_JPEG_END) >= 0
 
 
 def _png_is_whole(data: bytes) -> bool:
@@ -117,9 +136,12 @@ def _png_is_whole(data: bytes) -> bool:
 
 
 def _size_px(data: bytes) -> tuple[int, int]:
-    """Width and height from the header of a PNG or JPEG file, before anything is decoded; 0 x 0 if absent."""
+    """Width and height from the header of a file, before anything is decoded; 0 x 0 if absent."""
     if data.startswith(_PNG_SIGNATURE):
         return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    if data.startswith(_PNM_SIGNATURES):
+        header = _PNM_HEADER.match(data)
+        return (int(header[1]), int(header[2])) if header else (0, 0)
     position = 2
     while position + 9 <= len(data) and data[position] == 0xFF:
         marker = data[position + 1]

@@ -7,9 +7,10 @@ import re
 import cv2
 import numpy as np
 
-STEPS = ("Scene", "Depth", "Fuse", "Surface", "Network", "Export")
+STEPS = ("Scene", "Calibrate", "Depth", "Fuse", "Surface", "Network", "Export")
 TEXTS = {
     "Scene": "Each camera node delivers",
+    "Calibrate": "Photographs of a board of known size",
     "Depth": "points the sensor measured",
     "Fuse": "move the orange cloud",
     "Surface": "A ball rolls over the points",

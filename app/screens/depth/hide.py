@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import viser
 
+from app.compare import CompareArea
 from app.screens.depth.brush import BrushDrawing, clicked_disc
-from app.screens.depth.compare import CompareArea
 from app.screens.depth.labels import FILLS
 from app.screens.depth.view import Disc, HiddenView, HideRequest, SeenSample
 from app.tables import number, table

@@ -6,12 +6,12 @@ from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any, ClassVar
 
+from app.compare import CompareArea
 from app.controls import Controls
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import INFERRED, LOSS, TARGET
 from app.lesson import LessonFolder, read_lesson
 from app.records import DepthNode, DepthView, Sample, SceneView
-from app.screens.depth.compare import CompareArea
 from app.screens.depth.hide import HideFolder
 from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PICTURES
 from app.screens.depth.lesson import SETTINGS, SHIPPED, DepthLook

@@ -5,9 +5,9 @@ import numpy as np
 
 from lab.claims.calibration.photograph import seen_px
 from pipeline.calibration.board import Board
+from pipeline.calibration.depth_samples import DepthSamples, board_depth_samples
 from pipeline.calibration.estimate import View, calibrate
-from pipeline.calibration.depth_samples import board_depth_samples
-from pipeline.geometry import pixel_rays
+from pipeline.geometry import pixel_rays, project
 from pipeline.io.depth_correction import DepthCorrection
 from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise
 
@@ -26,7 +26,7 @@ RAYS = pixel_rays(CAMERA)
 
 
 def poses(rng, count=16, range_m=(0.5, 1.8), tilt_deg=(10.0, 45.0)):
-    """(4, 4) of boards wholly in the picture, tilted to all sides, distances spread evenly in their logarithm."""
+    """(4, 4) of boards wholly in the picture, tilted to all sides, from near to far."""
     made = []
     for away_m in np.geomspace(*range_m, count):
         while True:
@@ -63,17 +63,44 @@ def depth_of(T, bias: DepthCorrection, noise: DepthNoise, rng):
     return DepthMap(measured(noisy_m, bias).astype(np.float32))
 
 
-def measured(true_m, bias: DepthCorrection):
-    """(H, W) what the sensor measures of a true depth: the correction undone."""
-    linear = bias.scale + bias.map_over_image()
-    lacking_m = bias.offset_m - true_m
-    return -2.0 * lacking_m / (linear + np.sqrt(linear**2 - 4.0 * bias.curvature_per_m * lacking_m))
-
-
 def samples(bias, seed, count=16, range_m=(0.5, 1.8), tilt_deg=(10.0, 45.0), noise_px=0.2, noise=NOISE):
-    """Of a lens that is estimated from the same views."""
+    """From images, with a lens that is estimated from the same views."""
     rng = np.random.default_rng(seed)
     boards = poses(rng, count, range_m, tilt_deg)
     views = [view_of(T, noise_px, rng, f"view {index}") for index, T in enumerate(boards)]
     depths = [depth_of(T, bias, noise, rng) for T in boards]
-    return board_depth_samples(views, depths, calibrate(views, SIZE), BOARD)
+    return board_depth_samples(calibrate(views, SIZE), depths, BOARD)
+
+
+def quick_samples(
+    bias, seed, count=16, range_m=(0.5, 1.8), lens_share=0.001, pose_share=0.0003, of_a_view=300
+):
+    """Without images: boards are off by a share of their distance each, and by one of the lens."""
+    rng = np.random.default_rng(seed)
+    focal_off = lens_share * rng.standard_normal()
+    parts = []
+    for index, T in enumerate(poses(rng, count, range_m)):
+        flat_m = rng.uniform(-0.5, 0.5, (of_a_view, 2)) * np.ptp(BOARD.points_m[:, :2], axis=0)
+        points_m = np.column_stack([flat_m, np.zeros(of_a_view)]) @ T[:3, :3].T + T[:3, 3]
+        z_m, pixels = points_m[:, 2], np.rint(project(CAMERA, points_m)).astype(int)
+        cosine = np.abs(points_m @ T[:3, 2]) / np.linalg.norm(points_m, axis=1)
+        noisy_m = z_m + NOISE.sd_m(z_m, cosine) * rng.standard_normal(of_a_view)
+        share = bias.map_over_image()[pixels[:, 1], pixels[:, 0]]
+        believed_m = z_m * (1.0 + focal_off + pose_share * rng.standard_normal())
+        parts.append((pixels, _undone(noisy_m, bias, share), believed_m, cosine, np.full(of_a_view, index)))
+    pixels, measured_m, true_m, cosine, view = (np.concatenate(column) for column in zip(*parts, strict=True))
+    nothing = np.zeros(len(view), bool)
+    lens_m, focal = lens_share * true_m[None], np.array([lens_share])
+    names = tuple(map(str, range(count)))
+    return DepthSamples(SIZE, pixels, measured_m, true_m, cosine, view, nothing, names, lens_m, focal)
+
+
+def measured(true_m, bias: DepthCorrection):
+    """(H, W) what the sensor measures of a true depth."""
+    return _undone(true_m, bias, bias.map_over_image())
+
+
+def _undone(true_m, bias: DepthCorrection, share):
+    """What the correction takes to a true depth, where its map has a share."""
+    linear, lacking_m = bias.scale + share, bias.offset_m - true_m
+    return -2.0 * lacking_m / (linear + np.sqrt(linear**2 - 4.0 * bias.curvature_per_m * lacking_m))

@@ -66,6 +66,21 @@ def test_a_board_cut_off_by_the_rim_says_how_much_of_it_is_seen():
     assert 20 < len(found.blobs_px) < 99
 
 
+@pytest.mark.parametrize("size", [(10, 9), (11, 8), (7, 5), (12, 9), (11, 10)])
+def test_a_grid_of_another_size_is_not_found_in_a_part_of_the_board(size):
+    for T in poses(BOARDS["thesis"], 4):
+        found = detect(photograph(BOARDS["thesis"], T), Board("circles", *size, 0.035))
+        assert not found.found
+        assert "count its columns" in found.reason or "circles are seen" in found.reason
+
+
+@pytest.mark.parametrize("name", ["shifted", "chessboard", "charuco"])
+def test_other_boards_of_another_size_are_not_found_either(name):
+    board = BOARDS[name]
+    other = Board(board.pattern, board.columns - 1, board.rows - 2, board.spacing_m)
+    assert not detect(photograph(board, poses(board)[1]), other).found
+
+
 @pytest.mark.parametrize("board", [BOARDS["thesis"], BOARDS["chessboard"], BOARDS["charuco"]])
 def test_a_picture_of_something_else_has_no_board(board):
     noise = np.random.default_rng(0).integers(0, 255, (240, 320), np.uint8)

@@ -7,7 +7,7 @@ import pytest
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.board import Board
 from pipeline.calibration.detect import detect
-from pipeline.calibration.estimate import FLAGS, View, calibrate, held_out, rms_px
+from pipeline.calibration.estimate import FLAGS, View, calibrate, held_out, inverted, rms_px
 from tests.pipeline.calibration.views import CAMERA, photograph, poses, seen, views
 
 BOARD = Board()
@@ -34,6 +34,15 @@ def test_standard_errors_are_those_of_opencv(lens):
     seen_px = [view.points_px.astype(np.float32) for view in given]
     theirs = cv2.calibrateCameraExtended(board_m, seen_px, SIZE, None, None, flags=FLAGS[lens])[5].ravel()
     np.testing.assert_allclose(list(found.standard_errors.values()), theirs[: len(found.names)], rtol=0.02)
+
+
+def test_what_the_views_do_not_tell_is_unsure_and_never_sure():
+    told = np.array([[4.0, 4.0], [4.0, 4.0]])  # the sum of two parameters, to within a half
+    covariance = inverted(told)
+    assert np.sqrt(np.diag(covariance)).min() > 1e5
+    assert np.ones(2) @ covariance @ np.ones(2) == pytest.approx(0.25, rel=1e-3)
+    known = np.diag([4.0, 1e-12, 1e12])
+    np.testing.assert_allclose(inverted(known), np.diag([0.25, 1e12, 1e-12]))
 
 
 def test_the_truth_lies_within_the_intervals_about_as_often_as_they_say():

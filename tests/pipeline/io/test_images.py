@@ -27,6 +27,17 @@ def test_jpeg_is_read(tmp_path):
     np.testing.assert_allclose(read_color(tmp_path / "color.jpg"), rgb, atol=3)
 
 
+@pytest.mark.parametrize("name", ["color.ppm", "grey.pgm"])
+def test_images_of_machine_vision_cameras_are_read(name, tmp_path):
+    image = np.random.default_rng(1).integers(0, 256, (7, 9, 3)[: 3 if name == "color.ppm" else 2], np.uint8)
+    cv2.imwrite(str(tmp_path / name), image)
+    expected = image[..., ::-1] if image.ndim == 3 else np.stack([image] * 3, axis=-1)
+    np.testing.assert_array_equal(read_color(tmp_path / name), expected)
+    commented = (tmp_path / name).read_bytes().replace(b"\n", b"\n# by somebody\n", 1)
+    (tmp_path / name).write_bytes(commented)
+    np.testing.assert_array_equal(read_color(tmp_path / name), expected)
+
+
 def test_every_millimetre_survives(tmp_path):
     depth_mm = np.arange(65536, dtype=np.uint16).reshape(256, 256)
     z_m = (depth_mm / 1000.0).astype(np.float32)

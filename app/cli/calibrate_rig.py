@@ -1,0 +1,119 @@
+"""``packetmesh calibrate`` with several folders: several cameras at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.cli.text import print_json, say, say_progress
+from packetmesh.progress import drain
+
+if TYPE_CHECKING:
+    from pipeline.calibration.assess import Trust
+    from pipeline.calibration.board import Board
+    from pipeline.calibration.depth_bias import DepthFit
+    from pipeline.calibration.rig_from_images import RigReport
+    from pipeline.calibration.shots import NodeShots
+    from pipeline.config import Lens
+
+
+def several_cameras(images: Sequence[str]) -> tuple[NodeShots, ...]:
+    """The nodes whose folders are named; none where one camera's images are.
+
+    Raises:
+        InputError: folders that hold no images, or more than a rig has cameras.
+    """
+    from pipeline.calibration.shots import node_folders, node_shots
+
+    if not all(Path(word).is_dir() for word in images):
+        return ()
+    if len(images) == 1 and not node_folders(Path(images[0])):
+        return ()
+    return node_shots(images)
+
+
+def calibrate_cameras(
+    nodes: Sequence[NodeShots],
+    out: Path,
+    board: Board,
+    lens: Lens,
+    held_out: int,
+    range_m: float,
+    accuracy_m: float,
+    without: Sequence[str],
+    like: Path | None,
+    json: bool,
+) -> None:
+    """Estimate all lenses and poses together, and write a folder that is laid over a rig.
+
+    Args:
+        nodes: their images.
+        out: Folder for node_00/{intrinsics.json, pose.txt, ...} and so on, and metrics.json.
+        board: What they show.
+        lens: Distortion of all cameras.
+        held_out: In so many turns moments are left out and predicted; 0 leaves out none.
+        range_m: Where the cameras will measure.
+        accuracy_m: Within what a point must be placed there.
+        without: Images to leave out, as node_01/color_03.png.
+        like: A rig in whose world the cameras are placed, by the pose of its first node.
+        json: Print everything as one JSON object.
+    """
+    from app.reports.calibration import write_calibration_report
+    from packetmesh.files import writable_folder
+    from pipeline.calibration.assess import assess
+    from pipeline.calibration.rig_from_images import iterate_rig_calibration
+    from pipeline.calibration.rig_report import pose_like, rig_metrics, write_rig_folder
+
+    T_world_first = pose_like(like, nodes[0].name)
+    report = drain(iterate_rig_calibration(nodes, board, lens, held_out, without), say_progress)
+    trust = {
+        name: assess(one.calibration, one.views, board, range_m, accuracy_m)
+        for name, one in report.cameras.items()
+    }
+    writable_folder(out)
+    for sentence in write_rig_folder(report, out, T_world_first, trust):
+        say(sentence)
+    for name, one in report.cameras.items():
+        write_calibration_report(one, trust[name], out / name / "report.html")
+    if json:
+        print_json(rig_metrics(report, trust))
+    else:
+        say("\n".join(_lines(report, trust)))
+
+
+def depth_line(fit: DepthFit) -> str:
+    """A depth sensor's bias in a sentence."""
+    terms = " + ".join(fit.terms) or "nothing"
+    return (
+        f"depth is off by {1000.0 * fit.rms_before_m:.1f} mm, and by {1000.0 * fit.rms_after_m:.1f} mm "
+        f"corrected by {terms}"
+    )
+
+
+def _lines(report: RigReport, trust: Mapping[str, Trust]) -> Iterator[str]:
+    """Each camera in a line, then each pair."""
+    for name, one in report.cameras.items():
+        found = one.calibration
+        errors = found.standard_errors
+        numbers = ", ".join(
+            f"{key} {found.parameters[key]:.5g} ± {errors[key]:.2g}" for key in found.names[:4]
+        )
+        yield f"{name}: {numbers} px; RMS {found.rms_px:.3f} px over {len(found.views)} images"
+    for pose in report.rig.pairs():
+        yield (
+            f"{pose.camera} from {pose.reference}: turned by {pose.rotation_deg:.2f} ± "
+            f"{pose.rotation_sd_deg:.2g}°, {1000.0 * pose.baseline_m:.1f} ± "
+            f"{1000.0 * pose.position_sd_m:.2g} mm away; {pose.moments} moments in common"
+        )
+    for name, fit in report.depth.items():
+        yield f"{name}: {depth_line(fit)}"
+    for name, worth in trust.items():
+        yield f"{name}: {worth.verdict.sentence}"
+    unseen = report.rig.held_out
+    beside = "" if unseen is None else f"; {unseen.rms_px:.3f} px at moments that it has not seen"
+    yield f"RMS {report.rig.rms_px:.3f} px over {len(report.rig.moments)} moments{beside}"
+    for name, one in report.cameras.items():
+        for image, detection in one.detections.items():
+            if not detection.found:
+                yield f"not used: {name}/{image}. {detection.reason}"

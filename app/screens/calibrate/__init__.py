@@ -1,0 +1,1 @@
+"""Calibrate: the cameras from photographs of a board, and how far to believe them."""

@@ -1,0 +1,72 @@
+"""What is asked about the camera and the view that are shown: first the verdict, then depth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import TYPE_CHECKING
+
+from app.records import Picture
+from app.screens.calibrate.view import CameraView, DepthErrorView, TrustRequest, TrustView
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+
+class Answers:
+    """The newest verdict and the newest depth pictures; of two questions, the later waits for the earlier."""
+
+    def __init__(
+        self, session: Session, on_trust: Callable[[TrustView | None], None], on_depth: Callable[[], None]
+    ) -> None:
+        """Ask nothing yet.
+
+        Args:
+            session: whose jobs answer.
+            on_trust: called with a new verdict, or None if there could be none.
+            on_depth: called when there are new depth pictures.
+        """
+        self._session, self._on_trust, self._on_depth = session, on_trust, on_depth
+        self._trust: TrustView | None = None
+        self._off: DepthErrorView | None = None
+        self._asked: tuple[Hashable, ...] = ()
+        self._asked_depth: tuple[Hashable, ...] = ()
+        self._judging = False
+
+    def trust_in(self, camera: CameraView) -> TrustView | None:
+        """The newest verdict, if it is about this camera."""
+        return self._trust if self._trust is not None and self._trust.request.camera == camera.name else None
+
+    def pictures_of(self, camera: CameraView, view: str) -> dict[str, Picture]:
+        """What there is for a view."""
+        trust, off = self.trust_in(camera), self._off
+        pictures = {} if trust is None else dict(trust.pictures)
+        if off is not None and (off.camera, off.view) == (camera.name, view):
+            pictures |= off.pictures
+        return pictures
+
+    def ask(self, request: TrustRequest, view: str, depth: bool) -> None:
+        """Ask what is not known yet.
+
+        Args:
+            request: the verdict that is wanted.
+            view: the one that is shown.
+            depth: whether its depth is wanted.
+        """
+        if self._judging:
+            return
+        key = self._session.spec.key("calibrate")
+        if self._asked != (key, request):
+            self._asked, self._judging = (key, request), True
+            self._session.quick_job("calibrate.trust_job:trust_job", request, on_end=self._judged)
+        elif depth and self._asked_depth != (key, request.camera, view):
+            self._asked_depth = (key, request.camera, view)
+            job = "calibrate.depth_job:depth_job"
+            self._session.quick_job(job, request.camera, view, on_end=self._compared)
+
+    def _judged(self, view: TrustView | None) -> None:
+        self._judging, self._trust = False, view
+        self._on_trust(view)
+
+    def _compared(self, view: DepthErrorView | None) -> None:
+        self._off = view
+        self._on_depth()

@@ -1,0 +1,69 @@
+"""Two pictures of what one camera sees, with a line between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from app.compare import captions_html, split
+from app.records import Picture
+from app.screens.calibrate.labels import PAIRS, STRAIGHTENED
+from app.ui import Ui
+
+EMPTY = np.full((480, 640, 3), 235, np.uint8)
+QUALITY = 92
+MISSING = "not there for this view"
+
+
+class PictureArea:
+    """Which two pictures are shown, where the line is, the pictures, and what their colours mean."""
+
+    def __init__(self, ui: Ui, on_pair: Callable[[], None]) -> None:
+        """Add the area to the current container; ``on_pair`` is called when others are wanted."""
+        self._pictures: Mapping[str, Picture] = {}
+        self._drawn: tuple[object, ...] = ()
+        self._pair = ui.gui.add_dropdown(
+            "Compare", list(PAIRS), hint="What stands left and right of the line."
+        )
+        self._split = ui.gui.add_slider(
+            "Split (%)", 0.0, 100.0, 1.0, 50.0, hint="Where the line is, in % of the picture's width."
+        )
+        self._image = ui.gui.add_image(EMPTY, format="jpeg", jpeg_quality=QUALITY)
+        self._captions = ui.gui.add_html("")
+        ui.when_changed(self._pair, on_pair)
+        ui.when_changed(self._split, self._draw)
+
+    @property
+    def wanted(self) -> str:
+        """The pair that is to be shown, one of ``PAIRS``."""
+        return self._pair.value
+
+    def load(self, pictures: Mapping[str, Picture]) -> None:
+        """Show what there is; without the photograph nothing."""
+        self._pictures, self._drawn = pictures, ()
+        for handle in (self._pair, self._split, self._image, self._captions):
+            handle.visible = bool(pictures)
+        self._draw()
+
+    def set(self, pair: str = STRAIGHTENED, split_share: float = 0.5) -> None:
+        """Choose for the person."""
+        self._pair.value, self._split.value = pair, round(100.0 * split_share)
+        self._draw()
+
+    def _draw(self) -> None:
+        """Only what has changed: a dragged slider asks more often than it moves."""
+        if not self._pictures:
+            return
+        photo = self._pictures["photo"]
+        names, pair = self._pair.value.split(" | "), PAIRS[self._pair.value]
+        left, right = (
+            self._pictures.get(name) or Picture(photo.rgb, f"{title.capitalize()}: {MISSING}")
+            for name, title in zip((pair.left, pair.right), names, strict=True)
+        )
+        wanted = (id(left.rgb), id(right.rgb), self._pair.value, float(self._split.value))
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        self._captions.content = captions_html(left, right)
+        self._image.image = split(left.rgb, right.rgb, wanted[3] / 100.0)

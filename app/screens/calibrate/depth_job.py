@@ -1,0 +1,70 @@
+"""The depth of one view beside the board's plane, as measured and corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import cv2
+import numpy as np
+
+from app.records import Picture
+from app.screens.calibrate.bias import bias_of, depth_file
+from app.screens.calibrate.cameras import cameras_of, finished
+from app.screens.calibrate.maps import off_picture
+from app.screens.calibrate.request import board_of
+from app.screens.calibrate.view import DepthErrorView
+from app.state import Spec
+from app.store import Store
+from packetmesh.progress import Progress
+from pipeline.calibration.board import Board
+from pipeline.calibration.estimate import Calibration
+from pipeline.geometry import apply
+from pipeline.io.images import read_depth
+from pipeline.types import FloatArray
+
+LEAST_SCALE_M = 0.01
+
+
+def depth_job(store: Store, spec: Spec, name: str, view: str) -> Generator[Progress, None, DepthErrorView]:
+    """What a view's depth is off by on the board; no picture where there is no depth or no board."""
+    views = spec.views
+    assert views is not None
+    known = yield from finished(cameras_of(store, views))
+    camera = known.camera(name)
+    fitted = None if camera is None else camera.fitted(view)
+    path = depth_file(views, name, view)
+    if camera is None or camera.calibration is None or path is None or fitted is None:
+        return DepthErrorView(name, view, {})
+    depth = read_depth(path)
+    found = yield from bias_of(store, views, camera)
+    off_m = depth.z_m - board_depth_m(camera.calibration, fitted.T_camera_board, board_of(views))
+    off_most_m = np.abs(off_m[np.isfinite(off_m)])
+    most_m = max(float(np.quantile(off_most_m, 0.95)), LEAST_SCALE_M) if len(off_most_m) else LEAST_SCALE_M
+    zoom = camera.photographs[0].zoom
+    pictures: dict[str, Picture] = {
+        "off-before": off_picture(off_m, most_m, zoom, "Depth as measured, less the board's plane"),
+    }
+    if not isinstance(found, str):
+        corrected_m = found.correction.apply(depth).z_m - depth.z_m
+        pictures["off-after"] = off_picture(
+            off_m + corrected_m, most_m, zoom, "Corrected depth, less the plane"
+        )
+    return DepthErrorView(name, view, pictures)
+
+
+def board_depth_m(lens: Calibration, T_camera_board: FloatArray, board: Board) -> FloatArray:
+    """(H, W) depth of the board's plane between its outermost points; NaN elsewhere."""
+    width_px, height_px = lens.size_px
+    low_m, high_m = board.points_m[:, :2].min(axis=0), board.points_m[:, :2].max(axis=0)
+    along = np.linspace(0.0, 1.0, 16, endpoint=False)[:, None]
+    corners = np.array([[low_m[0], low_m[1]], [high_m[0], low_m[1]], high_m, [low_m[0], high_m[1]]])
+    rim = np.concatenate([a + along * (b - a) for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)])
+    rim_px = lens.optics.project(apply(T_camera_board, np.column_stack([rim, np.zeros(len(rim))])))
+    inside = np.zeros((height_px, width_px), np.uint8)
+    cv2.fillPoly(inside, [np.rint(rim_px).astype(np.int32)], 1)
+    v, u = np.nonzero(inside)
+    rays = lens.optics.rays(np.column_stack([u, v]).astype(float))
+    normal = T_camera_board[:3, 2]
+    depth_m = np.full((height_px, width_px), np.nan)
+    depth_m[v, u] = (normal @ T_camera_board[:3, 3]) * rays[:, 2] / (rays @ normal)
+    return depth_m

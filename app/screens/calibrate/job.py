@@ -1,0 +1,32 @@
+"""The job of the Calibrate screen: the cameras of a session with a board, and the bias of their depth."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+
+from app.screens.calibrate.bias import bias_of
+from app.screens.calibrate.cameras import cameras_of
+from app.screens.calibrate.view import CalibrationView
+from app.state import Spec
+from app.store import Store
+from packetmesh.progress import Progress
+
+CAMERAS_SHARE = 0.6
+"""Of the work is for the cameras, the rest for their depth."""
+
+
+def calibrate_job(store: Store, spec: Spec) -> Generator[Progress | CalibrationView, None, CalibrationView]:
+    """Find the board in all photographs, estimate every camera, all of them together, then the bias of their
+    depth; yields what there is so far.
+    """
+    views = spec.views
+    assert views is not None
+    view = yield from cameras_of(store, views, CAMERAS_SHARE)
+    yield view
+    for index, camera in enumerate(view.cameras):
+        done = CAMERAS_SHARE + (1.0 - CAMERAS_SHARE) * index / len(view.cameras)
+        told = yield from bias_of(store, views, camera, done)
+        view = replace(view, depth=view.depth | {camera.name: told if isinstance(told, str) else told.view})
+        yield view
+    return view

@@ -1,0 +1,36 @@
+"""What the choices of the Calibrate screen are called."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+PictureName = Literal[
+    "photo", "straightened", "uncertainty", "halves", "coverage", "next", "off-before", "off-after"
+]
+Around = Literal["camera", "board", "rig"]
+"""What stays in its place in space."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two pictures with a line between them."""
+
+    left: PictureName
+    right: PictureName
+
+
+PAIRS: dict[str, Pair] = {
+    "photograph | straightened": Pair("photo", "straightened"),
+    "photograph | uncertainty": Pair("photo", "uncertainty"),
+    "uncertainty | difference of two halves": Pair("uncertainty", "halves"),
+    "photograph | coverage": Pair("photo", "coverage"),
+    "photograph | next view to take": Pair("photo", "next"),
+    "depth error measured | corrected": Pair("off-before", "off-after"),
+}
+STRAIGHTENED, UNCERTAINTY, HALVES, COVERAGE, NEXT, DEPTH = PAIRS
+AROUND: dict[str, Around] = {
+    "boards around the camera": "camera",
+    "cameras around the board": "board",
+    "cameras of the rig": "rig",
+}

@@ -1,0 +1,87 @@
+"""The lesson of the Calibrate screen: what a stop can set, and the file that ships."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+
+from app.lesson import LESSONS, Setting, choice, quantity, sets
+from app.screens.calibrate.labels import AROUND, PAIRS, STRAIGHTENED, Around
+from app.screens.calibrate.view import CameraView
+from pipeline.config import Lens
+
+SHIPPED = LESSONS / "how-good-is-my-calibration.md"
+Keep = Literal["all", "three alike"]
+"""The views that a calibration is made of."""
+LEAST_DEG = 8.0
+"""Between the normals of the three: boards ever alike determine no lens."""
+_ON_OFF = {"on": True, "off": False}
+_KEEP: dict[str, Keep] = {"all": "all", "three alike": "three alike"}
+_LENSES: dict[str, Lens] = {"thesis": "thesis", "brown": "brown", "rational": "rational"}
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrateLook:
+    """What a stop shows; by default what the screen shows at first."""
+
+    pair: str = STRAIGHTENED
+    """One of ``app.screens.calibrate.labels.PAIRS``."""
+    split_share: float = 0.5
+    around: Around = "camera"
+    keep: Keep = "all"
+    lens: Lens = "thesis"
+    range_m: float | None = None
+    """Where the camera is judged; None leaves that to the scene."""
+    noise_px: float | None = None
+    """Replays the noise experiment."""
+    other_lens: bool = False
+    """Whether that is seen through a lens of another kind."""
+    used: bool = False
+    """Whether the chain computes with the calibration."""
+
+
+def _noise(look: CalibrateLook, text: str) -> CalibrateLook:
+    amount, _, lens = text.partition(" through ")
+    if lens not in ("", "another lens"):
+        raise ValueError("try such as '0.1 px' or '0.1 px through another lens'")
+    return replace(look, noise_px=quantity("px", 1.0)(amount), other_lens=bool(lens))
+
+
+SETTINGS: dict[str, Setting[CalibrateLook]] = {
+    "compare": sets("pair", choice({name: name for name in PAIRS})),
+    "split": sets("split_share", quantity("%", 100.0, 100.0)),
+    "in space": sets("around", choice(AROUND)),
+    "views": sets("keep", choice(_KEEP)),
+    "lens": sets("lens", choice(_LENSES)),
+    "range": sets("range_m", quantity("m", 6.0, above_zero=True)),
+    "noise": _noise,
+    "calibration in use": sets("used", choice(_ON_OFF)),
+}
+"""What a stop can set, by its name in the file."""
+
+
+def left_out(camera: CameraView, keep: Keep) -> Iterator[tuple[str, str]]:
+    """Camera and moment of the views that are left out to keep those.
+
+    Three alike are those whose boards point most nearly the same way, but not so nearly that they determine
+    no lens.
+    """
+    lens = camera.calibration
+    if keep == "all" or lens is None:
+        return
+    normals = {view.name: view.T_camera_board[:3, 2] for view in lens.views}
+    spread = {names: _spread_deg([normals[name] for name in names]) for names in combinations(normals, 3)}
+    enough = {names: deg for names, deg in spread.items() if deg >= LEAST_DEG}
+    if enough:
+        kept = min(enough, key=lambda names: enough[names])
+        yield from ((camera.name, name) for name in normals if name not in kept)
+
+
+def _spread_deg(normals: list[np.ndarray]) -> float:
+    """The largest angle between two of them."""
+    cosines = np.clip(np.array(normals) @ np.array(normals).T, -1.0, 1.0)
+    return float(np.degrees(np.arccos(cosines.min())))

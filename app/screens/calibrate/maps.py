@@ -1,0 +1,96 @@
+"""What is known of each pixel of a camera, as pictures of the size of its photographs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from app.drawing.colors import DELIVERED, DISTANCE_STOPS, LOSS, NEUTRAL, SOURCE, ramp
+from app.drawing.pictures import EQUAL, FARTHER, NEARER, UNKNOWN
+from app.records import ColorBar, Picture
+from pipeline.calibration.diagnosis import Coverage
+from pipeline.calibration.estimate import Calibration, FittedView
+from pipeline.calibration.next_view import NextView
+from pipeline.types import ByteArray, FloatArray
+
+PAPER = 245
+NO_POINTS = (228, 228, 228)
+SHIFT = 4
+"""Bits behind the comma of what is drawn."""
+
+
+def map_picture(error_m: FloatArray, most_m: float, size_px: tuple[int, int], what: str) -> Picture:
+    """Errors in mm over the image, dark for none; grey where the lens has no ray.
+
+    Args:
+        error_m: (R, C) of cells.
+        most_m: from which on the colour does not change.
+        size_px: width and height of the picture.
+        what: begins the caption.
+    """
+    known = np.isfinite(error_m)
+    filled = np.where(known, error_m, most_m).astype(np.float32)
+    fine = cv2.resize(filled, size_px, interpolation=cv2.INTER_CUBIC)
+    rgb = ramp(np.clip(fine, 0.0, most_m), most_m, DISTANCE_STOPS)
+    rgb[cv2.resize(known.astype(np.uint8), size_px, interpolation=cv2.INTER_NEAREST) == 0] = UNKNOWN
+    middle = error_m[error_m.shape[0] // 2, error_m.shape[1] // 2]
+    worst = float(np.nanmax(error_m))
+    labels = tuple(f"{1000.0 * value:.2g} mm" for value in np.linspace(0.0, most_m, 3))
+    told = f"{what} {1000.0 * middle:.2g} mm in the middle, {1000.0 * worst:.2g} mm at worst"
+    return Picture(rgb, told, ColorBar(DISTANCE_STOPS, labels))
+
+
+def coverage_picture(
+    told: Coverage, views: Sequence[FittedView], zoom: float, size_px: tuple[int, int]
+) -> Picture:
+    """How many points were seen where; light grey where there was none."""
+    most = max(int(told.counts.max()), 1)
+    cells = ramp(told.counts.astype(float), float(most), DISTANCE_STOPS)
+    cells[told.counts == 0] = NO_POINTS
+    rgb = cv2.resize(cells, size_px, interpolation=cv2.INTER_NEAREST)
+    for view in views:
+        _dots(rgb, view.points_px * zoom, SOURCE, 1)
+    return Picture(
+        rgb,
+        f"Points of all views, in {told.share:.0%} of the cells; grey: none, so the lens is guessed there",
+        ColorBar(DISTANCE_STOPS, ("1", f"{most:,} points a cell")),
+    )
+
+
+def next_picture(following: NextView, lens: Calibration, zoom: float, size_px: tuple[int, int]) -> Picture:
+    """Where to hold the board next, over the points that are there already."""
+    rgb = np.full((size_px[1], size_px[0], 3), PAPER, np.uint8)
+    for view in lens.views:
+        _dots(rgb, view.points_px * zoom, NEUTRAL, 1)
+    outline = np.rint(following.outline_px * zoom * (1 << SHIFT)).astype(np.int32)
+    cv2.polylines(rgb, [outline], True, DELIVERED, 3, cv2.LINE_AA, shift=SHIFT)
+    _dots(rgb, following.points_px * zoom, DELIVERED, 4)
+    _dots(rgb, following.points_px[:1] * zoom, LOSS, 7)
+    return Picture(
+        rgb,
+        f"Hold the board so next (green, its first circle red; grey: points so far): "
+        f"{following.distance_m:.2f} m away, tilted by {following.tilt_deg:.0f}°. Predicted: "
+        f"{1000.0 * following.error_before_m:.2g} mm → {1000.0 * following.error_after_m:.2g} mm",
+    )
+
+
+def off_picture(off_m: FloatArray, most_m: float, zoom: float, what: str) -> Picture:
+    """(H, W) depth that is off: blue too near, white right, orange too far, grey unknown."""
+    rgb = ramp(
+        np.clip(np.nan_to_num(off_m), -most_m, most_m) + most_m, 2.0 * most_m, (NEARER, EQUAL, FARTHER)
+    )
+    known = np.isfinite(off_m)
+    rgb[~known] = UNKNOWN
+    size_px = (round(off_m.shape[1] * zoom), round(off_m.shape[0] * zoom))
+    rgb = rgb if zoom == 1.0 else cv2.resize(rgb, size_px, interpolation=cv2.INTER_AREA)
+    middle = f"median {1000.0 * float(np.median(off_m[known])):+.1f} mm" if known.any() else "no depth there"
+    most = f"{1000.0 * most_m:.0f} mm"
+    bar = ColorBar((NEARER, EQUAL, FARTHER), (f"−{most}", "0", f"+{most}"))
+    return Picture(rgb, f"{what}: {middle}; blue too near, orange too far", bar)
+
+
+def _dots(rgb: ByteArray, points_px: FloatArray, color: tuple[int, int, int], radius_px: int) -> None:
+    for x, y in np.rint(points_px * (1 << SHIFT)).astype(int).tolist():
+        cv2.circle(rgb, (x, y), radius_px << SHIFT, color, -1, cv2.LINE_AA, shift=SHIFT)

@@ -1,0 +1,121 @@
+"""The thesis's robustness experiment, live: noise on the points of the views that are shown (SPEC 1.4)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from app.screens.calibrate.cameras import cameras_of, finished
+from app.screens.calibrate.noise_view import NoiseRequest, NoiseView
+from app.state import Spec
+from app.store import Store
+from packetmesh.errors import InputError, PacketMeshError
+from packetmesh.progress import Progress
+from pipeline.calibration.estimate import Calibration, View, calibrate
+from pipeline.calibration.lens import Optics
+from pipeline.calibration.trust import half_difference_px
+from pipeline.types import FloatArray
+
+SHOW_S = 0.25
+"""Between two pictures of what there is so far."""
+HALVED = 8
+"""In every eighth trial two halves of the views are compared, which takes three calibrations more."""
+AT_M = 2.0
+"""Range at which they are."""
+OTHER = np.array([0.0, 0.0, 0.003, -0.002, 0.3])
+"""What a lens of another kind has more of k1, k2, p1, p2 and k3: as a cheap one has that is mounted askew."""
+
+
+@dataclass(slots=True)
+class _Trials:
+    """Those that are done."""
+
+    found: list[list[float]] = field(default_factory=list)
+    covariances: list[FloatArray] = field(default_factory=list)
+    rms_px: list[float] = field(default_factory=list)
+    beyond_noise: list[bool] = field(default_factory=list)
+
+    def view(self, empty: NoiseView) -> NoiseView:
+        """What there is so far."""
+        if not self.found:
+            return empty
+        return replace(
+            empty,
+            found=np.array(self.found),
+            covariance=np.mean(self.covariances, axis=0),
+            rms_px=float(np.mean(self.rms_px)),
+            halved=len(self.beyond_noise),
+            beyond_noise=sum(self.beyond_noise),
+        )
+
+
+def noise_job(
+    store: Store, spec: Spec, request: NoiseRequest
+) -> Generator[Progress | NoiseView, None, NoiseView]:
+    """Take the calibration that was found as the truth, and see where noise on its points leads.
+
+    Yields:
+        What there is so far; the job stops at any of these.
+
+    Raises:
+        InputError: the camera has no calibration.
+    """
+    assert spec.views is not None
+    known = yield from finished(cameras_of(store, spec.views))
+    camera = known.camera(request.camera)
+    if camera is None or camera.calibration is None:
+        raise InputError(f"There is no calibration of {request.camera} to repeat; add views first")
+    true = camera.calibration
+    exact = _seen(true, request.other_lens)
+    empty = NoiseView(request, true.names, np.array([true.parameters[name] for name in true.names]))
+    trials, told_s = _Trials(), time.monotonic()
+    for trial in range(request.trials):
+        halves = request.sigma_px > 0.0 and trial % HALVED == 0
+        _repeat(trials, true, _with_noise(exact, request.sigma_px, trial), halves)
+        if time.monotonic() - told_s > SHOW_S:
+            told_s = time.monotonic()
+            yield Progress(f"trial {trial + 1} of {request.trials}", (trial + 1) / request.trials)
+            yield trials.view(empty)
+    return trials.view(empty)
+
+
+def _seen(true: Calibration, other_lens: bool) -> list[View]:
+    """The views without noise, through the lens itself or through one that has more to it."""
+    optics = true.optics
+    if other_lens and true.lens != "fisheye":
+        more = np.zeros(max(len(OTHER), true.distortion.size))
+        more[: len(OTHER)] = OTHER
+        more[: true.distortion.size] += true.distortion
+        optics = Optics("rational" if more.size > len(OTHER) else "brown", true.matrix, more)
+    return [
+        View(view.name, optics.project(view.board_m, view.T_camera_board), view.board_m)
+        for view in true.views
+    ]
+
+
+def _with_noise(views: Sequence[View], sigma_px: float, trial: int) -> list[View]:
+    rng = np.random.default_rng((14, trial))
+    return [
+        replace(view, points_px=view.points_px + sigma_px * rng.standard_normal(view.points_px.shape))
+        for view in views
+    ]
+
+
+def _repeat(trials: _Trials, true: Calibration, noisy: Sequence[View], halves: bool) -> None:
+    """Add a trial, unless its views do not determine the lens."""
+    try:
+        one = calibrate(noisy, true.size_px, true.lens)
+    except PacketMeshError:
+        return
+    trials.found.append([one.parameters[name] for name in one.names])
+    trials.covariances.append(one.covariance)
+    trials.rms_px.append(one.rms_px)
+    if halves:
+        try:
+            apart = half_difference_px(noisy, true.size_px, AT_M, true.lens)
+        except PacketMeshError:  # too few views for halves
+            return
+        trials.beyond_noise.append(apart.beyond_noise)

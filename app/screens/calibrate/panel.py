@@ -1,0 +1,403 @@
+"""Calibrate: the cameras from photographs of a board, and how far to believe them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import replace
+from functools import partial
+from typing import Any, ClassVar, get_args
+
+from app.drawing.cameras import turn
+from app.lesson import LessonFolder, read_lesson
+from app.records import Picture, SceneView
+from app.screens.calibrate.answers import Answers
+from app.screens.calibrate.area import PictureArea
+from app.screens.calibrate.bars import Bars, bars_of
+from app.screens.calibrate.depth import DepthFolder
+from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of
+from app.screens.calibrate.labels import AROUND, DEPTH
+from app.screens.calibrate.lesson import SETTINGS, SHIPPED, CalibrateLook, left_out
+from app.screens.calibrate.noise import NoiseFolder
+from app.screens.calibrate.noise_view import NoiseRequest
+from app.screens.calibrate.numbers import parameter_table, summary_table
+from app.screens.calibrate.photograph import found_picture, picture_of, straightened_picture
+from app.screens.calibrate.request import calibrate_command, inner, views_in, with_boards
+from app.screens.calibrate.rig import RigFolder
+from app.screens.calibrate.trust import TrustFolder, verdict_html
+from app.screens.calibrate.uploads import UploadFolder
+from app.screens.calibrate.use import WRITING, UseRow
+from app.screens.calibrate.view import CalibrationView, CameraView, RigView, TrustView
+from app.state import BoardViews, Spec, Step
+from app.ui import Panel
+from packetmesh.errors import InputError
+from pipeline.config import Lens
+from pipeline.io.demos import DEMO_SCENES, board_views_of
+from pipeline.sources import Calibrated, Demo
+
+TEXT = """**What you see.** Photographs of a board of known size tell how each camera bends what it sees, and
+where the board stood: click a bar or a board. What counts is not how well the lens explains these views, but
+how sure it is of **others**. Go on with **Depth**."""
+NOTHING = """This scene comes **without photographs of a board**: its cameras are taken at their word. Open a
+scene whose cameras need calibration, or use your own photographs below."""
+
+
+class CalibratePanel(Panel):
+    """Views of a board, the cameras they tell, and whether to trust them."""
+
+    title = "Calibrate"
+    step: ClassVar[Step | None] = "calibrate"
+    drawn_below = BELOW
+    only_when_shown: ClassVar[bool] = True
+
+    def build(self) -> None:
+        """Verdict, camera, bars, views, the split picture, the stage; numbers; the rest in folders."""
+        gui, ui = self.gui, self.ui
+        self._source = inner(self.session.spec.source)
+        self._here = self._had_views = False
+        self._view: CalibrationView | None = None
+        self._whole: dict[str, CameraView] = {}
+        """Every camera before a view of it was dropped."""
+        self._chosen, self._uses = "", 0
+        self._answers = Answers(self.session, self._judged, self._show_view)
+        self._framed: tuple[Hashable, ...] = ()
+        self._look: CalibrateLook | None = None
+        self._came: SceneView | None = None
+        """The scene as it came."""
+        gui.add_markdown(TEXT)
+        LessonFolder(ui, read_lesson(SHIPPED, SETTINGS, CalibrateLook()), self._take_look)
+        self._status = gui.add_markdown("")
+        self._open = ui.buttons(
+            "Open",
+            {DEMO_SCENES[name].title: partial(self._open_scene, name) for name in with_boards()}
+            or {"–": self.on_show},
+            "A scene with views of a board.",
+            visible=False,
+        )
+        self._verdict = gui.add_html("")
+        self._use = UseRow(ui, self._use_it, self._as_before)
+        self._camera = gui.add_dropdown("Camera", ["node_00"], hint="Whose views are shown.", visible=False)
+        ui.when_changed(self._camera, self._show_camera)
+        self._bars = Bars(ui, self._pick)
+        self._row = ui.buttons(
+            "View",
+            {
+                "Back": partial(self._go, -1),
+                "Next": partial(self._go, 1),
+                "Drop": self._drop,
+                "All": self._keep_all,
+            },
+            "Back, Next: the view before or after. Drop: leave this one out, or take it in again. All: leave "
+            "none out.",
+            visible=False,
+        )
+        self._area = PictureArea(ui, self._show_view)
+        self._around = gui.add_dropdown(
+            "In space", list(AROUND), hint="What stays in its place in the 3-D scene."
+        )
+        ui.when_changed(self._around, self._draw)
+        self._numbers = gui.add_html("")
+        self._build_folders()
+        self._drawing = BoardsDrawing(self.scene, lambda name: ui.post(self._pick, name))
+        self._show_camera()
+
+    def _build_folders(self) -> None:
+        gui, ui, session = self.gui, self.ui, self.session
+        self._judge = TrustFolder(ui, self._ask)
+        with gui.add_folder("Every parameter, and how sure it is", expand_by_default=False):
+            self._parameters = gui.add_html("")
+        self._depth = DepthFolder(ui)
+        self._rig = RigFolder(ui)
+        self._noise = NoiseFolder(ui, self._replay, session.cancel_side_job)
+        self._uploads = UploadFolder(ui, session.folder, self._use_own)
+        with gui.add_folder("Advanced", expand_by_default=False):
+            self._lens = gui.add_dropdown(
+                "Lens",
+                list(get_args(Lens)),
+                hint="Distortions that the camera may have: k1 and k2 (thesis), also p1, p2, k3 (brown), or "
+                "k4 to k6 as well (rational); or those of a fisheye.",
+            )
+            ui.when_changed(self._lens, self._picked_lens)
+
+    # What there is to calibrate from.
+
+    def on_show(self) -> None:
+        """Look for the board at the first visit."""
+        self._here = True
+        if self.session.spec.views is None:
+            self._use_own(None)
+
+    def on_hide(self) -> None:
+        """Another step is shown."""
+        self._here = False
+
+    def _use_own(self, views: BoardViews | None) -> None:
+        """Take the photographs of the person, or those of the scene, once somebody looks."""
+        if views is None and self._here and isinstance(self._source, Demo):
+            folder = board_views_of(self._source.name)
+            views = None if folder is None else views_in(folder)
+        self._want(views)
+
+    def _open_scene(self, name: str) -> None:
+        self.session.want(replace(self.session.spec, source=Demo(name), views=None))
+
+    def _want(self, views: BoardViews | None) -> None:
+        if views is not None:
+            views = replace(views, lens=self._lens.value)
+        if views != self.session.spec.views:
+            self.session.want(replace(self.session.spec, views=views))
+        self._show_camera()
+
+    def on_spec(self, spec: Spec) -> None:
+        """Another scene has other cameras; what is replayed belongs to the views before."""
+        moved, taken = inner(spec.source) != self._source, self._had_views and spec.views is None
+        self._had_views = spec.views is not None
+        if moved or taken:
+            self._view, self._whole = None, {}
+        if moved:
+            self._source = inner(spec.source)
+            self._use.forget()
+        if moved or taken:
+            self.ui.post(self._use_own, None)
+        if not self.session.results.fresh("calibrate", spec):
+            self._noise.forget()
+
+    def on_partial(self, view: Any) -> None:
+        """Show the cameras as they come."""
+        if isinstance(view, CalibrationView):
+            self._take(view)
+
+    def on_view(self, step: Step, view: Any) -> None:
+        """Show all cameras; and what becomes of the surface."""
+        if step == "scene":
+            self._uploads.cameras([node.name for node in view.nodes])
+            self._judge.at_range([0.5 * (node.nearest_m + node.farthest_m) for node in view.nodes])
+            if not isinstance(self.session.spec.source, Calibrated):
+                self._came = view
+            if self._view is None or AROUND[self._around.value] == "rig":
+                self._draw()
+        if step == "surface" and self.session.results.fresh("surface", self.session.spec):
+            self._use.surface(view.after, isinstance(self.session.spec.source, Calibrated))
+        if step == "calibrate":
+            self._take(view)
+            self._show_look()
+
+    def on_failure(self, step: Step, sentence: str) -> None:
+        """Say why there is no camera."""
+        if step == "calibrate":
+            self._view = None
+            self._show_camera()
+            self._status.content = sentence
+
+    def _take(self, view: CalibrationView) -> None:
+        self._view = view
+        names = tuple(camera.name for camera in view.cameras)
+        if names != self._camera.options:
+            chosen = self._camera.value
+            self._camera.options = names
+            self._camera.value = chosen if chosen in names else names[0]
+        self._whole |= {camera.name: camera for camera in view.cameras if not camera.dropped}
+        self._show_camera()
+
+    # The camera that is shown.
+
+    def _shown(self) -> CameraView | None:
+        return None if self._view is None else self._view.camera(self._camera.value)
+
+    def _show_camera(self) -> None:
+        camera = self._shown()
+        with self.ui.atomic():
+            for handle in (self._row, self._around):
+                handle.visible = camera is not None
+            self._camera.visible = self._view is not None and len(self._view.cameras) > 1
+            self._use.show(camera is not None and camera.calibration is not None)
+            nothing = camera is None and self.session.spec.views is None
+            self._open.visible = nothing and bool(with_boards())
+            self._status.content = NOTHING if nothing else "" if camera is None else camera.reason
+            self._show_numbers(camera)
+            self._show_view()
+        self._draw()
+
+    def _show_numbers(self, camera: CameraView | None) -> None:
+        if camera is None or self._view is None:
+            self._verdict.content = self._numbers.content = self._parameters.content = ""
+            self._judge.load(None)
+            self._depth.load("")
+            self._rig.load(None)
+            return
+        before = self._whole.get(camera.name)
+        pair = [camera] if before is None or not camera.dropped else [camera, before]
+        self._numbers.content = summary_table(pair, ("now", "all views") if len(pair) > 1 else ())
+        self._parameters.content = parameter_table(camera)
+        self._depth.load(self._view.depth.get(camera.name))
+        self._rig.load(self._view.rig)
+
+    def _show_view(self) -> None:
+        """Show the chosen view, and what is known of its pixels."""
+        camera = self._shown()
+        if camera is None:
+            self._area.load({})
+            self._bars.show((), "")
+            return
+        if self._chosen not in [one.name for one in camera.photographs]:
+            self._chosen = camera.photographs[0].name
+        trust = self._answers.trust_in(camera)
+        photograph = picture_of(camera, self._chosen)
+        pictures: dict[str, Picture] = {"photo": found_picture(photograph, camera.fitted(photograph.name))}
+        if camera.calibration is not None:
+            pictures["straightened"] = straightened_picture(
+                pictures["photo"], camera.calibration, photograph.zoom
+            )
+        pictures |= self._answers.pictures_of(camera, self._chosen)
+        self._area.load(pictures)
+        self._bars.show(bars_of(camera, () if trust is None else trust.outliers), self._chosen)
+        self._ask()
+
+    def _pick(self, name: str) -> None:
+        """Show another view."""
+        self._chosen = name
+        with self.ui.atomic():
+            self._show_view()
+            self._drawing.choose(name)
+
+    def _go(self, count: int) -> None:
+        camera = self._shown()
+        if camera is not None:
+            names = [one.name for one in camera.photographs]
+            self._pick(names[(names.index(self._chosen) + count) % len(names)])
+
+    def _drop(self) -> None:
+        """Leave the chosen view out, or take it in again."""
+        camera, views = self._shown(), self.session.spec.views
+        if camera is None or views is None:
+            return
+        if not picture_of(camera, self._chosen).found:
+            raise InputError(f"In view {self._chosen} no board was found, so it is left out already.")
+        left = set(views.dropped) ^ {(camera.name, self._chosen)}
+        self._want(replace(views, dropped=tuple(sorted(left))))
+
+    def _keep_all(self) -> None:
+        views = self.session.spec.views
+        if views is not None:
+            self._want(replace(views, dropped=()))
+
+    def _picked_lens(self) -> None:
+        self._whole = {}
+        if self.session.spec.views is not None:
+            self._want(self.session.spec.views)
+
+    # What is asked beside the chain.
+
+    def _ask(self) -> None:
+        """Ask for the verdict, and for the depth of the chosen view where it is wanted."""
+        camera = self._shown()
+        if camera is not None and camera.calibration is not None:
+            request = self._judge.request(camera.name)
+            self._answers.ask(request, self._chosen, self._area.wanted == DEPTH)
+
+    def _judged(self, view: TrustView | None) -> None:
+        with self.ui.atomic():
+            self._verdict.content = verdict_html(view)
+            self._judge.load(view)
+            self._show_view()
+
+    def _replay(self, sigma_px: float, other_lens: bool) -> None:
+        camera = self._shown()
+        if camera is None or camera.calibration is None:
+            raise InputError("There is no calibration to repeat; add photographs first.")
+        request = NoiseRequest(camera.name, sigma_px, other_lens)
+        self.session.side_job(
+            "calibrate.noise_job:noise_job",
+            request,
+            on_partial=self._noise.load,
+            on_end=lambda view: self._noise.ended(view, request),
+        )
+
+    # The chain.
+
+    def _use_it(self) -> None:
+        """Write what is shown, and have the chain compute with it."""
+        self._uses += 1
+        self._use.say(WRITING)
+        folder = str(self.session.folder / f"calibration_{self._uses:02d}")
+        self.session.quick_job("calibrate.use_job:use_job", folder, on_end=self._written)
+
+    def _written(self, folder: str | None) -> None:
+        if folder is None:
+            self._use.say("")
+            return
+        source: Any = self._source
+        self._use.used(folder)
+        self.session.want(replace(self.session.spec, source=Calibrated(source, folder)))
+
+    def _as_before(self) -> None:
+        self._use.used(None)
+        self.session.want(replace(self.session.spec, source=self._source))
+
+    @property
+    def command(self) -> str:
+        """The command line that finds the cameras that are shown."""
+        views = self.session.spec.views
+        return super().command if views is None else calibrate_command(views)
+
+    # The lesson.
+
+    def _take_look(self, look: CalibrateLook) -> None:
+        """Set the controls as a stop says; what needs the cameras waits for them."""
+        with self.ui.atomic():
+            self._area.set(look.pair, look.split_share)
+            self._around.value = next(name for name, key in AROUND.items() if key == look.around)
+            self._judge.set(look.range_m)
+            if self._lens.value != look.lens:
+                self._lens.value, self._whole = look.lens, {}
+            self._noise.forget()
+        if not look.used and isinstance(self.session.spec.source, Calibrated):
+            self._as_before()
+        self._look = look
+        views = self.session.spec.views
+        if views is not None:
+            self._want(replace(views, dropped=()))
+        if self.session.results.fresh("calibrate", self.session.spec):
+            self._show_look()
+
+    def _show_look(self) -> None:
+        """What the stop wants of the cameras, now that all of them are there."""
+        look, views = self._look, self.session.spec.views
+        if look is None or views is None or not self.session.results.fresh("calibrate", self.session.spec):
+            return
+        self._look = None
+        self._show_camera()
+        dropped = sorted(one for camera in self._whole.values() for one in left_out(camera, look.keep))
+        if dropped:
+            self._want(replace(views, dropped=tuple(dropped)))
+        if look.noise_px is not None:
+            self._noise.set(look.noise_px, look.other_lens)
+        if look.used and not isinstance(self.session.spec.source, Calibrated):
+            self._use_it()
+
+    # What is drawn.
+
+    def _draw(self) -> None:
+        camera, view, around = self._shown(), self._view, AROUND[self._around.value]
+        scene: SceneView | None = self.session.results.view("scene")
+        with self.ui.atomic():
+            if view is None or camera is None or camera.calibration is None:
+                self._drawing.draw_scene(scene)
+            elif around == "rig" and isinstance(view.rig, RigView):
+                self._drawing.draw_rig(view, view.rig, scene, self._came, self._chosen)
+            else:
+                self._drawing.draw_camera(camera, view.board, around, self._chosen)
+        if self._here:
+            self.session.frame_view()
+
+    def look(self) -> bool:
+        """Turn the view to the boards when there are others; the cameras of a rig stand in the scene."""
+        camera, around = self._shown(), AROUND[self._around.value]
+        if camera is None or camera.calibration is None or around == "rig":
+            self._framed = ()
+            return False
+        framed = (camera.name, around, len(camera.photographs))
+        if framed != self._framed:
+            self._framed, stage = framed, place_of(camera, around)
+            for client in self.session.clients():
+                turn(client, stage.middle_m, stage.viewpoint_m)
+        return True

@@ -1,0 +1,81 @@
+"""What is asked of the photographs of a board, in the terms of the pipeline."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+from app.state import BoardViews
+from pipeline.calibration.board import Board
+from pipeline.calibration.shots import BOARD_FILE, NodeShots, node_shots, read_board
+from pipeline.io.demos import DEMO_SCENES, board_views_of
+from pipeline.sources import Calibrated, Source
+
+TRUTH = "truth.json"
+FOLDS = 4
+"""In so many turns views, or moments of several cameras, are held out."""
+
+
+def views_in(folder: Path) -> BoardViews:
+    """The photographs in a folder, of the board that its board.json says, or else of the thesis's.
+
+    Raises:
+        InputError: the file says something else.
+    """
+    path = folder / BOARD_FILE
+    board = read_board(path) if path.exists() else Board()
+    return BoardViews(str(folder), 0, board.pattern, board.columns, board.rows, board.spacing_m)
+
+
+def board_of(views: BoardViews) -> Board:
+    """What is photographed."""
+    return Board(views.pattern, views.columns, views.rows, views.spacing_m)
+
+
+def shots_of(views: BoardViews) -> tuple[NodeShots, ...]:
+    """The images of every camera.
+
+    Raises:
+        InputError: there are none.
+    """
+    return node_shots([views.folder])
+
+
+def true_parameters(views: BoardViews, camera: str) -> dict[str, float]:
+    """fx, fy, cx, cy, k1 and so on of a camera whose photographs were rendered; empty for real ones."""
+    try:
+        told = json.loads(Path(views.folder, TRUTH).read_text(encoding="utf-8"))
+        true = told["cameras"][camera]
+        places = {name: float(true[name]) for name in ("fx", "fy", "cx", "cy")}
+        lens = zip(("k1", "k2", "p1", "p2", "k3"), true["distortion"], strict=False)
+        return places | {name: float(value) for name, value in lens}
+    except (OSError, KeyError, TypeError, ValueError):
+        return {}
+
+
+def calibrate_command(views: BoardViews) -> str:
+    """The command line that finds the same cameras."""
+    board, nodes = board_of(views), shots_of(views)
+    folder = views.folder if len(nodes) > 1 else str(nodes[0].folder)
+    words = ["packetmesh", "calibrate", folder, "--pattern", board.pattern]
+    words += ["--columns", str(board.columns), "--rows", str(board.rows)]
+    words += ["--spacing-mm", f"{1000.0 * board.spacing_m:g}", "--lens", views.lens, "--held-out", str(FOLDS)]
+    names = {
+        (node.name, shot.moment): f"{node.name}/{shot.color.name}" if len(nodes) > 1 else shot.color.name
+        for node in nodes
+        for shot in node.shots
+    }
+    if views.dropped:
+        words += ["--without", *(names[one] for one in views.dropped if one in names)]
+    return shlex.join([*words, "--out", "runs/calibration"])
+
+
+def inner(source: Source) -> Source:
+    """A source without the calibration that is laid over it."""
+    return source.source if isinstance(source, Calibrated) else source
+
+
+def with_boards() -> list[str]:
+    """The demo scenes that have views of a board."""
+    return [name for name in DEMO_SCENES if board_views_of(name) is not None]

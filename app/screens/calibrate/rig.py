@@ -1,0 +1,64 @@
+"""The folder of all cameras together: where each stands, and how sure that is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.screens.calibrate.view import RigView
+from app.tables import number, table
+from app.ui import Ui
+
+TEXT = """Moments at which several cameras see the board tell where these stand to each other. Choose
+**cameras of the rig** under *In space*: grey is where the scene had them, blue where the board puts them."""
+MEANING = (
+    "Distance from the first camera with its standard error, then the error of the rotation, and the moments "
+    "at which both see the board."
+)
+
+
+class RigFolder:
+    """Where the cameras stand."""
+
+    def __init__(self, ui: Ui) -> None:
+        """Add the folder."""
+        self._folder = ui.gui.add_folder("Where the cameras stand", expand_by_default=False, visible=False)
+        with self._folder:
+            ui.gui.add_markdown(TEXT)
+            self._table = ui.gui.add_html("")
+            self._text = ui.gui.add_markdown("")
+
+    def load(self, rig: RigView | str | None) -> None:
+        """Show another rig; a sentence says why there is none, None hides it."""
+        self._folder.visible = rig is not None
+        self._table.content = rig_table(rig) if isinstance(rig, RigView) else ""
+        self._text.content = rig_line(rig) if isinstance(rig, RigView) else rig or ""
+
+
+def rig_table(rig: RigView) -> str:
+    """HTML: a line for each camera but the first."""
+    rows = []
+    for one in rig.cameras[1:]:
+        away_m = float(np.linalg.norm(one.T_first_camera[:3, 3]))
+        rows.append(
+            (
+                one.name,
+                MEANING,
+                f"{away_m:.4f} m",
+                number(one.position_sd_m, 2, "mm", 1000.0),
+                number(one.rotation_sd_deg, 4, "°"),
+                str(one.moments),
+            )
+        )
+    return table(rows, (f"from {rig.cameras[0].name}", "± position", "± rotation", "moments"))
+
+
+def rig_line(rig: RigView) -> str:
+    """How well all of it fits, and moments that had no part in it."""
+    told = f"RMS over all cameras {rig.rms_px:.3f} px"
+    if rig.held_out_rms_px is None:
+        return f"{told}; there are too few shared moments to hold some out."
+    moved = [one.held_out_position_m for one in rig.cameras[1:] if one.held_out_position_m is not None]
+    return (
+        f"{told}, {rig.held_out_rms_px:.3f} px in moments that were held out; without a quarter of the "
+        f"moments no camera moves by more than {1000.0 * max(moved, default=0.0):.2f} mm."
+    )

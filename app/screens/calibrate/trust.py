@@ -1,0 +1,129 @@
+"""Whether a camera is good enough: for what range and accuracy, the verdict, and how the lens bends."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Sequence
+
+import plotly.graph_objects as go
+
+from app.drawing.calibration_plots import distortion_figure, radial_residuals_figure
+from app.drawing.colors import DELIVERED, LOSS, css
+from app.screens.calibrate.view import TrustRequest, TrustView
+from app.tables import number, table
+from app.ui import Ui
+
+REST_S = 0.3
+OWN_M = 2.0
+"""Range until a scene says another."""
+CURVES = {"distortion": "How far the lens moves a point", "left": "What it leaves along the radius"}
+
+
+class TrustFolder:
+    """Range and accuracy, what they ask of the camera, and two curves of its lens."""
+
+    def __init__(self, ui: Ui, on_ask: Callable[[], None]) -> None:
+        """Add the folder; ``on_ask`` is called when the camera is to be judged anew."""
+        self._view: TrustView | None = None
+        self._own_m = OWN_M
+        self._resting = ui.debounce(REST_S, on_ask)
+        gui = ui.gui
+        with gui.add_folder("Good enough for what?", expand_by_default=False):
+            gui.add_markdown("Say how far away things will be, and how well they are to be placed there.")
+            self._range = gui.add_slider(
+                "Range (m)", 0.3, 6.0, 0.1, OWN_M, hint="Distance of what will be measured, from the camera."
+            )
+            self._accuracy = gui.add_slider(
+                "Accuracy (mm)",
+                0.5,
+                20.0,
+                0.5,
+                5.0,
+                hint="Within which a point at that range must be placed, across the line of sight.",
+            )
+            self._table = gui.add_html("")
+        with gui.add_folder("How the lens bends", expand_by_default=False):
+            self._curve = gui.add_dropdown(
+                "Curve", list(CURVES.values()), hint="Over the radius in the image."
+            )
+            self._plot = gui.add_plotly(
+                go.Figure(), aspect=0.75, config={"displayModeBar": False}, visible=False
+            )
+        for handle in (self._range, self._accuracy):
+            ui.when_changed(handle, self._resting.restart)
+        ui.when_changed(self._curve, self._draw)
+
+    def request(self, camera: str) -> TrustRequest:
+        """What is asked of a camera."""
+        return TrustRequest(camera, float(self._range.value), self._accuracy.value / 1000.0)
+
+    def at_range(self, ranges_m: Sequence[float]) -> None:
+        """Ask for the middle of these distances."""
+        self._own_m = round(sum(ranges_m) / len(ranges_m), 1)
+        self.set(None)
+
+    def set(self, range_m: float | None) -> None:
+        """Choose for the person; None takes the scene's own distance."""
+        self._range.value = self._own_m if range_m is None else range_m
+
+    def load(self, view: TrustView | None) -> None:
+        """Show the answer; None where there is none."""
+        self._view = view
+        self._table.content = "" if view is None else trust_table(view)
+        self._draw()
+
+    def _draw(self) -> None:
+        self._plot.visible = self._view is not None
+        if self._view is not None:
+            distortion = self._curve.value == CURVES["distortion"]
+            self._plot.figure = (
+                distortion_figure(self._view.bends)
+                if distortion
+                else radial_residuals_figure(self._view.left)
+            )
+
+
+def verdict_html(view: TrustView | None) -> str:
+    """The verdict as a sign and its sentences."""
+    if view is None:
+        return ""
+    sign, color = ("✓ PASS", DELIVERED) if view.passed else ("✗ FAIL", LOSS)
+    first, *rest = (html.escape(line) for line in view.lines)
+    more = "".join(f"<div style='margin-top: 0.4em'>{line}</div>" for line in rest)
+    return (
+        f"<div style='margin: 0 0.8em 0.6em; padding: 0.5em 0.8em; font-size: 13px; border-radius: 4px; "
+        f"border-left: 4px solid {css(color)}; background: rgba(120, 130, 140, 0.1)'>"
+        f"<b style='color: {css(color)}'>{sign}</b> {first}{more}</div>"
+    )
+
+
+def trust_table(view: TrustView) -> str:
+    """HTML: what noise leaves, and what two halves of the views say of each other."""
+    return table(
+        [
+            (
+                "Noise, 95 %",
+                "Within which noise in the views leaves a point at the range 95 times in 100; root mean "
+                "square over the image. A lens of the wrong kind does not show in it.",
+                number(view.uncertainty_m, 2, "mm", 1000.0),
+            ),
+            (
+                "Two halves apart",
+                "The camera is estimated from every other view and from the others; how far apart both put a "
+                "point at the range, root mean square over the image. A lens of the wrong kind shows here.",
+                number(view.difference_m, 2, "mm", 1000.0),
+            ),
+            (
+                "Over what noise explains",
+                "The difference of the halves over what noise alone lets one expect: near 1 if the lens is "
+                "right.",
+                "–" if view.halves is None else f"{view.halves[0]:.2f} ×",
+            ),
+            (
+                "By chance up to",
+                "Noise alone makes that ratio smaller in 95 of 100 cases; what is more is a lens, a view or "
+                "a board that is wrong.",
+                "–" if view.halves is None else f"{view.halves[1]:.2f} ×",
+            ),
+        ]
+    )

@@ -1,0 +1,119 @@
+"""How far a camera is to be trusted at a range, as pictures over its image and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+
+import numpy as np
+
+from app.screens.calibrate.cameras import cameras_of, finished
+from app.screens.calibrate.maps import coverage_picture, map_picture, next_picture
+from app.screens.calibrate.view import CameraView, TrustRequest, TrustView
+from app.state import Spec
+from app.store import Store
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from pipeline.calibration.assess import Trust, assess
+from pipeline.calibration.board import Board
+from pipeline.calibration.diagnosis import radial_curve, radial_residuals
+from pipeline.calibration.estimate import Calibration, View
+from pipeline.calibration.trust import CIRCLE95
+from pipeline.types import FloatArray
+
+
+def trust_job(store: Store, spec: Spec, request: TrustRequest) -> Generator[Progress, None, TrustView]:
+    """Judge a camera.
+
+    Raises:
+        InputError: it has no lens, or the range makes no sense.
+    """
+    views = spec.views
+    assert views is not None
+    known = yield from finished(cameras_of(store, views))
+    camera = known.camera(request.camera)
+    if camera is None or camera.calibration is None:
+        raise InputError(f"{request.camera} has no lens to judge; add views of the board first")
+
+    def judge() -> Generator[Progress, None, TrustView]:
+        yield Progress(f"trust in {camera.name}", 0.5)
+        return _judged(camera, request, known.board)
+
+    return (yield from store.remember(("trust", views, request), judge))
+
+
+def _judged(camera: CameraView, request: TrustRequest, board: Board) -> TrustView:
+    lens = camera.calibration
+    assert lens is not None
+    views = [View(one.name, one.points_px, one.board_m) for one in lens.views]
+    trust = assess(lens, views, board, request.range_m, request.accuracy_m)
+    zoom = camera.photographs[0].zoom
+    size_px = (round(lens.size_px[0] * zoom), round(lens.size_px[1] * zoom))
+    noise_m = CIRCLE95 * trust.sd.error_m
+    apart_m = None if trust.halves is None else trust.halves.map.error_m
+    most_m = _most_m(noise_m, apart_m)
+    at = f"at {request.range_m:g} m"
+    pictures = {
+        "uncertainty": map_picture(
+            noise_m, most_m, size_px, f"95 times in 100 noise moves a point {at} less than"
+        ),
+        "coverage": coverage_picture(trust.coverage, lens.views, zoom, size_px),
+    }
+    if apart_m is not None:
+        pictures["halves"] = map_picture(
+            apart_m, most_m, size_px, f"Two halves of the views put a point {at} apart by"
+        )
+    if trust.following is not None:
+        pictures["next"] = next_picture(trust.following, lens, zoom, size_px)
+    return TrustView(
+        request,
+        trust.verdict.passed,
+        tuple(_lines(trust, lens)),
+        tuple(one.name for one in trust.outliers),
+        pictures,
+        radial_curve(lens),
+        radial_residuals(lens),
+        _rms(noise_m),
+        None if apart_m is None else _rms(apart_m),
+        None if trust.halves is None else (trust.halves.ratio, trust.halves.most_by_noise),
+    )
+
+
+def _lines(trust: Trust, lens: Calibration) -> Iterator[str]:
+    """The verdict, and what to do, in the words of the screen."""
+    judged, halves, following = trust.verdict, trust.halves, trust.following
+    asked = f"{1000.0 * judged.accuracy_m:g} mm at {judged.range_m:g} m"
+    most = 1000.0 * judged.error_of_most_m
+    reached = f"within {most:.2g} mm" if np.isfinite(most) else "nowhere, as the lens folds back,"
+    yield (
+        f"{'Good enough' if judged.passed else 'Not good enough'} for {asked}: a point is placed that well "
+        f"over {100.0 * judged.share:.0f} % of the image, and {reached} over 95 % of it."
+    )
+    if halves is not None and halves.beyond_noise and not judged.passed:
+        yield (
+            f"Two halves of the views differ by {halves.ratio:.1f} times what noise explains (by chance up "
+            f"to {halves.most_by_noise:.1f}): the lens is of the wrong kind, or a view or the board is "
+            "wrong. Try another lens under Advanced, or drop the views that stand out."
+        )
+    elif following is not None and not judged.passed:
+        yield (
+            "The next view to take (under Compare) is predicted to bring "
+            f"{1000.0 * following.error_before_m:.2g} mm to {1000.0 * following.error_after_m:.2g} mm."
+        )
+    if trust.outliers:
+        names = ", ".join(one.name for one in trust.outliers)
+        worst = trust.outliers[0]
+        yield (
+            f"Out of line: view {names}, red below; {worst.name} has {worst.rms_px:.2f} px where the others "
+            f"have {worst.others_px:.2f}. Look at it, then drop it or not."
+        )
+
+
+def _most_m(noise_m: FloatArray, apart_m: FloatArray | None) -> float:
+    """Both maps share their colours, so that they can be compared by eye."""
+    every = noise_m if apart_m is None else np.concatenate([noise_m, apart_m])
+    known = every[np.isfinite(every)]
+    return float(np.quantile(known, 0.98)) if len(known) else 1.0
+
+
+def _rms(error_m: FloatArray) -> float:
+    return float(np.sqrt(np.nanmean(error_m**2)))

@@ -1,0 +1,180 @@
+"""The folder for photographs of one's own board."""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+import zlib
+from collections.abc import Callable, Sequence
+from pathlib import Path, PurePosixPath
+from typing import get_args
+
+import viser
+
+from app.screens.calibrate.request import shots_of, views_in
+from app.state import BoardViews
+from app.ui import Ui
+from packetmesh.errors import InputError
+from pipeline.calibration.shots import BOARD_FILE
+from pipeline.config import Pattern
+
+TEXT = """Photograph a flat board of circles or squares from eight or more directions, tilted by 20 to 40°,
+also into the corners of the image. `packetmesh target` prints one. Add the photographs one by one, or all in
+a ZIP, with a folder for each camera (node_00, node_01 …) if there are several; depth images beside them
+(depth_05.png of color_05.png) tell what the depth sensor is off by."""
+ENDINGS = (".png", ".jpg", ".jpeg")
+UPLOAD_LIMIT_BYTES = 64 << 20
+UNPACKED_LIMIT_BYTES = 256 << 20
+MOST_FILES = 240
+INSTEAD = "use packetmesh calibrate for larger files"
+NONE = "No photograph yet."
+
+
+class UploadFolder:
+    """Upload buttons, what is on the board, and a button that finds the cameras."""
+
+    def __init__(self, ui: Ui, below: Path, on_views: Callable[[BoardViews | None], None]) -> None:
+        """Add the folder.
+
+        Args:
+            ui: where to add it.
+            below: folder of the session.
+            on_views: called with the photographs that are to be used; None for the scene's own.
+        """
+        self._on_views, self._below = on_views, below
+        self._edition = 0
+        self._folder: Path | None = None
+        gui = ui.gui
+        with gui.add_folder("Use your own photographs", expand_by_default=False):
+            gui.add_markdown(TEXT)
+            self._node = gui.add_dropdown(
+                "Taken by", ["node_00"], hint="The camera of the single photographs."
+            )
+            mime = "image/png,image/jpeg,application/zip,.zip"
+            button = gui.add_upload_button("Photograph or ZIP …", icon=viser.Icon.UPLOAD, mime_type=mime)
+            button.on_upload(lambda event: ui.post(self._keep, event.target.value))
+            self._have = gui.add_markdown(NONE)
+            self._pattern = gui.add_dropdown("Board", list(get_args(Pattern)), hint="What is printed on it.")
+            self._columns = gui.add_number(
+                "Columns", 11, min=2, max=50, step=1, hint="Circles, or inner corners."
+            )
+            self._rows = gui.add_number("Rows", 9, min=2, max=50, step=1, hint="Circles, or inner corners.")
+            self._spacing = gui.add_number(
+                "Spacing (mm)",
+                35.0,
+                min=1.0,
+                max=1000.0,
+                step=0.1,
+                hint="Pitch of circles, or side of a square.",
+            )
+            ui.buttons(
+                "Photographs",
+                {"Find the cameras": self._use, "Forget them": self.forget},
+                "Find the cameras: from these photographs. Forget them: go back to those of the scene.",
+            )
+
+    def cameras(self, names: Sequence[str]) -> None:
+        """The cameras that there are."""
+        if tuple(names) != self._node.options:
+            self._node.options = tuple(names)
+
+    def forget(self) -> None:
+        """Go back to the scene's own photographs."""
+        if self._folder is not None:
+            self._folder, self._have.content = None, NONE
+            self._on_views(None)
+
+    def _keep(self, file: viser.UploadedFile) -> None:
+        if self._folder is None:
+            self._folder = self._below / f"photographs_{self._edition:03d}"
+        self._edition += 1
+        kept = keep_photographs(file, self._folder, self._node.value)
+        views = views_in(self._folder)
+        if BOARD_FILE in kept:
+            self._write(views)
+        count = sum(len(node.shots) for node in shots_of(views))
+        noun = "photograph" if count == 1 else "photographs"
+        self._have.content = (
+            f"**{count} {noun}**, the last {kept[-1]}. Add more, or press *Find the cameras*."
+        )
+
+    def _write(self, views: BoardViews) -> None:
+        """Show what a ZIP says of the board."""
+        self._pattern.value = views.pattern
+        self._columns.value, self._rows.value = views.columns, views.rows
+        self._spacing.value = 1000.0 * views.spacing_m
+
+    def _use(self) -> None:
+        if self._folder is None or not self._folder.exists():
+            raise InputError("There is no photograph to look at; add some first.")
+        self._on_views(
+            BoardViews(
+                str(self._folder),
+                self._edition,
+                self._pattern.value,
+                int(self._columns.value),
+                int(self._rows.value),
+                self._spacing.value / 1000.0,
+            )
+        )
+
+
+def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[str]:
+    """Keep a photograph, or all of a ZIP, below ``folder`` as ``NODE/NAME``.
+
+    Returns:
+        What was kept.
+
+    Raises:
+        InputError: it is too large, no ZIP that can be read, or holds no photograph.
+    """
+    if len(file.content) > UPLOAD_LIMIT_BYTES:
+        raise InputError(
+            f"{file.name} has {len(file.content) >> 20} MB; the app takes up to {UPLOAD_LIMIT_BYTES >> 20} "
+            f"MB, so {INSTEAD}."
+        )
+    photographs = {_place(file.name, node): file.content}
+    if file.name.lower().endswith(".zip"):
+        photographs = _unpacked(file, node)
+    elif not file.name.lower().endswith(ENDINGS):
+        raise InputError(f"{file.name} is no photograph; try PNG or JPEG, or a ZIP of them.")
+    there = len(list(folder.glob("*/*")))
+    if there + len(photographs) > MOST_FILES:
+        raise InputError(f"The app takes up to {MOST_FILES} images; {INSTEAD}.")
+    for place, content in photographs.items():
+        path = folder / place
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return list(photographs)
+
+
+def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
+    try:
+        with zipfile.ZipFile(io.BytesIO(file.content)) as archive:
+            inside = [
+                one for one in archive.infolist() if one.filename.lower().endswith((*ENDINGS, BOARD_FILE))
+            ]
+            if sum(one.file_size for one in inside) > UNPACKED_LIMIT_BYTES:
+                raise InputError(
+                    f"{file.name} unpacks to more than {UNPACKED_LIMIT_BYTES >> 20} MB; {INSTEAD}."
+                )
+            found = {
+                _place(one.filename, node): archive.read(one)
+                for one in inside
+                if not PurePosixPath(one.filename).name.startswith(".")
+            }
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error):
+        raise InputError(f"{file.name} cannot be read as a ZIP; pack the photographs again.") from None
+    if not set(found) - {BOARD_FILE}:
+        raise InputError(f"{file.name} holds no PNG or JPEG; try a ZIP of photographs.")
+    return found
+
+
+def _place(name: str, node: str) -> str:
+    """``NODE/NAME`` of a file, in the node's folder that its own path names or else in ``node``."""
+    path = PurePosixPath(name.replace("\\", "/"))
+    if path.name == BOARD_FILE:
+        return BOARD_FILE
+    named = next((part for part in path.parts[:-1] if re.fullmatch(r"node_\d\d", part)), node)
+    return f"{named}/{re.sub(r'[^A-Za-z0-9._-]', '-', path.name)[-60:]}"

@@ -1,0 +1,100 @@
+"""Carries a calibration into the chain, and shows what becomes of the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from app.tables import number, table
+from app.ui import Ui
+
+USE, BEFORE = "Use this calibration", "As before"
+IDLE = ""
+WRITING = "Writing the calibration …"
+ROWS = (
+    (
+        "F-score 5 cm",
+        "Harmonic mean of coverage and accuracy within 5 cm of the true surface.",
+        "f_score_5cm",
+        "%",
+    ),
+    (
+        "Depth error",
+        "Median depth error of the rays that hit, against the truth.",
+        "median_depth_error_m",
+        "cm",
+    ),
+)
+
+
+class UseRow:
+    """Two buttons, and the surface's numbers with and without the calibration."""
+
+    def __init__(self, ui: Ui, on_use: Callable[[], None], on_before: Callable[[], None]) -> None:
+        """Add them to the current container."""
+        self._row = ui.buttons(
+            "In the chain",
+            {USE: on_use, BEFORE: on_before},
+            "Use this calibration: all later steps are computed with it, and the surface changes. As before: "
+            "with what the rig came with.",
+            visible=False,
+        )
+        self._text = ui.gui.add_markdown("")
+        self._table = ui.gui.add_html("")
+        self._surfaces: dict[bool, Any] = {}
+
+    def show(self, visible: bool) -> None:
+        """Whether there is a calibration to use."""
+        self._row.visible = visible
+
+    def say(self, sentence: str) -> None:
+        """Tell what is going on."""
+        self._text.content = sentence
+
+    def used(self, folder: str | None) -> None:
+        """The chain computes with a calibration's folder, or as before."""
+        self._text.content = (
+            "" if folder is None else f"**In use** ({Path(folder).name}): every later step computes with it."
+        )
+        if folder is not None:
+            self._surfaces.pop(True, None)
+        self._draw()
+
+    def surface(self, mesh: Any, calibrated: bool) -> None:
+        """A surface has been made, with the calibration or without."""
+        self._surfaces[calibrated] = mesh
+        self._draw()
+
+    def forget(self) -> None:
+        """Another scene."""
+        self._surfaces = {}
+        self.used(None)
+
+    def _draw(self) -> None:
+        columns = {"as before": self._surfaces.get(False), "calibrated": self._surfaces.get(True)}
+        if columns["calibrated"] is None:
+            self._table.content = ""
+            return
+        self._table.content = surface_table(columns)
+
+
+def surface_table(columns: dict[str, Any]) -> str:
+    """HTML: the surface's numbers, a column for each mesh; a dash for one that is not there."""
+    meshes = list(columns.values())
+    rows = [
+        (
+            "No-hit rays",
+            "Share of the cameras' pixel rays that miss the surface.",
+            *(number(mesh and mesh.quality.no_hit_ray_share, 1, "%", 100.0) for mesh in meshes),
+        )
+    ]
+    if any(mesh is not None and mesh.truth for mesh in meshes):
+        rows += [(name, hint, *(_true(mesh, key, unit) for mesh in meshes)) for name, hint, key, unit in ROWS]
+    return table(rows, tuple(f"surface {name}" for name in columns))
+
+
+def _true(mesh: Any, key: str, unit: str) -> str:
+    if mesh is None:
+        return "–"
+    return "…" if mesh.truth is None else number(mesh.truth.get(key), 1, unit, 100.0)

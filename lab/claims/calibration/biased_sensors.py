@@ -1,0 +1,213 @@
+"""Two nodes with biased depth sensors, calibrated by views of a board and registered (SPEC 1.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lab.claims.calibration.photograph import seen_px
+from lab.claims.registration.cases import NODE_REACH_M, Case, wrong_start
+from lab.claims.registration.entrants import Entrant
+from lab.claims.registration.setup import MAX_POINTS, tuned
+from lab.claims.registration.trials import run_entrant
+from lab.trials import iterate_trials
+from lab.worlds.board_poses import propose_poses
+from lab.worlds.board_views import INK, PAPER, BoardCamera
+from lab.worlds.boxes import box_room
+from lab.worlds.depth_bias import DepthBias
+from lab.worlds.render import View as Render
+from lab.worlds.render import render
+from lab.worlds.sensor import sense_depth
+from packetmesh.progress import Progress
+from pipeline.acquisition import back_project
+from pipeline.calibration.board import Board
+from pipeline.calibration.depth_bias import fit_depth
+from pipeline.calibration.depth_samples import board_depth_samples
+from pipeline.calibration.estimate import Calibration, View, calibrate
+from pipeline.geometry import apply, inverse, pixel_rays, scaled
+from pipeline.io.depth_correction import DepthCorrection
+from pipeline.registration import point_error_m
+from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, FloatArray, PointCloud, RgbdFrame
+
+BOARD = Board()
+"""The thesis's."""
+ROOMS = range(200, 240)
+"""Seeds of ``box_room``: no room that anything was tuned or tried in."""
+SCALE, OFFSET_M = 0.01, 0.03
+"""Off by so much are the one node's sensor and the other's; which way is drawn for each room."""
+ANGLE_DEG, START_DEG, START_M, GATE_M = 25.0, 3.0, 0.06, 0.3
+VIEWS, CORNER_PX, AWAY_M = 24, 0.2, (0.5, 1.7)
+"""Of the board before each node, and the error of its circles' centres."""
+BEHIND_M, WALL = 0.7, 0.6
+"""How far behind the board's middle there is a wall, and what share of infrared it gives back."""
+METHOD = tuned(Entrant("ceicp-a", "plane"))
+CASES = ("unbiased", "unbiased, calibrated", "biased", "biased, calibrated")
+RANGES_M = (1.0, 2.0, 3.0, 4.0)
+"""Where the depth that is left wrong is looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensorsTask:
+    """One room with its two nodes, their sensors and their boards."""
+
+    room: int
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A node of a room."""
+
+    camera: CameraIntrinsics
+    T_world_camera: FloatArray
+    sensed: DepthMap
+    """(H, W) of the room, by an unbiased sensor."""
+    bias: DepthBias
+
+    @property
+    def measured(self) -> DepthMap:
+        """(H, W) of the room, by its own sensor."""
+        return self.bias.measured(self.sensed)
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """Views of the board before a node, and the lens that they tell."""
+
+    lens: Calibration
+    sensed: tuple[DepthMap, ...]
+    """By an unbiased sensor."""
+
+    @property
+    def camera(self) -> CameraIntrinsics:
+        """As the chain takes it."""
+        return CameraIntrinsics(self.lens.matrix, self.lens.distortion[:5], *self.lens.size_px)
+
+    def calibrated(self, bias: DepthBias) -> Found:
+        """What they tell of a sensor with a bias."""
+        depths = [bias.measured(one) for one in self.sensed]
+        fit = fit_depth(board_depth_samples(self.lens, depths, BOARD))
+        return Found(self.camera, fit.correction, fit.terms)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A calibrated node: nothing of it is given."""
+
+    camera: CameraIntrinsics
+    correction: DepthCorrection
+    terms: tuple[str, ...]
+
+
+def sensors_trial(task: SensorsTask) -> dict[str, float | str]:
+    """Point error of the registration by case, in cm, and the depth that calibration leaves wrong."""
+    rng = np.random.default_rng([task.room, 15])
+    nodes = [_node(task.room, index, bias, rng) for index, bias in enumerate(_biases(rng))]
+    boards = [_board_session(node, rng) for node in nodes]
+    found = [session.calibrated(node.bias) for node, session in zip(nodes, boards, strict=True)]
+    plain = [session.calibrated(DepthBias()) for session in boards]
+    clouds = {
+        "unbiased": [_cloud(node, node.sensed, node.camera) for node in nodes],
+        "unbiased, calibrated": [
+            _corrected(node, node.sensed, one) for node, one in zip(nodes, plain, strict=True)
+        ],
+        "biased": [
+            _cloud(node, node.measured, session.camera) for node, session in zip(nodes, boards, strict=True)
+        ],
+        "biased, calibrated": [
+            _corrected(node, node.measured, one) for node, one in zip(nodes, found, strict=True)
+        ],
+    }
+    target, source = nodes
+    T_true = inverse(target.T_world_camera) @ source.T_world_camera
+    points_m = clouds["unbiased"][1].points_m
+    T_init = wrong_start(T_true, points_m, START_DEG, START_M, rng)
+    errors: dict[str, float | str] = {}
+    for name, (onto, moved) in clouds.items():
+        case = Case(moved, onto, T_true, T_init, np.nan).thinned(MAX_POINTS)
+        T = run_entrant(METHOD, case, "q2p", GATE_M).poses[-1]
+        errors[name] = 100.0 * point_error_m(T, T_true, points_m)
+    for index, (node, one) in enumerate(zip(nodes, found, strict=True)):
+        errors[f"terms {index}"] = " + ".join(one.terms) or "none"
+        errors[f"terms of an unbiased sensor {index}"] = " + ".join(plain[index].terms) or "none"
+        errors[f"focal {index}"] = one.camera.fx_px / node.camera.fx_px - 1.0
+        for away_m in RANGES_M:
+            errors[f"left at {away_m:g} m {index}"] = _left_m(node, one.correction, away_m)
+    return errors
+
+
+def _biases(rng: np.random.Generator) -> tuple[DepthBias, DepthBias]:
+    scale, offset = rng.choice((-1.0, 1.0), 2)
+    return DepthBias(b=1.0 + scale * SCALE), DepthBias(a_m=offset * OFFSET_M)
+
+
+def _node(room: int, index: int, bias: DepthBias, rng: np.random.Generator) -> Node:
+    """One of two nodes of a room, as the registration benchmark has them but with a Kinect's 640 pixels."""
+    chord_m = 2.0 * NODE_REACH_M * float(np.sin(np.radians(ANGLE_DEG) / 2.0))
+    scene = box_room(room, 2, ANGLE_DEG, chord_m)
+    camera = scaled(scene.intrinsics, 2.0)
+    view = render(scene, camera, scene.cameras[index], "fast", rng)
+    return Node(camera, scene.cameras[index], sense_depth(view, camera, rng), bias)
+
+
+def _cloud(
+    node: Node, depth: DepthMap, camera: CameraIntrinsics, noise: DepthNoise | None = None
+) -> PointCloud:
+    """Sensor points as the chain takes them."""
+    rgb = np.zeros((*depth.z_m.shape, 3), np.uint8)
+    return back_project(RgbdFrame("node", rgb, depth, camera, node.T_world_camera, noise=noise))
+
+
+def _corrected(node: Node, depth: DepthMap, found: Found) -> PointCloud:
+    """The same with a calibration laid over the node."""
+    return _cloud(node, found.correction.apply(depth), found.camera, found.correction.noise)
+
+
+def _board_session(node: Node, rng: np.random.Generator) -> Session:
+    """Poses that cover image and distances, circles' centres with noise, depth by the sensor's model."""
+    alone, seed = BoardCamera(node.camera, np.eye(4)), int(rng.integers(1 << 31))
+    poses = propose_poses(BOARD, [alone], VIEWS, seed, distances_m=AWAY_M)
+    views = []
+    for index, T in enumerate(poses):
+        points_px = seen_px(BOARD, T, node.camera)
+        off_px = CORNER_PX * rng.standard_normal(points_px.shape)
+        views.append(View(f"view {index}", points_px + off_px, BOARD.points_m))
+    lens = calibrate(views, (node.camera.width_px, node.camera.height_px))
+    return Session(lens, tuple(sense_depth(_board_view(T, node.camera), node.camera, rng) for T in poses))
+
+
+def _board_view(T_camera_board: FloatArray, camera: CameraIntrinsics) -> Render:
+    """The printed board before a wall, as far as the depth sensor looks at it."""
+    rays = pixel_rays(camera)
+    normal = T_camera_board[:3, 2]
+    z_m = (normal @ T_camera_board[:3, 3]) / (rays @ normal)
+    at_m = (rays * z_m[..., None]).reshape(-1, 3)
+    flat_m = apply(inverse(T_camera_board), at_m)[:, :2].reshape(*z_m.shape, 2)
+    half_m = np.abs(BOARD.points_m[:, :2]).max(axis=0) + BOARD.spacing_m
+    there = (np.abs(flat_m) <= half_m).all(axis=-1)
+    nearest_m = np.rint(flat_m / BOARD.spacing_m) * BOARD.spacing_m
+    ink = np.linalg.norm(flat_m - nearest_m, axis=-1) <= BOARD.radius_m
+    ink &= (np.abs(nearest_m) <= half_m - 0.5 * BOARD.spacing_m).all(axis=-1)
+    return Render(
+        rgb=np.zeros((*z_m.shape, 3), np.uint8),
+        z_m=np.where(there, z_m, T_camera_board[2, 3] + BEHIND_M).astype(np.float32),
+        normals=np.where(there[..., None], -normal, (0.0, 0.0, -1.0)),
+        infrared=np.where(there, np.where(ink, INK, PAPER), WALL),
+        gloss=np.zeros(z_m.shape),
+        T_world_camera=np.eye(4),
+    )
+
+
+def _left_m(node: Node, correction: DepthCorrection, away_m: float) -> float:
+    """RMS over the image of the corrected depth less the true one."""
+    flat = DepthMap(np.full((node.camera.height_px, node.camera.width_px), away_m, np.float32))
+    left_m = correction.apply(node.bias.measured(flat)).z_m - away_m
+    return float(np.sqrt(np.mean(left_m**2)))
+
+
+def sensors_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, list[dict[str, float]]]:
+    """A trial in every room."""
+    tasks = [SensorsTask(room) for room in ROOMS]
+    return (yield from iterate_trials("D09, biased sensors", sensors_trial, tasks, folder, scheduler))

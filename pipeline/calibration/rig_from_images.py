@@ -1,0 +1,190 @@
+"""Several cameras from a session's image files (SPEC 1.3): each by itself first, then all together."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from packetmesh.errors import InputError, PacketMeshError
+from packetmesh.progress import Progress, part
+from pipeline.calibration.board import Board
+from pipeline.calibration.depth_bias import DepthFit
+from pipeline.calibration.from_images import CameraReport, iterate_calibration
+from pipeline.calibration.rig import RelativePose, RigCalibration, Seen, calibrate_rig
+from pipeline.calibration.session_depth import fit_session_depth
+from pipeline.calibration.shots import NodeShots
+from pipeline.config import Lens
+from pipeline.io.calibrations import CalibratedNode
+from pipeline.io.rigs import LEVEL_POSE
+from pipeline.types import CameraIntrinsics, FloatArray
+
+ALONE, DEPTH = 0.7, 0.85
+"""Shares of the work before which boards and each camera's own lens are found, and after which depth is."""
+INFRARED = "/infrared"
+"""After a node's name: its separate depth camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class RigReport:
+    """Calibrated cameras and the images that they come from."""
+
+    board: Board
+    cameras: Mapping[str, CameraReport]
+    """By name, node_00 and so on, with the lenses as all cameras together have them; the separate depth
+    camera of a node is node_00/infrared."""
+    rig: RigCalibration
+    depth: Mapping[str, DepthFit]
+    """By node, the bias of its depth, where its images tell it."""
+    without_depth: Mapping[str, str]
+    """By node, why its depth images tell no bias."""
+
+    def nodes(self, T_world_first: FloatArray = LEVEL_POSE) -> dict[str, CalibratedNode]:
+        """What a calibration's folder says of every node.
+
+        Args:
+            T_world_first: (4, 4) where the first camera stands; by default where a node without a pose does.
+        """
+        poses = self.rig.T_first_camera
+        made = {}
+        for name, report in self.cameras.items():
+            if name.endswith(INFRARED):
+                continue
+            node = CalibratedNode(_intrinsics(report), T_world_first @ poses[name])
+            beside = name + INFRARED
+            if beside in self.cameras:
+                node = replace(
+                    node,
+                    depth_intrinsics=_intrinsics(self.cameras[beside]),
+                    T_color_depth=self.rig.relative(beside, name).T_reference_camera,
+                )
+            made[name] = node
+        return made
+
+    def metrics(self) -> dict[str, Any]:
+        """Beside those of each camera."""
+        held_out = self.rig.held_out
+        return {
+            "board": self.board.title,
+            "extrinsics": [self._pose_metrics(pose) for pose in self.rig.pairs()],
+            "rms_px": self.rig.rms_px,
+            "held_out_rms_px": None if held_out is None else held_out.rms_px,
+            "moments": list(self.rig.moments),
+        }
+
+    def _pose_metrics(self, pose: RelativePose) -> dict[str, Any]:
+        held_out = self.rig.held_out if pose.reference == self.rig.names[0] else None
+        return {
+            "camera": pose.camera,
+            "reference": pose.reference,
+            "T_reference_camera": pose.T_reference_camera.tolist(),
+            "rotation_deg": pose.rotation_deg,
+            "baseline_m": pose.baseline_m,
+            "standard_errors": {
+                "rotation_deg": pose.rotation_sd_deg,
+                "position_m": pose.position_sd_m,
+                "baseline_m": pose.baseline_sd_m,
+            },
+            "held_out_rotation_deg": None if held_out is None else held_out.rotation_deg[pose.camera],
+            "held_out_position_m": None if held_out is None else held_out.position_m[pose.camera],
+            "moments": pose.moments,
+        }
+
+
+def iterate_rig_calibration(
+    nodes: Sequence[NodeShots],
+    board: Board,
+    lens: Lens = "thesis",
+    folds: int = 0,
+    leave_out: Sequence[str] = (),
+) -> Generator[Progress, None, RigReport]:
+    """Find the board in every image, estimate each camera, then all lenses and poses together.
+
+    Args:
+        nodes: their images, by moment.
+        board: what they show.
+        lens: which distortions the cameras may have.
+        folds: in how many turns moments are held out; 0 holds none out.
+        leave_out: images to leave out, as node_01/color_03.png.
+
+    Yields:
+        Progress, before each image.
+
+    Raises:
+        InputError: unreadable images, several sizes in one camera, the board in too few of them, an image to
+            leave out that is not there, or cameras that never see the board together.
+        ReconstructionError: the views do not determine a lens or the poses.
+    """
+    moments = _moments(nodes)
+    strange = [word for word in leave_out if not any(word.startswith(f"{name}/") for name in moments)]
+    if strange:
+        raise InputError(f"{strange[0]} is none of the cameras' images; name it as {next(iter(moments))}/...")
+    reports: dict[str, CameraReport] = {}
+    for index, (name, files) in enumerate(moments.items()):
+        left_out = [word.removeprefix(f"{name}/") for word in leave_out if word.startswith(f"{name}/")]
+        steps = iterate_calibration(list(files), board, lens, 0, left_out)
+        begin, end = (ALONE * share / len(moments) for share in (index, index + 1))
+        try:
+            reports[name] = yield from part(steps, name, begin, end)
+        except PacketMeshError as error:
+            raise type(error)(f"{name}: {error}") from None
+    yield Progress("placing the cameras", ALONE)
+    seen = {name: _seen(reports[name], files) for name, files in moments.items()}
+    rig = calibrate_rig({name: one.calibration for name, one in reports.items()}, seen, board, folds)
+    together = {
+        name: replace(
+            one,
+            calibration=rig.cameras[name],
+            held_out=() if rig.held_out is None else rig.held_out.views[name],
+        )
+        for name, one in reports.items()
+    }
+    depth: dict[str, DepthFit] = {}
+    without: dict[str, str] = {}
+    for index, node in enumerate(nodes):
+        share = DEPTH + (1.0 - DEPTH) * index / len(nodes)
+        yield Progress(f"comparing depth with the board in {node.name}", share)
+        try:
+            depth |= _depth(node, together)
+        except InputError as error:
+            without[node.name] = str(error)
+    return RigReport(board, together, rig, depth, without)
+
+
+def _depth(node: NodeShots, cameras: Mapping[str, CameraReport]) -> dict[str, DepthFit]:
+    """Of one node; empty without depth images."""
+    beside = cameras.get(node.name + INFRARED)
+    files = {
+        (shot.color if beside is None or shot.infrared is None else shot.infrared).name: shot.depth
+        for shot in node.shots
+        if shot.depth is not None
+    }
+    if not files:
+        return {}
+    return {node.name: fit_session_depth(cameras[node.name] if beside is None else beside, files)}
+
+
+def _moments(nodes: Sequence[NodeShots]) -> dict[str, dict[Path, str]]:
+    """By camera, the moments of its images."""
+    found: dict[str, dict[Path, str]] = {}
+    for node in nodes:
+        found[node.name] = {shot.color: shot.moment for shot in node.shots}
+        infrared = {shot.infrared: shot.moment for shot in node.shots if shot.infrared is not None}
+        if infrared:
+            found[node.name + INFRARED] = infrared
+    return found
+
+
+def _seen(report: CameraReport, files: Mapping[Path, str]) -> dict[str, Seen]:
+    """By moment."""
+    moments = {path.name: moment for path, moment in files.items()}
+    return {moments[view.name]: Seen(view, report.detections[view.name].oriented) for view in report.views}
+
+
+def _intrinsics(report: CameraReport) -> CameraIntrinsics | None:
+    """None of a lens that the chain does not know."""
+    try:
+        return report.intrinsics
+    except InputError:
+        return None

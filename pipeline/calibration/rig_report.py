@@ -1,0 +1,83 @@
+"""The folder that a calibration of several cameras leaves."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from packetmesh.errors import InputError
+from packetmesh.files import atomic_path, finite
+from pipeline.calibration.assess import Trust
+from pipeline.calibration.report import metrics, write_camera_folder
+from pipeline.calibration.rig_from_images import INFRARED, RigReport
+from pipeline.io.calibrations import write_calibration
+from pipeline.io.poses import read_pose
+from pipeline.io.rigs import LEVEL_POSE
+from pipeline.types import AnyPath, FloatArray
+
+NO_TRUST: Mapping[str, Trust] = {}
+
+
+def rig_metrics(report: RigReport, trust: Mapping[str, Trust] = NO_TRUST) -> dict[str, Any]:
+    """What ``--json`` prints: every camera as one alone has it, and how they stand to each other.
+
+    Args:
+        report: of all cameras.
+        trust: by camera, what it is worth.
+    """
+    cameras = {
+        name: metrics(one, trust.get(name), report.depth.get(name)) for name, one in report.cameras.items()
+    }
+    return {"cameras": cameras} | report.metrics()
+
+
+def write_rig_folder(
+    report: RigReport,
+    folder: Path,
+    T_world_first: FloatArray = LEVEL_POSE,
+    trust: Mapping[str, Trust] = NO_TRUST,
+) -> list[str]:
+    """Write metrics.json, and of every node what ``load_rig(..., calibration=folder)`` reads and its camera
+    in the files of other programs.
+
+    Args:
+        report: of all cameras.
+        folder: where.
+        T_world_first: (4, 4) where the first camera stands.
+        trust: by camera, what it is worth.
+
+    Returns:
+        A sentence for each file that is not written.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    with atomic_path(folder / "metrics.json") as sibling:
+        sibling.write_text(json.dumps(finite(rig_metrics(report, trust)), indent=1, allow_nan=False) + "\n")
+    sentences = [
+        f"{name}: depth_correction.json is not written: {why}" for name, why in report.without_depth.items()
+    ]
+    for name, one in report.cameras.items():
+        if not name.endswith(INFRARED):
+            told = write_camera_folder(one, folder / name, trust.get(name), report.depth.get(name))
+            sentences += [f"{name}: {sentence}" for sentence in told]
+    write_calibration(folder, report.nodes(T_world_first))
+    return sentences
+
+
+def pose_like(rig: AnyPath | None, node: str) -> FloatArray:
+    """(4, 4) pose of a rig's node, in whose world others are placed; without a rig, of a node without pose.
+
+    Raises:
+        InputError: the rig has no such node, or that one no pose.
+    """
+    if rig is None:
+        return LEVEL_POSE
+    path = Path(rig) / node / "pose.txt"
+    if not path.exists():
+        raise InputError(
+            f"{rig} has no {node}/pose.txt by which to place the cameras; try another rig, or none"
+        )
+    return read_pose(path)

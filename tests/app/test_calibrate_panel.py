@@ -1,0 +1,314 @@
+"""The Calibrate screen over photographs of known cameras, without a browser."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import shlex
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import viser
+
+from app.lesson import ANSWER, read_lesson
+from app.screens.calibrate.labels import AROUND, COVERAGE, DEPTH, HALVES, NEXT, UNCERTAINTY
+from app.screens.calibrate.lesson import SETTINGS, SHIPPED, CalibrateLook, left_out
+from app.screens.calibrate.noise import OTHER, READY
+from app.screens.calibrate.panel import CalibratePanel
+from app.screens.calibrate.use import BEFORE, USE
+from app.state import Spec
+from app.store import Store
+from packetmesh.errors import InputError
+from pipeline.io.calibrations import node_files
+from pipeline.io.depth_correction import read_depth_correction
+from pipeline.io.intrinsics import read_intrinsics
+from pipeline.io.poses import read_pose
+from pipeline.io.rigs import save_rig
+from pipeline.sources import Calibrated, RigFolder
+from pipeline.types import DepthMap, RgbdFrame, Rig
+from tests.app.boards import BLANK, CAMERAS, MOMENTS, OFFSET_M, T_WORLD_CAMERA, save_boards
+from tests.app.fakes import Bench, Impatient, ui_of
+
+pytestmark = pytest.mark.xdist_group("calibrate panel")
+UPLOADS, NOISE = "Use your own photographs", "What if the points were noisier?"
+
+
+@pytest.fixture(scope="module")
+def server():
+    server = viser.ViserServer(port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def boards(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("boards")
+    save_boards(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """Two nodes that look at nothing much and believe to be cameras like others."""
+    folder = tmp_path_factory.mktemp("rig")
+    rng = np.random.default_rng(0)
+    frames = []
+    for node, T in enumerate(T_WORLD_CAMERA):
+        rgb = rng.integers(0, 255, (240, 320, 3), dtype=np.uint8)
+        depth = DepthMap(np.full((240, 320), 1.5, np.float32))
+        believed = replace(CAMERAS[node], distortion=np.zeros(5))
+        frames.append(RgbdFrame(f"node_{node:02d}", rgb, depth, believed, T))
+    save_rig(folder, Rig("rig", tuple(frames)))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    return Store(str(tmp_path_factory.mktemp("store")))
+
+
+def zipped(folder, names):
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name in names:
+            archive.write(folder / name, name)
+    return content.getvalue()
+
+
+@pytest.fixture
+def screen(server, store, rig, boards, tmp_path):
+    """The screen with all photographs uploaded and looked at."""
+    bench = empty(server, store, rig, tmp_path)
+    names = [str(path.relative_to(boards)) for path in sorted(boards.rglob("*.*"))]
+    bench.gui.upload("Photograph or ZIP …", "boards.zip", zipped(boards, names))
+    bench.gui.press("Photographs", "Find the cameras", UPLOADS)
+    return bench
+
+
+def empty(server, store, rig, tmp_path):
+    spec = Spec(RigFolder(str(rig)))
+    steps = ("scene", "calibrate")
+    bench = Bench(CalibratePanel, ui_of(server.scene, kind=Impatient), store, tmp_path, steps, spec)
+    bench.advance()
+    bench.panel.on_show()
+    return bench
+
+
+def calibration(bench):
+    return bench.results.view("calibrate")
+
+
+def test_without_photographs_it_says_so_and_shows_the_scene(server, store, rig, tmp_path):
+    bench = empty(server, store, rig, tmp_path)
+    assert "without photographs of a board" in bench.gui.text()
+    assert bench.gui.find("Open").seen
+    assert any(name.endswith("cloud") for name in bench.ui.scene.names("/calibrate"))
+    assert bench.panel.command == bench.spec.command()
+
+
+def test_both_cameras_are_found_within_their_intervals(screen):
+    view = calibration(screen)
+    assert [camera.name for camera in view.cameras] == ["node_00", "node_01"]
+    for camera, true in zip(view.cameras, CAMERAS, strict=True):
+        found = camera.calibration
+        for name, value in (("fx", true.fx_px), ("cx", true.cx_px), ("k1", true.distortion[0])):
+            assert abs(found.parameters[name] - value) < 5.0 * found.standard_errors[name]
+    placed = view.rig.cameras[1].T_first_camera
+    true = np.linalg.inv(T_WORLD_CAMERA[0]) @ T_WORLD_CAMERA[1]
+    assert np.abs(placed - true).max() < 0.003
+    depth = view.depth["node_00"]
+    assert abs(np.mean(depth.before_m) + OFFSET_M) < 0.002
+    assert abs(np.mean(depth.after_m)) < 0.002
+    assert "no depth images" in view.depth["node_01"]
+
+
+def test_every_photograph_has_a_bar_and_a_click_shows_it(screen):
+    (bars,) = [one for one in screen.gui.handles if "packetmesh-views" in str(getattr(one, "content", ""))]
+    assert bars.content.count("<button") == MOMENTS + 1
+    assert "View 99: no board found" in bars.content
+    field = screen.gui.find("View that was clicked")
+    for name in ("3", BLANK):
+        field.value = json.dumps([name, 1])
+        screen.gui._fire(field, field)
+        assert f"View {name}" in screen.gui.text()
+    assert "Nothing in it looks like a circle" in screen.gui.text()
+    field.value = "not from the page"
+    screen.gui._fire(field, field)
+    assert f"View {BLANK}" in screen.gui.text()
+
+
+def test_a_dropped_view_is_compared_with_all_views_and_comes_back(screen):
+    gui = screen.gui
+    gui.press("View", "Next")
+    gui.press("View", "Drop")
+    assert screen.spec.views.dropped == (("node_00", "1"),)
+    camera = calibration(screen).camera("node_00")
+    assert len(camera.calibration.views) == MOMENTS - 1
+    assert camera.unseen_rms_px("1") is not None
+    assert f"{MOMENTS - 1} of {MOMENTS + 1}" in gui.text()
+    assert f"{MOMENTS} of {MOMENTS + 1}" in gui.text()
+    words = shlex.split(screen.panel.command)
+    assert words[words.index("--without") + 1] == "node_00/color_01.png"
+    gui.press("View", "Drop")
+    assert screen.spec.views.dropped == ()
+
+
+def test_the_verdict_follows_the_accuracy(screen):
+    gui = screen.gui
+    gui.set("Accuracy (mm)", 20.0)
+    assert "✓ PASS" in gui.text()
+    gui.set("Range (m)", 6.0)
+    gui.set("Accuracy (mm)", 0.5)
+    assert "✗ FAIL" in gui.text()
+
+
+@pytest.mark.parametrize("pair", [UNCERTAINTY, HALVES, COVERAGE, NEXT, DEPTH])
+def test_every_comparison_has_its_pictures(screen, pair):
+    gui = screen.gui
+    before = gui.all("image")[0].image
+    gui.set("Compare", pair)
+    assert "not there for this view" not in gui.text()
+    assert not np.array_equal(gui.all("image")[0].image, before)
+
+
+@pytest.mark.parametrize(("around", "inside"), [(name, name) for name in AROUND])
+def test_boards_and_cameras_stand_in_space(screen, around, inside):
+    screen.gui.set("In space", around)
+    names = screen.ui.scene.names("/calibrate")
+    frusta = [name for name in names if name.startswith("/calibrate/frustum-") and name.count("/") == 2]
+    sheets = [name for name in names if name.startswith("/calibrate/board-") and name.count("/") == 2]
+    expected = {"camera": (1, MOMENTS), "board": (MOMENTS, 1), "rig": (3, MOMENTS)}[AROUND[around]]
+    assert (len(frusta), len(sheets)) == expected
+
+
+def test_noise_is_replayed_and_another_lens_misses_the_truth(screen):
+    gui = screen.gui
+    assert READY in gui.text(NOISE)
+    gui.set("Noise (px)", 0.1)
+    assert "All trials" in gui.text(NOISE)
+    view = screen.panel._noise._view
+    assert view.trials == view.request.trials == 200
+    assert 0.8 < view.rmse("fx") / view.predicted("fx") < 1.25
+    assert view.inside("fx", "k1").mean() > 0.85
+    gui.set("Seen through", OTHER)
+    view = screen.panel._noise._view
+    assert view.rmse("cy") > 2.0 * view.predicted("cy")
+    assert view.inside("cx", "cy").mean() < 0.5
+
+
+def test_without_noise_the_truth_is_found(screen):
+    screen.gui.set("Noise (px)", 0.0)
+    view = screen.panel._noise._view
+    assert view.rmse("fx") < 1e-2
+    assert view.close_share == 1.0
+    assert view.halved == 0
+
+
+def test_use_lays_the_calibration_over_the_rig_and_before_takes_it_away(screen):
+    gui, source = screen.gui, screen.spec.source
+    gui.press("In the chain", USE)
+    used = screen.spec.source
+    assert isinstance(used, Calibrated)
+    assert used.source == source
+    assert "**In use**" in gui.text()
+    assert "--calibration" in screen.spec.command()
+    for node, true in enumerate(CAMERAS):
+        files = node_files(screen.folder / "calibration_01" / f"node_{node:02d}")
+        assert abs(read_intrinsics(files["intrinsics"]).fx_px - true.fx_px) < 2.0
+        assert np.abs(read_pose(files["pose"]) - T_WORLD_CAMERA[node]).max() < 0.003
+    correction = read_depth_correction(screen.folder / "calibration_01/node_00/depth_correction.json")
+    assert (
+        abs(float(correction.corrected_m(np.array([1.0]), np.array([[160, 120]]))[0]) - 1.0 - OFFSET_M)
+        < 0.004
+    )
+    loaded = used.load()
+    assert np.allclose(loaded.frames[0].depth.z_m, 1.5 + OFFSET_M, atol=0.02)
+    gui.press("In the chain", BEFORE)
+    assert screen.spec.source == source
+    assert "**In use**" not in gui.text()
+
+
+def test_a_lens_that_the_chain_does_not_know_is_a_sentence(screen):
+    screen.gui.set("Lens", "rational")
+    screen.gui.press("In the chain", USE)
+    assert any("The chain knows no rational lens" in sentence for sentence in screen.notices)
+    assert not isinstance(screen.spec.source, Calibrated)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("notes.txt", b"x", "notes.txt is no photograph"),
+        ("boards.zip", b"no zip", "boards.zip cannot be read as a ZIP"),
+        ("large.png", b"\0" * (65 << 20), "large.png has 65 MB"),
+    ],
+)
+def test_an_upload_that_cannot_be_used_is_a_sentence(server, store, rig, tmp_path, name, content, sentence):
+    bench = empty(server, store, rig, tmp_path)
+    with pytest.raises(InputError, match=sentence):
+        bench.gui.upload("Photograph or ZIP …", name, content)
+
+
+def test_a_zip_does_not_reach_out_of_its_folder(server, store, rig, boards, tmp_path):
+    bench = empty(server, store, rig, tmp_path)
+    content, picture = io.BytesIO(), (boards / "node_00/color_00.png").read_bytes()
+    with zipfile.ZipFile(content, "w") as archive:
+        archive.writestr(zipfile.ZipInfo("../../node_01/../evil.png"), picture)
+    bench.gui.upload("Photograph or ZIP …", "evil.zip", content.getvalue())
+    written = [path.relative_to(tmp_path) for path in tmp_path.rglob("*.png")]
+    assert [str(path) for path in written] == ["photographs_000/node_01/evil.png"]
+    assert not list(tmp_path.parent.glob("evil*"))
+
+
+def test_too_few_photographs_are_a_sentence_and_shown(server, store, rig, boards, tmp_path):
+    bench = empty(server, store, rig, tmp_path)
+    names = ["node_00/color_00.png", "node_00/color_01.png", "board.json"]
+    bench.gui.upload("Photograph or ZIP …", "two.zip", zipped(boards, names))
+    bench.gui.press("Photographs", "Find the cameras", UPLOADS)
+    assert "is found in 2 of 2 images" in bench.gui.text()
+    assert "View 0, 35 points found" in bench.gui.text()
+    assert not bench.gui.find("In the chain").seen
+    bench.gui.press("Photographs", "Forget them", UPLOADS)
+    assert "without photographs of a board" in bench.gui.text()
+
+
+def test_a_wrong_board_shows_the_blobs_that_were_seen(server, store, rig, boards, tmp_path):
+    bench = empty(server, store, rig, tmp_path)
+    names = [f"node_00/color_{moment:02d}.png" for moment in range(4)]
+    bench.gui.upload("Photograph or ZIP …", "some.zip", zipped(boards, names))
+    bench.gui.set("Rows", 9, UPLOADS)
+    bench.gui.press("Photographs", "Find the cameras", UPLOADS)
+    assert re.search(r"no board found.*Red: \d+ blobs", bench.gui.text())
+
+
+def test_the_lesson_asks_at_every_stop():
+    shipped = read_lesson(SHIPPED, SETTINGS, CalibrateLook())
+    assert len(shipped.stops) == len({stop.look for stop in shipped.stops}) == 7
+    assert all(stop.text.count("*Question:*") == stop.text.count(ANSWER) == 1 for stop in shipped.stops)
+
+
+def test_the_lesson_leaves_three_views_that_are_tilted_most_alike(screen):
+    camera = calibration(screen).camera("node_00")
+    out = {name for _, name in left_out(camera, "three alike")}
+    kept = [view for view in camera.calibration.views if view.name not in out]
+    assert len(kept) == 3
+    normals = np.array([view.T_camera_board[:3, 2] for view in kept])
+    spread = np.degrees(np.arccos(np.clip(normals @ normals.T, -1.0, 1.0))).max()
+    every = np.array([view.T_camera_board[:3, 2] for view in camera.calibration.views])
+    assert 8.0 <= spread < np.degrees(np.arccos(np.clip(every @ every.T, -1.0, 1.0))).max()
+    assert list(left_out(camera, "all")) == []
+
+
+def test_the_lesson_takes_views_away_and_gives_them_back(screen):
+    gui = screen.gui
+    for stop in range(1, 8):
+        gui.press("Go", "Next")
+        assert f"({stop} of 7)" in gui.text()
+        used = len(calibration(screen).camera("node_00").calibration.views)
+        assert used == (3 if stop in (2, 6) else MOMENTS)
+        assert isinstance(screen.spec.source, Calibrated) == (stop == 7)
+    gui.press("Go", "Back")
+    assert not isinstance(screen.spec.source, Calibrated)

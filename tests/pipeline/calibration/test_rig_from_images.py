@@ -1,0 +1,109 @@
+"""The demo rig that nobody has calibrated, from the photographs of a board before its three cameras."""
+
+import numpy as np
+import pytest
+
+from packetmesh.errors import InputError
+from packetmesh.progress import drain
+from pipeline.calibration.rig_from_images import iterate_rig_calibration
+from pipeline.calibration.rig_report import pose_like, rig_metrics, write_rig_folder
+from pipeline.calibration.shots import board_beside, node_shots
+from pipeline.geometry import inverse, rotation_angle_rad
+from pipeline.io.images import write_color
+from pipeline.io.intrinsics import read_intrinsics
+from pipeline.io.poses import read_pose
+from pipeline.io.rigs import LEVEL_POSE, load_rig
+from tests.paths import ASSETS
+
+RIG = ASSETS / "scenes" / "uncalibrated"
+SESSION = RIG / "board"
+
+
+@pytest.fixture(scope="module")
+def report():
+    return drain(iterate_rig_calibration(node_shots([SESSION]), board_beside([SESSION]), folds=2))
+
+
+def test_three_rendered_cameras_are_found_within_a_tenth_of_a_degree_and_two_millimetres(report):
+    true = {name: read_pose(RIG / name / "true_pose.txt") for name in report.cameras}
+    for pose in report.rig.pairs():
+        truth = inverse(true[pose.reference]) @ true[pose.camera]
+        apart = inverse(truth) @ pose.T_reference_camera
+        assert np.degrees(rotation_angle_rad(apart[:3, :3])) < 0.02
+        off_m = np.linalg.norm(pose.T_reference_camera[:3, 3] - truth[:3, 3])
+        assert off_m < max(3.0 * pose.position_sd_m, 0.0003)
+
+
+def test_their_lenses_are_those_that_took_the_photographs(report):
+    for name, one in report.cameras.items():
+        lens, found = read_intrinsics(RIG / name / "true_intrinsics.json"), one.calibration
+        for key, true in zip(("fx", "fy", "cx", "cy"), lens.matrix[[0, 1, 0, 1], [0, 1, 2, 2]], strict=True):
+            assert abs(found.parameters[key] - true) < max(4.0 * found.standard_errors[key], 0.1)
+        np.testing.assert_allclose(one.calibration.distortion[:2], lens.distortion[:2], atol=0.005)
+
+
+def test_moments_that_were_held_out_are_predicted(report):
+    metrics = rig_metrics(report)
+    assert metrics["rms_px"] < metrics["held_out_rms_px"] < 1.5 * metrics["rms_px"] < 0.1
+    for name, camera in metrics["cameras"].items():
+        assert camera["held_out_rms_px"] < 0.1, name
+        used = [view for view in camera["views"] if view["found"]]
+        assert all(view["rms_px"] is not None and view["held_out_rms_px"] is not None for view in used)
+    assert [(one["camera"], one["reference"]) for one in metrics["extrinsics"]] == [
+        ("node_01", "node_00"),
+        ("node_02", "node_00"),
+        ("node_02", "node_01"),
+    ]
+
+
+def test_the_folder_is_laid_over_the_rig_in_its_own_world(report, tmp_path):
+    write_rig_folder(report, tmp_path, pose_like(RIG, "node_00"))
+    before, after = load_rig(RIG), load_rig(RIG, tmp_path)
+    np.testing.assert_allclose(after.frames[0].T_world_camera, before.frames[0].T_world_camera, atol=1e-12)
+
+    def off_m(rig):
+        """Of the second node's place, seen from the first."""
+        first, second = (frame.T_world_camera for frame in rig.frames[:2])
+        truth = inverse(rig.truth.T_world_camera[0]) @ rig.truth.T_world_camera[1]
+        return np.linalg.norm((inverse(first) @ second - truth)[:3, 3])
+
+    assert off_m(after) < 0.0003 < 0.003 < off_m(before)
+    np.testing.assert_array_equal(
+        after.frames[1].intrinsics.matrix, report.cameras["node_01"].calibration.matrix
+    )
+
+
+def test_depth_is_corrected_by_the_same_boards(report, tmp_path):
+    write_rig_folder(report, tmp_path, pose_like(RIG, "node_00"))
+    assert sorted(report.depth) == sorted(report.cameras)
+
+    def off_m(rig):
+        return [
+            abs(float(np.nanmedian(frame.depth.z_m - true.z_m)))
+            for frame, true in zip(rig.frames, rig.truth.depth, strict=True)
+        ]
+
+    before_m, after_m = off_m(load_rig(RIG)), off_m(load_rig(RIG, tmp_path))
+    assert max(before_m) > 0.02
+    assert max(after_m) < 0.3 * max(before_m)
+
+
+def test_without_a_rig_the_first_camera_stands_level(report, tmp_path):
+    write_rig_folder(report, tmp_path)
+    np.testing.assert_array_equal(read_pose(tmp_path / "node_00" / "pose.txt"), LEVEL_POSE)
+    with pytest.raises(InputError, match=r"has no node_00/pose\.txt"):
+        pose_like(tmp_path / "elsewhere", "node_00")
+
+
+def test_what_is_wrong_with_one_camera_names_it(tmp_path):
+    for name in ("node_00", "node_01"):
+        for index in range(3):
+            write_color(tmp_path / name / f"color_{index}.png", np.full((60, 80, 3), 200, np.uint8))
+    board = board_beside([SESSION])
+    with pytest.raises(InputError, match=r"^node_00: The board .* is found in 0 of 3 images"):
+        drain(iterate_rig_calibration(node_shots([tmp_path]), board))
+    write_color(tmp_path / "node_00" / "color_9.png", np.full((50, 80, 3), 200, np.uint8))
+    with pytest.raises(InputError, match=r"^node_00: The images are not of one size"):
+        drain(iterate_rig_calibration(node_shots([tmp_path]), board))
+    with pytest.raises(InputError, match=r"^node_09/color_00\.jpg is none of the cameras' images"):
+        drain(iterate_rig_calibration(node_shots([tmp_path]), board, leave_out=["node_09/color_00.jpg"]))
