@@ -91,7 +91,7 @@ class BoardsDrawing:
             camera = view.camera(one.name)
             if camera is None or camera.calibration is None:
                 continue
-            sure = f" ± {1000.0 * one.position_sd_m:.1f} mm" if one.position_sd_m else ""
+            sure = f" ± {1000.0 * one.position_sd_m:.2g} mm" if one.position_sd_m else ""
             placed = T_world_first @ one.T_first_camera
             self._add_frustum(one.name, placed, camera, f"{one.name}{sure}", 0.12, BRAND)
             if one.name in believed and one.name != first:
