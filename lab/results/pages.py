@@ -21,6 +21,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "reconstruct": ("What comes out", tables.reconstructions),
     "bench_chain": ("Time and memory of the whole chain", tables.chain_speed),
     "calibration_claims": ("Calibration: the thesis's claims", tables.claims),
+    "board_claims": ("Boxes and biased sensors: what a calibration is worth", tables.claims),
     "outlier_claims": ("Outlier filter: the thesis's claim", tables.claims),
     "depth_claims": ("Inferred depth: the thesis's claims", tables.claims),
     "bench_depth": ("Filling holes", tables.filling),
