@@ -70,9 +70,8 @@ def calibrated(camera: BoardCamera, seed: int) -> tuple[CameraIntrinsics, DepthC
     with tempfile.TemporaryDirectory() as folder:
         save_board_views(Path(folder), views)
         found = drain(iterate_calibration(image_files([f"{folder}/node_00/color_*.jpg"]), BOARD))
-    depths = [_depth_of(views, view.name) for view in found.views]
-    samples = board_depth_samples(found.views, depths, found.calibration, BOARD)
-    return found.intrinsics, fit_depth(samples).correction
+    depths = [_depth_of(views, view.name) for view in found.calibration.views]
+    return found.intrinsics, fit_depth(board_depth_samples(found.calibration, depths, BOARD)).correction
 
 
 def _depth_of(views: BoardViews, image: str) -> DepthMap:
