@@ -12,7 +12,7 @@ import numpy as np
 from lab.claims.calibration.box_size import box_size_m
 from lab.worlds.board_files import save_board_views
 from lab.worlds.board_poses import propose_poses
-from lab.worlds.board_views import BoardCamera, BoardViews, render_board_views
+from lab.worlds.board_views import BoardCamera, render_board_views
 from lab.worlds.depth_bias import DepthBias
 from lab.worlds.furniture.placing import ORIGIN, board
 from lab.worlds.render import Renderer
@@ -23,9 +23,8 @@ from lab.worlds.textures import cardboard, plaster
 from packetmesh.progress import drain
 from pipeline.acquisition import back_project, filter_outliers
 from pipeline.calibration.board import Board
-from pipeline.calibration.depth_bias import fit_depth
-from pipeline.calibration.depth_samples import board_depth_samples
 from pipeline.calibration.from_images import image_files, iterate_calibration
+from pipeline.calibration.session_depth import depth_beside, fit_session_depth
 from pipeline.config import PRESETS
 from pipeline.geometry import look_at
 from pipeline.io.depth_correction import DepthCorrection
@@ -69,14 +68,10 @@ def calibrated(camera: BoardCamera, seed: int) -> tuple[CameraIntrinsics, DepthC
     views = render_board_views(BOARD, [camera], poses, seed)
     with tempfile.TemporaryDirectory() as folder:
         save_board_views(Path(folder), views)
-        found = drain(iterate_calibration(image_files([f"{folder}/node_00/color_*.jpg"]), BOARD))
-    depths = [_depth_of(views, view.name) for view in found.views]
-    samples = board_depth_samples(found.calibration, depths, BOARD)
-    return found.intrinsics, fit_depth(samples).correction
-
-
-def _depth_of(views: BoardViews, image: str) -> DepthMap:
-    return views.images[int(image.removeprefix("color_").removesuffix(".jpg"))][0].depth
+        photographs = image_files([f"{folder}/node_00/color_*.jpg"])
+        found = drain(iterate_calibration(photographs, BOARD))
+        fit = fit_session_depth(found, depth_beside(photographs))
+    return found.intrinsics, fit.correction
 
 
 def box_scene(size_m: Sequence[float], seed: int) -> Scene:
