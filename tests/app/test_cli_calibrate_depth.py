@@ -41,9 +41,7 @@ def test_the_bias_is_told_and_written_where_a_rig_looks_for_it(folder, tmp_path,
     assert np.nanmean(correction.apply(flat).z_m) == pytest.approx(SCALE * away_m, rel=0.003)
 
 
-def test_depth_that_cannot_be_used_is_told_and_the_camera_is_calibrated_anyway(
-    folder, tmp_path, capsys
-):
+def test_depth_that_cannot_be_used_is_told_and_the_camera_is_calibrated_anyway(folder, tmp_path, capsys):
     session = tmp_path / "session"
     session.mkdir()
     for path in folder.glob("*.png"):
