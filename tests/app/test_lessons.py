@@ -3,6 +3,7 @@
 import pytest
 
 from app.lesson import ANSWER, BEGIN, OFF, LessonFolder, read_lesson
+from app.screens.calibrate import lesson as calibrate
 from app.screens.depth import lesson as depth
 from app.screens.fuse.labels import STARTS
 from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
@@ -30,6 +31,7 @@ def test_the_stops_of_the_lesson_that_ships_have_different_titles_and_text():
 @pytest.mark.parametrize(
     ("path", "settings", "look"),
     [
+        (calibrate.SHIPPED, calibrate.SETTINGS, calibrate.CalibrateLook()),
         (depth.SHIPPED, depth.SETTINGS, depth.DepthLook()),
         (surface.SHIPPED, surface.SETTINGS, surface.SurfaceLook()),
         (network.CROSSING, network.SETTINGS, network.NetworkLook()),

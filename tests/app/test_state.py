@@ -8,7 +8,7 @@ import tyro
 
 from app.cli import options
 from app.controls import put
-from app.state import CHAIN, Results, Spec
+from app.state import CHAIN, BoardViews, Results, Spec
 from network_sim.config import NetworkConfig
 from packetmesh.settings import config_named, with_settings
 from pipeline.config import PRESETS
@@ -41,6 +41,15 @@ def test_a_change_makes_stale_what_depends_on_it_and_nothing_else(spec, first):
     expected = CHAIN[CHAIN.index(first) :] if first else ()
     assert tuple(step for step in CHAIN if not results.fresh(step, spec)) == expected
     assert results.first_stale(spec) == first
+
+
+def test_photographs_of_a_board_concern_no_step_of_the_chain_and_wait_until_somebody_looks():
+    views = replace(SPEC, views=BoardViews("boards"))
+    assert all(views.key(step) == SPEC.key(step) for step in CHAIN)
+    assert Results().first_stale(SPEC, ("calibrate",)) is None
+    assert Results().first_stale(views, ("calibrate",)) == "calibrate"
+    dropped = replace(views, views=replace(views.views, dropped=(("node_00", "3"),)))
+    assert dropped.key("calibrate") != views.key("calibrate")
 
 
 def test_going_back_makes_fresh_again():
