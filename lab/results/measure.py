@@ -20,7 +20,7 @@ from pipeline.io.demos import CALIBRATED_SCENES
 COMMANDS: dict[str, tuple[str, ...]] = {
     "calibration_claims": (
         *("packetmesh", "reproduce", "--only"),
-        "C01,C02,C03,C04,C05,C06,C07,C08,D09",
+        "C01,C02,C03,C04,C05,C06,C07,C08",
     ),
     "board_claims": ("packetmesh", "reproduce", "--only", "C25,D09"),
     "outlier_claims": ("packetmesh", "reproduce", "--only", "C10"),
