@@ -23,8 +23,8 @@ from lab.worlds.textures import cardboard, plaster
 from packetmesh.progress import drain
 from pipeline.acquisition import back_project, filter_outliers
 from pipeline.calibration.board import Board
+from pipeline.calibration.depth_from_images import depth_beside, depth_fit
 from pipeline.calibration.from_images import image_files, iterate_calibration
-from pipeline.calibration.session_depth import depth_beside, fit_session_depth
 from pipeline.config import PRESETS
 from pipeline.geometry import look_at
 from pipeline.io.depth_correction import DepthCorrection
@@ -70,7 +70,7 @@ def calibrated(camera: BoardCamera, seed: int) -> tuple[CameraIntrinsics, DepthC
         save_board_views(Path(folder), views)
         photographs = image_files([f"{folder}/node_00/color_*.jpg"])
         found = drain(iterate_calibration(photographs, BOARD))
-        fit = fit_session_depth(found, depth_beside(photographs))
+        fit = depth_fit(found.calibration, depth_beside(photographs), BOARD)
     return found.intrinsics, fit.correction
 
 
