@@ -14,8 +14,12 @@ import numpy as np
 from packetmesh.errors import InputError
 from pipeline.depth_to_color import register_depth
 from pipeline.geometry import look_at
-from pipeline.io.calibrations import NodeFiles, calibration_files, node_files
-from pipeline.io.depth_correction import read_depth_correction
+from pipeline.io.calibrations import FILES, NodeFiles, calibration_files, node_files
+from pipeline.io.depth_correction import (
+    DepthCorrection,
+    read_depth_correction,
+    write_depth_correction,
+)
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import read_color, read_depth, write_color, write_depth_mm
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
@@ -181,8 +185,20 @@ def save_rig(directory: AnyPath, rig: Rig) -> None:
         write_depth_mm(folder / "depth.png", frame.depth)
         write_intrinsics(folder / "intrinsics.json", frame.intrinsics)
         write_pose(folder / "pose.txt", frame.T_world_camera)
+        _write_noise(folder, frame)
     if rig.truth is not None:
         write_truth(directory, dict(zip(names, rig.frames, strict=True)), rig.truth)
+
+
+def _write_noise(folder: Path, frame: RgbdFrame) -> None:
+    """Depth is written as it is, corrected and registered: what an older rig there says of that goes."""
+    for name in ("depth_correction", "depth_intrinsics", "extrinsics"):
+        (folder / FILES[name]).unlink(missing_ok=True)
+    if frame.noise is not None:
+        size_px = (frame.intrinsics.width_px, frame.intrinsics.height_px)
+        write_depth_correction(
+            folder / FILES["depth_correction"], DepthCorrection(size_px, noise=frame.noise)
+        )
 
 
 def _node_folders(directory: Path) -> list[Path]:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from pipeline.geometry import look_at
+from pipeline.io.depth_correction import DepthCorrection, write_depth_correction
 from pipeline.io.rigs import LEVEL_POSE, load_frame, load_rig, save_rig
-from pipeline.types import CameraIntrinsics, DepthMap, RgbdFrame, Rig
+from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, RgbdFrame, Rig
 
 
 def small_frame(seed: int) -> RgbdFrame:
@@ -82,3 +83,25 @@ def test_poses_may_have_comments_and_commas(tmp_path):
     expected = np.eye(4)
     expected[:3, 3] = [0.5, -1, 2]
     np.testing.assert_array_equal(load_rig(tmp_path / "rig").frames[0].T_world_camera, expected)
+
+
+def test_a_corrected_rig_is_written_corrected_and_never_corrected_twice(tmp_path):
+    rng = np.random.default_rng(0)
+    noise = DepthNoise(0.002, 0.0019, 2.36, 0.5)
+    camera = CameraIntrinsics.pinhole(50.0, 50.0, 15.5, 11.5, 32, 24)
+    z_m = (np.rint(rng.uniform(900.0, 3000.0, (24, 32))) / 1000.0).astype(np.float32)
+    rgb = rng.integers(0, 256, (24, 32, 3), dtype=np.uint8)
+    raw = Rig("raw", (RgbdFrame("node_00", rgb, DepthMap(z_m), camera, np.eye(4)),))
+    save_rig(tmp_path / "rig", raw)
+    write_depth_correction(
+        tmp_path / "rig" / "node_00" / "depth_correction.json",
+        DepthCorrection((32, 24), scale=1.1, noise=noise),
+    )
+    corrected = load_rig(tmp_path / "rig")
+    np.testing.assert_allclose(corrected.frames[0].depth.z_m, 1.1 * z_m, rtol=1e-6)
+    save_rig(tmp_path / "rig", corrected)
+    again = load_rig(tmp_path / "rig").frames[0]
+    np.testing.assert_allclose(again.depth.z_m, corrected.frames[0].depth.z_m, atol=0.00051)
+    assert again.noise == noise
+    save_rig(tmp_path / "rig", raw)
+    assert load_rig(tmp_path / "rig").frames[0].noise is None
