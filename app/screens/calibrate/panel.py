@@ -68,8 +68,7 @@ class CalibratePanel(Panel):
         self._status = gui.add_markdown("")
         self._open = ui.buttons(
             "Open",
-            {DEMO_SCENES[name].title: partial(self._open_scene, name) for name in with_boards()}
-            or {"–": self.on_show},
+            {DEMO_SCENES[name].title: partial(self._open_scene, name) for name in with_boards()},
             "A scene with views of a board.",
             visible=False,
         )
@@ -211,7 +210,7 @@ class CalibratePanel(Panel):
             self._camera.visible = self._view is not None and len(self._view.cameras) > 1
             self._use.show(camera is not None and camera.calibration is not None)
             nothing = camera is None and self.session.spec.views is None
-            self._open.visible = nothing and bool(with_boards())
+            self._open.visible = nothing
             self._status.content = NOTHING if nothing else "" if camera is None else camera.reason
             self._show_numbers(camera)
             self._show_view()
@@ -282,8 +281,7 @@ class CalibratePanel(Panel):
 
     def _picked_lens(self) -> None:
         self._whole = {}
-        if self.session.spec.views is not None:
-            self._want(self.session.spec.views)
+        self._want(self.session.spec.views)
 
     # What is asked beside the chain.
 
