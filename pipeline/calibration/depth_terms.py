@@ -265,10 +265,13 @@ def _falls(before: FloatArray, after: FloatArray) -> bool:
 
 
 def _certain(problem: Problem, model: tuple[str, ...], added: Iterable[str]) -> bool:
-    """Whether every term that a model adds has a parameter whose interval leaves out 0: of 95 % together."""
+    """Whether every term that a model adds has a parameter whose interval leaves out 0, of 95 % together for all
+    of the term's parameters and all models that are tried.
+    """
     columns = columns_of(model)
     sds = np.abs(problem.solve(columns)) / np.sqrt(np.diag(problem.covariance(columns)))
     by_column = dict(zip(columns.tolist(), sds.tolist(), strict=True))
     return all(
-        max(by_column[column] for column in GROUPS[term]) > problem.wide(len(GROUPS[term])) for term in added
+        max(by_column[column] for column in GROUPS[term]) > problem.wide(len(GROUPS[term]) * len(LADDER))
+        for term in added
     )
