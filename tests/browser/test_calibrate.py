@@ -97,7 +97,7 @@ def test_the_mesh_is_another_with_the_calibration_and_the_same_again_without(cal
     go(calibrated, "Calibrate")
     press(calibrated, "Use this calibration")
     calibrated.get_by_text("In use").wait_for()
-    expect(calibrated.get_by_text("Up to date")).to_be_visible()
+    calibrated.get_by_text("Up to date").wait_for()
     row = calibrated.get_by_role("row", name="F-score 5 cm").locator("visible=true").first
     expect(row).to_have_text(re.compile(r"\d %.*\d %"), timeout=LONG_MS)
     came, calibrated_share = f_scores(calibrated)

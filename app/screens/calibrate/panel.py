@@ -275,8 +275,7 @@ class CalibratePanel(Panel):
         self._want(replace(views, dropped=tuple(sorted(left))))
 
     def _keep_all(self) -> None:
-        views = self.session.spec.views
-        if views is not None:
+        if (views := self.session.spec.views) is not None:
             self._want(replace(views, dropped=()))
 
     def _picked_lens(self) -> None:
