@@ -265,8 +265,8 @@ def _falls(before: FloatArray, after: FloatArray) -> bool:
 
 
 def _certain(problem: Problem, model: tuple[str, ...], added: Iterable[str]) -> bool:
-    """Whether every term that a model adds has a parameter whose interval leaves out 0, of 95 % together for all
-    of the term's parameters and all models that are tried.
+    """Whether every term that a model adds has a parameter whose interval leaves out 0, of 95 % for all the
+    term's parameters and all models that are tried together.
     """
     columns = columns_of(model)
     sds = np.abs(problem.solve(columns)) / np.sqrt(np.diag(problem.covariance(columns)))
