@@ -19,6 +19,10 @@ COLORS: dict[StepStatus, str] = {
 }
 
 
+WIDE_PX = 700
+"""Of a window in which all steps stand in one row."""
+
+
 class Stepper:
     """Buttons, one for each step; the current one is filled."""
 
@@ -49,7 +53,8 @@ def _style(current: int, statuses: Sequence[StepStatus | None]) -> str:
     row = "div:has(> .packetmesh-steps) + div"
     rules = [
         f"{row} > div > div:first-child {{ display: none; }}",
-        f"{row} > div > div:last-child > div {{ flex-wrap: nowrap !important; gap: 3px !important; }}",
+        f"@media (min-width: {WIDE_PX}px) {{ {row} > div > div:last-child > div "
+        "{ flex-wrap: nowrap !important; gap: 3px !important; } }",
         f"canvas[data-engine] {{ background: {css(BACKGROUND)} }}",
         f"{row} button {{ height: 2.2em; padding: 0 0.15em; font-size: 11.5px; }}",
     ]

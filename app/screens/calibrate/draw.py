@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.drawing.cameras import Stage, add_camera
+from app.drawing.cameras import Stage, add_camera, turn
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import BRAND, NEUTRAL, SOURCE, TARGET
 from app.drawing.poses import place
@@ -25,6 +25,8 @@ BELOW = "/calibrate"
 FACES = np.array([[0, 1, 2], [0, 2, 3]])
 RIM = 0.9
 """Of the board beyond its outer points, in its spacing."""
+ASPECT = 1.2
+"""In a picture that is narrower than so many heights one stands farther away."""
 FAR = 0.95
 """How far away one stands, over the size of what is seen."""
 
@@ -185,3 +187,9 @@ def place_of(camera: CameraView, around: Around) -> Stage:
     stand_m = middle_m + FAR * size_m * direction / np.linalg.norm(direction)
     right = np.cross(middle_m - stand_m, (0.0, 0.0, 1.0))
     return Stage(stand_m, middle_m, right / np.linalg.norm(right), size_m, middle_m)
+
+
+def stand_before(client: viser.ClientHandle, stage: Stage) -> None:
+    """Turn a browser's view there, from far enough that all is seen in a narrow picture, too."""
+    away = max(1.0, ASPECT / max(client.camera.aspect, 0.1))
+    turn(client, stage.middle_m, stage.middle_m + away * (stage.viewpoint_m - stage.middle_m))

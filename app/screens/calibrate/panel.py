@@ -7,14 +7,13 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar, get_args
 
-from app.drawing.cameras import turn
 from app.lesson import LessonFolder, read_lesson
 from app.records import Picture, SceneView
 from app.screens.calibrate.answers import Answers
 from app.screens.calibrate.area import PictureArea
 from app.screens.calibrate.bars import Bars, bars_of
 from app.screens.calibrate.depth import DepthFolder
-from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of
+from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of, stand_before
 from app.screens.calibrate.labels import AROUND, DEPTH
 from app.screens.calibrate.lesson import SETTINGS, SHIPPED, CalibrateLook, left_out
 from app.screens.calibrate.noise import NoiseFolder
@@ -375,7 +374,7 @@ class CalibratePanel(Panel):
 
     def _draw(self) -> None:
         camera, view, around = self._shown(), self._view, AROUND[self._around.value]
-        scene: SceneView | None = self.session.results.view("scene")
+        scene = self.session.results.view("scene")
         with self.ui.atomic():
             if view is None or camera is None or camera.calibration is None:
                 self._drawing.draw_scene(scene)
@@ -396,5 +395,5 @@ class CalibratePanel(Panel):
         if framed != self._framed:
             self._framed, stage = framed, place_of(camera, around)
             for client in self.session.clients():
-                turn(client, stage.middle_m, stage.viewpoint_m)
+                stand_before(client, stage)
         return True
