@@ -13,8 +13,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import i0e
-from scipy.stats import ncx2
 
 from network_sim.config import MacConfig, NetworkConfig, RadioConfig
 from network_sim.places import Places
@@ -154,6 +152,9 @@ def _dqpsk_table() -> list[float]:
     The rate is ``Q1(x, y) - I0(x y) exp(-(x^2 + y^2) / 2) / 2`` with Marcum's Q and x, y = b sqrt(1 -+ 1/2^½)
     (Proakis 2001, 5.2).
     """
+    from scipy.special import i0e  # who draws a network's reach does without
+    from scipy.stats import ncx2
+
     b = np.arange(_STEP, _LARGEST + 2 * _STEP, _STEP)
     x, y = b * math.sqrt(1.0 - math.sqrt(0.5)), b * math.sqrt(1.0 + math.sqrt(0.5))
     rate = ncx2.sf(y**2, 2, x**2) - 0.5 * i0e(x * y) * np.exp(-0.5 * (y - x) ** 2)

@@ -48,6 +48,10 @@ def look_at(eye_m: ArrayLike, target_m: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.
     return rigid(np.stack([right, np.cross(forward, right), forward], axis=1), eye_m)
 
 
+LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
+"""T_world_camera of a camera of which nothing is known: at the origin, upright, looking along +y."""
+
+
 def scaled(intrinsics: CameraIntrinsics, factor: float) -> CameraIntrinsics:
     """The camera of an image resized by ``factor``: pixel centres stay at integers."""
     matrix = intrinsics.matrix.copy()

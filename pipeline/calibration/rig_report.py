@@ -12,9 +12,9 @@ from packetmesh.files import atomic_path, finite
 from pipeline.calibration.assess import Trust
 from pipeline.calibration.report import metrics, write_camera_folder
 from pipeline.calibration.rig_from_images import INFRARED, RigReport
+from pipeline.geometry import LEVEL_POSE
 from pipeline.io.calibrations import write_calibration
 from pipeline.io.poses import read_pose
-from pipeline.io.rigs import LEVEL_POSE
 from pipeline.types import AnyPath, FloatArray
 
 NO_TRUST: Mapping[str, Trust] = {}

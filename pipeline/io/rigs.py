@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from packetmesh.errors import InputError
 from pipeline.depth_to_color import register_depth
-from pipeline.geometry import look_at
+from pipeline.geometry import LEVEL_POSE
 from pipeline.io.calibrations import FILES, NodeFiles, calibration_files, node_files
 from pipeline.io.depth_correction import (
     DepthCorrection,
@@ -28,8 +26,6 @@ from pipeline.io.truth import read_truth, write_truth
 from pipeline.types import AnyPath, CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
 MAX_NODES = 6
-LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
-"""T_world_camera of a node without a pose file: at the origin, upright, looking along +y."""
 
 
 def load_frame(

@@ -20,12 +20,14 @@ CONFIG = with_settings(PRESETS["packetmesh"], ["surface.max_points=2500"])
 
 def small_rig(nodes=2, scene="office"):
     rig = load_demo(scene)
+    frames = tuple(small_frame(frame) for frame in rig.frames[:nodes])
     truth = replace(
         rig.truth,
         T_world_camera=rig.truth.T_world_camera[:nodes],
         depth=tuple(thinned(depth) for depth in rig.truth.depth[:nodes]),
+        intrinsics=tuple(frame.intrinsics for frame in frames),
     )
-    return Rig(rig.name, tuple(small_frame(frame) for frame in rig.frames[:nodes]), truth)
+    return Rig(rig.name, frames, truth)
 
 
 def small_frame(frame):
