@@ -39,7 +39,7 @@ def simulate(
         describe: List every setting with its value, unit and meaning, and run nothing.
         json: Print the metrics as one JSON object.
     """
-    from network_sim.config import PRESETS
+    from network_sim.presets import PRESETS
     from packetmesh.settings import config_named, with_settings
 
     config = with_settings(config_named(preset, PRESETS), set)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from network_sim.arrivals import Arrivals, Spent, arrivals, until
-from network_sim.config import PRESETS, NetworkConfig
+from network_sim.config import NetworkConfig
+from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
 from network_sim.trace import NetworkTrace
 from packetmesh.errors import InputError

@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from network_sim.config import PRESETS, NetworkConfig
+from network_sim.config import NetworkConfig
+from network_sim.presets import PRESETS
 from network_sim.replicate import measured
 from packetmesh.settings import settings, with_settings
 from tests.app import commands

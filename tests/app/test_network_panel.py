@@ -23,7 +23,7 @@ from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import What
 from app.screens.network.what_if import WhatIf
 from app.state import Spec
-from network_sim.config import PRESETS
+from network_sim.presets import PRESETS
 from network_sim.types import Cause
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from network_sim.arrivals import arrivals, energy_by_node_j, until
-from network_sim.config import PRESETS, NetworkConfig
+from network_sim.config import NetworkConfig
 from network_sim.metrics import camera_nodes, metrics
+from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
 from network_sim.states import State
 from network_sim.types import NS_PER_S, EventKind, to_ns

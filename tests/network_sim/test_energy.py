@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import ArrayLike
 
 from network_sim import energy as e
-from network_sim.config import PRESETS, EnergyConfig
+from network_sim.config import EnergyConfig
 from network_sim.metrics import camera_nodes, metrics
+from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
 from network_sim.states import State
 from network_sim.types import NS_PER_S

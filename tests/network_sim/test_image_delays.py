@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from network_sim.config import PRESETS
 from network_sim.metrics import image_delays_s
+from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from network_sim.config import PRESETS, NetworkConfig
+from network_sim.config import NetworkConfig
 from network_sim.conservation import balance, image_balance
 from network_sim.losses import LinkLosses, LossConfig, frames_lost
 from network_sim.metrics import metrics
+from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
 from network_sim.trace import NetworkTrace
 from network_sim.types import Cause, EventKind

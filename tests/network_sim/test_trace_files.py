@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from network_sim.config import PRESETS, Keep, NetworkConfig, SchemeConfig
+from network_sim.config import Keep, NetworkConfig, SchemeConfig
+from network_sim.presets import PRESETS
 from network_sim.trace import COLUMNS
 from network_sim.trace_files import write_trace
 from network_sim.types import Cause, EventKind, PacketKind

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from app.drawing.colors import INFERRED, SOURCE, TARGET
-from network_sim.config import PRESETS, WAVELAN, EnergyConfig, NetworkConfig
+from network_sim.config import EnergyConfig, NetworkConfig
+from network_sim.presets import PRESETS, WAVELAN
 from network_sim.types import Cause, PacketKind
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings

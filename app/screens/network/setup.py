@@ -12,7 +12,8 @@ from app.screens.network.lesson import NetworkLook
 from app.screens.network.what_if import WhatIf
 from app.state import Sent, Spec
 from app.ui import Ui
-from network_sim.config import PRESETS, NetworkConfig
+from network_sim.config import NetworkConfig
+from network_sim.presets import PRESETS
 from packetmesh.errors import InputError
 from packetmesh.settings import differences, settings, with_settings
 from pipeline.config import PRESETS as CHAINS

@@ -17,7 +17,7 @@ from lab.claims.delivery.trials import SubsetTask, Values, subset_trial
 from lab.claims.delivery.views import rig_quality
 from lab.claims.exhibits import Table
 from lab.trials import iterate_trials
-from network_sim.config import PRESETS
+from network_sim.presets import PRESETS
 from network_sim.selection import FloatArray, greedy, greedy_by_cost, nearest
 from packetmesh.progress import Progress
 from pipeline.delivery import coding_named

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 from lab.claims.delivery.trials import Values
 from network_sim.arrivals import until
-from network_sim.config import PRESETS, NetworkConfig
+from network_sim.config import NetworkConfig
+from network_sim.presets import PRESETS
 from network_sim.types import to_s
 from pipeline.delivery.sending import DeliverySpec, packet_bytes_of, send
 from pipeline.sources import Demo

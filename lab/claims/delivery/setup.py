@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from lab.claims.delivery.network import NETWORKS, SendTask
 from lab.claims.delivery.trials import Loss, LossTask
-from network_sim.config import PRESETS
+from network_sim.presets import PRESETS
 from pipeline.config import AlignmentMode
 from pipeline.delivery.sending import packet_bytes_of
 from pipeline.io.demos import CALIBRATED_SCENES

@@ -14,9 +14,10 @@ from lab.claims.exhibits import Chart, Exhibit, Table, plain_curve
 from lab.claims.network.intervals import curve, interval
 from lab.claims.network.tasks import transfer
 from lab.trials import iterate_trials
-from network_sim.config import PRESETS, NetworkConfig
+from network_sim.config import NetworkConfig
 from network_sim.images import encoded_bytes, pgm_bytes, ppm_bytes
 from network_sim.mac.ieee802154 import LINK_BPS
+from network_sim.presets import PRESETS
 from network_sim.replicate import replications
 from packetmesh.progress import Progress
 from pipeline.types import FloatArray

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from network_sim.config import PRESETS as NETWORKS
+from network_sim.presets import PRESETS as NETWORKS
 from packetmesh.settings import with_settings
 from pipeline.config import PRESETS
 from pipeline.delivery.sending import DeliverySpec

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from network_sim.config import PRESETS
+from network_sim.presets import PRESETS
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
 from pipeline.delivery.plan import network_of, placed, places_of, poses_known
