@@ -29,6 +29,10 @@ MOST_BEND = 0.5
 """Of the step between neighbours: by so much it may change from one to the next along a row or column."""
 NEAR, MOST_OF_A_SIDE = 0.3, 0.8
 """A grid goes on where so much of a further row or column has a blob so near its place, in pitches."""
+ALTERNATES = 0.75
+"""Of how strongly dark and light squares alternate along the row inside; on the board's rim it is a half."""
+INTO_A_SQUARE = 0.3
+"""Of a square's side, from the corner: there brightness is read; the outermost may be narrow."""
 FEW_CHARUCO = 6
 """Corners of a ChArUco board from which on a view counts."""
 
@@ -263,17 +267,48 @@ def _chessboard(gray: ByteArray, board: Board) -> Detection:
         ),
         lambda: _refined(gray, board),
     )
-    for find in ways:
-        found, corners = find()
-        if found and corners is not None:
-            points_px = np.asarray(corners, float).reshape(-1, 2)
-            order = next(order for order in _orders(board) if _right_handed(points_px[order], board))
-            return _dark_first(gray, board, points_px[order])
     reason = (
         f"No chessboard of {board.columns} x {board.rows} inner corners is seen; count the corners between "
         "four squares, and have the whole board with its white rim in the picture, sharp and evenly lit"
     )
+    for find in ways:
+        found, corners = find()
+        if not found or corners is None:
+            continue
+        points_px = np.asarray(corners, float).reshape(-1, 2)
+        if not _even(points_px, board):
+            continue
+        inside, beyond = _alternation(gray, board, points_px)
+        if beyond.max() > ALTERNATES:
+            reason = (
+                f"The board has more inner corners than {board.columns} x {board.rows}; "
+                "count its columns and rows"
+            )
+        elif inside.min() > ALTERNATES:
+            order = next(order for order in _orders(board) if _right_handed(points_px[order], board))
+            return _dark_first(gray, board, points_px[order])
     return _nothing(reason)
+
+
+def _alternation(gray: ByteArray, board: Board, points_px: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(4,) how strongly squares alternate along the four outermost rows and columns of corners, and where one
+    more of each would be, each over the one inside it: 1 where there are corners, and 0.5 on the board's rim.
+    """
+    grid = points_px.reshape(board.rows, board.columns, 2)
+    for _ in range(2):  # a row more on either side, straight on; then, turned, a column
+        grid = np.concatenate([2 * grid[:1] - grid[1:2], grid, 2 * grid[-1:] - grid[-2:-1]]).swapaxes(0, 1)
+    down, right = (INTO_A_SQUARE * np.gradient(grid, axis=axis) for axis in (0, 1))
+    ways = (right + down, -right - down, right - down, down - right)
+    squares_px = grid + np.stack(ways)
+    one, opposite, left, below = _brightness(gray, squares_px.reshape(-1, 2)).reshape(squares_px.shape[:3])
+    crossing = one + opposite - left - below
+    crossing[::2] *= -1.0
+    crossing[:, ::2] *= -1.0
+    crossing *= np.sign(crossing[1:-1, 1:-1].mean())
+    rows, columns = crossing[:, 1:-1].mean(axis=1), crossing[1:-1].mean(axis=0)
+    sides = np.array([side[:3] for line in (rows, columns) for side in (line, line[::-1])])
+    outside, last, inner = np.maximum(sides, 1.0).T  # of 510 for black and white
+    return last / inner, outside / last
 
 
 def _refined(gray: ByteArray, board: Board) -> tuple[bool, FloatArray | None]:
