@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from network_sim.arrivals import Arrivals, arrivals
-    from network_sim.config import PRESETS as NETWORK_PRESETS
     from network_sim.config import (
         EnergyConfig,
         LossConfig,
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     )
     from network_sim.metrics import Metric, image_delays_s
     from network_sim.metrics import metrics as network_metrics
+    from network_sim.presets import PRESETS as NETWORK_PRESETS
     from network_sim.simulate import iterate_simulation, simulate
     from network_sim.trace import Events, NetworkTrace
     from network_sim.types import Cause, EventKind
@@ -120,7 +120,7 @@ _NAMES = {
     ),
 }
 _PLACES = {name: (module, name) for module, names in _NAMES.items() for name in names.split()} | {
-    "NETWORK_PRESETS": ("network_sim.config", "PRESETS"),
+    "NETWORK_PRESETS": ("network_sim.presets", "PRESETS"),
     "network_metrics": ("network_sim.metrics", "metrics"),
 }
 """Module and attribute of every public name."""

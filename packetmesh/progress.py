@@ -52,12 +52,15 @@ def drain(
 
 
 def part(
-    steps: Generator[Progress, None, Result], stage: str, begin: float, end: float
+    steps: Generator[Progress, None, Result], stage: str, begin: float, end: float, detail: bool = False
 ) -> Generator[Progress, None, Result]:
-    """The same computation as a stage of a longer one, which goes from ``begin`` to ``end`` of it."""
+    """The same computation as a stage of a longer one, which goes from ``begin`` to ``end`` of it; in
+    ``detail``, each report says after that stage what it said before.
+    """
     while True:
         try:
             step = next(steps)
         except StopIteration as stop:
             return stop.value
-        yield Progress(stage, begin + step.fraction * (end - begin))
+        told = f"{stage}: {step.stage}" if detail else stage
+        yield Progress(told, begin + step.fraction * (end - begin))

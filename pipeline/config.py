@@ -11,7 +11,7 @@ Pattern = Literal["circles", "circles-asymmetric", "chessboard", "charuco"]
 """What is printed on a calibration board."""
 Lens = Literal["thesis", "brown", "rational", "fisheye"]
 """Distortion that a camera may have: k1, k2 (SPEC 1.1); also p1, p2, k3; also k4 to k6; or a fisheye's."""
-OutlierMode = Literal["thesis", "depth_normalised", "robust"]
+OutlierMode = Literal["thesis", "depth_normalised", "robust", "flying"]
 AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]
 ModelKind = Literal["metric", "relative", "inverse"]
 NetworkPreset = Literal[
@@ -61,13 +61,16 @@ def _above(key: str, value: float, bound: float) -> None:
 class AcquisitionConfig:
     """Depth image to filtered point cloud (SPEC 2)."""
 
-    outlier_mode: OutlierMode = "robust"
-    """How a point's mean neighbour distance is judged: against mu + t sigma of the cloud (thesis),
-    the same after division by depth (depth_normalised), or median + 3 robust sigma (robust)."""
+    outlier_mode: OutlierMode = "flying"
+    """flying: what hangs between two surfaces or alone, by the sensor's noise. The others judge a point's
+    mean neighbour distance: against mu + t sigma of the cloud (thesis), the same after division by depth
+    (depth_normalised), or median + 3 robust sigma (robust)."""
     outlier_neighbours: int = 4
-    """Neighbours N whose mean distance is judged (eq. 3.5)."""
+    """Neighbours N whose mean distance is judged (eq. 3.5); the flying mode does not use it."""
     outlier_t: float = 1.0
-    """Threshold t in sigmas (eq. 3.6); the robust mode does not use it."""
+    """Threshold t in sigmas (eq. 3.6); the robust and the flying mode do not use it."""
+    average: bool = True
+    """Average measured depth over its surface, within the sensor's noise."""
 
     def __post_init__(self) -> None:
         _at_least("acquisition.outlier_neighbours", self.outlier_neighbours, 1)
@@ -228,7 +231,7 @@ class PipelineConfig:
 PRESETS: dict[str, PipelineConfig] = {
     "packetmesh": PipelineConfig(),
     "thesis": PipelineConfig(
-        acquisition=AcquisitionConfig(outlier_mode="thesis"),
+        acquisition=AcquisitionConfig(outlier_mode="thesis", average=False),
         depth=DepthConfig(crop=True, alignment="median"),
         inferred_registration=RegistrationConfig(method="ceicp-n", metric="point"),
         node_registration=RegistrationConfig(method="ceicp-n", metric="point"),

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from network_sim.config import PRESETS as NETWORKS
 from network_sim.config import NetworkConfig
+from network_sim.presets import PRESETS as NETWORKS
 from packetmesh.batch import process_pool
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain

@@ -25,6 +25,25 @@ class RayParts:
 
 
 @dataclass(frozen=True, slots=True)
+class Kept:
+    """What became of the measurements; no truth is needed. Shares of 0 to 1 over all nodes."""
+
+    kept_share: float
+    """Of the measured pixels, those that the outlier filter keeps."""
+    within_2pct_before: float
+    """Of the measured pixels, those whose ray meets the surface before fusion, of the sensors' points alone,
+    within 2 % of the measurement."""
+    within_2pct_after: float
+    """The same of the surface after fusion."""
+    within_5pct_before: float
+    within_5pct_after: float
+    measured_ray_share: float
+    """Of all pixel rays, those that after fusion meet a surface of measured points."""
+    guessed_ray_share: float
+    """Of all pixel rays, those that after fusion meet a triangle most of whose corners were inferred."""
+
+
+@dataclass(frozen=True, slots=True)
 class Explanation:
     """Why a hole is there and what would close it."""
 

@@ -11,7 +11,14 @@ from pipeline import geometry
 from pipeline.config import FusionMode
 from pipeline.nodes import NodeClouds
 from pipeline.registration import hidden_from
-from pipeline.surface import estimate_normals, smooth, spacing, voxel_average, voxel_for_count
+from pipeline.surface import (
+    estimate_normals,
+    in_cubes_of,
+    smooth,
+    spacing,
+    voxel_average,
+    voxel_for_count,
+)
 from pipeline.types import FloatArray, PointCloud, PointSource, RgbdFrame
 
 
@@ -26,6 +33,8 @@ class FusedCloud:
     """Mean nearest-neighbour distance."""
     sigma_D_m: float
     """Its standard deviation."""
+    measured: int | None
+    """Its first points that are those of the sensors alone, untouched by any guess; None if all are mixed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +63,8 @@ def merge_fused(
         frames: the nodes' images.
         nodes: their clouds.
         T_world_camera: (4, 4) registered pose of each node.
-        mode: ``fill`` drops inferred points that another node's sensor can judge.
+        mode: ``fill`` drops inferred points that another node's sensor can judge, and those beside
+            measured ones, so that no measurement is averaged with a guess.
         max_points: it is averaged over the voxels that leave about so many points.
         smoothing_passes: how often every point is moved onto the plane of its neighbours.
     """
@@ -63,20 +73,49 @@ def merge_fused(
         joint = without_guesses_in_view(frames, nodes, T_world_camera)
     everything = PointCloud.concatenate(_placed(joint, T_world_camera))
     voxel_m = voxel_for_count(everything.points_m, max_points)
-    fused = merge(joint, T_world_camera, voxel_m, smoothing_passes)
-    return FusedCloud(fused, voxel_m, *spacing(fused.points_m))
+    whole = thinned(joint, T_world_camera, voxel_m)
+    fused, measured = smooth(whole, smoothing_passes), None
+    if mode == "fill":
+        own = thinned([node.sensor for node in nodes], T_world_camera, voxel_m)
+        fused, measured = with_guesses_around(own, whole, fused, voxel_m, smoothing_passes), len(own)
+    return FusedCloud(fused, voxel_m, *spacing(fused.points_m), measured)
+
+
+def with_guesses_around(
+    own: PointCloud, whole: PointCloud, smoothed: PointCloud, voxel_m: float, smoothing_passes: int
+) -> PointCloud:
+    """The measured points as without any guess, then the inferred ones in voxels where nothing was measured.
+
+    At the rim of a hole, a voxel and the planes that smooth it would mix both: the surface there would come
+    loose from what was measured, by as much as the guess is off.
+
+    Args:
+        own: the sensors' points, thinned.
+        whole: those and the inferred ones, thinned alike.
+        smoothed: the same points after smoothing; inferred ones may follow measured ones.
+        voxel_m: that both were thinned to.
+        smoothing_passes: of the sensors' points alone.
+    """
+    guessed = np.flatnonzero(whole.source == PointSource.INFERRED)
+    free = guessed[~in_cubes_of(own.points_m, whole.points_m[guessed], voxel_m)]
+    measured = replace(smooth(own, smoothing_passes), source=np.full(len(own), PointSource.SENSOR, np.uint8))
+    return PointCloud.concatenate([measured, smoothed.select(free)])
 
 
 def merge(
     clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], voxel_m: float, smoothing_passes: int
 ) -> PointCloud:
     """Clouds in their nodes' frames as one in the world frame: averaged, with normals, smoothed."""
+    return smooth(thinned(clouds, T_world_camera, voxel_m), smoothing_passes)
+
+
+def thinned(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], voxel_m: float) -> PointCloud:
+    """The same before it is smoothed."""
     thin = [
         replace(estimate_normals(voxel_average(cloud, voxel_m), np.zeros(3)), pixels=None) for cloud in clouds
     ]
     placed = _placed(thin, T_world_camera)
-    whole = placed[0] if len(placed) == 1 else voxel_average(PointCloud.concatenate(placed), voxel_m)
-    return smooth(whole, smoothing_passes)
+    return placed[0] if len(placed) == 1 else voxel_average(PointCloud.concatenate(placed), voxel_m)
 
 
 def without_guesses_in_view(

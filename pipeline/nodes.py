@@ -10,7 +10,7 @@ import numpy as np
 
 from packetmesh.errors import ReconstructionError
 from pipeline import geometry
-from pipeline.acquisition import FilterResult, Outliers, back_project, split
+from pipeline.acquisition import Acquired, FilterResult, back_project
 from pipeline.config import DepthConfig, FusionMode, NodePoints, RegistrationConfig
 from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, judge
 from pipeline.pixels import near
@@ -94,7 +94,7 @@ def nothing_inferred(frame: RgbdFrame) -> InferredDepth:
 def prepare_node(
     frame: RgbdFrame,
     inferred: InferredDepth,
-    outliers: Outliers,
+    acquired: Acquired,
     depth: DepthConfig,
     mode: FusionMode,
     registration: RegistrationConfig | None = None,
@@ -104,13 +104,13 @@ def prepare_node(
     Args:
         frame: the node's images.
         inferred: what the depth network gives for its colour image.
-        outliers: which of its sensor points are outliers.
+        acquired: its measured depth, and which of its points are outliers.
         depth: how inferred depth is made metric, and how much of it is believed.
         mode: ``fill`` lets inferred points in only at pixels that the sensor has not measured.
         registration: moves the inferred cloud rigidly onto the sensor cloud, as the thesis does; None
             leaves its points where their pixels are.
     """
-    filtered = split(back_project(frame), outliers)
+    filtered = acquired.cloud(frame)
     sensor = filtered.kept
     alignment = _aligned(frame, inferred, depth)
     judged = judge(alignment, frame.depth, frame.rgb, depth.reach, depth.least_confidence)

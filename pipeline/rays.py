@@ -9,7 +9,15 @@ import numpy as np
 
 from pipeline.geometry import pixel_rays
 from pipeline.open3d_runtime import o3d
-from pipeline.types import CameraIntrinsics, DepthMap, FloatArray, IntArray
+from pipeline.types import (
+    BoolArray,
+    ByteArray,
+    CameraIntrinsics,
+    DepthMap,
+    FloatArray,
+    IntArray,
+    PointSource,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +40,13 @@ def hit_depths(vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Ca
     """The depth image of a mesh in each camera."""
     scene = triangle_scene(vertices_m, triangles)
     for camera in cameras:
-        z_m = camera_hits(scene, camera)["t_hit"].numpy()  # in units of directions that have z = 1
-        yield DepthMap(np.where(np.isfinite(z_m), z_m, np.float32(np.nan)))
+        yield depth_of(camera_hits(scene, camera))
+
+
+def depth_of(hits: dict[str, o3d.core.Tensor]) -> DepthMap:
+    """The depth image in the answers of ``camera_hits``; NaN where a ray misses."""
+    z_m = hits["t_hit"].numpy()  # in units of directions that have z = 1
+    return DepthMap(np.where(np.isfinite(z_m), z_m, np.float32(np.nan)))
 
 
 def triangle_scene(vertices_m: FloatArray, triangles: IntArray) -> o3d.t.geometry.RaycastingScene:
@@ -62,6 +75,11 @@ def camera_hits(scene: o3d.t.geometry.RaycastingScene, camera: Camera) -> dict[s
 def tensor(array: np.ndarray, dtype: type[np.generic]) -> o3d.core.Tensor:
     """Open3D's view of an array."""
     return o3d.core.Tensor.from_numpy(np.ascontiguousarray(array, dtype=dtype))
+
+
+def guessed_triangles(triangles: IntArray, source: ByteArray) -> BoolArray:
+    """(F,) True where two or three of the corners were inferred, by the (V,) source of the vertices."""
+    return np.sum(source[triangles] == PointSource.INFERRED, axis=1) >= 2
 
 
 def triangle_areas_m2(vertices_m: FloatArray, triangles: IntArray) -> FloatArray:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
+from pipeline.findings import Kept
 from pipeline.merging import MergedClouds
 from pipeline.nodes import NodeClouds, Placement
 from pipeline.sources import LoadedRig
@@ -33,6 +36,20 @@ class Reconstruction:
     truth_after: dict[str, float] | None
     timings_s: dict[str, float]
     """Of each stage, when it was computed."""
+
+    @property
+    def kept(self) -> Kept:
+        """What became of the measurements."""
+        before, after = self.before.quality, self.after.quality
+        return Kept(
+            kept_share=float(np.mean(np.concatenate([node.filtered.keep for node in self.nodes]))),
+            within_2pct_before=before.within_2pct_share,
+            within_2pct_after=after.within_2pct_share,
+            within_5pct_before=before.within_5pct_share,
+            within_5pct_after=after.within_5pct_share,
+            measured_ray_share=1.0 - after.no_hit_ray_share - after.guessed_ray_share,
+            guessed_ray_share=after.guessed_ray_share,
+        )
 
 
 def reconstruct(rig: Rig, config: PipelineConfig = PRESETS["packetmesh"]) -> Reconstruction:

@@ -76,6 +76,7 @@ def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
                 "sensor_points": len(node.sensor),
                 "sensor_coverage": frame.depth.coverage,
                 "outliers": len(node.filtered.outliers),
+                "kept_share": float(node.filtered.keep.mean()),
                 "provider": node.network.provider,
                 "alignment": {
                     "mode": node.alignment.mode,
@@ -96,10 +97,7 @@ def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
         "spacing": {"r_F_m": reconstruction.clouds.r_F_m, "sigma_D_m": reconstruction.clouds.sigma_D_m},
         "surface_before": surface_metrics(before),
         "surface_after": surface_metrics(after),
-        "measured": {
-            "within_2pct_before": before.quality.kept_measurement_share,
-            "within_2pct_after": after.quality.kept_measurement_share,
-        },
+        "measured": asdict(reconstruction.kept),
         "truth": truth,
         "timings_s": reconstruction.timings_s,
         "peak_memory_bytes": peak_memory_bytes(),

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, Protocol, TypeVar
 
+import numpy as np
+
 from packetmesh.progress import Progress
-from pipeline.acquisition import Outliers, back_project, find_outliers
+from pipeline.acquisition import Acquired, acquire
 from pipeline.config import (
     AcquisitionConfig,
     DepthConfig,
@@ -134,13 +136,13 @@ def infer_depths(depth: DepthConfig, rig: Rig) -> Steps[tuple[InferredDepth, ...
     return tuple(inferred)
 
 
-def measured_outliers(acquisition: AcquisitionConfig, rig: Rig) -> Steps[tuple[Outliers, ...]]:
-    """The outliers of every node's measured points; colour has no say in it."""
-    found = []
+def acquired_depths(acquisition: AcquisitionConfig, rig: Rig) -> Steps[tuple[Acquired, ...]]:
+    """Every node's measured depth and its outliers; colour has no say in it."""
+    acquired = []
     for index, frame in enumerate(rig.frames):
         yield Progress(f"outliers of {frame.name}", 0.2 + 0.1 * index / len(rig.frames))
-        found.append(find_outliers(back_project(frame), acquisition, frame.intrinsics.fx_px))
-    return tuple(found)
+        acquired.append(acquire(frame, acquisition))
+    return tuple(acquired)
 
 
 def prepare_nodes(
@@ -149,13 +151,13 @@ def prepare_nodes(
     registration: RegistrationConfig | None,
     rig: Rig,
     inferred: tuple[InferredDepth, ...],
-    outliers: tuple[Outliers, ...],
+    acquired: tuple[Acquired, ...],
 ) -> Steps[tuple[NodeClouds, ...]]:
     """The clouds of every node."""
     nodes = []
-    for index, (frame, answer, found) in enumerate(zip(rig.frames, inferred, outliers, strict=True)):
+    for index, (frame, answer, depths) in enumerate(zip(rig.frames, inferred, acquired, strict=True)):
         yield Progress(f"clouds of {frame.name}", 0.3 + 0.15 * index / len(rig.frames))
-        nodes.append(prepare_node(frame, answer, found, depth, mode, registration))
+        nodes.append(prepare_node(frame, answer, depths, depth, mode, registration))
     return tuple(nodes)
 
 
@@ -185,7 +187,11 @@ def both_clouds(
 ) -> Steps[MergedClouds]:
     """The same beside the sensors' own points, thinned alike."""
     yield Progress("merging the sensors' clouds", 0.75)
-    sensor = merge([node.sensor for node in nodes], placement.T_world_camera, fused.voxel_m, smoothing_passes)
+    if fused.measured is None:
+        own = [node.sensor for node in nodes]
+        sensor = merge(own, placement.T_world_camera, fused.voxel_m, smoothing_passes)
+    else:
+        sensor = fused.fused.select(np.arange(fused.measured))
     return MergedClouds(sensor, fused.fused, fused.r_F_m, fused.sigma_D_m)
 
 
@@ -263,7 +269,7 @@ def cameras_of(rig: Rig, placement: Placement) -> list[Camera]:
 STAGES: dict[StageName, Callable[..., Steps[Any]]] = {
     "rig": open_rig,
     "inferred": infer_depths,
-    "outliers": measured_outliers,
+    "outliers": acquired_depths,
     "nodes": prepare_nodes,
     "placement": register_nodes,
     "fused": fused_cloud,

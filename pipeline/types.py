@@ -256,9 +256,14 @@ class SurfaceQuality:
     area_m2: float
     unused_points: int
     """Input points that no triangle uses."""
-    kept_measurement_share: float = float("nan")
+    within_2pct_share: float = float("nan")
     """Share of the pixels that the sensors have measured whose ray meets the mesh within 2 % of the
     measurement, 0 to 1; NaN without sensor depth."""
+    within_5pct_share: float = float("nan")
+    """The same within 5 %."""
+    guessed_ray_share: float = float("nan")
+    """Share of the cameras' pixel rays that meet a triangle most of whose corners were inferred; NaN where
+    the source of the points is unknown."""
 
 
 @dataclass(frozen=True, slots=True)

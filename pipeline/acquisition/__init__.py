@@ -1,11 +1,14 @@
 """Depth image to filtered point cloud (SPEC 2)."""
 
+from pipeline.acquisition.acquire import Acquired, acquire
 from pipeline.acquisition.back_project import back_project, depth_sigma_m
 from pipeline.acquisition.outliers import FilterResult, Outliers, filter_outliers, find_outliers, split
 
 __all__ = [
+    "Acquired",
     "FilterResult",
     "Outliers",
+    "acquire",
     "back_project",
     "depth_sigma_m",
     "filter_outliers",

@@ -24,7 +24,8 @@ class Outliers:
     keep: BoolArray
     """(N,) False for the outliers."""
     score: FloatArray
-    """(N,) mean distance to the neighbours: metres in mode ``thesis``, else pixels (d f / z)."""
+    """(N,) in mode ``flying`` the distance from all surfaces around, standard deviations; else the mean
+    distance to the neighbours: metres in mode ``thesis``, pixels (d f / z) in the other two."""
     threshold: float
     """Largest score that is kept, in the unit of ``score``."""
 
@@ -63,8 +64,10 @@ def find_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: float)
         focal_px: focal length of the camera.
 
     Raises:
-        InputError: not more than N points, or points behind the camera.
+        InputError: not more than N points, points behind the camera, or mode ``flying``.
     """
+    if config.outlier_mode == "flying":
+        raise InputError("Outlier mode 'flying' looks at a depth image, not at a cloud; try mode 'robust'.")
     if len(cloud) <= config.outlier_neighbours:
         raise InputError(
             f"The cloud has {len(cloud)} points, too few to compare each with {config.outlier_neighbours} "

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import get_args
 
@@ -166,16 +166,30 @@ def calibration_of(
     )
 
 
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """OpenCV calibrates in one thread: of several it adds up the views as they end, and the last bits differ
+    from one time to the next. One is as fast.
+    """
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(threads)
+
+
 def _brown(views: Sequence[View], size_px: tuple[int, int], lens: Lens) -> tuple[Optics, list[FloatArray]]:
     """OpenCV's lens, and the boards' poses."""
-    _, matrix, distortion, turns, moves, *_ = cv2.calibrateCameraExtended(
-        [view.board_m.astype(np.float32) for view in views],
-        [view.points_px.astype(np.float32).reshape(-1, 1, 2) for view in views],
-        size_px,
-        None,
-        None,
-        flags=FLAGS[lens],
-    )
+    with one_thread():
+        _, matrix, distortion, turns, moves, *_ = cv2.calibrateCameraExtended(
+            [view.board_m.astype(np.float32) for view in views],
+            [view.points_px.astype(np.float32).reshape(-1, 1, 2) for view in views],
+            size_px,
+            None,
+            None,
+            flags=FLAGS[lens],
+        )
     poses = [pose_of(turn, move) for turn, move in zip(turns, moves, strict=True)]
     return Optics(lens, matrix, distortion.ravel()), poses
 

@@ -13,7 +13,7 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.depth_from_images import with_depth
 from pipeline.calibration.from_images import CameraReport, iterate_calibration
 from pipeline.calibration.rig import RelativePose, RigCalibration, Seen, calibrate_rig
-from pipeline.calibration.shots import NodeShots
+from pipeline.calibration.shots import INFRARED, NodeShots, camera_images
 from pipeline.config import Lens
 from pipeline.geometry import LEVEL_POSE
 from pipeline.io.calibrations import CalibratedNode
@@ -21,8 +21,6 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 ALONE, DEPTH = 0.7, 0.85
 """Shares of the work before which boards and each camera's own lens are found, and after which depth is."""
-INFRARED = "/infrared"
-"""After a node's name: its separate depth camera."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,21 +110,45 @@ def iterate_rig_calibration(
             leave out that is not there, or cameras that never see the board together.
         ReconstructionError: the views do not determine a lens or the poses.
     """
-    moments = _moments(nodes)
-    strange = [word for word in without if not any(word.startswith(f"{name}/") for name in moments)]
-    if strange:
-        raise InputError(f"{strange[0]} is none of the cameras' images; name it as {next(iter(moments))}/...")
+    images = camera_images(nodes)
+    left_out: dict[str, list[str]] = {name: [] for name in images}
+    for word in without:
+        name, _, image = word.rpartition("/")
+        if name not in images:
+            raise InputError(f"{word} is none of the cameras' images; name it as {next(iter(images))}/...")
+        left_out[name].append(image)
     reports: dict[str, CameraReport] = {}
-    for index, (name, files) in enumerate(moments.items()):
-        left_out = [word.removeprefix(f"{name}/") for word in without if word.startswith(f"{name}/")]
-        steps = iterate_calibration(list(files), board, lens, 0, left_out)
-        begin, end = (ALONE * share / len(moments) for share in (index, index + 1))
+    for index, (name, files) in enumerate(images.items()):
+        steps = iterate_calibration(list(files), board, lens, 0, left_out[name])
+        begin, end = (ALONE * share / len(images) for share in (index, index + 1))
         try:
-            reports[name] = yield from part(steps, name, begin, end)
+            reports[name] = yield from part(steps, name, begin, end, detail=True)
         except PacketMeshError as error:
             raise type(error)(f"{name}: {error}") from None
     yield Progress("placing the cameras", ALONE)
-    seen = {name: _seen(reports[name], files) for name, files in moments.items()}
+    together = cameras_together(nodes, reports, board, folds)
+    yield Progress("comparing depth with the board", DEPTH)
+    measured = {node.name: node_with_depth(node, together.cameras) for node in nodes}
+    return replace(together, cameras={**together.cameras, **measured})
+
+
+def cameras_together(
+    nodes: Sequence[NodeShots], reports: Mapping[str, CameraReport], board: Board, folds: int = 0
+) -> RigReport:
+    """All lenses and poses together, from cameras that are calibrated each by itself.
+
+    Args:
+        nodes: their images, by moment.
+        reports: by camera; one without a report has no part.
+        board: what the images show.
+        folds: in how many turns moments are held out; 0 holds none out.
+
+    Raises:
+        InputError: fewer than two cameras, or some that never see the board together.
+        ReconstructionError: the views do not determine the poses.
+    """
+    images = camera_images(nodes)
+    seen = {name: _seen(report, images[name]) for name, report in reports.items()}
     rig = calibrate_rig({name: one.calibration for name, one in reports.items()}, seen, board, folds)
     together = {
         name: replace(
@@ -136,30 +158,23 @@ def iterate_rig_calibration(
         )
         for name, one in reports.items()
     }
-    yield Progress("comparing depth with the board", DEPTH)
-    return RigReport(board, together | _with_depth(nodes, together), rig)
+    return RigReport(board, together, rig)
 
 
-def _with_depth(nodes: Sequence[NodeShots], reports: Mapping[str, CameraReport]) -> dict[str, CameraReport]:
-    """The nodes with the bias of their depth sensors, by the separate cameras of those that have them."""
-    made = {}
-    for node in nodes:
-        own = reports.get(node.name + INFRARED)
-        grids = ((shot.color if own is None else shot.infrared, shot.depth) for shot in node.shots)
-        depths = {image.name: depth for image, depth in grids if image is not None and depth is not None}
-        made[node.name] = with_depth(reports[node.name], depths, own)
-    return made
+def node_with_depth(node: NodeShots, reports: Mapping[str, CameraReport]) -> CameraReport:
+    """A node's own report with the bias of its depth sensor, or why that is not known.
 
-
-def _moments(nodes: Sequence[NodeShots]) -> dict[str, dict[Path, str]]:
-    """By camera, the moments of its images."""
-    found: dict[str, dict[Path, str]] = {}
-    for node in nodes:
-        found[node.name] = {shot.color: shot.moment for shot in node.shots}
-        infrared = {shot.infrared: shot.moment for shot in node.shots if shot.infrared is not None}
-        if infrared:
-            found[node.name + INFRARED] = infrared
-    return found
+    Args:
+        node: its images.
+        reports: by camera, the node's and, if its depth has a camera of its own, that one's.
+    """
+    report, own = reports[node.name], reports.get(node.name + INFRARED)
+    if own is None and any(shot.infrared is not None for shot in node.shots):
+        reason = f"{node.name}{INFRARED} has no lens, and its depth is judged through it"
+        return replace(report, depth_reason=reason)
+    grids = ((shot.color if own is None else shot.infrared, shot.depth) for shot in node.shots)
+    depths = {image.name: depth for image, depth in grids if image is not None and depth is not None}
+    return with_depth(report, depths, own)
 
 
 def _seen(report: CameraReport, files: Mapping[Path, str]) -> dict[str, Seen]:

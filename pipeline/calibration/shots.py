@@ -21,6 +21,8 @@ from pipeline.types import AnyPath
 ENDINGS = (".png", ".jpg", ".jpeg", ".pgm", ".ppm")
 MOST_CAMERAS = 6
 BOARD_FILE = "board.json"
+INFRARED = "/infrared"
+"""After a node's name: its separate depth camera."""
 _LAST_NUMBER = re.compile(r"(\d+)\D*$")
 
 
@@ -77,6 +79,17 @@ def node_shots(folders: Sequence[AnyPath]) -> tuple[NodeShots, ...]:
         NodeShots(path.name if named else f"node_{index:02d}", path, _shots(path))
         for index, path in enumerate(paths)
     )
+
+
+def camera_images(nodes: Iterable[NodeShots]) -> dict[str, dict[Path, str]]:
+    """By camera, node_00 and, where there is one, node_00/infrared, the moments of its images."""
+    found: dict[str, dict[Path, str]] = {}
+    for node in nodes:
+        found[node.name] = {shot.color: shot.moment for shot in node.shots}
+        infrared = {shot.infrared: shot.moment for shot in node.shots if shot.infrared is not None}
+        if infrared:
+            found[node.name + INFRARED] = infrared
+    return found
 
 
 def node_folders(folder: Path) -> list[Path]:

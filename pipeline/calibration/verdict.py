@@ -82,7 +82,8 @@ def _advice(calibration: Calibration, halves: HalfDifference | None, following: 
         lens = f"--lens {richer}, " if richer else ""
         return [
             f"Two halves of the views differ by {halves.ratio:.1f} times what noise explains (by chance up "
-            f"to {halves.most_by_noise:.1f}): try {lens}--board-warp, or leave out views that stand out."
+            f"to {halves.most_by_noise:.1f}): try {lens}--board-warp (one camera at a time), or leave out "
+            "views that stand out."
         ]
     if following is None:
         return ["Take more views, near the edges of the image."]

@@ -18,6 +18,7 @@ from pipeline.calibration.estimate import (
     View,
     calibration_of,
     held_out,
+    one_thread,
     place,
     pose_of,
     rms_px,
@@ -103,15 +104,16 @@ def _released(
     """The camera, and (N, 3) points of the board."""
     upper_right = board.columns - 1
     try:
-        _, matrix, distortion, turns, moves, board_m, *_ = cv2.calibrateCameraROExtended(
-            [view.board_m.astype(np.float32) for view in views],
-            [view.points_px.astype(np.float32).reshape(-1, 1, 2) for view in views],
-            size_px,
-            upper_right,
-            None,
-            None,
-            flags=FLAGS[lens] | cv2.CALIB_USE_LU,
-        )
+        with one_thread():
+            _, matrix, distortion, turns, moves, board_m, *_ = cv2.calibrateCameraROExtended(
+                [view.board_m.astype(np.float32) for view in views],
+                [view.points_px.astype(np.float32).reshape(-1, 1, 2) for view in views],
+                size_px,
+                upper_right,
+                None,
+                None,
+                flags=FLAGS[lens] | cv2.CALIB_USE_LU,
+            )
     except cv2.error:
         raise ReconstructionError(
             "The views do not determine lens and board together; take more, tilted to all sides, or do "

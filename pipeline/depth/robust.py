@@ -44,15 +44,19 @@ def fit_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> tuple[fl
 
 def weighted_line(x: FloatArray, y: FloatArray, weights: FloatArray) -> tuple[float, float]:
     """Weighted least squares; a horizontal line when all x are equal."""
-    total = weights.sum()
+    total = float(weights.sum())
     if not total > 0.0:
         return 0.0, float(np.median(y))
-    mean_x, mean_y = weights @ x / total, weights @ y / total
-    variance = weights @ (x - mean_x) ** 2 / total
+
+    def mean(values: FloatArray) -> float:  # a product of vectors would wait for the threads of BLAS
+        return float(np.sum(weights * values)) / total
+
+    mean_x, mean_y = mean(x), mean(y)
+    variance = mean((x - mean_x) ** 2)
     if variance <= 1e-12 * mean_x**2:
-        return 0.0, float(mean_y)
-    a = float(weights @ ((x - mean_x) * (y - mean_y)) / total / variance)
-    return a, float(mean_y - a * mean_x)
+        return 0.0, mean_y
+    a = mean((x - mean_x) * (y - mean_y)) / variance
+    return a, mean_y - a * mean_x
 
 
 def best_random_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> tuple[float, float]:

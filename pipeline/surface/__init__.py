@@ -8,7 +8,7 @@ from pipeline.surface.quality import measure_quality, measured
 from pipeline.surface.radii import nearest_distances_m, radii, spacing
 from pipeline.surface.smooth import smooth
 from pipeline.surface.truth import Yardstick, compare_with_truth, distances_to_truth_m, yardstick_of
-from pipeline.surface.voxel import voxel_average, voxel_for_count
+from pipeline.surface.voxel import in_cubes_of, voxel_average, voxel_for_count
 
 __all__ = [
     "Camera",
@@ -18,6 +18,7 @@ __all__ = [
     "distances_to_truth_m",
     "estimate_normals",
     "hit_depth",
+    "in_cubes_of",
     "measure_quality",
     "measured",
     "nearest_distances_m",

@@ -2,18 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import fields
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from pipeline.rays import Camera, hit_depths, triangle_areas_m2
+from pipeline.rays import (
+    Camera,
+    camera_hits,
+    depth_of,
+    guessed_triangles,
+    hit_depths,
+    triangle_areas_m2,
+    triangle_scene,
+)
 from pipeline.surface.boundary import connected_parts, edges_and_faces
 from pipeline.surface.holes import open_area_m2
-from pipeline.types import DepthMap, FloatArray, IntArray, Surface, SurfaceQuality, SurfaceResult
+from pipeline.types import (
+    BoolArray,
+    ByteArray,
+    DepthMap,
+    FloatArray,
+    IntArray,
+    Surface,
+    SurfaceQuality,
+    SurfaceResult,
+)
 
-KEPT_WITHIN = 0.02
-"""Relative distance from its measurement within which a surface has kept it."""
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What one camera sees of a mesh."""
+
+    depth: DepthMap
+    """(H, W) NaN where a ray misses."""
+    guessed: BoolArray | None
+    """(H, W) rays that meet a triangle most of whose corners were inferred; None if nothing says so."""
 
 
 def measure_quality(
@@ -22,6 +46,7 @@ def measure_quality(
     cameras: Sequence[Camera],
     n_input_points: int,
     sensed: Sequence[DepthMap] = (),
+    source: ByteArray | None = None,
 ) -> SurfaceQuality:
     """All measures of a mesh that has no unused vertex.
 
@@ -30,9 +55,11 @@ def measure_quality(
         triangles: (F, 3).
         cameras: whose pixel rays look for the surface; without any, shares of rays are NaN.
         n_input_points: points the mesh was made from.
-        sensed: what each camera's sensor has measured; without it, the share that is kept is NaN.
+        sensed: what each camera's sensor has measured; without it, shares of measured pixels are NaN.
+        source: (V,) of the vertices; without it, the share of rays that a guess closes is NaN.
     """
-    seen = list(hit_depths(vertices_m, triangles, cameras))
+    views = list(seen_by(vertices_m, triangles, cameras, source))
+    seen = [view.depth for view in views]
     edges, faces = edges_and_faces(triangles)
     rim = edges[faces == 1]
     rim_vertices, rim_corners = np.unique(rim, return_inverse=True)
@@ -46,7 +73,9 @@ def measure_quality(
         components=len(np.unique(connected_parts(edges, len(vertices_m)))),
         area_m2=float(triangle_areas_m2(vertices_m, triangles).sum()),
         unused_points=n_input_points - len(vertices_m),
-        kept_measurement_share=kept_share(seen, sensed) if sensed else float("nan"),
+        within_2pct_share=kept_share(seen, sensed, 0.02) if sensed else float("nan"),
+        within_5pct_share=kept_share(seen, sensed, 0.05) if sensed else float("nan"),
+        guessed_ray_share=guessed_share(views),
     )
 
 
@@ -54,9 +83,23 @@ def measured(
     surface: Surface, cameras: Sequence[Camera], n_input_points: int, sensed: Sequence[DepthMap] = ()
 ) -> SurfaceResult:
     """A surface with all its measures; the arguments are those of ``measure_quality``."""
-    quality = measure_quality(surface.vertices_m, surface.triangles, cameras, n_input_points, sensed)
+    quality = measure_quality(
+        surface.vertices_m, surface.triangles, cameras, n_input_points, sensed, surface.source
+    )
     parts = {part.name: getattr(surface, part.name) for part in fields(Surface)}
     return SurfaceResult(**parts, quality=quality)
+
+
+def seen_by(
+    vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Camera], source: ByteArray | None
+) -> Iterator[Seen]:
+    """What each camera sees of a mesh; ``source`` is (V,) of the vertices, where it is known."""
+    scene = triangle_scene(vertices_m, triangles)
+    guessed = None if source is None else np.append(guessed_triangles(triangles, source), False)
+    for camera in cameras:
+        hits = camera_hits(scene, camera)
+        triangle = np.minimum(hits["primitive_ids"].numpy(), len(triangles))  # beyond all of them for none
+        yield Seen(depth_of(hits), None if guessed is None else guessed[triangle])
 
 
 def no_hit_ray_share(vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> float:
@@ -71,12 +114,19 @@ def missed_share(seen: Sequence[DepthMap]) -> float:
     return 1.0 - sum(int(depth.valid.sum()) for depth in seen) / sum(depth.z_m.size for depth in seen)
 
 
-def kept_share(seen: Sequence[DepthMap], sensed: Sequence[DepthMap]) -> float:
-    """Share of the measured pixels whose ray meets the mesh within ``KEPT_WITHIN`` of the measurement.
+def guessed_share(views: Sequence[Seen]) -> float:
+    """Share of the pixels of all cameras that see inferred surface, 0 to 1; NaN if nothing says so."""
+    guessed = [view.guessed for view in views if view.guessed is not None]
+    return float(np.mean(np.concatenate([part.ravel() for part in guessed]))) if guessed else float("nan")
+
+
+def kept_share(seen: Sequence[DepthMap], sensed: Sequence[DepthMap], within: float) -> float:
+    """Share of the measured pixels whose ray meets the mesh near the measurement.
 
     Args:
         seen: depth of the mesh in each camera.
         sensed: what that camera's sensor has measured, on the same pixel grid.
+        within: the largest distance from the measurement that counts as near, as a share of it.
 
     Returns:
         A share from 0 to 1; NaN where nothing was measured.
@@ -85,5 +135,5 @@ def kept_share(seen: Sequence[DepthMap], sensed: Sequence[DepthMap]) -> float:
     for mesh, sensor in zip(seen, sensed, strict=True):
         measured_m = sensor.z_m[sensor.valid]
         total += len(measured_m)
-        kept += int(np.sum(np.abs(mesh.z_m[sensor.valid] - measured_m) <= KEPT_WITHIN * measured_m))
+        kept += int(np.sum(np.abs(mesh.z_m[sensor.valid] - measured_m) <= within * measured_m))
     return kept / total if total else float("nan")

@@ -11,8 +11,8 @@ from packetmesh.errors import InputError
 from pipeline.findings import RayParts
 from pipeline.geometry import apply, inverse, project, undistorted_rays
 from pipeline.open3d_runtime import o3d
-from pipeline.rays import Camera, camera_hits, first_hits, triangle_scene
-from pipeline.types import BoolArray, FloatArray, IntArray, PointSource, SurfaceResult
+from pipeline.rays import Camera, camera_hits, first_hits, guessed_triangles, triangle_scene
+from pipeline.types import BoolArray, FloatArray, IntArray, SurfaceResult
 
 _FOLDED = 1e-3
 """A pixel whose ray misses its point by more than this (z = 1) is an artefact of the distortion."""
@@ -70,7 +70,9 @@ def ray_parts(surface: SurfaceResult, views: Sequence[View]) -> RayParts:
     if not views:
         return RayParts(*5 * [float("nan")])
     scene = triangle_scene(surface.vertices_m, surface.triangles)
-    inferred = _inferred_triangles(surface)
+    inferred = np.zeros(len(surface.triangles), dtype=bool)
+    if surface.source is not None:
+        inferred = guessed_triangles(surface.triangles, surface.source)
     counts = np.zeros(5)
     for view in views:
         sensor, network = _known_pixels(view)
@@ -164,10 +166,3 @@ def sight(
     hidden[in_image] = hit_m < distance_m - slack_m
     past[in_image] = np.isfinite(hit_m) & (hit_m > distance_m + slack_m)
     return Sight(in_image, hidden, past, pixels)
-
-
-def _inferred_triangles(surface: SurfaceResult) -> BoolArray:
-    """(F,) True where two or three of the corners were inferred."""
-    if surface.source is None:
-        return np.zeros(len(surface.triangles), dtype=bool)
-    return np.sum(surface.source[surface.triangles] == PointSource.INFERRED, axis=1) >= 2

@@ -2,7 +2,7 @@
 
 import pytest
 
-from packetmesh.progress import drain
+from packetmesh.progress import Progress, drain, part
 
 
 def counting(end):
@@ -24,3 +24,14 @@ def test_what_the_generator_raises_is_raised_after_the_steps_before_it():
     with pytest.raises(ValueError, match="too far"):
         drain(counting(5), steps.append)
     assert steps == [0, 1, 2, 3, 4]
+
+
+def test_a_part_of_a_longer_computation_says_its_stage_and_in_detail_what_it_does():
+    def work():
+        yield Progress("reading", 0.5)
+        return "done"
+
+    for detail, stage in ((False, "camera"), (True, "camera: reading")):
+        steps = []
+        assert drain(part(work(), "camera", 0.2, 0.6, detail), steps.append) == "done"
+        assert steps == [Progress(stage, 0.4)]

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from network_sim.config import PRESETS as NETWORKS
 from network_sim.config import NetworkConfig
+from network_sim.presets import PRESETS as NETWORKS
 from packetmesh.errors import InputError
 from packetmesh.files import write_json
 from packetmesh.settings import config_named, differences, settings, with_settings

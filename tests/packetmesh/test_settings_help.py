@@ -2,8 +2,8 @@
 
 import pytest
 
-from network_sim.config import PRESETS as NETWORKS
 from network_sim.config import NetworkConfig
+from network_sim.presets import PRESETS as NETWORKS
 from packetmesh.settings import settings, with_settings
 from packetmesh.settings_help import describe, unit_of
 from pipeline.config import PRESETS

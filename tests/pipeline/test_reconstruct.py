@@ -100,7 +100,7 @@ def test_a_ball_that_falls_through_leaves_an_empty_surface_and_all_rays_miss(rig
     for surface in (result.before, result.after):
         assert len(surface.triangles) == 0
         assert surface.quality.no_hit_ray_share == 1.0
-        assert surface.quality.kept_measurement_share == 0.0
+        assert surface.quality.within_2pct_share == 0.0
     assert result.truth_after is None
 
 

@@ -2,13 +2,14 @@
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from app.cli import main
-from pipeline.acquisition import back_project, depth_sigma_m, filter_outliers
+from pipeline.acquisition import acquire, depth_sigma_m
 from pipeline.config import AcquisitionConfig, RegistrationConfig
 from pipeline.geometry import apply, pixel_rays, rigid, rotation_exp
 from pipeline.io.clouds import read_cloud
@@ -32,8 +33,8 @@ def frame(request, shared_data) -> RgbdFrame:
 
 
 def _cloud(frame: RgbdFrame, z_m: np.ndarray) -> PointCloud:
-    cloud = back_project(frame, DepthMap(z_m.astype(np.float32)))
-    return filter_outliers(cloud, AcquisitionConfig(), frame.intrinsics.fx_px).kept
+    seen = replace(frame, depth=DepthMap(z_m.astype(np.float32)))
+    return acquire(seen, AcquisitionConfig()).cloud(seen).kept
 
 
 def _seen_from(frame: RgbdFrame, T: np.ndarray, rng: np.random.Generator) -> PointCloud:

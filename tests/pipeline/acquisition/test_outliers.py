@@ -89,6 +89,8 @@ def test_equal_spacing_has_no_outlier(mode):
 def test_bad_input():
     points_m = np.random.default_rng(0).normal(size=(10, 3))
     with pytest.raises(InputError, match="4 points, too few"):
-        filter_outliers(PointCloud(points_m[:4]), AcquisitionConfig(), FOCAL_PX)
+        filter_outliers(PointCloud(points_m[:4]), AcquisitionConfig("thesis"), FOCAL_PX)
     with pytest.raises(InputError, match="in front of the camera"):
         filter_outliers(PointCloud(points_m), AcquisitionConfig("robust"), FOCAL_PX)
+    with pytest.raises(InputError, match="not at a cloud"):
+        filter_outliers(PointCloud(points_m), AcquisitionConfig("flying"), FOCAL_PX)

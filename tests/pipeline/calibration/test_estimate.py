@@ -8,6 +8,7 @@ from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.board import Board
 from pipeline.calibration.detect import detect
 from pipeline.calibration.estimate import FLAGS, View, calibrate, held_out, inverted, rms_px
+from pipeline.calibration.warp import board_warp
 from tests.pipeline.calibration.views import CAMERA, photograph, poses, seen, views
 
 BOARD = Board()
@@ -24,6 +25,25 @@ def test_without_noise_the_camera_is_found_exactly():
     assert found.rms_px < 1e-4
     for view, T in zip(found.views, poses(BOARD), strict=True):
         np.testing.assert_allclose(view.T_camera_board, T, atol=1e-5)
+
+
+def bent_board(given, size_px):
+    return board_warp(given, size_px, BOARD, 2).calibration
+
+
+@pytest.mark.parametrize("estimate", [calibrate, bent_board])
+def test_the_same_views_give_the_same_bits_however_many_threads_there_are(estimate):
+    given, threads = views(BOARD, noise_px=0.4, count=10), cv2.getNumThreads()
+    found = set()
+    try:
+        for count in (1, 4, 4, 4, 4, 4):
+            cv2.setNumThreads(count)
+            camera = estimate(given, SIZE)
+            found.add((camera.matrix.tobytes(), camera.distortion.tobytes()))
+            assert cv2.getNumThreads() == count
+    finally:
+        cv2.setNumThreads(threads)
+    assert len(found) == 1
 
 
 @pytest.mark.parametrize("lens", ["thesis", "brown"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.surface import voxel_average, voxel_for_count
+from pipeline.surface import in_cubes_of, voxel_average, voxel_for_count
 from pipeline.types import PointCloud, PointSource
 
 SENSOR, INFERRED = PointSource.SENSOR, PointSource.INFERRED
@@ -102,3 +102,11 @@ def test_an_empty_cloud_stays_empty():
 def test_bad_input_gets_its_sentence(cloud, use, says):
     with pytest.raises(InputError, match=says):
         use(cloud)
+
+
+def test_cubes_are_shared_by_points_of_two_clouds():
+    points_m = np.array([[0.1, 0.1, 0.1], [1.1, 0.1, -0.1]])
+    others_m = np.array([[0.9, 0.9, 0.9], [1.1, 0.1, 0.1], [1.9, 0.9, -0.9], [-0.1, 0.1, 0.1]])
+    assert in_cubes_of(points_m, others_m, 1.0).tolist() == [True, False, True, False]
+    assert in_cubes_of(points_m[:0], others_m, 1.0).tolist() == [False] * 4
+    assert not len(in_cubes_of(points_m, others_m[:0], 1.0))

@@ -1,0 +1,118 @@
+"""The surfaces of a depth image pixel by pixel, and how uncertain its sensor is of them.
+
+All of it is in 1/z: planes are linear there, and where a sensor measures disparity, its steps are equal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, DepthNoise, FloatArray
+
+FARTHEST_SD = 3.0
+"""Standard deviations off a surface up to which a pixel is of it: the usual three, which noise alone passes
+on one side once in four hundred pixels and on both sides hardly ever."""
+STEEPEST_DEG = 85.0
+"""Surfaces seen at a flatter angle send nothing back: Nguyen et al. 2012 found a Kinect's depth to end
+between 80 and 90 degrees. A depth step that would need one is an edge."""
+LATERAL_PX = 1.0
+"""How far beside its pixel a sensor may have measured: 0.8 pixels (Nguyen et al. 2012), and half a pixel of
+the grid. On a slanted surface that is an error of the depth, by which noise grows with the angle."""
+PLANE_PX = 5
+"""Side of the window of a local plane: the smallest with two pixels on either side of its middle."""
+REACH = 0.005
+"""How far a surface is followed, as a share of the diagonal: 4 pixels of 640 x 480, as wide as the band
+without depth that sensors leave along an edge."""
+BINS = 12
+"""Of depth, with as many pixels each, in which noise and steps are estimated."""
+
+
+@dataclass(frozen=True, slots=True)
+class LocalPlanes:
+    """The plane around every pixel of a depth image."""
+
+    inverse: FloatArray
+    """(H, W) float32 1/z, 1/m; 0 where unknown."""
+    right: FloatArray
+    """(H, W) float32 change of 1/z from a pixel to the next on its right, on the plane around it."""
+    down: FloatArray
+    """(H, W) the same to the next below."""
+    sd: FloatArray
+    """(H, W) float32 standard deviation of 1/z, 1/m."""
+
+    @property
+    def known(self) -> BoolArray:
+        """(H, W) where a depth was measured."""
+        return self.inverse > 0
+
+    @property
+    def reach_px(self) -> int:
+        """How far a surface is followed."""
+        return max(2, round(REACH * float(np.hypot(*self.inverse.shape))))
+
+
+def local_planes(
+    depth: DepthMap, intrinsics: CameraIntrinsics, noise: DepthNoise | None = None
+) -> LocalPlanes:
+    """The planes of a depth image.
+
+    Args:
+        depth: (H, W) metric.
+        intrinsics: of its pixels, which say what step from pixel to pixel is too steep for a surface.
+        noise: the sensor's, from its calibration; None estimates it from the image.
+    """
+    known = depth.valid & (depth.z_m > 0)
+    inverse = (known / np.where(known, depth.z_m, 1.0)).astype(np.float32)
+    steepest = float(np.tan(np.radians(STEEPEST_DEG))) / intrinsics.fx_px
+    across, below = surface_steps(inverse, steepest)
+    right = mean_around(*across, (PLANE_PX - 1, PLANE_PX))
+    down = mean_around(*below, (PLANE_PX, PLANE_PX - 1))
+    slope = np.hypot(right, down)
+    if noise is None:
+        sd = np.hypot(typical_step(inverse, (across, below)), LATERAL_PX * slope)
+    else:
+        z_m = 1.0 / np.where(known, inverse, 1.0)
+        sd = noise.sd_m(z_m, 1.0 / np.hypot(1.0, slope * z_m * intrinsics.fx_px)) * inverse**2
+    return LocalPlanes(inverse, right, down, sd.astype(np.float32))
+
+
+Steps = tuple[FloatArray, BoolArray]
+"""(H, W) differences of 1/z from every pixel to the next, and where both are of one surface."""
+
+
+def surface_steps(inverse: FloatArray, steepest: float) -> Iterator[Steps]:
+    """Steps to the right, then down; ``steepest`` is the largest on a surface, as a share of the depth."""
+    for axis in (1, 0):
+        following = np.roll(inverse, -1, axis)
+        following[(slice(None), -1) if axis else -1] = 0.0
+        step = following - inverse
+        yield step, (inverse > 0) & (following > 0) & (np.abs(step) <= steepest * inverse)
+
+
+def mean_around(step: FloatArray, smooth: BoolArray, size_px: tuple[int, int]) -> FloatArray:
+    """(H, W) mean of the steps on surfaces, in a window of ``size_px`` around every pixel; 0 without any."""
+    total, count = (
+        cv2.boxFilter(layer, -1, size_px, anchor=(2, 2), normalize=False, borderType=cv2.BORDER_CONSTANT)
+        for layer in (np.where(smooth, step, np.float32(0.0)), smooth.astype(np.float32))
+    )
+    return total / np.maximum(count, 1.0)
+
+
+def typical_step(inverse: FloatArray, both: tuple[Steps, Steps]) -> FloatArray:
+    """(H, W) median step at that depth between neighbours on a surface that differ at all.
+
+    Where depth comes in steps it is one step, where it does not, about one standard deviation of the noise:
+    that of disparity, of millimetres, of stereo, whatever the image shows.
+    """
+    differ = [smooth & (step != 0) for step, smooth in both]
+    at = np.concatenate([inverse[where] for where in differ])
+    size = np.concatenate([np.abs(step[where]) for (step, _), where in zip(both, differ, strict=True)])
+    if not len(at):
+        return np.zeros_like(inverse)
+    parts = np.array_split(np.argsort(at, kind="stable"), min(BINS, len(at)))
+    middle, typical = ([np.median(of[part]) for part in parts] for of in (at, size))
+    return np.interp(inverse, middle, typical)

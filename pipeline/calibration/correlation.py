@@ -1,0 +1,74 @@
+"""Which numbers of a camera go together, so that the views hardly tell one from the other (SPEC 1.3 d)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.calibration.estimate import Calibration, FittedView, coordinate_sd_px
+from pipeline.calibration.lens import Optics
+from pipeline.types import FloatArray
+
+DISTANCE = "distance"
+"""Of the board from the camera, the mean over the views: no parameter of the lens, but what a focal length
+is mistaken for first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two numbers and how they go together."""
+
+    first: str
+    second: str
+    correlation: float
+    """From -1 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Correlations:
+    """How the errors of all numbers go together."""
+
+    names: tuple[str, ...]
+    """Of the lens's parameters, then the board's distance."""
+    matrix: FloatArray
+    """(P, P) from -1 to 1."""
+
+    @property
+    def strongest(self) -> Pair:
+        """The two that the views tell apart least."""
+        size = np.abs(np.tril(self.matrix, -1))
+        row, column = np.unravel_index(int(size.argmax()), size.shape)
+        return Pair(self.names[column], self.names[row], float(self.matrix[row, column]))
+
+
+def correlations(lens: Calibration) -> Correlations:
+    """How the errors of a camera's parameters and of the board's distance go together.
+
+    A pose's error has a part of its own and one that comes from the lens's; the lens's covariance already
+    has the poses in it, so both parts of the mean distance follow view by view.
+    """
+    noise = coordinate_sd_px(lens.views, lens.lens) ** 2
+    count = len(lens.views)
+    by_lens, own = np.zeros(len(lens.names)), 0.0
+    for view in lens.views:
+        slope, variance = _distance(view, lens.optics)
+        by_lens += slope / count
+        own += noise * variance / count**2
+    across = lens.covariance @ by_lens
+    joint = np.block(
+        [[lens.covariance, across[:, None]], [across[None], np.atleast_2d(own + by_lens @ across)]]
+    )
+    sd = np.sqrt(np.diag(joint))
+    return Correlations((*lens.names, DISTANCE), np.clip(joint / np.outer(sd, sd), -1.0, 1.0))
+
+
+def _distance(view: FittedView, optics: Optics) -> tuple[FloatArray, float]:
+    """(P,) by how much a view's distance changes with the lens, as its pose follows; and its own variance
+    for noise of 1 px.
+    """
+    told = optics.linearised(view.board_m, view.T_camera_board)
+    away = view.T_camera_board[:3, 3]
+    outward = np.concatenate([np.zeros(3), away / np.linalg.norm(away)])
+    known = np.linalg.solve(told.by_pose.T @ told.by_pose, outward)
+    return -told.by_lens.T @ (told.by_pose @ known), float(outward @ known)
