@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -120,9 +120,18 @@ def split(left: ByteArray, right: ByteArray, share: float) -> ByteArray:
 
 def captions_html(left: Picture, right: Picture) -> str:
     """Two columns under the picture: the caption and the colour bar of either side."""
+    return _columns((("<b>Left:</b> ", left), ("<b>Right:</b> ", right)))
+
+
+def caption_html(picture: Picture) -> str:
+    """The caption and the colour bar under a picture that is shown alone."""
+    return _columns((("", picture),))
+
+
+def _columns(sides: Sequence[tuple[str, Picture]]) -> str:
     columns = "".join(
-        f'<div style="flex: 1; min-width: 0"><b>{side}</b> {html.escape(picture.caption)}.'
+        f'<div style="flex: 1; min-width: 0">{side}{html.escape(picture.caption)}.'
         f"{'' if picture.bar is None else bar_html(picture.bar)}</div>"
-        for side, picture in (("Left:", left), ("Right:", right))
+        for side, picture in sides
     )
     return f'<div style="display: flex; gap: 1em; padding: 0 0.8em 0.8em; font-size: 12px">{columns}</div>'

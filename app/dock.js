@@ -8,20 +8,12 @@
   const LATEST = ["look", "point", "seek"]; // of these only the last counts
   const PAGE = Math.random().toString(36).slice(2);
   const docks = new Map();
-  const {AXIS_PX, DockView, make} = window.packetmeshDockView;
-
-  // The page's root is a column with the picture and the control panel in its row.
-  function root() {
-    let found = null;
-    for (let element = document.querySelector("canvas[data-engine]"); element; element = element.parentElement)
-      if (element.style.flexDirection === "column" && element.style.height === "100%") found = element;
-    return found;
-  }
+  const {make} = window.packetmeshDockRow;
+  const {AXIS_PX, DockView} = window.packetmeshDockView;
 
   class Dock extends DockView {
     constructor(name) {
-      super();
-      this.name = name;
+      super(name, "Timeline");
       this.start = 0;
       this.end = 1;
       this.now = 0;
@@ -31,14 +23,10 @@
       this.unheard = [];
       this.said = 0;
       this.playing = false;
-      this.visible = false;
       this.build();
-      // Without the panel through which it speaks, as when the server is gone, it is not there.
-      new MutationObserver(() => this.place()).observe(document.body, {childList: true, subtree: true});
     }
 
     build() {
-      this.row = make("div", "packetmesh-dock-row", null, {tabIndex: 0, role: "group", ariaLabel: "Timeline"});
       const bar = make("div", "bar", this.row);
       const button = (text, title, action) => {
         const [ariaLabel] = title.split(":");
@@ -221,10 +209,6 @@
       }
     }
 
-    anchor() {
-      return document.querySelector(`.packetmesh-dock[data-dock="${this.name}"]`);
-    }
-
     // What the server says.
 
     hear(message) {
@@ -281,15 +265,8 @@
       this.look(this.now - 0.05 * span, this.now + 0.95 * span);
     }
 
-    place() {
-      const visible = Boolean(this.wanted && this.anchor());
-      if (visible === this.visible && (!visible || this.row.isConnected)) return;
-      this.visible = visible;
-      if (visible) root()?.append(this.row);
-      else {
-        this.row.remove();
-        this.tip.hidden = true;
-      }
+    left() {
+      this.tip.hidden = true;
     }
   }
 

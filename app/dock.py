@@ -1,9 +1,9 @@
 """The dock at the lower edge of the window: one clock, its buttons, and a timeline of anything in lanes.
 
-The page's side is ``dock.js``, and ``dock_view.js`` for what it looks like. What the page is to know is in
-three hidden pieces of HTML, each of which says all of its part, so that a page that comes later knows as
-much. What a hand does there comes back through a hidden text field, as the list of all that the server has
-not acknowledged yet: of many changes within 50 ms viser sends only the last.
+The page's side is ``dock.js``, ``dock_view.js`` for what it looks like and ``dock_row.js`` for its place.
+What the page is to know is in three hidden pieces of HTML, each of which says all of its part, so that a page
+that comes later knows as much. What a hand does there comes back through a hidden text field, as the list of
+all that the server has not acknowledged yet: of many changes within 50 ms viser sends only the last.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.dock_row import add_hidden
 from app.page import running
 from app.player import Ticker
 from app.timeline import Lane
@@ -40,9 +41,8 @@ LEAST_SPAN_NS = 1000
 PAGES = 50
 """As many pages are known apart."""
 
-_VIEW, _SCRIPT, _STYLE = (
-    Path(__file__).with_name(name).read_text(encoding="utf-8")
-    for name in ("dock_view.js", "dock.js", "dock.css")
+_SCRIPT = "".join(
+    Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("dock_view.js", "dock.js")
 )
 
 
@@ -75,13 +75,7 @@ class Dock:
         self._heard: dict[str, int] = {}
         self._tip = ""
         self._chosen: dict[str, Any] = {}
-        # Nobody sees this panel. It is one of its own so that it stays when the control panel is closed.
-        panel = ui.gui.add_panel()
-        panel.float(x=0, y=0)
-        panel.expand()
-        with panel.add_tab("Dock"):
-            mark = f'<span class="packetmesh-dock" data-dock="{self._name}"></span>'
-            ui.gui.add_html(f"{mark}<style>{_STYLE}</style>{running(_VIEW + _SCRIPT)}")
+        with add_hidden(ui, self._name, _SCRIPT):
             self._field = ui.when_changed(ui.gui.add_text("Dock", ""), self._hear)
             self._setup, self._picture, self._state = (ui.gui.add_html("") for _ in range(3))
         self._ticker = Ticker(lambda: ui.post(self._tick), PICTURE_S)

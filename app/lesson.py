@@ -1,17 +1,20 @@
 """Lessons: markdown files whose sections set a screen's controls and say what to look at.
 
-A lesson is a ``# title`` and sections. A section is a ``## title``, lines ``set: name = value`` and its
-text. What a section does not set is at its default, so that every stop can be shown by itself.
+A lesson is a ``# title`` and sections. A section is a ``## title``, lines ``set: name = value``, lines
+``open: folder`` and its text. What a section does not set is at its default, so that every stop can be shown
+by itself; the folders that it speaks of are unfolded.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
+from app.page import running
 from app.ui import Ui
 from packetmesh.errors import InputError
 
@@ -37,6 +40,8 @@ class Stop(Generic[Look]):
     text: str
     """Markdown."""
     look: Look
+    opens: tuple[str, ...] = ()
+    """Titles of the folders that it speaks of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +79,8 @@ def read_lesson(path: Path, settings: Mapping[str, Setting[Look]], default: Look
 
 def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: Look) -> Stop[Look]:
     title, *lines = section.splitlines()
-    text = "\n".join(line for line in lines if not line.startswith("set:")).strip()
+    text = "\n".join(line for line in lines if not line.startswith(("set:", "open:"))).strip()
+    opens = tuple(line[5:].strip() for line in lines if line.startswith("open:"))
     where = f"The lesson {file}, section '{title.strip()}',"
     if not text:
         raise InputError(f"{where} has no text.")
@@ -85,7 +91,9 @@ def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: 
                 look = choice(settings)(name)(look, value)
             except ValueError as error:
                 raise InputError(f"{where} cannot set {name} = {value}: {error}.") from None
-    return Stop(title.strip(), text, look)
+    if "" in opens:
+        raise InputError(f"{where} opens nothing; name a folder behind 'open:'.")
+    return Stop(title.strip(), text, look, opens)
 
 
 def sets(key: str, read: Callable[[str], Any]) -> Callable[[Look, str], Look]:
@@ -144,6 +152,8 @@ class LessonFolder(Generic[Look]):
                 hint = "To the stop before or after, or to the answer of this one."
             ui.buttons("Go", keys, hint)
             self._text = ui.gui.add_markdown(BEGIN)
+            self._unfolding = ui.gui.add_html("")
+        self._unfolded = 0
 
     def _go(self, count: int) -> None:
         index = self._index() + count
@@ -158,11 +168,19 @@ class LessonFolder(Generic[Look]):
         index = self._index()
         if index < 0:
             self._text.content = BEGIN
+            self._unfold(())
             return
         stop = self._lesson.stops[index]
         asked, answer, _ = stop.text.partition(ANSWER)
         self._write(asked + THINK if answer else asked)
         self._on_stop(stop.look)
+        self._unfold(stop.opens)
+
+    def _unfold(self, titles: tuple[str, ...]) -> None:
+        """Have the page do what a hand would."""
+        self._unfolded += 1
+        script = f"window.packetmesh?.unfold({json.dumps(titles)})"
+        self._unfolding.content = running(script, self._unfolded) if titles else ""
 
     def _answer(self) -> None:
         if self._index() >= 0:

@@ -8,6 +8,8 @@
   const HELD_MS = 6000; // at most, since the last call
   const AWAITED_MS = 3000; // at most, before the answer is given without
   const POLL_MS = 4;
+  const UNFOLD_MS = 200; // before it is seen again whether a folder has come
+  const UNFOLD_TRIES = 10;
   const KEY = {key: "Insert", ctrlKey: true, altKey: true, shiftKey: true};
 
   let gl = null; // what viser draws with
@@ -90,7 +92,19 @@
     else held = false;
   };
 
+  // viser keeps to itself whether a folder is open; its title has an arrow down while it is not.
+  function unfold(titles, tries = UNFOLD_TRIES) {
+    const shut = [...document.querySelectorAll("svg.tabler-icon-chevron-down")].map(arrow => arrow.parentElement);
+    const found = shut.filter(head => titles.includes(head.textContent.trim()) && head.offsetParent !== null);
+    for (const head of found) head.click();
+    const left = titles.filter(title => !found.some(head => head.textContent.trim() === title));
+    if (left.length > 0 && tries > 1) setTimeout(unfold, UNFOLD_MS, left, tries - 1);
+  }
+
   window.packetmesh = {
+    // Open folders by their titles; those that are not there yet, when they come within a second or two.
+    unfold,
+
     // Draw nothing but new meshes for now.
     hold() {
       watch();

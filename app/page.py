@@ -1,4 +1,4 @@
-"""What the app adds to viser's page: a script of its own, ``page.js``."""
+"""What the app adds to viser's page: a script and a style sheet of its own, ``page.js`` and ``page.css``."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from pathlib import Path
 
 import viser
 
-_SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
+_SCRIPT, _STYLE = (Path(__file__).with_suffix(kind).read_text(encoding="utf-8") for kind in (".js", ".css"))
 
 
 def add_script(gui: viser.GuiApi) -> None:
-    """Have the page run the script, before it is first called."""
-    gui.add_html(running(_SCRIPT))
+    """Have the page run the script, before it is first called, and take the style sheet."""
+    gui.add_html(f"<style>{_STYLE}</style>{running(_SCRIPT)}")
 
 
 def running(script: str, mark: object = "") -> str:

@@ -54,6 +54,8 @@ class BoardViews:
     rows: int = 9
     spacing_m: float = 0.035
     lens: Lens = "thesis"
+    bent: bool = False
+    """Whether the board's own shape is estimated, too; of one camera's photographs only."""
     dropped: tuple[tuple[str, str], ...] = ()
     """Camera and view of those that are left out, in order."""
 

@@ -7,23 +7,50 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 from app.drawing.colors import css
-from app.records import ColorBar
+from app.records import ColorBar, MeshView
 
 _CELL = "padding: 2px 8px 2px 0; vertical-align: top;"
 _NAME = "border-bottom: 1px dotted #999; cursor: help;"
 
+WAITING, UNKNOWN = "…", "–"
+"""For a value that is to come, and for one that is not."""
+
 Row: TypeAlias = tuple[str, ...]
 """One quantity: its name, what it means in a sentence, and its value with the unit for each column."""
+Head: TypeAlias = str | tuple[str, str]
+"""Of a column; with what it means in a sentence, where that is not plain."""
+
+TRUTH_ROWS = (
+    (
+        "F-score 5 cm",
+        "Harmonic mean of coverage and accuracy within 5 cm of the true surface.",
+        "f_score_5cm",
+        "%",
+    ),
+    (
+        "Depth error",
+        "Median depth error of the rays that hit, against the truth.",
+        "median_depth_error_m",
+        "cm",
+    ),
+)
+"""Of a surface beside the true one: names, what they mean, where they are in the comparison, and units."""
 
 
-def table(rows: Sequence[Row], columns: Sequence[str] = ()) -> str:
+def term(name: str, hint: str) -> str:
+    """HTML of a word that is explained when the pointer rests on it."""
+    return f'<span style="{_NAME}" title="{html.escape(hint, quote=True)}">{html.escape(name)}</span>'
+
+
+def table(rows: Sequence[Row], columns: Sequence[Head] = ()) -> str:
     """HTML of rows of numbers; ``columns`` head the values when there are several."""
     lines = []
     if columns:
-        heads = "".join(f'<th style="{_CELL} text-align: right">{html.escape(c)}</th>' for c in columns)
+        names = [html.escape(one) if isinstance(one, str) else term(*one) for one in columns]
+        heads = "".join(f'<th style="{_CELL} text-align: right">{name}</th>' for name in names)
         lines.append(f"<tr><th></th>{heads}</tr>")
     for name, hint, *values in rows:
-        text = f'<span style="{_NAME}" title="{html.escape(hint, quote=True)}">{html.escape(name)}</span>'
+        text = term(name, hint)
         cells = "".join(
             f'<td style="{_CELL} text-align: right; font-variant-numeric: tabular-nums">{html.escape(v)}</td>'
             for v in values
@@ -61,5 +88,18 @@ def command_html(command: str) -> str:
 def number(value: float | None, digits: int = 1, unit: str = "", scale: float = 1.0) -> str:
     """A value with its unit, or a dash where it is unknown."""
     if value is None or value != value:
-        return "–"
+        return UNKNOWN
     return f"{value * scale:,.{digits}f}{unit and ' '}{unit}"
+
+
+def truth_rows(meshes: Sequence[MeshView | None], missing: str = WAITING) -> list[Row]:
+    """Surfaces beside the true one, a column for each; ``missing`` stands for one that is not there."""
+
+    def value(mesh: MeshView | None, key: str, unit: str) -> str:
+        if mesh is None:
+            return missing
+        return WAITING if mesh.truth is None else number(mesh.truth.get(key), 1, unit, 100.0)
+
+    return [
+        (name, hint, *(value(mesh, key, unit) for mesh in meshes)) for name, hint, key, unit in TRUTH_ROWS
+    ]

@@ -56,7 +56,8 @@ def calibrate(
         range_m: Where the camera will measure: the verdict is about points so far away.
         accuracy_mm: Within how many millimetres a point must be placed there.
         without: Names of images to leave out, such as those that the command proposes.
-        board_warp: Whether to estimate the board's shape, too, and to use it if that predicts images better.
+        board_warp: One camera: whether to estimate the board's shape, too, and to use it if that predicts
+            images better.
         like: Several cameras: a rig in whose world they are placed, by the pose of its first node.
         json: Print everything as one JSON object.
     """
@@ -73,6 +74,11 @@ def calibrate(
     if held_out < 0 or held_out == 1:
         raise InputError(f"--held-out {held_out} leaves no view to predict; try 2, or 0 for none")
     nodes = several_cameras(images)
+    if nodes and board_warp:
+        raise InputError(
+            "--board-warp works with one camera: several are placed by a board that is taken as flat; give "
+            "each camera's folder alone with it, or do without it"
+        )
     if nodes:
         accuracy_m = accuracy_mm / 1000.0
         calibrate_cameras(nodes, out, board, lens, held_out, range_m, accuracy_m, without, like, json)

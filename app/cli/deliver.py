@@ -73,7 +73,7 @@ def deliver(
 
 def _settings(preset: str, chain: str, changes: tuple[str, ...]) -> tuple[NetworkConfig, PipelineConfig]:
     """The network's and the chain's settings; every change goes to the one that has its key."""
-    from network_sim.config import PRESETS as NETWORKS
+    from network_sim.presets import PRESETS as NETWORKS
     from packetmesh.settings import config_named, settings, with_settings
     from pipeline.config import PRESETS
 

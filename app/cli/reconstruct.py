@@ -47,7 +47,9 @@ def reconstruct(
     before, after = metrics["surface_before"], metrics["surface_after"]
     say(
         f"100%  rays without a surface: {before['no_hit_ray_share']:.1%} before fusion, "
-        f"{after['no_hit_ray_share']:.1%} after; see {out / 'report.html'}"
+        f"{after['no_hit_ray_share']:.1%} after; measured pixels within 2 % of the surface: "
+        f"{before['within_2pct_share']:.1%} before, {after['within_2pct_share']:.1%} after; see "
+        f"{out / 'report.html'}"
     )
     if not after["triangles"]:
         say("The ball falls through everywhere; try larger surface.radii_m")

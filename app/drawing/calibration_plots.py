@@ -9,16 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from app.drawing.colors import (
-    BRAND,
-    DELIVERED,
-    DISTANCE_STOPS,
-    LOSS,
-    NEUTRAL,
-    SOURCE,
-    TARGET,
-    css,
-)
+from app.drawing.colors import DELIVERED, DISTANCE_STOPS, LOSS, NEUTRAL, SOURCE, TARGET, css
+from app.drawing.plots import BAND95, faint, image_figure, titled_figure
 from pipeline.calibration.diagnosis import Coverage, RadialCurve, RadialResiduals
 from pipeline.calibration.estimate import Calibration, FittedView
 from pipeline.calibration.next_view import NextView
@@ -30,14 +22,13 @@ RAMP = [(index / 4.0, css(color)) for index, color in enumerate(DISTANCE_STOPS)]
 ARROW_SHARE = 0.03
 """Of the image's width, about the length of the median residual's arrow."""
 MOST_ARROWS = 1500
-BAND95 = 1.96
 
 
 def views_figure(
     fitted: Sequence[FittedView], unseen: Sequence[FittedView] = (), outliers: Sequence[str] = ()
 ) -> go.Figure:
     """Bars of every view's error, in the fit and, beside it, when it is held out; outliers are red."""
-    figure = _figure("Error of each view", "", "RMS, px")
+    figure = titled_figure("Error of each view", "", "RMS, px")
     names = [view.name for view in fitted]
     colors = [css(LOSS) if name in outliers else css(TARGET) for name in names]
     figure.add_bar(x=names, y=[view.rms_px for view in fitted], name="in the fit", marker_color=colors)
@@ -55,13 +46,15 @@ def views_figure(
 
 def distortion_figure(curve: RadialCurve) -> go.Figure:
     """How far the lens moves a point, over the distance from the principal point, with its 95 % band."""
-    figure = _figure("Distortion of the lens", "distance from the principal point, px", "moved outward, px")
+    figure = titled_figure(
+        "Distortion of the lens", "distance from the principal point, px", "moved outward, px"
+    )
     low, high = curve.moved_px - BAND95 * curve.sd_px, curve.moved_px + BAND95 * curve.sd_px
     figure.add_scatter(
         x=np.concatenate([curve.radius_px, curve.radius_px[::-1]]),
         y=np.concatenate([high, low[::-1]]),
         fill="toself",
-        fillcolor=_faint(TARGET),
+        fillcolor=faint(TARGET),
         line={"width": 0},
         name="95 %",
         hoverinfo="skip",
@@ -93,7 +86,7 @@ def residuals_figure(calibration: Calibration) -> go.Figure:
     residuals_px = np.concatenate([view.residuals_px for view in calibration.views])
     median_px = float(np.median(np.linalg.norm(residuals_px, axis=1)))
     times = _round_number(ARROW_SHARE * calibration.size_px[0] / max(median_px, 1e-6))
-    figure = _image_figure(f"What the lens leaves, drawn {times:g} times as long", calibration.size_px)
+    figure = image_figure(f"What the lens leaves, drawn {times:g} times as long", calibration.size_px)
     every = max(1, -(-len(points_px) // MOST_ARROWS))
     begin_px = (points_px - residuals_px)[::every]
     end_px = begin_px + times * residuals_px[::every]
@@ -121,7 +114,9 @@ def residuals_figure(calibration: Calibration) -> go.Figure:
 
 def radial_residuals_figure(told: RadialResiduals) -> go.Figure:
     """What is left along the radius, with the mean of each band: a wave is a lens of a wrong kind."""
-    figure = _figure("What is left along the radius", "distance from the principal point, px", "outward, px")
+    figure = titled_figure(
+        "What is left along the radius", "distance from the principal point, px", "outward, px"
+    )
     figure.add_scatter(
         x=told.radius_px,
         y=told.outward_px,
@@ -176,7 +171,7 @@ def verdict_figure(judged: Verdict, sd: ErrorMap, size_px: tuple[int, int]) -> g
 def coverage_figure(told: Coverage, size_px: tuple[int, int], views: Sequence[FittedView] = ()) -> go.Figure:
     """How many points were seen in each cell of the image; cells without any stay white."""
     title = f"Points in {100.0 * told.share:.0f} % of the image"
-    figure = _image_figure(title, size_px)
+    figure = image_figure(title, size_px)
     figure.add_heatmap(
         x=told.columns_px,
         y=told.rows_px,
@@ -206,7 +201,7 @@ def next_view_figure(
         f"Next: {following.distance_m:.2f} m away, tilted by {following.tilt_deg:.0f}°; "
         f"{1000.0 * following.error_before_m:.2g} mm → {1000.0 * following.error_after_m:.2g} mm"
     )
-    figure = _image_figure(title, size_px)
+    figure = image_figure(title, size_px)
     if views:
         points_px = np.concatenate([view.points_px for view in views])
         _dots(figure, points_px, NEUTRAL, 2, "so far")
@@ -241,7 +236,7 @@ def _map_figure(
     told: ErrorMap, values_mm: FloatArray, title: str, size_px: tuple[int, int], most_mm: float | None
 ) -> go.Figure:
     """Millimetres over the image; pixels come up under the pointer, too."""
-    figure = _image_figure(title, size_px)
+    figure = image_figure(title, size_px)
     known = values_mm[np.isfinite(values_mm)]
     most_mm = most_mm or (float(np.quantile(known, 0.98)) if len(known) else 1.0)
     figure.add_heatmap(
@@ -259,37 +254,7 @@ def _map_figure(
     return figure
 
 
-def _figure(title: str, x_title: str, y_title: str) -> go.Figure:
-    figure = go.Figure()
-    figure.update_layout(
-        template="plotly_white",
-        title={"text": title, "font": {"size": 13, "color": css(BRAND)}, "x": 0.02},
-        margin={"l": 56, "r": 10, "t": 34, "b": 40},
-        xaxis={"title": x_title},
-        yaxis={"title": y_title},
-        font={"size": 11},
-        legend={"orientation": "h", "y": -0.25},
-    )
-    return figure
-
-
-def _image_figure(title: str, size_px: tuple[int, int]) -> go.Figure:
-    """Axes of an image: its first row is on top, its pixels are square."""
-    width, height = size_px
-    figure = _figure(title, "column, px", "row, px")
-    figure.update_layout(
-        xaxis={"range": [-0.5, width - 0.5], "showgrid": False, "constrain": "domain"},
-        yaxis={"range": [height - 0.5, -0.5], "showgrid": False, "scaleanchor": "x", "constrain": "domain"},
-        showlegend=False,
-    )
-    return figure
-
-
 def _round_number(value: float) -> float:
     """The largest of 1, 2, 5, 10, 20, ... that is not above a value."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))
-
-
-def _faint(color: tuple[int, int, int]) -> str:
-    return "rgba({}, {}, {}, 0.25)".format(*color)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import numpy as np
 import plotly.graph_objects as go
 
-from app.drawing.colors import BRAND, DELIVERED, LOSS, NEUTRAL, TARGET, css
-from pipeline.calibration.depth_bias import DepthFit
+from app.drawing.colors import DELIVERED, LOSS, NEUTRAL, TARGET, css
+from app.drawing.plots import BAND95, faint, image_figure, titled_figure
+from pipeline.types import FloatArray
 
-BAND95 = 1.96
+if TYPE_CHECKING:
+    from pipeline.calibration.depth_bias import DepthFit
+
 STEPS = 80
 MAP_EVERY = 8
 """Pixels of the image from one of the map's to the next."""
@@ -16,22 +22,55 @@ DIVERGING = [(0.0, "#0072b2"), (0.5, "#f7f7f7"), (1.0, "#d55e00")]
 """Too near is blue, too far is orange, right is white."""
 
 
-def bias_figure(fit: DepthFit, to_m: float | None = None) -> go.Figure:
-    """Measured less true depth over the distance: each view before and after, and the terms with their band.
+@dataclass(frozen=True, slots=True)
+class BiasCurve:
+    """What a depth sensor is off by over the distance: numbers to draw, without what they come from."""
+
+    terms: tuple[str, ...]
+    z_m: FloatArray
+    """(K,) measured depth."""
+    off_m: FloatArray
+    """(K,) measured less true, the map aside."""
+    sd_m: FloatArray
+    """(K,) its standard error."""
+    noise_m: FloatArray | None
+    """(K,) standard deviation of the depth of a board that faces the sensor; None if it is not known."""
+    far_m: float
+    """Of the farthest view; beyond, the curve is a guess."""
+    view_z_m: FloatArray
+    """(V,) mean depth of each view."""
+    before_m: FloatArray
+    """(V,) measured less true, in the mean."""
+    after_m: FloatArray
+    """(V,) the same when corrected."""
+
+
+def bias_curve(fit: DepthFit, to_m: float | None = None) -> BiasCurve:
+    """The numbers of ``bias_figure``.
 
     Args:
         fit: what was found.
         to_m: how far the curve goes; None is a little beyond the farthest view, where it is a guess.
     """
-    figure = _figure("What the sensor is off by", "measured depth, m", "measured less true, mm")
     near_m, far_m = fit.correction.range_m
     z_m = np.linspace(min(near_m, 0.4), to_m or 1.25 * far_m, STEPS)
     off_m, sd_m = fit.bias_m(z_m)
+    law, points = fit.correction.noise, fit.points
+    noise_m = None if law is None else law.sd_m(z_m, np.ones(STEPS))
+    return BiasCurve(fit.terms, z_m, off_m, sd_m, noise_m, far_m, points.z_m, points.before_m, points.after_m)
+
+
+def bias_figure(told: BiasCurve) -> go.Figure:
+    """Measured less true depth over the distance: each view before and after, the terms with their band, and
+    within what noise alone leaves a pixel.
+    """
+    figure = titled_figure("What the sensor is off by", "measured depth, m", "measured less true, mm")
+    z_m, off_m, sd_m = told.z_m, told.off_m, told.sd_m
     figure.add_scatter(
         x=np.concatenate([z_m, z_m[::-1]]),
         y=1000.0 * np.concatenate([off_m - BAND95 * sd_m, (off_m + BAND95 * sd_m)[::-1]]),
         fill="toself",
-        fillcolor=_faint(TARGET),
+        fillcolor=faint(TARGET),
         line={"width": 0},
         name="95 %",
         hoverinfo="skip",
@@ -40,25 +79,27 @@ def bias_figure(fit: DepthFit, to_m: float | None = None) -> go.Figure:
         x=z_m,
         y=1000.0 * off_m,
         line={"color": css(TARGET)},
-        name=" + ".join(fit.terms) or "no bias",
+        name=" + ".join(told.terms) or "no bias",
         hovertemplate="%{x:.2f} m: %{y:+.1f} mm<extra></extra>",
     )
     for name, values_m, color, symbol in (
-        ("views, measured", fit.points.before_m, LOSS, "circle"),
-        ("views, corrected", fit.points.after_m, DELIVERED, "diamond"),
+        ("views, measured", told.before_m, LOSS, "circle"),
+        ("views, corrected", told.after_m, DELIVERED, "diamond"),
     ):
         figure.add_scatter(
-            x=fit.points.z_m,
+            x=told.view_z_m,
             y=1000.0 * values_m,
             mode="markers",
             marker={"color": css(color), "symbol": symbol, "size": 7},
             name=name,
             hovertemplate="%{x:.2f} m: %{y:+.1f} mm<extra>" + name + "</extra>",
         )
+    if told.noise_m is not None:
+        _add_noise(figure, z_m, told.noise_m)
     figure.add_hline(y=0.0, line={"color": css(NEUTRAL), "width": 1})
-    if z_m[-1] > far_m:
+    if z_m[-1] > told.far_m:
         figure.add_vrect(
-            x0=far_m,
+            x0=told.far_m,
             x1=float(z_m[-1]),
             fillcolor=css(NEUTRAL),
             opacity=0.12,
@@ -69,10 +110,24 @@ def bias_figure(fit: DepthFit, to_m: float | None = None) -> go.Figure:
     return figure
 
 
+def _add_noise(figure: go.Figure, z_m: FloatArray, noise_m: FloatArray) -> None:
+    """Two lines between which noise leaves 95 of 100 pixels of a sensor without bias."""
+    for side in (-BAND95, BAND95):
+        figure.add_scatter(
+            x=z_m,
+            y=1000.0 * side * noise_m,
+            mode="lines",
+            line={"color": css(NEUTRAL), "dash": "dot", "width": 1},
+            name="noise of a pixel, 95 %",
+            showlegend=side > 0.0,
+            hoverinfo="skip",
+        )
+
+
 def bias_map_figure(fit: DepthFit, at_m: float = 1.5) -> go.Figure:
     """Measured less true depth over the image, where that much is measured, in millimetres."""
     width, height = fit.correction.size_px
-    figure = _figure(f"What the sensor is off by at {at_m:g} m", "column, px", "row, px")
+    figure = image_figure(f"What the sensor is off by at {at_m:g} m", (width, height))
     u, v = np.arange(0, width, MAP_EVERY), np.arange(0, height, MAP_EVERY)
     pixels = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
     true_m = fit.correction.corrected_m(np.full(len(pixels), at_m), pixels)
@@ -89,16 +144,12 @@ def bias_map_figure(fit: DepthFit, at_m: float = 1.5) -> go.Figure:
         colorbar={"title": {"text": "mm"}},
         hovertemplate="(%{x}, %{y}): %{z:+.1f} mm<extra></extra>",
     )
-    figure.update_layout(
-        xaxis={"range": [-0.5, width - 0.5], "showgrid": False, "constrain": "domain"},
-        yaxis={"range": [height - 0.5, -0.5], "showgrid": False, "scaleanchor": "x", "constrain": "domain"},
-    )
     return figure
 
 
 def noise_figure(fit: DepthFit) -> go.Figure:
     """Standard deviation of the depth over the distance: parts of boards by their tilt, and the law."""
-    figure = _figure("Noise of the depth", "depth, m", "standard deviation, mm")
+    figure = titled_figure("Noise of the depth", "depth, m", "standard deviation, mm")
     points, law = fit.noise_points, fit.correction.noise
     angle_deg = np.degrees(np.arccos(np.clip(points.cosine, 0.0, 1.0)))
     figure.add_scatter(
@@ -131,23 +182,5 @@ def noise_figure(fit: DepthFit) -> go.Figure:
 
 def depth_bias_figures(fit: DepthFit, at_m: float = 1.5) -> dict[str, go.Figure]:
     """All of them by name, the map only where there is one."""
-    figures = {"bias": bias_figure(fit), "noise": noise_figure(fit)}
+    figures = {"bias": bias_figure(bias_curve(fit)), "noise": noise_figure(fit)}
     return figures | ({"map": bias_map_figure(fit, at_m)} if "map" in fit.terms else {})
-
-
-def _figure(title: str, x_title: str, y_title: str) -> go.Figure:
-    figure = go.Figure()
-    figure.update_layout(
-        template="plotly_white",
-        title={"text": title, "font": {"size": 13, "color": css(BRAND)}, "x": 0.02},
-        margin={"l": 56, "r": 10, "t": 34, "b": 40},
-        xaxis={"title": x_title},
-        yaxis={"title": y_title},
-        font={"size": 11},
-        legend={"orientation": "h", "y": -0.25},
-    )
-    return figure
-
-
-def _faint(color: tuple[int, int, int]) -> str:
-    return "rgba({}, {}, {}, 0.25)".format(*color)

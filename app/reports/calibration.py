@@ -8,6 +8,7 @@ from pathlib import Path
 import plotly.graph_objects as go
 
 from app.drawing import calibration_plots as plots
+from app.drawing.depth_bias_plots import depth_bias_figures
 from app.reports.html import pictures, table, write_page
 from pipeline.calibration.assess import Trust
 from pipeline.calibration.diagnosis import radial_curve, radial_residuals
@@ -73,6 +74,7 @@ def _all(report: CameraReport, trust: Trust) -> list[go.Figure]:
         plots.distortion_figure(radial_curve(found)),
         plots.radial_residuals_figure(radial_residuals(found)),
         plots.residuals_figure(found),
+        *({} if report.depth is None else depth_bias_figures(report.depth)).values(),
     ]
 
 

@@ -16,6 +16,13 @@ from pipeline.surface.pictures import mesh_picture
 
 QUALITY_ROWS = (
     ("no_hit_ray_share", "camera rays that miss the surface (%)", 100.0),
+    ("guessed_ray_share", "camera rays that meet inferred surface (%)", 100.0),
+    (
+        "within_2pct_share",
+        "measured pixels whose ray meets the surface within 2 % of the measurement (%)",
+        100.0,
+    ),
+    ("within_5pct_share", "the same within 5 % (%)", 100.0),
     ("hole_area_m2", "area of the holes inside the surface (m²)", 1.0),
     ("boundary_loops", "boundary loops", None),
     ("boundary_length_m", "length of the boundary (m)", 1.0),
@@ -39,7 +46,7 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
     yield (
         f'<p class="lead">Preset <code>{escape(metrics["preset"])}</code>. Of all camera rays, '
         f"<b>{before['no_hit_ray_share']:.1%}</b> find no surface before fusion and "
-        f"<b>{after['no_hit_ray_share']:.1%}</b> after it.</p>"
+        f"<b>{after['no_hit_ray_share']:.1%}</b> after it.{_kept(metrics['measured'])}</p>"
     )
     yield from _surfaces(result, before, after)
     yield from _truth(metrics)
@@ -51,6 +58,17 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
     yield (
         f'<p class="note">At most {memory_mb:,.0f} MB of memory. All settings are in '
         "<code>config.json</code>, all numbers in <code>metrics.json</code>.</p>"
+    )
+
+
+def _kept(measured: dict[str, float]) -> str:
+    """What became of the measurements, in two sentences."""
+    return (
+        f" Of the measured pixels, the outlier filter keeps <b>{measured['kept_share']:.2%}</b>; the surface "
+        f"lies within 2 % of what was measured at <b>{measured['within_2pct_before']:.1%}</b> of them before "
+        f"and at <b>{measured['within_2pct_after']:.1%}</b> after fusion. Afterwards measurements close "
+        f"<b>{measured['measured_ray_share']:.1%}</b> of all rays and guesses "
+        f"<b>{measured['guessed_ray_share']:.1%}</b>."
     )
 
 
@@ -127,12 +145,21 @@ def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
         yield pictures(figures, columns=3)
     rows = (
         (
-            *(node[key] for key in ("name", "sensor_points", "outliers", "filled_points")),
+            *(node[key] for key in ("name", "sensor_points", "outliers")),
+            100.0 * node["kept_share"],
+            node["filled_points"],
             1000 * node["alignment"]["residual_rms_m"],
         )
         for node in metrics["nodes"]
     )
-    head = ("node", "sensor points", "outliers removed", "inferred points kept", "alignment residual (mm)")
+    head = (
+        "node",
+        "sensor points",
+        "outliers removed",
+        "measured pixels kept (%)",
+        "inferred points kept",
+        "alignment residual (mm)",
+    )
     yield table(head, rows)
 
 

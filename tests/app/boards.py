@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from lab.claims.calibration.photograph import photograph
 from pipeline.calibration.board import Board
 from pipeline.geometry import inverse, look_at, rigid, rotation_exp
 from pipeline.io.images import write_color, write_depth_mm
-from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, FloatArray
+from pipeline.io.rigs import save_rig
+from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, FloatArray, RgbdFrame, Rig
 
 BOARD = Board("circles", 7, 5, 0.05)
 CAMERAS = (
@@ -50,6 +52,17 @@ def save_boards(folder: Path) -> None:
     board = {"pattern": "circles", "columns": BOARD.columns, "rows": BOARD.rows, "spacing_mm": 50.0}
     (folder / "board.json").write_text(json.dumps(board))
     (folder / "truth.json").write_text(json.dumps({"cameras": dict(map(_true, enumerate(CAMERAS)))}))
+
+
+def save_believing_rig(folder: Path, nodes: int = 2) -> None:
+    """Write a rig of the first cameras, which look at nothing much and take their lenses for straight."""
+    rng, frames = np.random.default_rng(0), []
+    for node, T in enumerate(T_WORLD_CAMERA[:nodes]):
+        rgb = rng.integers(0, 255, (240, 320, 3), dtype=np.uint8)
+        depth = DepthMap(np.full((240, 320), 1.5, np.float32))
+        believed = replace(CAMERAS[node], distortion=np.zeros(5))
+        frames.append(RgbdFrame(f"node_{node:02d}", rgb, depth, believed, T))
+    save_rig(folder, Rig("rig", tuple(frames)))
 
 
 def _true(numbered: tuple[int, CameraIntrinsics]) -> tuple[str, dict[str, object]]:

@@ -7,7 +7,6 @@ import json
 import re
 import shlex
 import zipfile
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,13 +24,21 @@ from pipeline.io.calibrations import node_files
 from pipeline.io.depth_correction import read_depth_correction
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.poses import read_pose
-from pipeline.io.rigs import save_rig
 from pipeline.sources import Calibrated, RigFolder
-from pipeline.types import DepthMap, RgbdFrame, Rig
-from tests.app.boards import BLANK, CAMERAS, MOMENTS, OFFSET_M, T_WORLD_CAMERA, save_boards
+from tests.app.boards import (
+    BLANK,
+    BOARD,
+    CAMERAS,
+    MOMENTS,
+    OFFSET_M,
+    T_WORLD_CAMERA,
+    save_believing_rig,
+    save_boards,
+)
 from tests.app.fakes import Bench, Impatient, ui_of
 
 pytestmark = pytest.mark.xdist_group("calibrate panel")
+BENT = "The board may be bent"
 UPLOADS, NOISE = "Use your own photographs", "What if the points were noisier?"
 
 
@@ -51,16 +58,8 @@ def boards(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
-    """Two nodes that look at nothing much and believe to be cameras like others."""
     folder = tmp_path_factory.mktemp("rig")
-    rng = np.random.default_rng(0)
-    frames = []
-    for node, T in enumerate(T_WORLD_CAMERA):
-        rgb = rng.integers(0, 255, (240, 320, 3), dtype=np.uint8)
-        depth = DepthMap(np.full((240, 320), 1.5, np.float32))
-        believed = replace(CAMERAS[node], distortion=np.zeros(5))
-        frames.append(RgbdFrame(f"node_{node:02d}", rgb, depth, believed, T))
-    save_rig(folder, Rig("rig", tuple(frames)))
+    save_believing_rig(folder)
     return folder
 
 
@@ -119,8 +118,8 @@ def test_both_cameras_are_found_within_their_intervals(screen):
     true = np.linalg.inv(T_WORLD_CAMERA[0]) @ T_WORLD_CAMERA[1]
     assert np.abs(placed - true).max() < 0.003
     depth = view.depth["node_00"]
-    assert abs(np.mean(depth.before_m) + OFFSET_M) < 0.002
-    assert abs(np.mean(depth.after_m)) < 0.002
+    assert abs(np.mean(depth.curve.before_m) + OFFSET_M) < 0.002
+    assert abs(np.mean(depth.curve.after_m)) < 0.002
     assert "no depth images" in view.depth["node_01"]
 
 
@@ -260,6 +259,71 @@ def test_a_zip_does_not_reach_out_of_its_folder(server, store, rig, boards, tmp_
     written = [path.relative_to(tmp_path) for path in tmp_path.rglob("*.png")]
     assert [str(path) for path in written] == ["photographs_000/node_01/evil.png"]
     assert not list(tmp_path.parent.glob("evil*"))
+
+
+def one_camera(server, store, rig, boards, tmp_path):
+    """The screen with the photographs of the first camera alone."""
+    bench = empty(server, store, rig, tmp_path)
+    names = [f"node_00/color_{moment:02d}.png" for moment in range(MOMENTS)]
+    bench.gui.upload("Photograph or ZIP …", "one.zip", zipped(boards, [*names, "board.json"]))
+    bench.gui.press("Photographs", "Find the cameras", UPLOADS)
+    return bench
+
+
+def test_the_board_of_one_camera_may_be_bent(server, store, rig, boards, tmp_path):
+    bench = one_camera(server, store, rig, boards, tmp_path)
+    gui = bench.gui
+    assert not gui.find(BENT).disabled
+    assert "Board bent by" not in gui.text()
+    assert "--board-warp" not in bench.panel.command
+    gui.set(BENT, True)
+    warp = calibration(bench).camera("node_00").warp
+    assert warp.off_plane_m.shape == (BOARD.rows, BOARD.columns)
+    assert warp.used == (warp.rms_px < warp.flat_rms_px)
+    assert f"{1000.0 * warp.bend_m:.2g} mm, {'' if warp.used else 'not '}used" in gui.text()
+    assert "Board bent by" in gui.text("Advanced")
+    assert len(gui.all("image", "Advanced")) == 1
+    assert "--board-warp" in shlex.split(bench.panel.command)
+    gui.press("In the chain", USE)
+    used = node_files(bench.folder / "calibration_01" / "node_00")
+    found = calibration(bench).camera("node_00").calibration
+    assert read_intrinsics(used["intrinsics"]).fx_px == pytest.approx(found.parameters["fx"], rel=1e-9)
+    gui.set(BENT, False)
+    assert calibration(bench).camera("node_00").warp is None
+    assert gui.all("image", "Advanced") == []
+
+
+def test_several_cameras_have_a_flat_board(screen):
+    box = screen.gui.find(BENT)
+    assert box.disabled
+    assert "Only with the photographs of **one camera**" in screen.gui.text("Advanced")
+    assert not screen.spec.views.bent
+
+
+def test_what_goes_together_is_shown_with_the_parameters(screen):
+    told = screen.gui.text("Every parameter, and how sure it is")
+    assert re.search(r"Correlation</span></b>: .* at \.\d\d", told)
+    assert "fx and fy: " in told
+
+
+def test_the_trials_are_in_the_dock_while_the_screen_is_shown(screen):
+    gui = screen.gui
+
+    def docked():
+        told = (str(getattr(one, "content", "")) for one in gui.handles)
+        (message,) = [one for one in told if "packetmeshPlots ??= []).push" in one]
+        return "&quot;visible&quot;:true" in message
+
+    assert not docked()
+    gui.set("Noise (px)", 0.2)
+    assert docked()
+    screen.panel.on_hide()
+    assert not docked()
+    screen.panel.on_show()
+    assert docked()
+    gui.set("Camera", "node_01")
+    assert not docked()
+    assert READY in gui.text(NOISE)
 
 
 def test_too_few_photographs_are_a_sentence_and_shown(server, store, rig, boards, tmp_path):

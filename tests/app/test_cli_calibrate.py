@@ -258,6 +258,8 @@ def test_cameras_that_cannot_be_placed_are_one_sentence_and_leave_no_folder(pair
     (session / "node_00").mkdir()
     (session / "node_00" / "0.png").write_bytes((session / "left" / "0.png").read_bytes())
     assert "holds one camera only" in failure(["calibrate", str(session), *ASKED, *out], capsys)
+    warp = failure(["calibrate", *folders, *ASKED, "--board-warp", *out], capsys)
+    assert warp.count("--board-warp works with one camera") == 1
     like = ["calibrate", *folders, *ASKED, "--like", str(tmp_path), *out]
     assert "has no node_00/pose.txt" in failure(like, capsys)
     assert not (tmp_path / "cal").exists()

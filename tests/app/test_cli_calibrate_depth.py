@@ -39,6 +39,9 @@ def test_the_bias_is_told_and_written_where_a_rig_looks_for_it(folder, tmp_path,
     away_m = float(np.mean([T[2, 3] for T in poses(BOARD, 8)])) / SCALE
     flat = DepthMap(np.full((CAMERA.height_px, CAMERA.width_px), away_m, np.float32))
     assert np.nanmean(correction.apply(flat).z_m) == pytest.approx(SCALE * away_m, rel=0.003)
+    page = (tmp_path / "report.html").read_text()
+    assert "What the sensor is off by" in page
+    assert "Noise of the depth" in page
 
 
 def test_depth_that_cannot_be_used_is_told_and_the_camera_is_calibrated_anyway(folder, tmp_path, capsys):

@@ -17,6 +17,7 @@ from app.screens.depth.view import Disc, HideRequest, ModelChoice, SeenSample
 from app.state import Spec
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
+from pipeline.acquisition import acquire
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork
 from pipeline.depth.confidence import judge
@@ -95,7 +96,8 @@ def test_the_drawn_sensor_points_know_their_pixels(rig, view):
         assert isinstance(seen, SeenSample)
         assert (seen.height_px, seen.width_px) == frame.depth.z_m.shape
         u, v = seen.pixels.T
-        np.testing.assert_allclose(seen.points_m[:, 2], frame.depth.z_m[v, u], rtol=1e-6)
+        depth = acquire(frame, SPEC.config.acquisition).depth
+        np.testing.assert_allclose(seen.points_m[:, 2], depth.z_m[v, u], rtol=1e-6)
         np.testing.assert_array_equal(seen.colors, frame.rgb[v, u])
 
 

@@ -1,10 +1,14 @@
 """Lesson files, the one about the race that ships and bad ones, and the folder that shows them."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from app.lesson import ANSWER, BEGIN, OFF, LessonFolder, read_lesson
 from app.screens.calibrate import lesson as calibrate
 from app.screens.depth import lesson as depth
+from app.screens.fuse import lesson as fuse
 from app.screens.fuse.labels import STARTS
 from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.view import Race, Start
@@ -66,6 +70,41 @@ def test_a_stop_sets_what_it_names_and_leaves_the_rest_at_the_default(tmp_path):
     assert stop.text == "Look *here*.\n\nAnd there."
 
 
+def test_a_stop_unfolds_what_it_speaks_of(tmp_path):
+    bare, told = lesson(tmp_path, "# A\n## One\nx\n## Two\nopen: Capture range\nopen: Chain\n\nSee.\n").stops
+    assert (bare.opens, told.opens, told.text) == ((), ("Capture range", "Chain"), "See.")
+    ui = ui_of()
+    LessonFolder(ui, lesson(tmp_path, "# A\n## One\nopen: Chain\nx\n"), lambda look: None)
+    contents = [one for one in ui.gui.handles if one.kind == "add_html"]
+    assert not any("unfold" in one.content for one in contents)
+    ui.gui.press("Go", "Next")
+    (once,) = [one.content for one in contents if "unfold" in one.content]
+    assert "[&quot;Chain&quot;]" in once
+    ui.gui.press("Go", "Back")
+    ui.gui.set("Stop", "1. One")
+    (again,) = [one.content for one in contents if "unfold" in one.content]
+    assert again != once
+
+
+@pytest.mark.parametrize(
+    ("path", "screen"),
+    [
+        (calibrate.SHIPPED, calibrate),
+        (depth.SHIPPED, depth),
+        (surface.SHIPPED, surface),
+        (network.CROSSING, network),
+        (network.LOST_PACKET, network),
+        (SHIPPED, fuse),
+    ],
+    ids=lambda value: getattr(value, "stem", ""),
+)
+def test_the_folders_that_lessons_unfold_are_on_their_screens(path, screen):
+    sources = "".join(one.read_text() for one in Path(screen.__file__).parent.glob("*.py"))
+    folders = set(re.findall(r'add_folder\(\s*"([^"]+)"', sources))
+    named = set(re.findall(r"^open: (.+)$", path.read_text(), re.MULTILINE))
+    assert named <= folders
+
+
 def test_a_start_in_numbers_and_the_end(tmp_path):
     (stop,) = lesson(tmp_path, "# A\n## One\nset: start = 10 deg 20 cm\nset: position = end\nx").stops
     assert stop.look.race.start == Start.towards(10.0, 20.0, seed=0)
@@ -82,6 +121,7 @@ def test_a_start_in_numbers_and_the_end(tmp_path):
         ("# A\n## One\nset: methods = icp\nx", "cannot set methods = icp: try one of icp point"),
         ("# A\n## One\nset: methods = icp point, icp point, icp point, icp point, icp point\nx", "at most 4"),
         ("# A\n## One\nset: noise = much\nx", "try 0 to 10 cm"),
+        ("# A\n## One\nopen:\nx", "section 'One', opens nothing"),
         ("# A\n## One\nset: holes = 95 %\nx", "try 0 to 80 %"),
         ("# A\n## One\nset: start = near\nx", "try one of aligned, slightly off, far off or such as"),
         ("# A\n## One\nset: position = -1\nx", "try start, end or the number"),

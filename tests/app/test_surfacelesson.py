@@ -122,11 +122,15 @@ def clouds(rig, nodes, poses, passes):
     return Room(rig, nodes, poses, sensor, merged.fused, merged.r_F_m, merged.sigma_D_m)
 
 
+def room_of(config, passes):
+    done = end(run(Spec(Demo("living-room"), config=config), stages=("rig", "nodes", "placement")))
+    rig, nodes, placement = (result.value for result in done.values())
+    return clouds(rig, nodes, placement.T_world_camera, passes)
+
+
 @pytest.fixture(scope="module")
 def room():
-    done = end(run(Spec(Demo("living-room"), config=CONFIG), stages=("rig", "nodes", "placement")))
-    rig, nodes, placement = (result.value for result in done.values())
-    return clouds(rig, nodes, placement.T_world_camera, CONFIG.surface.smoothing_passes)
+    return room_of(CONFIG, CONFIG.surface.smoothing_passes)
 
 
 @pytest.fixture(scope="module")
@@ -156,17 +160,17 @@ def unused(surface, cloud):
     return surface.quality.unused_points / len(cloud)
 
 
-def test_too_small_a_ball_uses_only_one_point_in_ten(room):
+def test_too_small_a_ball_uses_only_one_point_in_eight(room):
     look, _ = stop_named("Too small a ball")
-    assert 0.87 < unused(room.roll(look, room.fused), room.fused) < 0.93
+    assert 0.85 < unused(room.roll(look, room.fused), room.fused) < 0.89
     assert look.radius_in_r_F > 1.0 / np.sqrt(3.0)  # wide enough for three points that are r_F apart
 
 
-def test_r_F_uses_half_of_the_points_and_covers_a_tenth_and_the_thesis_closes_the_rest(room):
+def test_r_F_uses_nine_points_in_ten_and_leaves_much_open_and_the_thesis_closes_it(room):
     look, _ = stop_named("A ball of r_F")
     least = room.roll(look, room.fused)
-    assert unused(least, room.fused) < 0.5
-    assert 0.85 < missed(least) < 0.9
+    assert 0.07 < unused(least, room.fused) < 0.12
+    assert 0.34 < missed(least) < 0.39
     look, text = stop_named("The thesis's radii")
     thesis = room.roll(look, room.fused)
     largest_m = room.r_F_m + room.sigma_D_m
@@ -180,13 +184,13 @@ def test_r_F_uses_half_of_the_points_and_covers_a_tenth_and_the_thesis_closes_th
 def test_too_large_a_ball_loses_rays_points_and_truth(room, four_balls):
     look, text = stop_named("Too large a ball")
     large = room.roll(look, room.fused)
-    assert missed(large) > 1.15 * missed(four_balls)
+    assert missed(large) > 2.0 * missed(four_balls)
     assert about(
         text,
         r"leave (\d+) % of the rays without surface, this one (\d+) %",
         (missed(four_balls), missed(large)),
     )
-    assert 0.25 < unused(large, room.fused) < 0.35
+    assert 0.38 < unused(large, room.fused) < 0.45
     score, best = (room.truth(surface)["f_score_5cm"] for surface in (large, four_balls))
     assert score < best - 0.05
     assert about(text, r"\*F-score\* is (\d+) % instead of (\d+) %", (score, best))
@@ -211,13 +215,19 @@ def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, fo
     look, text = stop_named("Why holes stay: noise")
     noisy = clouds(room.rig, room.nodes, room.poses, look.smoothing_passes)
     torn = noisy.roll(look, noisy.fused)
-    assert 1.6 < missed(torn) / missed(four_balls) < 2.0
-    assert 2.5 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 3.5
+    assert missed(torn) > 1.1 * missed(four_balls)
+    assert 1.3 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 1.5
     old_normals = room.roll(look, replace(room.fused, normals=noisy.fused.normals))
     new_normals = noisy.roll(look, replace(noisy.fused, normals=room.fused.normals))
     assert missed(old_normals) <= missed(four_balls) < missed(torn) <= missed(new_normals)
-    pattern = r"old normals close as well \((\d+) %\); noisy points with smoothed normals do not \((\d+) %\)"
-    assert about(text, pattern, (missed(old_normals), missed(new_normals)))
+    pattern = (
+        r"old normals close as well \(([\d.]+) %\); noisy points with smoothed normals do not \(([\d.]+) %\)"
+    )
+    assert about(text, pattern, (missed(old_normals), missed(new_normals)), 0.3)
+    raw = replace(CONFIG, acquisition=replace(CONFIG.acquisition, average=False))
+    rough = room_of(raw, look.smoothing_passes)
+    shares = (missed(rough.roll(look, rough.fused)), missed(four_balls))
+    assert about(text, r"\*\*(\d+) %\*\* of the rays miss instead of \*\*(\d+) %", shares, 1.0)
 
 
 def test_no_ball_closes_before_fusion_what_the_sensor_did_not_see(room, four_balls):
@@ -231,24 +241,24 @@ def test_no_ball_closes_before_fusion_what_the_sensor_did_not_see(room, four_bal
         for camera, frame, node in zip(room.cameras, room.rig.frames, room.nodes, strict=True)
     ]
     parts = ray_parts(before, views)
-    assert 0.7 < (parts.missed_inferred + parts.missed_unknown) / missed(before) < 0.8
+    assert 0.85 < (parts.missed_inferred + parts.missed_unknown) / missed(before) < 0.93
     singles = (SurfaceLook(rule="manual", radius_in_r_F=factor) for factor in (2.0, 4.0, 6.0, 8.0))
     best = min(missed(room.roll(single, room.sensor)) for single in singles)
     assert best > 2.0 * missed(four_balls)
     assert about(text, r"even the best radius leaves (\d+) %", (best,))
 
 
-def test_what_is_guessed_is_a_fifth_and_two_tenths_of_it_is_off(room, four_balls):
+def test_what_is_guessed_is_a_fifth_and_a_quarter_of_it_is_off(room, four_balls):
     text = stop_named("Measured or guessed?")[1]
     guessed = four_balls.source == PointSource.INFERRED
     a, b, c = four_balls.vertices_m[four_balls.triangles].swapaxes(0, 1)
     area_m2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     share = area_m2[guessed[four_balls.triangles].any(axis=1)].sum() / area_m2.sum()
-    assert 0.15 < guessed.mean() < 0.2
+    assert 0.2 < guessed.mean() < 0.25
     assert 0.25 < share < 0.33
     near = distances_to_truth_m(four_balls.vertices_m, room.rig.truth, room.cameras) <= 0.05
-    assert near[~guessed].mean() > 0.999
-    assert 0.75 < near[guessed].mean() < 0.85
+    assert near[~guessed].mean() > 0.997
+    assert 0.72 < near[guessed].mean() < 0.79
     before, after = (
         room.truth(surface)["f_score_5cm"] for surface in (room.roll(SurfaceLook(), room.sensor), four_balls)
     )
@@ -260,7 +270,7 @@ def test_poisson_closes_nearly_everything_and_is_no_better(room, four_balls):
     look, text = stop_named("Is no hole at all better?")
     assert look.shown == POISSON
     poisson = poisson_surface(room.fused, room.r_F_m)
-    assert no_hit_ray_share(poisson.vertices_m, poisson.triangles, room.cameras) < 0.004
+    assert no_hit_ray_share(poisson.vertices_m, poisson.triangles, room.cameras) < 0.001
     theirs, ours = room.truth(poisson), room.truth(four_balls)
     assert theirs["f_score_5cm"] < ours["f_score_5cm"]
     scores = (theirs["f_score_5cm"], ours["f_score_5cm"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 
 import pytest
 from playwright.sync_api import expect
@@ -14,6 +15,7 @@ from tests.browser.hands import canvas, changed_from, go, press, slider, unfold
 LONG_MS = 240_000
 """For the cameras and their depth on a busy machine."""
 BARS = ".packetmesh-views button"
+DOCK = ".packetmesh-dock-row"
 
 
 @pytest.fixture(scope="module")
@@ -83,11 +85,67 @@ def test_the_noise_slider_replays_the_experiment(calibrated):
     handle = slider(calibrated, "Noise (px)")
     handle.focus()
     handle.press("ArrowRight")
-    calibrated.get_by_text(re.compile(r"\d+ of 200 trials")).wait_for()
+    calibrated.locator(f"{DOCK} b").get_by_text(re.compile(r"\d+ of 200 trials")).wait_for()
     handle.press("ArrowRight")
     calibrated.get_by_text("All trials").wait_for()
-    expect(calibrated.locator(".js-plotly-plot").locator("visible=true").first).to_be_visible()
     unfold(calibrated, "What if the points were noisier?")
+
+
+def test_the_dock_shows_every_trial_with_labels_and_units_until_the_screen_is_left(calibrated):
+    dock = calibrated.locator(DOCK)
+    expect(dock.locator("b").first).to_have_text(re.compile("0.60 px of noise.*200 of 200 trials"))
+    plots = dock.locator(".plot")
+    expect(plots).to_have_count(3)
+    for index, (x, y) in enumerate((("fx (px)", "fy (px)"), ("cx (px)", "cy (px)"), ("k1 (", "k2 ("))):
+        plot = plots.nth(index)
+        expect(plot.locator(".xtitle")).to_contain_text(x)
+        expect(plot.locator(".ytitle")).to_contain_text(y)
+        assert plot.locator(".scatterlayer .point").count() == 200 + 2
+    box, window = dock.bounding_box(), calibrated.viewport_size
+    assert (box["x"], box["width"]) == (0, window["width"])
+    assert box["y"] + box["height"] == window["height"]
+    go(calibrated, "Surface")
+    expect(dock).to_have_count(0)
+    go(calibrated, "Calibrate")
+    expect(dock).to_be_visible()
+    dock.get_by_role("button", name="✕").click()
+    expect(dock).to_have_count(0)
+
+
+def test_a_stop_of_the_lesson_unfolds_what_it_speaks_of(calibrated):
+    unfold(calibrated, "Lesson: How good is my calibration?")
+    sliders = calibrated.get_by_text("Range (m)", exact=True).locator("visible=true")
+    expect(sliders).to_have_count(0)
+    pick(calibrated, "Stop", "4. Sure of what, and where?")
+    expect(sliders).to_have_count(1)
+    pick(calibrated, "Stop", "3. Ask those it has not seen")
+    pick(calibrated, "Stop", "4. Sure of what, and where?")
+    calibrated.wait_for_timeout(600)
+    expect(sliders).to_have_count(1)
+    pick(calibrated, "Stop", "not now")
+    unfold(calibrated, "Good enough for what?")
+    unfold(calibrated, "Lesson: How good is my calibration?")
+
+
+def test_on_a_phone_nothing_covers_anything(browser, app):
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
+    page = context.new_page()
+    page.set_default_timeout(LONG_MS)
+    page.goto(f"{app.url}?fixedDpr=1")
+    go(page, "Network")
+    page.locator(DOCK).wait_for()
+    page.wait_for_timeout(1000)
+    places = [
+        page.locator(one).first.bounding_box()
+        for one in ("canvas", ".mantine-Paper-root:has(.packetmesh-steps)", DOCK)
+    ]
+    for above, below in pairwise(places):
+        assert above["y"] + above["height"] <= below["y"] + 1
+    assert all((one["x"], one["width"]) == (0, 390) for one in places)
+    assert places[0]["height"] > 150
+    assert places[2]["y"] + places[2]["height"] == pytest.approx(844, abs=1)
+    assert page.get_by_label("Dock", exact=True).locator("visible=true").count() == 0
+    context.close()
 
 
 def test_the_mesh_is_another_with_the_calibration_and_the_same_again_without(calibrated):

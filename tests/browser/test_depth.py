@@ -138,6 +138,5 @@ def test_the_lesson_sets_the_controls(depth):
             expect(visible(depth, "Alignment")).to_have_value("one scale")
         if stop == 5:
             expect(visible(depth, "Right")).to_have_value(PICTURES["confidence"])
-    unfold(depth, "Hide a region and see it filled")
     depth.get_by_text(re.compile(r"[\d,]+ measured pixels of node_00 hidden")).wait_for()
     depth.get_by_text("Up to date").wait_for()

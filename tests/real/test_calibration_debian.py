@@ -1,6 +1,5 @@
 """Boards in Debian's packages ``opencv-doc`` and ``visp-images-data``, against what they publish."""
 
-import os
 from pathlib import Path
 
 import cv2
@@ -13,22 +12,16 @@ from pipeline.calibration.detect import detect
 from pipeline.calibration.estimate import View, calibrate
 from pipeline.calibration.from_images import image_files, iterate_calibration
 from pipeline.calibration.outliers import outlier_views
+from tests.real.debian import opencv_doc, visp_images
 
 CHESSBOARD = Board("chessboard", 9, 6, 0.025)
 PUBLISHED_F_PX = 535.9157
 
 
-def folder(variable: str, installed: str) -> Path:
-    path = Path(os.environ.get(variable, installed))
-    if not path.is_dir():
-        pytest.skip(f"no images at {path}; install the Debian package or set {variable}")
-    return path
-
-
 @pytest.fixture(scope="module")
 def lefts():
     """The thirteen images of the left camera."""
-    data = folder("PACKETMESH_OPENCV_DOC", "/usr/share/doc/opencv-doc/examples/data")
+    data = opencv_doc()
     return image_files([str(data / "left[01]*.jpg")])
 
 
@@ -65,7 +58,7 @@ def test_our_corners_find_all_boards_and_a_lens_that_explains_them_better(lefts)
 
 
 def test_a_square_grid_of_circles_is_found_in_four_of_four_and_never_mirrored():
-    data = folder("PACKETMESH_VISP_IMAGES", "/usr/share/visp-images-data/ViSP-images")
+    data = visp_images()
     files = image_files([str(data / "calibration" / "grid36-*.pgm")])
     board = Board("circles", 6, 6, 0.03)
     report = drain(iterate_calibration(files, board, "thesis", 2))

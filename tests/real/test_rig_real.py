@@ -1,8 +1,6 @@
 """Pairs of real cameras: a stereo rig before a chessboard, and a depth camera beside a grey one."""
 
-import os
 import shutil
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -14,23 +12,17 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.rig_from_images import iterate_rig_calibration
 from pipeline.calibration.shots import node_shots
 from pipeline.geometry import inverse, rigid, rotation_angle_rad
+from tests.real.debian import opencv_doc, visp_images
 
 BOARD = Board("chessboard", 9, 6, 0.025)
 PUBLISHED_FOCAL_PX = 534.803
 """OpenCV's own stereo example of these images, one focal length for both (samples/data/intrinsics.yml)."""
 
 
-def folder(variable: str, usual: str) -> Path:
-    path = Path(os.environ.get(variable, usual))
-    if not path.is_dir():
-        pytest.skip(f"no {path}; set {variable}")
-    return path
-
-
 @pytest.fixture(scope="module")
 def stereo(tmp_path_factory):
     """The left and the right images of Debian's opencv-doc, a folder each."""
-    data = folder("PACKETMESH_OPENCV_DOC", "/usr/share/doc/opencv-doc/examples/data")
+    data = opencv_doc()
     session = tmp_path_factory.mktemp("stereo")
     for side in ("left", "right"):
         (session / side).mkdir()
@@ -77,7 +69,7 @@ def test_its_baseline_and_focal_length_are_those_of_two_cameras_side_by_side(ste
 @pytest.fixture(scope="module")
 def castle():
     """A grey image, and the depth beside it before and after it is registered."""
-    images = folder("PACKETMESH_VISP_IMAGES", "/usr/share/visp-images-data/ViSP-images")
+    images = visp_images()
     root = images / "mbt-depth" / "castel"
     (pair,) = [load() for load in find(root) if str(load.args[1]).endswith("image_0000.pgm")]
     raw_m = read_depth_bin(root / "castel" / "depth_image_0000.bin")

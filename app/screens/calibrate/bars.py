@@ -8,7 +8,9 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from app.drawing.colors import BRAND, LOSS, NEUTRAL, SOURCE, css
+from app.screens.calibrate.terms import HELD_OUT, RMS
 from app.screens.calibrate.view import CameraView
+from app.tables import term
 from app.ui import Ui
 
 MARK = "packetmesh-views"
@@ -84,8 +86,10 @@ def bars_html(bars: tuple[Bar, ...], chosen: str) -> str:
     if not bars:
         return f'<div class="{MARK}">{hide}</div>'
     kept = [bar.rms_px for bar in bars if bar.rms_px is not None and not bar.dropped]
-    meaning = f"Error of each of {len(bars)} views, px (RMS): bar by the lens that has seen it, line by one "
-    meaning += "that has not. Click one."
+    meaning = (
+        f"Error of each of {len(bars)} views, px ({term('RMS', RMS)}): bar by the lens that has seen it, "
+    )
+    meaning += f"line by one that has not ({term('held out', HELD_OUT)}). Click one."
     if len(kept) < len(bars):
         meaning += " ✕ no board found, pale: dropped."
     return (

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 
 from app.screens.calibrate.request import FOLDS, board_of, shots_of, true_parameters
-from app.screens.calibrate.view import CalibrationView, CameraView, Photograph, PlacedCamera, RigView
+from app.screens.calibrate.view import (
+    CalibrationView,
+    CameraView,
+    Photograph,
+    PlacedCamera,
+    RigView,
+    WarpView,
+)
 from app.state import BoardViews
 from app.store import Store
 from packetmesh.errors import PacketMeshError
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, part
 from pipeline.calibration.board import Board
 from pipeline.calibration.detect import Detection, detect
-from pipeline.calibration.estimate import Calibration, FittedView, View, place
+from pipeline.calibration.estimate import FittedView, View, place
 from pipeline.calibration.from_images import CameraReport, iterate_calibration
-from pipeline.calibration.rig import RigCalibration, Seen, calibrate_rig
-from pipeline.calibration.shots import NodeShots
+from pipeline.calibration.rig import RigCalibration
+from pipeline.calibration.rig_from_images import RigReport, cameras_together
+from pipeline.calibration.shots import camera_images
+from pipeline.calibration.warp import BoardWarp
 from pipeline.io.images import read_color
 from pipeline.types import ByteArray
 
@@ -36,34 +46,48 @@ class CameraFound:
     """None if its views do not determine it."""
 
 
+@dataclass(frozen=True, slots=True)
+class CamerasFound:
+    """All cameras, as the panel shows them and as ``packetmesh calibrate`` has them."""
+
+    view: CalibrationView
+    reports: Mapping[str, CameraReport]
+    """By name, of those that their views determine: as all together have them, or each by itself."""
+    rig: RigReport | None = None
+    """None of one camera, and where they cannot be placed."""
+
+
 def cameras_of(
     store: Store, views: BoardViews, share: float = 1.0
-) -> Generator[Progress | CalibrationView, None, CalibrationView]:
+) -> Generator[Progress | CalibrationView, None, CamerasFound]:
     """All cameras, without their depth; yields what there is so far, in the first ``share`` of the work.
 
     Raises:
         InputError: there are no photographs.
     """
-    board, nodes = board_of(views), shots_of(views)
+    images = camera_images(shots_of(views))
 
-    def compute() -> Generator[Progress | CalibrationView, None, CalibrationView]:
-        view, found = CalibrationView(board), []
-        for index, node in enumerate(nodes):
-            step = 0.9 * share / len(nodes)
-            found.append((yield from _camera_of(store, views, node, index * step, step)))
-            view = replace(view, cameras=(*view.cameras, found[-1].view))
+    def compute() -> Generator[Progress | CalibrationView, None, CamerasFound]:
+        view = CalibrationView(board_of(views))
+        reports: dict[str, CameraReport] = {}
+        for index, (name, moments) in enumerate(images.items()):
+            begin, end = (0.9 * share * done / len(images) for done in (index, index + 1))
+            found = yield from _camera_of(store, views, name, moments, begin, end)
+            if found.report is not None:
+                reports[name] = found.report
+            view = replace(view, cameras=(*view.cameras, found.view))
             yield view
-        if len(nodes) < 2:
-            return view
+        if len(images) < 2:
+            return CamerasFound(view, reports)
         yield Progress("placing the cameras", 0.9 * share)
-        return _together(view, found, nodes)
+        return _together(views, view, reports)
 
     return (yield from store.remember(("cameras", views), compute))
 
 
 def finished(
-    steps: Generator[Progress | CalibrationView, None, CalibrationView],
-) -> Generator[Progress, None, CalibrationView]:
+    steps: Generator[Progress | CalibrationView, None, CamerasFound],
+) -> Generator[Progress, None, CamerasFound]:
     """Only the progress on the way to all cameras."""
     while True:
         try:
@@ -74,65 +98,58 @@ def finished(
             yield step
 
 
+def own_views(views: BoardViews, *cameras: str) -> BoardViews:
+    """All that some cameras depend on as long as each is by itself: what others leave out is not there."""
+    return replace(views, dropped=tuple(one for one in views.dropped if one[0] in cameras))
+
+
+def stage_name(kind: str, camera: str) -> str:
+    """What the store calls a result about a camera, which may be one of a node's two."""
+    return f"{kind}-{camera.replace('/', '-')}"
+
+
 def _camera_of(
-    store: Store, views: BoardViews, node: NodeShots, begin: float, share: float
+    store: Store, views: BoardViews, name: str, moments: Mapping[Path, str], begin: float, end: float
 ) -> Generator[Progress, None, CameraFound]:
     """One camera, which nothing but its own views changes."""
-    board, dropped = board_of(views), _dropped(views, node.name)
+    own = own_views(views, name)
 
     def compute() -> Generator[Progress, None, CameraFound]:
-        yield Progress(f"{node.name}: looking for the board", begin)
-        without = [shot.color.name for shot in node.shots if shot.moment in dropped]
-        files = [shot.color for shot in node.shots]
-        images = {path.name: read_color(path) for path in files}
-        steps = iterate_calibration(files, board, views.lens, FOLDS, without)
+        yield Progress(f"{name}: looking for the board", begin)
+        board, dropped = board_of(own), tuple(moment for _, moment in own.dropped)
+        images = {path: read_color(path) for path in moments}
+        left_out = [path.name for path, moment in moments.items() if moment in dropped]
+        steps = iterate_calibration(list(images), board, own.lens, FOLDS, left_out, own.bent)
+        reason, report = "", None
         try:
-            report: CameraReport | None = yield from _part(steps, node.name, begin, share)
-            reason = ""
+            report = yield from part(steps, name, begin, end, detail=True)
         except PacketMeshError as error:
-            report, reason = None, str(error)
+            reason = str(error)
         found = (
-            {name: detect(one, board) for name, one in images.items()}
+            {path.name: detect(image, board) for path, image in images.items()}
             if report is None
             else report.detections
         )
-        photographs = tuple(
-            _photograph(shot.moment, images[shot.color.name], found[shot.color.name]) for shot in node.shots
+        photographs = [_photograph(moments[path], image, found[path.name]) for path, image in images.items()]
+        height_px, width_px = next(iter(images.values())).shape[:2]
+        camera = CameraView(
+            name,
+            (width_px, height_px),
+            tuple(photographs),
+            reason=reason,
+            dropped=dropped,
+            truth=true_parameters(own, name),
+            warp=None if report is None or report.warp is None else _warp(report.warp, board),
         )
-        first = next(iter(images.values()))
-        camera = CameraView(node.name, (first.shape[1], first.shape[0]), photographs, dropped=dropped)
-        camera = replace(camera, reason=reason, truth=true_parameters(views, node.name))
-        if report is None:
-            return CameraFound(camera, None)
-        moments = {shot.color.name: shot.moment for shot in node.shots}
-        unseen = [replace(view, name=moments[view.name]) for view in report.held_out]
-        return CameraFound(
-            _with_lens(camera, _named(report.calibration, moments), unseen, board, found, moments), report
-        )
+        return CameraFound(camera if report is None else _with_lens(camera, report, moments), report)
 
-    key = (f"camera-{node.name}", views.folder, views.edition, board, views.lens, dropped)
-    return (yield from store.remember(key, compute))
+    return (yield from store.remember((stage_name("camera", name), own), compute))
 
 
-def _part(
-    steps: Generator[Progress, None, CameraReport], name: str, begin: float, share: float
-) -> Generator[Progress, None, CameraReport]:
-    while True:
-        try:
-            step = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        yield Progress(f"{name}: {step.stage}", begin + share * step.fraction)
-
-
-def _dropped(views: BoardViews, camera: str) -> tuple[str, ...]:
-    """Moments of the views of a camera that are left out."""
-    return tuple(moment for name, moment in views.dropped if name == camera)
-
-
-def _named(lens: Calibration, moments: dict[str, str]) -> Calibration:
-    """Its views by their moments instead of the names of files."""
-    return replace(lens, views=tuple(replace(view, name=moments[view.name]) for view in lens.views))
+def _warp(found: BoardWarp, board: Board) -> WarpView:
+    """What the panel shows of a board's shape."""
+    off_plane_m = found.off_plane_m.reshape(board.rows, board.columns)
+    return WarpView(off_plane_m, found.helps, found.rms_px, found.flat_rms_px)
 
 
 def _photograph(moment: str, image: ByteArray, found: Detection) -> Photograph:
@@ -143,19 +160,15 @@ def _photograph(moment: str, image: ByteArray, found: Detection) -> Photograph:
     return Photograph(moment, encoded.tobytes(), zoom, found.points_px, found.blobs_px, found.reason)
 
 
-def _with_lens(
-    camera: CameraView,
-    lens: Calibration,
-    unseen: Sequence[FittedView],
-    board: Board,
-    found: dict[str, Detection],
-    moments: dict[str, str],
-) -> CameraView:
-    """The camera with its lens, by which the views that were dropped are placed, too."""
-    placed = list(unseen)
-    for name, moment in moments.items():
-        if moment in camera.dropped and found[name].found:
-            view = View(moment, found[name].points_px, board.points_m[found[name].indices])
+def _with_lens(camera: CameraView, report: CameraReport, moments: Mapping[Path, str]) -> CameraView:
+    """The camera with its lens, by which dropped views are placed, too; all are called by their moments."""
+    names = {path.name: moment for path, moment in moments.items()}
+    lens = replace(report.calibration, views=_named(report.calibration.views, names))
+    placed = [*_named(report.held_out, names)]
+    for name, moment in names.items():
+        one = report.detections[name]
+        if moment in camera.dropped and one.found:
+            view = View(moment, one.points_px, report.board.points_m[one.indices])
             try:
                 placed.append(place(view, lens.matrix, lens.distortion, lens.lens))
             except PacketMeshError:
@@ -163,36 +176,24 @@ def _with_lens(
     return replace(camera, calibration=lens, unseen=tuple(placed))
 
 
-def _together(
-    view: CalibrationView, found: Sequence[CameraFound], nodes: Sequence[NodeShots]
-) -> CalibrationView:
+def _named(fitted: Sequence[FittedView], moments: Mapping[str, str]) -> tuple[FittedView, ...]:
+    """Views by their moments instead of the names of files."""
+    return tuple(replace(view, name=moments[view.name]) for view in fitted)
+
+
+def _together(views: BoardViews, view: CalibrationView, reports: Mapping[str, CameraReport]) -> CamerasFound:
     """All lenses and poses together; where that cannot be, every camera as it is by itself."""
-    reports = {one.view.name: one.report for one in found if one.report is not None}
-    seen = {
-        node.name: _seen(reports[node.name], {shot.color.name: shot.moment for shot in node.shots})
-        for node in nodes
-        if node.name in reports
-    }
+    nodes = shots_of(views)
     try:
-        rig = calibrate_rig({name: one.calibration for name, one in reports.items()}, seen, view.board, FOLDS)
+        rig = cameras_together(nodes, reports, view.board, FOLDS)
     except PacketMeshError as error:
-        return replace(view, rig=str(error))
-    cameras = []
-    for camera, node in zip(view.cameras, nodes, strict=True):
-        if camera.name in reports:
-            moments = {shot.color.name: shot.moment for shot in node.shots}
-            lens = _named(rig.cameras[camera.name], moments)
-            apart = () if rig.held_out is None else rig.held_out.views[camera.name]
-            unseen = [replace(one, name=moments[one.name]) for one in apart]
-            detections = reports[camera.name].detections
-            camera = _with_lens(camera, lens, unseen, view.board, detections, moments)
-        cameras.append(camera)
-    return replace(view, cameras=tuple(cameras), rig=_rig_view(rig))
-
-
-def _seen(report: CameraReport, moments: dict[str, str]) -> dict[str, Seen]:
-    """By moment."""
-    return {moments[view.name]: Seen(view, report.detections[view.name].oriented) for view in report.views}
+        return CamerasFound(replace(view, rig=str(error)), reports)
+    images = camera_images(nodes)
+    cameras = (
+        _with_lens(one, rig.cameras[one.name], images[one.name]) if one.name in reports else one
+        for one in view.cameras
+    )
+    return CamerasFound(replace(view, cameras=tuple(cameras), rig=_rig_view(rig.rig)), rig.cameras, rig)
 
 
 def _rig_view(rig: RigCalibration) -> RigView:

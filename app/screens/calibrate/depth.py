@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from app.drawing.colors import DELIVERED, LOSS, NEUTRAL, css
+from app.drawing.depth_bias_plots import bias_figure
 from app.screens.calibrate.view import BiasView
 from app.tables import number, table
 from app.ui import Ui
@@ -24,7 +24,7 @@ class DepthFolder:
             gui.add_markdown(TEXT)
             self._table = gui.add_html("")
             self._plot = gui.add_plotly(
-                bias_figure(None), aspect=0.85, config={"displayModeBar": False}, visible=False
+                go.Figure(), aspect=0.85, config={"displayModeBar": False}, visible=False
             )
             self._note = gui.add_markdown("")
 
@@ -34,7 +34,7 @@ class DepthFolder:
         self._plot.visible = found is not None
         self._table.content = "" if found is None else bias_table(found)
         if found is not None:
-            self._plot.figure = bias_figure(found)
+            self._plot.figure = bias_figure(found.curve)
             self._note.content = found.note and f"{found.note}."
         else:
             self._note.content = "Comparing depth with the board …" if told is None else str(told)
@@ -65,45 +65,3 @@ def bias_table(view: BiasView) -> str:
         )
     )
     return table(rows)
-
-
-def bias_figure(view: BiasView | None) -> go.Figure:
-    """Depth less the board's plane over the true depth, measured and corrected, and the bias found."""
-    figure = go.Figure()
-    figure.update_layout(
-        template="plotly_white",
-        margin={"l": 56, "r": 10, "t": 44, "b": 40},
-        xaxis={"title": "distance of the board, m"},
-        yaxis={"title": "depth is off by, mm"},
-        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
-        font={"size": 11},
-    )
-    if view is None:
-        return figure
-    for values, color, name in (
-        (view.before_m, LOSS, "measured"),
-        (view.after_m, DELIVERED, "corrected"),
-    ):
-        figure.add_scatter(
-            x=view.true_m,
-            y=1000.0 * values,
-            mode="markers",
-            marker={"size": 3, "color": css(color), "opacity": 0.45},
-            name=name,
-            hovertemplate=f"%{{x:.2f}} m: %{{y:+.1f}} mm<extra>{name}</extra>",
-        )
-    at_m = view.curve_z_m - view.curve_m
-    figure.add_scatter(
-        x=at_m, y=1000.0 * view.curve_m, mode="lines", line={"color": css(LOSS)}, name="bias that was found"
-    )
-    for sign in (-1.96, 1.96):
-        figure.add_scatter(
-            x=at_m,
-            y=1000.0 * sign * view.sd_m,
-            mode="lines",
-            line={"color": css(NEUTRAL), "dash": "dot", "width": 1},
-            name="noise, 95 %",
-            showlegend=sign > 0.0,
-            hoverinfo="skip",
-        )
-    return figure

@@ -30,13 +30,13 @@ def depth_job(store: Store, spec: Spec, name: str, view: str) -> Generator[Progr
     views = spec.views
     assert views is not None
     known = yield from finished(cameras_of(store, views))
-    camera = known.camera(name)
+    camera = known.view.camera(name)
     fitted = None if camera is None else camera.fitted(view)
     path = depth_file(views, name, view)
     if camera is None or camera.calibration is None or path is None or fitted is None:
         return DepthErrorView(name, view, {})
     depth = read_depth(path)
-    found = yield from bias_of(store, views, camera)
+    found = yield from bias_of(store, views, known, name)
     off_m = depth.z_m - board_depth_m(camera.calibration, fitted.T_camera_board, board_of(views))
     off_most_m = np.abs(off_m[np.isfinite(off_m)])
     most_m = max(float(np.quantile(off_most_m, 0.95)), LEAST_SCALE_M) if len(off_most_m) else LEAST_SCALE_M

@@ -151,8 +151,9 @@ class BoardsDrawing:
         """A camera; one that is named like a view can be clicked."""
         assert camera.calibration is not None
         width_px, height_px = camera.size_px
+        path = f"{BELOW}/frustum-{name.replace('/', '-')}"  # below no other camera, though one node has two
         frustum = self._scene.add_camera_frustum(
-            f"{BELOW}/frustum-{name}",
+            path,
             fov=2.0 * float(np.arctan2(0.5 * height_px, camera.calibration.matrix[1, 1])),
             aspect=width_px / height_px,
             scale=scale,
@@ -161,9 +162,10 @@ class BoardsDrawing:
             image=None if picture is None else decoded(picture_of(camera, picture))[::4, ::4],
         )
         place(frustum, pose)
-        below = f"{BELOW}/frustum-{name}/name"
         if label:
-            self._scene.add_label(below, label, position=(0.0, -0.9 * scale, 0.0), font_screen_scale=0.8)
+            self._scene.add_label(
+                f"{path}/name", label, position=(0.0, -0.9 * scale, 0.0), font_screen_scale=0.8
+            )
         if label == name and camera.fitted(name) is not None:
             self._handles[name] = frustum
             frustum.on_click(lambda _: self._on_pick(name))

@@ -22,11 +22,12 @@ def calibrate_job(store: Store, spec: Spec) -> Generator[Progress | CalibrationV
     """
     views = spec.views
     assert views is not None
-    view = yield from cameras_of(store, views, CAMERAS_SHARE)
+    found = yield from cameras_of(store, views, CAMERAS_SHARE)
+    view = found.view
     yield view
     for index, camera in enumerate(view.cameras):
         done = CAMERAS_SHARE + (1.0 - CAMERAS_SHARE) * index / len(view.cameras)
-        told = yield from bias_of(store, views, camera, done)
+        told = yield from bias_of(store, views, found, camera.name, done)
         view = replace(view, depth=view.depth | {camera.name: told if isinstance(told, str) else told.view})
         yield view
     return view

@@ -10,6 +10,7 @@ import numpy as np
 from app.drawing.colors import DELIVERED, DISTANCE_STOPS, LOSS, NEUTRAL, SOURCE, ramp
 from app.drawing.pictures import EQUAL, FARTHER, NEARER, UNKNOWN
 from app.records import ColorBar, Picture
+from app.screens.calibrate.view import WarpView
 from pipeline.calibration.diagnosis import Coverage
 from pipeline.calibration.estimate import Calibration, FittedView
 from pipeline.calibration.next_view import NextView
@@ -17,6 +18,8 @@ from pipeline.types import ByteArray, FloatArray
 
 PAPER = 245
 NO_POINTS = (228, 228, 228)
+WARP_WIDTH_PX, LEAST_WARP_M = 400, 5e-4
+"""Of the picture of a bent board, and from where on its colours are full."""
 SHIFT = 4
 """Bits behind the comma of what is drawn."""
 
@@ -89,6 +92,23 @@ def off_picture(off_m: FloatArray, most_m: float, zoom: float, what: str) -> Pic
     most = f"{1000.0 * most_m:.0f} mm"
     bar = ColorBar((NEARER, EQUAL, FARTHER), (f"−{most}", "0", f"+{most}"))
     return Picture(rgb, f"{what}: {middle}; blue too near, orange too far", bar)
+
+
+def warp_picture(warp: WarpView) -> Picture:
+    """How the board is bent, as one looks at it: blue towards the camera, orange away from it."""
+    most_m = max(float(np.abs(warp.off_plane_m).max()), LEAST_WARP_M)
+    rows, columns = warp.off_plane_m.shape
+    size_px = (WARP_WIDTH_PX, round(WARP_WIDTH_PX * rows / columns))
+    fine_m = cv2.resize(warp.off_plane_m.astype(np.float32), size_px, interpolation=cv2.INTER_CUBIC)
+    rgb = ramp(np.clip(fine_m, -most_m, most_m) + most_m, 2.0 * most_m, (NEARER, EQUAL, FARTHER))
+    most = f"{1000.0 * most_m:.2g} mm"
+    return Picture(
+        rgb,
+        f"Board bent by {1000.0 * warp.bend_m:.2g} mm from its deepest point to its highest; blue stands out "
+        f"towards the camera, orange lies behind. {'Used' if warp.used else 'Not used'}: views held out have "
+        f"{warp.rms_px:.4f} px with it, {warp.flat_rms_px:.4f} px with a flat board",
+        ColorBar((NEARER, EQUAL, FARTHER), (f"−{most}", "0", f"+{most}")),
+    )
 
 
 def _dots(rgb: ByteArray, points_px: FloatArray, color: tuple[int, int, int], radius_px: int) -> None:

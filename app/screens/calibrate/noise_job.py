@@ -64,7 +64,7 @@ def noise_job(
         InputError: the camera has no calibration.
     """
     assert spec.views is not None
-    known = yield from finished(cameras_of(store, spec.views))
+    known = (yield from finished(cameras_of(store, spec.views))).view
     camera = known.camera(request.camera)
     if camera is None or camera.calibration is None:
         raise InputError(f"There is no calibration of {request.camera} to repeat; add views first")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from app.screens.calibrate.terms import BENT, HELD_OUT, INTERVAL, RMS, STANDARD_ERROR, TRUTH, VIEWS
 from app.screens.calibrate.view import CameraView
 from app.tables import number, table
 from pipeline.calibration.estimate import Calibration, rms_px
@@ -22,15 +23,6 @@ MEANING = {
     "p1": "Tangential distortion, of a lens that is tilted against the sensor.",
     "p2": "Tangential distortion in the other direction.",
 }
-ABOUT_RMS = (
-    "Root mean square distance between where a point was seen and where the lens puts it, over all points "
-    "that the lens was made from. A low one says that the lens explains these views, not that it is right."
-)
-ABOUT_UNSEEN = (
-    "The same for views by a lens that has not seen them: each is left out in turn, and only its pose is "
-    "fitted to it."
-)
-ABOUT_VIEWS = "Photographs in which the board was found and that are used, of all there are."
 
 
 def unseen_rms_px(camera: CameraView) -> float | None:
@@ -47,13 +39,15 @@ def summary_table(cameras: Sequence[CameraView], names: Sequence[str] = ()) -> s
         return (name, meaning, *values)
 
     rows = [
-        row("Views used", ABOUT_VIEWS, [views_used(camera) for camera in cameras]),
-        row("RMS error", ABOUT_RMS, [number(None if one is None else one.rms_px, 3, "px") for one in found]),
-        row("Held-out RMS", ABOUT_UNSEEN, [number(unseen_rms_px(camera), 3, "px") for camera in cameras]),
+        row("Views used", VIEWS, [views_used(camera) for camera in cameras]),
+        row("RMS error", RMS, [number(None if one is None else one.rms_px, 3, "px") for one in found]),
+        row("Held-out RMS", HELD_OUT, [number(unseen_rms_px(camera), 3, "px") for camera in cameras]),
     ]
     rows += [
         row(f"{name} ± 95 %", MEANING[name], [within(one, name) for one in found]) for name in ("fx", "k1")
     ]
+    if any(camera.warp for camera in cameras):
+        rows.append(row("Board bent by", BENT, [bend(camera) for camera in cameras]))
     return table(rows, names)
 
 
@@ -61,6 +55,12 @@ def views_used(camera: CameraView) -> str:
     """How many of how many."""
     used = len(camera.calibration.views) if camera.calibration else 0
     return f"{used} of {len(camera.photographs)}"
+
+
+def bend(camera: CameraView) -> str:
+    """By how much the board is bent, and whether that is used."""
+    warp = camera.warp
+    return "–" if warp is None else f"{1000.0 * warp.bend_m:.2g} mm, {'' if warp.used else 'not '}used"
 
 
 def within(found: Calibration | None, name: str) -> str:
@@ -87,4 +87,5 @@ def parameter_table(camera: CameraView) -> str:
         if camera.truth:
             values.append(number(camera.truth.get(name), digits))
         rows.append((f"{name}{unit}", meaning, *values))
-    return table(rows, ("value", "std. error", "95 % interval", *(("truth",) if camera.truth else ())))
+    truth = (("truth", TRUTH),) if camera.truth else ()
+    return table(rows, ("value", ("std. error", STANDARD_ERROR), ("95 % interval", INTERVAL), *truth))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import replace
 from functools import partial
-from typing import Any, ClassVar, get_args
+from typing import Any, ClassVar
 
 from app.lesson import LessonFolder, read_lesson
 from app.records import Picture, SceneView
@@ -14,13 +14,15 @@ from app.screens.calibrate.area import PictureArea
 from app.screens.calibrate.bars import Bars, bars_of
 from app.screens.calibrate.depth import DepthFolder
 from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of, stand_before
-from app.screens.calibrate.labels import AROUND, DEPTH
+from app.screens.calibrate.labels import AROUND, DEPTH, NOTHING, TEXT
+from app.screens.calibrate.lens_folder import LensFolder
 from app.screens.calibrate.lesson import SETTINGS, SHIPPED, CalibrateLook, left_out
 from app.screens.calibrate.noise import NoiseFolder
 from app.screens.calibrate.noise_view import NoiseRequest
-from app.screens.calibrate.numbers import parameter_table, summary_table
+from app.screens.calibrate.numbers import summary_table
+from app.screens.calibrate.parameters import ParameterFolder
 from app.screens.calibrate.photograph import found_picture, picture_of, straightened_picture
-from app.screens.calibrate.request import calibrate_command, inner, views_in, with_boards
+from app.screens.calibrate.request import calibrate_command, inner, several, views_in, with_boards
 from app.screens.calibrate.rig import RigFolder
 from app.screens.calibrate.trust import TrustFolder, verdict_html
 from app.screens.calibrate.uploads import UploadFolder
@@ -29,15 +31,8 @@ from app.screens.calibrate.view import CalibrationView, CameraView, RigView, Tru
 from app.state import BoardViews, Spec, Step
 from app.ui import Panel
 from packetmesh.errors import InputError
-from pipeline.config import Lens
 from pipeline.io.demos import DEMO_SCENES, board_views_of
 from pipeline.sources import Calibrated, Demo
-
-TEXT = """**What you see.** Photographs of a board of known size tell how each camera bends what it sees, and
-where the board stood: click a bar or a board. What counts is not how well the lens explains these views, but
-how sure it is of **others**. Go on with **Depth**."""
-NOTHING = """This scene comes **without photographs of a board**: its cameras are taken at their word. Open a
-scene whose cameras need calibration, or use your own photographs below."""
 
 
 class CalibratePanel(Panel):
@@ -74,7 +69,7 @@ class CalibratePanel(Panel):
         self._verdict = gui.add_html("")
         self._use = UseRow(ui, self._use_it, self._as_before)
         self._camera = gui.add_dropdown("Camera", ["node_00"], hint="Whose views are shown.", visible=False)
-        ui.when_changed(self._camera, self._show_camera)
+        ui.when_changed(self._camera, self._picked_camera)
         self._bars = Bars(ui, self._pick)
         self._row = ui.buttons(
             "View",
@@ -99,34 +94,28 @@ class CalibratePanel(Panel):
         self._show_camera()
 
     def _build_folders(self) -> None:
-        gui, ui, session = self.gui, self.ui, self.session
+        ui, session = self.ui, self.session
         self._judge = TrustFolder(ui, self._ask)
-        with gui.add_folder("Every parameter, and how sure it is", expand_by_default=False):
-            self._parameters = gui.add_html("")
+        self._parameters = ParameterFolder(ui)
         self._depth = DepthFolder(ui)
         self._rig = RigFolder(ui)
         self._noise = NoiseFolder(ui, self._replay, session.cancel_side_job)
         self._uploads = UploadFolder(ui, session.folder, self._use_own)
-        with gui.add_folder("Advanced", expand_by_default=False):
-            self._lens = gui.add_dropdown(
-                "Lens",
-                list(get_args(Lens)),
-                hint="Distortions that the camera may have: k1 and k2 (thesis), also p1, p2, k3 (brown), or "
-                "k4 to k6 as well (rational); or those of a fisheye.",
-            )
-            ui.when_changed(self._lens, self._picked_lens)
+        self._lens = LensFolder(ui, self._picked_lens)
 
     # What there is to calibrate from.
 
     def on_show(self) -> None:
         """Look for the board at the first visit."""
         self._here = True
+        self._noise.show(True)
         if self.session.spec.views is None:
             self._use_own(None)
 
     def on_hide(self) -> None:
-        """Another step is shown."""
+        """Another step is shown, and the lower edge is left to it."""
         self._here = False
+        self._noise.show(False)
 
     def _use_own(self, views: BoardViews | None) -> None:
         """Take the photographs of the person, or those of the scene, once somebody looks."""
@@ -140,7 +129,8 @@ class CalibratePanel(Panel):
 
     def _want(self, views: BoardViews | None) -> None:
         if views is not None:
-            views = replace(views, lens=self._lens.value)
+            self._lens.one_camera(not several(views))
+            views = replace(views, lens=self._lens.lens, bent=self._lens.bent)
         if views != self.session.spec.views:
             self.session.want(replace(self.session.spec, views=views))
         self._show_camera()
@@ -201,6 +191,11 @@ class CalibratePanel(Panel):
     def _shown(self) -> CameraView | None:
         return None if self._view is None else self._view.camera(self._camera.value)
 
+    def _picked_camera(self) -> None:
+        """Show another camera; what was replayed is not its own."""
+        self._noise.forget()
+        self._show_camera()
+
     def _show_camera(self) -> None:
         camera = self._shown()
         with self.ui.atomic():
@@ -217,15 +212,18 @@ class CalibratePanel(Panel):
 
     def _show_numbers(self, camera: CameraView | None) -> None:
         if camera is None or self._view is None:
-            self._verdict.content = self._numbers.content = self._parameters.content = ""
+            self._verdict.content = self._numbers.content = ""
             self._judge.load(None)
+            self._parameters.load(None)
+            self._lens.load(None)
             self._depth.load("")
             self._rig.load(None)
             return
         before = self._whole.get(camera.name)
         pair = [camera] if before is None or not camera.dropped else [camera, before]
         self._numbers.content = summary_table(pair, ("now", "all views") if len(pair) > 1 else ())
-        self._parameters.content = parameter_table(camera)
+        self._parameters.load(camera)
+        self._lens.load(camera)
         self._depth.load(self._view.depth.get(camera.name))
         self._rig.load(self._view.rig)
 
@@ -239,6 +237,7 @@ class CalibratePanel(Panel):
         if self._chosen not in [one.name for one in camera.photographs]:
             self._chosen = camera.photographs[0].name
         trust = self._answers.trust_in(camera)
+        self._parameters.relate(None if trust is None else trust.together)
         photograph = picture_of(camera, self._chosen)
         pictures: dict[str, Picture] = {"photo": found_picture(photograph, camera.fitted(photograph.name))}
         if camera.calibration is not None:
@@ -333,7 +332,7 @@ class CalibratePanel(Panel):
     def command(self) -> str:
         """The command line that finds the cameras that are shown."""
         views = self.session.spec.views
-        return super().command if views is None else calibrate_command(views)
+        return super().command if views is None else calibrate_command(views, self._source)
 
     # The lesson.
 
@@ -343,8 +342,8 @@ class CalibratePanel(Panel):
             self._area.set(look.pair, look.split_share)
             self._around.value = next(name for name, key in AROUND.items() if key == look.around)
             self._judge.set(look.range_m)
-            if self._lens.value != look.lens:
-                self._lens.value, self._whole = look.lens, {}
+            if self._lens.set(look.lens):
+                self._whole = {}
             self._noise.forget()
         if not look.used and isinstance(self.session.spec.source, Calibrated):
             self._as_before()

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from app.state import BoardViews
 from pipeline.calibration.board import Board
-from pipeline.calibration.shots import BOARD_FILE, NodeShots, node_shots, read_board
-from pipeline.io.demos import DEMO_SCENES, board_views_of
-from pipeline.sources import Calibrated, Source
+from pipeline.calibration.shots import BOARD_FILE, NodeShots, camera_images, node_shots, read_board
+from pipeline.io.demos import DEMO_SCENES, SCENES, board_views_of
+from pipeline.sources import Calibrated, Demo, RigFolder, Source
 
 TRUTH = "truth.json"
 FOLDS = 4
@@ -42,6 +42,11 @@ def shots_of(views: BoardViews) -> tuple[NodeShots, ...]:
     return node_shots([views.folder])
 
 
+def several(views: BoardViews) -> bool:
+    """Whether more than one camera took them."""
+    return len(camera_images(shots_of(views))) > 1
+
+
 def true_parameters(views: BoardViews, camera: str) -> dict[str, float]:
     """fx, fy, cx, cy, k1 and so on of a camera whose photographs were rendered; empty for real ones."""
     try:
@@ -54,21 +59,33 @@ def true_parameters(views: BoardViews, camera: str) -> dict[str, float]:
         return {}
 
 
-def calibrate_command(views: BoardViews) -> str:
-    """The command line that finds the same cameras."""
+def calibrate_command(views: BoardViews, source: Source) -> str:
+    """The command line that finds the same cameras, several of them in the world of the scene's rig."""
     board, nodes = board_of(views), shots_of(views)
     folder = views.folder if len(nodes) > 1 else str(nodes[0].folder)
     words = ["packetmesh", "calibrate", folder, "--pattern", board.pattern]
     words += ["--columns", str(board.columns), "--rows", str(board.rows)]
     words += ["--spacing-mm", f"{1000.0 * board.spacing_m:g}", "--lens", views.lens, "--held-out", str(FOLDS)]
+    if views.bent:
+        words.append("--board-warp")
+    images = camera_images(nodes)
     names = {
-        (node.name, shot.moment): f"{node.name}/{shot.color.name}" if len(nodes) > 1 else shot.color.name
-        for node in nodes
-        for shot in node.shots
+        (camera, moment): f"{camera}/{path.name}" if len(images) > 1 else path.name
+        for camera, moments in images.items()
+        for path, moment in moments.items()
     }
     if views.dropped:
         words += ["--without", *(names[one] for one in views.dropped if one in names)]
+    if len(images) > 1 and (rig := _folder(source)) and (rig / nodes[0].name / "pose.txt").exists():
+        words += ["--like", str(rig)]
     return shlex.join([*words, "--out", "runs/calibration"])
+
+
+def _folder(source: Source) -> Path | None:
+    """Where the rig of a scene lies; None of one that is no rig on disk."""
+    if isinstance(source, Demo):
+        return SCENES / source.name
+    return Path(source.path) if isinstance(source, RigFolder) else None
 
 
 def inner(source: Source) -> Source:

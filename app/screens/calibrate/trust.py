@@ -9,8 +9,9 @@ import plotly.graph_objects as go
 
 from app.drawing.calibration_plots import distortion_figure, radial_residuals_figure
 from app.drawing.colors import DELIVERED, LOSS, css
+from app.screens.calibrate.terms import HALVES
 from app.screens.calibrate.view import TrustRequest, TrustView
-from app.tables import number, table
+from app.tables import number, table, term
 from app.ui import Ui
 
 REST_S = 0.3
@@ -89,6 +90,7 @@ def verdict_html(view: TrustView | None) -> str:
         return ""
     sign, color = ("✓ PASS", DELIVERED) if view.passed else ("✗ FAIL", LOSS)
     first, *rest = (html.escape(line) for line in view.lines)
+    rest = [line.replace("Two halves", term("Two halves", HALVES)) for line in rest]
     more = "".join(f"<div style='margin-top: 0.4em'>{line}</div>" for line in rest)
     return (
         f"<div style='margin: 0 0.8em 0.6em; padding: 0.5em 0.8em; font-size: 13px; border-radius: 4px; "
@@ -109,8 +111,8 @@ def trust_table(view: TrustView) -> str:
             ),
             (
                 "Two halves apart",
-                "The camera is estimated from every other view and from the others; how far apart both put a "
-                "point at the range, root mean square over the image. A lens of the wrong kind shows here.",
+                f"{HALVES} This is how far apart both put a point at the range, root mean square over the "
+                "image. A lens of the wrong kind shows here.",
                 number(view.difference_m, 2, "mm", 1000.0),
             ),
             (

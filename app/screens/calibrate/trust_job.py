@@ -15,6 +15,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.calibration.assess import Trust, assess
 from pipeline.calibration.board import Board
+from pipeline.calibration.correlation import correlations
 from pipeline.calibration.diagnosis import radial_curve, radial_residuals
 from pipeline.calibration.estimate import Calibration, View
 from pipeline.calibration.trust import CIRCLE95
@@ -29,19 +30,20 @@ def trust_job(store: Store, spec: Spec, request: TrustRequest) -> Generator[Prog
     """
     views = spec.views
     assert views is not None
-    known = yield from finished(cameras_of(store, views))
+    known = (yield from finished(cameras_of(store, views))).view
     camera = known.camera(request.camera)
     if camera is None or camera.calibration is None:
         raise InputError(f"{request.camera} has no lens to judge; add views of the board first")
 
     def judge() -> Generator[Progress, None, TrustView]:
         yield Progress(f"trust in {camera.name}", 0.5)
-        return _judged(camera, request, known.board)
+        return _judged(camera, request, known.board, len(known.cameras) == 1 and not views.bent)
 
     return (yield from store.remember(("trust", views, request), judge))
 
 
-def _judged(camera: CameraView, request: TrustRequest, board: Board) -> TrustView:
+def _judged(camera: CameraView, request: TrustRequest, board: Board, may_bend: bool) -> TrustView:
+    """The answer; ``may_bend`` tells whether another shape of the board is still to be tried."""
     lens = camera.calibration
     assert lens is not None
     views = [View(one.name, one.points_px, one.board_m) for one in lens.views]
@@ -67,7 +69,7 @@ def _judged(camera: CameraView, request: TrustRequest, board: Board) -> TrustVie
     return TrustView(
         request,
         trust.verdict.passed,
-        tuple(_lines(trust, lens)),
+        tuple(_lines(trust, lens, may_bend)),
         tuple(one.name for one in trust.outliers),
         pictures,
         radial_curve(lens),
@@ -75,10 +77,11 @@ def _judged(camera: CameraView, request: TrustRequest, board: Board) -> TrustVie
         _rms(noise_m),
         None if apart_m is None else _rms(apart_m),
         None if trust.halves is None else (trust.halves.ratio, trust.halves.most_by_noise),
+        correlations(lens),
     )
 
 
-def _lines(trust: Trust, lens: Calibration) -> Iterator[str]:
+def _lines(trust: Trust, lens: Calibration, may_bend: bool) -> Iterator[str]:
     """The verdict, and what to do, in the words of the screen."""
     judged, halves, following = trust.verdict, trust.halves, trust.following
     asked = f"{1000.0 * judged.accuracy_m:g} mm at {judged.range_m:g} m"
@@ -89,10 +92,11 @@ def _lines(trust: Trust, lens: Calibration) -> Iterator[str]:
         f"over {100.0 * judged.share:.0f} % of the image, and {reached} over 95 % of it."
     )
     if halves is not None and halves.beyond_noise and not judged.passed:
+        bent = ", say there that the board may be bent," if may_bend else ""
         yield (
             f"Two halves of the views differ by {halves.ratio:.1f} times what noise explains (by chance up "
             f"to {halves.most_by_noise:.1f}): the lens is of the wrong kind, or a view or the board is "
-            "wrong. Try another lens under Advanced, or drop the views that stand out."
+            f"wrong. Try another lens under Advanced{bent} or drop the views that stand out."
         )
     elif following is not None and not judged.passed:
         yield (

@@ -6,26 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from app.tables import number, table
+from app.tables import UNKNOWN, number, table, truth_rows
 from app.ui import Ui
 
 USE, BEFORE = "Use this calibration", "As before"
-IDLE = ""
 WRITING = "Writing the calibration …"
-ROWS = (
-    (
-        "F-score 5 cm",
-        "Harmonic mean of coverage and accuracy within 5 cm of the true surface.",
-        "f_score_5cm",
-        "%",
-    ),
-    (
-        "Depth error",
-        "Median depth error of the rays that hit, against the truth.",
-        "median_depth_error_m",
-        "cm",
-    ),
-)
 
 
 class UseRow:
@@ -90,11 +75,5 @@ def surface_table(columns: dict[str, Any]) -> str:
         )
     ]
     if any(mesh is not None and mesh.truth for mesh in meshes):
-        rows += [(name, hint, *(_true(mesh, key, unit) for mesh in meshes)) for name, hint, key, unit in ROWS]
+        rows += truth_rows(meshes, UNKNOWN)
     return table(rows, tuple(f"surface {name}" for name in columns))
-
-
-def _true(mesh: Any, key: str, unit: str) -> str:
-    if mesh is None:
-        return "–"
-    return "…" if mesh.truth is None else number(mesh.truth.get(key), 1, unit, 100.0)

@@ -7,19 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.screens.calibrate.bias import bias_of
-from app.screens.calibrate.cameras import cameras_of, finished
-from app.screens.calibrate.view import CameraView, RigView
+from app.screens.calibrate.cameras import CamerasFound, cameras_of, finished
+from app.screens.calibrate.request import inner
 from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
+from pipeline.calibration.shots import INFRARED
+from pipeline.geometry import LEVEL_POSE
 from pipeline.io.calibrations import CalibratedNode, write_calibration
 from pipeline.io.depth_correction import DEPTH_CORRECTION, write_depth_correction
-from pipeline.sources import Calibrated
-from pipeline.types import CameraIntrinsics, FloatArray, Rig
-
-CHAIN_LENSES = ("thesis", "brown")
-"""Those that the chain can undo."""
+from pipeline.types import CameraIntrinsics, Rig
 
 
 def use_job(store: Store, spec: Spec, folder: str) -> Generator[Progress, None, str]:
@@ -35,59 +33,48 @@ def use_job(store: Store, spec: Spec, folder: str) -> Generator[Progress, None, 
     """
     views, source = spec.views, spec.source
     assert views is not None
-    before = replace(spec, source=source.source if isinstance(source, Calibrated) else source)
-    rig: Rig = yield from store.stage(before, "rig")
+    rig: Rig = yield from store.stage(replace(spec, source=inner(source)), "rig")
     known = yield from finished(cameras_of(store, views))
-    cameras = [camera for camera in known.cameras if camera.calibration is not None]
-    if not cameras:
+    if not known.reports:
         raise InputError("No camera is calibrated yet; add views of the board first")
-    for camera in cameras:
-        _check(camera, rig)
-    poses = _poses(known.rig, rig) if isinstance(known.rig, RigView) else {}
-    write_calibration(
-        folder, {one.name: CalibratedNode(_intrinsics(one), poses.get(one.name)) for one in cameras}
-    )
-    for index, camera in enumerate(cameras):
-        found = yield from bias_of(store, views, camera, index / len(cameras))
+    for name, report in known.reports.items():
+        if not name.endswith(INFRARED):
+            _check(name, report.intrinsics, rig)
+    nodes = _nodes(known, rig)
+    write_calibration(folder, nodes)
+    for index, name in enumerate(nodes):
+        found = yield from bias_of(store, views, known, name, index / len(nodes))
         if not isinstance(found, str):
-            write_depth_correction(Path(folder) / camera.name / DEPTH_CORRECTION, found.correction)
+            write_depth_correction(Path(folder) / name / DEPTH_CORRECTION, found.correction)
     return folder
 
 
-def _poses(placed: RigView, rig: Rig) -> dict[str, FloatArray]:
-    """(4, 4) T_world_camera by name; none unless all nodes were placed: others would be in another world."""
+def _nodes(known: CamerasFound, rig: Rig) -> dict[str, CalibratedNode]:
+    """By name; without poses unless all nodes were placed, as others would be in another world."""
+    if known.rig is None:
+        return {
+            name: CalibratedNode(report.intrinsics)
+            for name, report in known.reports.items()
+            if not name.endswith(INFRARED)
+        }
     believed = {frame.name: frame.T_world_camera for frame in rig.frames}
-    found = {one.name: one.T_first_camera for one in placed.cameras}
-    if set(found) != set(believed):
-        return {}
-    T_world_first = believed[placed.cameras[0].name]
-    return {name: T_world_first @ T for name, T in found.items()}
+    nodes = known.rig.nodes(believed.get(known.rig.rig.names[0], LEVEL_POSE))
+    if set(nodes) == set(believed):
+        return nodes
+    return {name: replace(node, T_world_camera=None) for name, node in nodes.items()}
 
 
-def _intrinsics(camera: CameraView) -> CameraIntrinsics:
-    lens = camera.calibration
-    assert lens is not None
-    return CameraIntrinsics(lens.matrix, lens.distortion[:5].copy(), *lens.size_px)
-
-
-def _check(camera: CameraView, rig: Rig) -> None:
-    """Raise InputError where the chain cannot take a camera."""
-    lens = camera.calibration
-    assert lens is not None
+def _check(name: str, camera: CameraIntrinsics, rig: Rig) -> None:
+    """Raise InputError where the scene cannot take a camera."""
     sizes_px = {frame.name: (frame.intrinsics.width_px, frame.intrinsics.height_px) for frame in rig.frames}
-    if camera.name not in sizes_px:
+    if name not in sizes_px:
         raise InputError(
-            f"The scene has no {camera.name}, only {', '.join(sizes_px)}; choose under 'Taken by' whose "
-            "photographs these are"
+            f"The scene has no {name}, only {', '.join(sizes_px)}; choose under 'Taken by' whose photographs "
+            "these are"
         )
-    if sizes_px[camera.name] != lens.size_px:
-        (width, height), (own_width, own_height) = sizes_px[camera.name], lens.size_px
+    if sizes_px[name] != (camera.width_px, camera.height_px):
+        width, height = sizes_px[name]
         raise InputError(
-            f"{camera.name} of the scene has {width} x {height} pixels and the photographs {own_width} x "
-            f"{own_height}; a calibration is good for one size only"
-        )
-    if lens.lens not in CHAIN_LENSES:
-        raise InputError(
-            f"The chain knows no {lens.lens} lens; choose {' or '.join(CHAIN_LENSES)} under Advanced to use "
-            "it"
+            f"{name} of the scene has {width} x {height} pixels and the photographs {camera.width_px} x "
+            f"{camera.height_px}; a calibration is good for one size only"
         )

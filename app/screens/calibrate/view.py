@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from app.drawing.depth_bias_plots import BiasCurve
 from app.records import Picture
 from pipeline.calibration.board import Board
+from pipeline.calibration.correlation import Correlations
 from pipeline.calibration.diagnosis import RadialCurve, RadialResiduals
 from pipeline.calibration.estimate import Calibration, FittedView
 from pipeline.types import FloatArray
@@ -35,6 +39,25 @@ class Photograph:
 
 
 @dataclass(frozen=True, slots=True)
+class WarpView:
+    """The board's own shape, as the views of one camera have it."""
+
+    off_plane_m: FloatArray
+    """(R, C) of its points, above or below the plane that lies best in them."""
+    used: bool
+    """Whether the camera was estimated with it: it is where that predicts held-out views better."""
+    rms_px: float
+    """Of held-out views, with it."""
+    flat_rms_px: float
+    """With a flat board."""
+
+    @property
+    def bend_m(self) -> float:
+        """From the deepest point to the highest."""
+        return float(np.ptp(self.off_plane_m))
+
+
+@dataclass(frozen=True, slots=True)
 class CameraView:
     """One camera, from its photographs."""
 
@@ -51,6 +74,8 @@ class CameraView:
     """Names of the views that are left out."""
     truth: dict[str, float] = field(default_factory=dict)
     """Parameters as they truly are, by name; empty for real cameras."""
+    warp: WarpView | None = None
+    """None unless it was asked for."""
 
     def fitted(self, name: str) -> FittedView | None:
         """A view as the lens explains it, which may have been dropped; None without board or lens."""
@@ -74,18 +99,7 @@ class BiasView:
     """Of each number of theirs: its name, value, ends of its 95 % interval and unit."""
     rms_before_m: float
     rms_after_m: float
-    true_m: FloatArray
-    """(N,) depth of some pixels on the boards, by the boards' planes."""
-    before_m: FloatArray
-    """(N,) measured less true."""
-    after_m: FloatArray
-    """(N,) corrected less true."""
-    curve_z_m: FloatArray
-    """(K,)"""
-    curve_m: FloatArray
-    """(K,) by which a sensor of this bias is off at each, measured less true, in the mean over the image."""
-    sd_m: FloatArray
-    """(K,) of its noise on a board that faces it."""
+    curve: BiasCurve
     note: str
     """What the views cannot tell apart; empty if they can."""
 
@@ -164,6 +178,8 @@ class TrustView:
     """Between two halves of the views, likewise; None with too few of them."""
     halves: tuple[float, float] | None
     """That difference over what noise lets one expect, and how much that is at most in 95 of 100 cases."""
+    together: Correlations
+    """How the errors of the parameters go together."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,7 +51,11 @@ def depth_table(node: DepthNode) -> str:
                 "Median error of the inferred depth where the sensor is blind, against the truth.",
                 number(node.truth_error_m, 1, "cm", 100),
             ),
-            ("Outliers", "Sensor points that the filter rejects.", f"{rejected:,} ({share:.1%})"),
+            (
+                "Outliers",
+                "Sensor points that the filter rejects, and what share of the measured pixels it keeps.",
+                f"{rejected:,} ({1.0 - share:.2%} kept)",
+            ),
             ("Sensor points", "Points that pass the filter.", f"{kept:,}"),
             ("Filled points", "Inferred points that fusion adds.", f"{node.filled.total:,}"),
         ]

@@ -46,10 +46,16 @@ ADVANCED = (
     Choice(
         "Outlier filter",
         "acquisition.outlier_mode",
-        {"thesis": "thesis: mean + t sigma", "depth_normalised": "depth-normalised", "robust": "robust"},
+        {
+            "flying": "flying pixels",
+            "thesis": "thesis: mean + t sigma",
+            "depth_normalised": "depth-normalised",
+            "robust": "robust",
+        },
     ),
     Number("Neighbours N", "acquisition.outlier_neighbours", 1, 16, 1),
     Number("Threshold t (σ)", "acquisition.outlier_t", 0.0, 4.0, 0.1),
+    Toggle("Average the noise", "acquisition.average"),
     Toggle("Centre crop", "depth.crop"),
     Choice("Fusion", "fusion.mode", {"union": "union: all points", "fill": "fill: only the holes"}),
     Toggle("Rigid fit", "fusion.register_inferred"),

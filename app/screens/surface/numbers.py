@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 from app.records import MeshView
 from app.screens.surface.view import BaselineView, PaintedView, SurfaceView
-from app.tables import Row, number, table
+from app.tables import WAITING, Row, number, table, truth_rows
 
 
 def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_truth: bool) -> str:
@@ -16,13 +16,29 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
     columns |= {baseline.name: baseline.mesh for baseline in baselines}
 
     def row(name: str, hint: str, value: Callable[[MeshView], str]) -> Row:
-        return (name, hint, *("…" if mesh is None else value(mesh) for mesh in columns.values()))
+        return (name, hint, *(WAITING if mesh is None else value(mesh) for mesh in columns.values()))
 
     rows = [
         row(
             "No-hit rays",
             "Share of the cameras' pixel rays that miss the surface: what one sees as holes.",
             lambda m: number(m.quality.no_hit_ray_share, 1, "%", 100),
+        ),
+        row(
+            "Rays by guess",
+            "Share of the rays that meet surface most of whose points were inferred, not measured.",
+            lambda m: number(m.quality.guessed_ray_share, 1, "%", 100),
+        ),
+        row(
+            "Measured within 2 %",
+            "Share of the measured pixels whose ray meets the surface within 2 % of the measurement. It must "
+            "not fall by fusion: a measurement is never replaced by a guess.",
+            lambda m: number(m.quality.within_2pct_share, 1, "%", 100),
+        ),
+        row(
+            "Measured within 5 %",
+            "The same within 5 % of the measurement.",
+            lambda m: number(m.quality.within_5pct_share, 1, "%", 100),
         ),
         row(
             "Hole area",
@@ -48,7 +64,7 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
         ),
     ]
     if has_truth:
-        rows[1:1] = [row(name, hint, _truth_number(key, unit)) for name, hint, key, unit in TRUTH_ROWS]
+        rows[1:1] = truth_rows(list(columns.values()))
     head = ", ".join(f"{1000 * radius_m:.1f}" for radius_m in view.radii_m)
     caption = f"<div style='padding: 0 0.8em; font-size: 13px'>Ball radii: {head} mm</div>"
     return caption + table(rows, tuple(columns)) + _price(view)
@@ -85,23 +101,3 @@ def _price(view: SurfaceView) -> str:
         "<div style='padding: 0.4em 0.8em; font-size: 13px'>Fewer holes have a price here: what fills them "
         f"is guessed, and the F-score falls from {before:.1%} to {after:.1%}.</div>"
     )
-
-
-def _truth_number(key: str, unit: str) -> Callable[[MeshView], str]:
-    return lambda mesh: "…" if mesh.truth is None else number(mesh.truth.get(key), 1, unit, 100.0)
-
-
-TRUTH_ROWS = (
-    (
-        "F-score 5 cm",
-        "Harmonic mean of coverage and accuracy within 5 cm of the true surface.",
-        "f_score_5cm",
-        "%",
-    ),
-    (
-        "Depth error",
-        "Median depth error of the rays that hit, against the truth.",
-        "median_depth_error_m",
-        "cm",
-    ),
-)

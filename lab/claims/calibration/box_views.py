@@ -21,7 +21,7 @@ from lab.worlds.sensor import sense_depth
 from lab.worlds.staging import VGA
 from lab.worlds.textures import cardboard, plaster
 from packetmesh.progress import drain
-from pipeline.acquisition import back_project, filter_outliers
+from pipeline.acquisition import acquire
 from pipeline.calibration.board import Board
 from pipeline.calibration.depth_from_images import depth_beside, depth_fit
 from pipeline.calibration.from_images import image_files, iterate_calibration
@@ -102,9 +102,8 @@ def box_depth(
 def measured_m(depth: DepthMap, lens: CameraIntrinsics) -> FloatArray:
     """(3,) of the box by the sensor's points, with outliers left out as the chain does."""
     rgb = np.zeros((*depth.z_m.shape, 3), np.uint8)
-    cloud = back_project(RgbdFrame("box", rgb, depth, lens, np.eye(4)))
-    kept = filter_outliers(cloud, PRESETS["packetmesh"].acquisition, lens.fx_px).kept
-    return box_size_m(kept.points_m)
+    frame = RgbdFrame("box", rgb, depth, lens, np.eye(4))
+    return box_size_m(acquire(frame, PRESETS["packetmesh"].acquisition).cloud(frame).kept.points_m)
 
 
 def box_trial(task: BoxTask) -> dict[str, list[list[list[float]]]]:

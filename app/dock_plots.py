@@ -1,0 +1,73 @@
+"""Plots in the dock at the lower edge of the window, for what a whole class is to read.
+
+The page's side is ``dock_plots.js``. What it is to know is in one hidden piece of HTML, which says all of it.
+"""
+
+from __future__ import annotations
+
+import json
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import plotly.graph_objects as go
+
+from app.dock_row import add_hidden
+from app.page import running
+from app.ui import Ui
+
+_SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """What is shown at a time."""
+
+    title: str
+    legend: str
+    """HTML: what the signs in all plots mean."""
+    figures: tuple[go.Figure, ...]
+    table: str = ""
+    """HTML, right of the plots."""
+
+
+class PlotDock:
+    """Shows plots beside each other; a person may close it, which holds until something else is shown."""
+
+    def __init__(self, ui: Ui) -> None:
+        """Add it, empty and hidden."""
+        self._name, self._run = uuid.uuid4().hex, 0
+        self._sheet: Sheet | None = None
+        self._visible = False
+        with add_hidden(ui, self._name, _SCRIPT):
+            self._message = ui.gui.add_html("")
+
+    def begin(self) -> None:
+        """What comes is something else, to be seen even if what was there was closed."""
+        self._run += 1
+
+    def load(self, sheet: Sheet | None) -> None:
+        """Show another sheet; None shows nothing."""
+        if sheet is not None or self._sheet is not None:
+            self._sheet = sheet
+            self._tell()
+
+    def show(self, visible: bool) -> None:
+        """Show it or leave the lower edge to others."""
+        if visible != self._visible:
+            self._visible = visible
+            self._tell()
+
+    def _tell(self) -> None:
+        sheet = self._sheet if self._visible else None
+        said: dict[str, object] = {"dock": self._name, "run": self._run, "visible": sheet is not None}
+        if sheet is not None:
+            said |= {"title": sheet.title, "legend": sheet.legend, "table": sheet.table}
+            said["figures"] = _figures(sheet.figures)
+        message = json.dumps(said, separators=(",", ":"))
+        self._message.content = running(f"(window.packetmeshPlots ??= []).push({message})")
+
+
+def _figures(figures: Sequence[go.Figure]) -> list[object]:
+    return [json.loads(figure.to_json()) for figure in figures]

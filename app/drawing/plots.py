@@ -1,0 +1,42 @@
+"""What all plots of a calibration have in common: their look, and axes like an image's."""
+
+from __future__ import annotations
+
+import plotly.graph_objects as go
+
+from app.drawing.colors import BRAND, css
+
+BAND95 = 1.96
+"""Standard deviations to either side that hold 95 % of a normal distribution."""
+
+
+def titled_figure(title: str, x_title: str, y_title: str) -> go.Figure:
+    """An empty plot; its legend is below it."""
+    figure = go.Figure()
+    figure.update_layout(
+        template="plotly_white",
+        title={"text": title, "font": {"size": 13, "color": css(BRAND)}, "x": 0.02},
+        margin={"l": 56, "r": 10, "t": 34, "b": 40},
+        xaxis={"title": x_title},
+        yaxis={"title": y_title},
+        font={"size": 11},
+        legend={"orientation": "h", "y": -0.25},
+    )
+    return figure
+
+
+def image_figure(title: str, size_px: tuple[int, int]) -> go.Figure:
+    """Axes of an image: its first row is on top, its pixels are square."""
+    width, height = size_px
+    figure = titled_figure(title, "column, px", "row, px")
+    figure.update_layout(
+        xaxis={"range": [-0.5, width - 0.5], "showgrid": False, "constrain": "domain"},
+        yaxis={"range": [height - 0.5, -0.5], "showgrid": False, "scaleanchor": "x", "constrain": "domain"},
+        showlegend=False,
+    )
+    return figure
+
+
+def faint(color: tuple[int, int, int]) -> str:
+    """A colour to fill a band with."""
+    return "rgba({}, {}, {}, 0.25)".format(*color)

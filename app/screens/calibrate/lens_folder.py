@@ -1,0 +1,74 @@
+"""What the camera and the board may be: the kind of lens, and whether the board may be bent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import get_args
+
+import numpy as np
+
+from app.compare import caption_html
+from app.screens.calibrate.maps import warp_picture
+from app.screens.calibrate.view import CameraView
+from app.ui import Ui
+from pipeline.config import Lens
+
+ABOUT_LENS = (
+    "Distortions that the camera may have: k1 and k2 (thesis), also p1, p2, k3 (brown), or k4 to k6 as well "
+    "(rational); or those of a fisheye, a lens so wide that straight lines cannot stay straight."
+)
+ABOUT_BENT = (
+    "Estimates where every point of the board truly is, with the camera, and uses that if views that had no "
+    "part in it are predicted better. Off: the board is as flat as it was printed."
+)
+NOT_BENT = """Only with the photographs of **one camera**: several are placed by a board that is taken as
+flat. Use those of one of them alone to see whether the board is bent."""
+EMPTY = np.full((48, 64, 3), 235, np.uint8)
+
+
+class LensFolder:
+    """A drop-down, a checkbox, and the board's shape where it was asked for."""
+
+    def __init__(self, ui: Ui, on_change: Callable[[], None]) -> None:
+        """Add the folder; ``on_change`` is called when somebody wants another camera."""
+        gui = ui.gui
+        with gui.add_folder("Advanced", expand_by_default=False):
+            self._lens = gui.add_dropdown("Lens", list(get_args(Lens)), hint=ABOUT_LENS)
+            self._bent = gui.add_checkbox("The board may be bent", False, hint=ABOUT_BENT)
+            self._why_not = gui.add_markdown("")
+            self._image = gui.add_image(EMPTY, format="jpeg", visible=False)
+            self._caption = gui.add_html("", visible=False)
+        for handle in (self._lens, self._bent):
+            ui.when_changed(handle, on_change)
+
+    @property
+    def lens(self) -> Lens:
+        """The kind that is wanted."""
+        return self._lens.value
+
+    @property
+    def bent(self) -> bool:
+        """Whether the board's shape is wanted, too."""
+        return bool(self._bent.value) and not self._bent.disabled
+
+    def one_camera(self, alone: bool) -> None:
+        """Whether there is only one, so that the board may be bent."""
+        self._bent.disabled = not alone
+        self._why_not.content = "" if alone else NOT_BENT
+        if not alone:
+            self._bent.value = False
+
+    def set(self, lens: Lens) -> bool:
+        """Choose for the person, with a flat board; whether that is another choice."""
+        changed = (self._lens.value, self._bent.value) != (lens, False)
+        self._lens.value, self._bent.value = lens, False
+        return changed
+
+    def load(self, camera: CameraView | None) -> None:
+        """Show the shape of the board of a camera's views."""
+        warp = None if camera is None else camera.warp
+        self._image.visible = self._caption.visible = warp is not None
+        if warp is not None:
+            picture = warp_picture(warp)
+            self._image.image = picture.rgb
+            self._caption.content = caption_html(picture)

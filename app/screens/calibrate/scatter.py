@@ -1,0 +1,159 @@
+"""The trials of the noise experiment as the dock shows them: large, around the truth, beside the thesis's."""
+
+from __future__ import annotations
+
+import html
+
+import numpy as np
+import plotly.graph_objects as go
+
+from app.dock_plots import Sheet
+from app.drawing.colors import BRAND, DELIVERED, INFERRED, LOSS, NEUTRAL, css
+from app.screens.calibrate.noise_view import CLOSE, INSIDE_95, NoiseView
+from app.screens.calibrate.numbers import MEANING, UNITS
+from app.screens.calibrate.thesis import Cell, nearest_cell
+from app.tables import number, term
+from pipeline.types import FloatArray
+
+PAIRS = (("fx", "fy"), ("cx", "cy"), ("k1", "k2"))
+TEXT_PX, TICK_PX, DOT_PX = 17, 15, 8
+REACH = 3.5
+"""Standard errors on either side of the truth that are shown at least."""
+INK = "#111"
+ERROR = "Root mean square of the trials' difference from the truth."
+PREDICTED = (
+    "The standard error that each trial gives itself, in the mean; like the error if it can be trusted."
+)
+THESIS = (
+    "What the thesis's one trial is off by at the noise of Table 4.1 that is nearest: of f and c the same "
+    "share of this camera's, of k1 and k2 the same difference."
+)
+
+
+def noise_sheet(view: NoiseView) -> Sheet:
+    """Everything that the dock shows of the trials so far."""
+    cell = nearest_cell(view.request.sigma_px, view.names)
+    request = view.request
+    lens = ", through a lens of another kind" if request.other_lens else ""
+    return Sheet(
+        f"{request.camera}, {request.sigma_px:.2f} px of noise{lens}: {view.trials} of {request.trials} "
+        "trials",
+        legend_html(cell),
+        tuple(scatter_figure(view, x, y, cell) for x, y in PAIRS),
+        errors_html(view, cell),
+    )
+
+
+def legend_html(cell: Cell | None) -> str:
+    """What the signs mean."""
+    signs = [
+        (f'<i style="background: {css(BRAND)}"></i>', "trial"),
+        (f'<i style="background: {css(LOSS)}"></i>', "trial outside"),
+        (f'<i class="line" style="border-color: {css(DELIVERED)}"></i>', "95 % predicted"),
+        ("<b>+ </b>", "truth"),
+        (
+            f'<i class="line" style="border-top-style: dashed; border-color: {css(NEUTRAL)}"></i>',
+            f"thesis: within {100.0 * CLOSE:g} %",
+        ),
+    ]
+    if cell is not None:
+        sign = f'<b style="color: {css(INFERRED)}">◆ </b>'
+        signs.append((sign, f"thesis: its trial at {cell.sigma_px:g} px (Table 4.1)"))
+    return "".join(f"<span>{sign}{html.escape(text)}</span>" for sign, text in signs)
+
+
+def errors_html(view: NoiseView, cell: Cell | None) -> str:
+    """A table: how far the trials are off, how far they think they are, and the thesis's."""
+    pad = "padding: 3px 0 3px 14px; text-align: right; font-variant-numeric: tabular-nums"
+    heads = [term("error", ERROR), term("predicted", PREDICTED)]
+    heads += [] if cell is None else [term("thesis", THESIS)]
+    lines = ["".join(f'<th style="{pad}">{head}</th>' for head in ("", *heads))]
+    for name in view.names:
+        digits, unit = (2, "px") if name in UNITS else (4, "")
+        told = [number(view.rmse(name), digits, unit), number(view.predicted(name), digits, unit)]
+        off = None if cell is None else cell.error(name, view.true(name))
+        told += (
+            []
+            if cell is None
+            else ["–" if off is None else f"{off:+.{digits}f} {unit}".strip().replace("-", "−")]
+        )
+        cells = "".join(f'<td style="{pad}">{one}</td>' for one in told)
+        lines.append(f'<td style="{pad}">{term(name, MEANING.get(name, name))}</td>{cells}')
+    return f'<table style="border-collapse: collapse">{"".join(f"<tr>{line}</tr>" for line in lines)}</table>'
+
+
+def scatter_figure(view: NoiseView, x: str, y: str, cell: Cell | None) -> go.Figure:
+    """The trials, the truth as a cross, and the ellipse that should hold 95 % of them."""
+    figure = go.Figure()
+    figure.update_layout(
+        template="plotly_white",
+        margin={"l": 78, "r": 14, "t": 8, "b": 52},
+        xaxis=_axis(view, x, cell),
+        yaxis=_axis(view, y, cell),
+        showlegend=False,
+        font={"size": TICK_PX, "color": INK},
+    )
+    _add_claim(figure, view, x, y)
+    inside = view.inside(x, y)
+    for rows, color in ((inside, BRAND), (~inside, LOSS)):
+        marker = {"color": css(color), "size": DOT_PX, "opacity": 0.55}
+        _add_dots(figure, view.column(x)[rows], view.column(y)[rows], marker, (x, y), "trial")
+    ellipse = ellipse_points(np.array([view.true(x), view.true(y)]), view.pair_covariance(x, y))
+    line = {"color": css(DELIVERED), "width": 3}
+    figure.add_scatter(x=ellipse[:, 0], y=ellipse[:, 1], mode="lines", line=line, hoverinfo="skip")
+    true = np.array([view.true(x)]), np.array([view.true(y)])
+    cross = {"symbol": "cross-thin", "size": 22, "line": {"color": INK, "width": 4}}
+    _add_dots(figure, *true, cross, (x, y), "truth")
+    off = (None, None) if cell is None else (cell.error(x, view.true(x)), cell.error(y, view.true(y)))
+    if off[0] is not None and off[1] is not None:
+        diamond = {"symbol": "diamond", "size": 15, "color": css(INFERRED)}
+        diamond["line"] = {"color": "white", "width": 1}
+        _add_dots(figure, true[0] + off[0], true[1] + off[1], diamond, (x, y), "thesis")
+    return figure
+
+
+def _axis(view: NoiseView, name: str, cell: Cell | None) -> dict[str, object]:
+    """From the truth to either side as far as the trials and the thesis go."""
+    true, found = view.true(name), view.column(name)
+    off = None if cell is None else cell.error(name, true)
+    reach = max(REACH * view.predicted(name), 1.1 * float(np.abs(found - true).max()), 1.2 * abs(off or 0.0))
+    title = f"{name} (px)" if name in UNITS else f"{name} (no unit)"
+    shown = max(reach, 1e-6)
+    return {
+        "title": {"text": title, "font": {"size": TEXT_PX}, "standoff": 6},
+        "range": [true - shown, true + shown],
+        "nticks": 5,
+        "tickfont": {"size": TICK_PX},
+        "zeroline": False,
+    }
+
+
+def _add_claim(figure: go.Figure, view: NoiseView, x: str, y: str) -> None:
+    """The frame in which the thesis says that its estimates are."""
+    if x not in UNITS:
+        return
+    (left, right), (low, high) = (
+        (true * (1.0 - CLOSE), true * (1.0 + CLOSE)) for true in (view.true(x), view.true(y))
+    )
+    line = {"color": css(NEUTRAL), "width": 2, "dash": "dash"}
+    figure.add_shape(type="rect", x0=left, x1=right, y0=low, y1=high, line=line, layer="below")
+
+
+def _add_dots(
+    figure: go.Figure,
+    x: FloatArray,
+    y: FloatArray,
+    marker: dict[str, object],
+    names: tuple[str, str],
+    told: str,
+) -> None:
+    hover = f"{told}<br>{names[0]} %{{x:.5g}}<br>{names[1]} %{{y:.5g}}<extra></extra>"
+    figure.add_scatter(x=x, y=y, mode="markers", marker=marker, hovertemplate=hover)
+
+
+def ellipse_points(center: FloatArray, covariance: FloatArray, count: int = 73) -> FloatArray:
+    """(count, 2) a closed line around 95 % of a normal distribution."""
+    values, vectors = np.linalg.eigh(covariance)
+    angle = np.linspace(0.0, 2.0 * np.pi, count)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    return center + np.sqrt(INSIDE_95) * (circle * np.sqrt(np.maximum(values, 0.0))) @ vectors.T

@@ -1,0 +1,83 @@
+"""The numbers of the Calibrate screen that need no photographs: what goes together, the thesis's table."""
+
+import numpy as np
+import pytest
+
+from app.screens.calibrate import thesis
+from app.screens.calibrate.noise_view import NoiseRequest, NoiseView
+from app.screens.calibrate.parameters import correlation_html, signed, strongest_sentence
+from app.screens.calibrate.scatter import PAIRS, noise_sheet
+from app.screens.calibrate.thesis import nearest_cell
+from lab.claims.calibration.claims import TABLE_4_1
+from lab.claims.calibration.protocol import TRUTH
+from pipeline.calibration.correlation import DISTANCE, Correlations, Pair
+
+NAMES = ("fx", "fy", "cx", "cy", "k1", "k2")
+
+
+def trials(count, sigma_px=0.4):
+    truth = np.array([525.0, 525.0, 320.0, 240.0, -0.05, 0.02])
+    sd = np.array([1.0, 1.0, 0.8, 0.8, 0.004, 0.01])
+    found = truth + sd * np.random.default_rng(0).standard_normal((count, 6))
+    return NoiseView(NoiseRequest("node_01", sigma_px), NAMES, truth, found, np.diag(sd**2), 0.5)
+
+
+def test_the_printed_table_is_that_of_the_claims():
+    assert thesis.TABLE_4_1 == TABLE_4_1
+    assert dict(zip(thesis.NAMES, thesis.TRUE, strict=True)) == TRUTH
+
+
+def test_the_thesis_is_shown_at_the_nearest_noise_and_not_without_any():
+    assert nearest_cell(0.0, NAMES) is None
+    assert nearest_cell(0.55, NAMES).sigma_px == 0.6
+    cell = nearest_cell(1.0, NAMES)
+    assert cell.error("fx", 600.0) == pytest.approx(600.0 * 2.474 / 500.0)
+    assert cell.error("k1", -0.3) == pytest.approx(0.0882)
+    assert cell.error("p1", 0.0) is None
+    fisheye = nearest_cell(1.0, ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"))
+    assert (fisheye.error("k1", -0.3), fisheye.error("fx", 600.0)) == (None, cell.error("fx", 600.0))
+
+
+@pytest.mark.parametrize(
+    ("pair", "words"),
+    [
+        (Pair("fx", DISTANCE, 0.97), ("fx and the board's distance go together at .97", "more tilted views")),
+        (Pair("k1", "k2", -0.95), ("k1 and k2 go against each other at .95", "nearer to its corners")),
+        (Pair("cx", "p1", 0.9), ("a lens that leans",)),
+        (Pair("cy", "k1", 0.9), ("opposite sides",)),
+        (Pair("fx", "k1", 0.9), ("out to the corners",)),
+        (Pair("fx", "k1", -0.5), ("tell all numbers apart", "at .50")),
+    ],
+)
+def test_the_strongest_pair_is_a_sentence_with_advice(pair, words):
+    sentence = strongest_sentence(pair)
+    assert all(word in sentence for word in words)
+
+
+def test_the_square_has_every_pair_once():
+    matrix = np.array([[1.0, -0.97, 0.3], [-0.97, 1.0, 0.0], [0.3, 0.0, 1.0]])
+    shown = correlation_html(Correlations(("fx", "k1", DISTANCE), matrix))
+    assert shown.count("<td ") == 3
+    for told in ("fx and k1: −.97", "fx and dist.: .30", "k1 and dist.: .00"):
+        assert told in shown
+    assert [signed(value) for value in (1.0, -1.0, 0.0, -0.001)] == ["1.00", "−1.00", ".00", ".00"]
+
+
+def test_the_sheet_has_axes_with_units_signs_and_the_thesis_beside_the_trials():
+    sheet = noise_sheet(trials(50))
+    assert sheet.title == "node_01, 0.40 px of noise: 50 of 200 trials"
+    assert len(sheet.figures) == len(PAIRS)
+    titles = [
+        axis.title.text for figure in sheet.figures for axis in (figure.layout.xaxis, figure.layout.yaxis)
+    ]
+    assert titles == ["fx (px)", "fy (px)", "cx (px)", "cy (px)", "k1 (no unit)", "k2 (no unit)"]
+    for figure in sheet.figures:
+        inside, outside, _, truth, printed = figure.data
+        assert len(inside.x) + len(outside.x) == 50
+        low, high = figure.layout.xaxis.range
+        assert low < min(*inside.x, *truth.x, *printed.x)
+        assert max(*inside.x, *truth.x, *printed.x) < high
+    assert "thesis: its trial at 0.4 px (Table 4.1)" in sheet.legend
+    assert sheet.table.count("<tr>") == 1 + len(NAMES)
+    assert "thesis" in sheet.table
+    assert "Table 4.1" not in noise_sheet(trials(3, 0.0)).legend
