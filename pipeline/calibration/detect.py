@@ -297,7 +297,7 @@ def _alternation(gray: ByteArray, board: Board, points_px: FloatArray) -> tuple[
     grid = points_px.reshape(board.rows, board.columns, 2)
     for _ in range(2):  # a row more on either side, straight on; then, turned, a column
         grid = np.concatenate([2 * grid[:1] - grid[1:2], grid, 2 * grid[-1:] - grid[-2:-1]]).swapaxes(0, 1)
-    down, right = (INTO_A_SQUARE * np.gradient(grid, axis=axis) for axis in (0, 1))
+    down, right = np.gradient(INTO_A_SQUARE * grid, axis=(0, 1))
     ways = (right + down, -right - down, right - down, down - right)
     squares_px = grid + np.stack(ways)
     one, opposite, left, below = _brightness(gray, squares_px.reshape(-1, 2)).reshape(squares_px.shape[:3])
