@@ -54,6 +54,7 @@ class DeliveryDrawing:
         self._losses: dict[int, viser.LabelHandle] = {}
         self._made = 0
         self._shown: MomentView | None = None
+        self._lit_row = -1
         self._add_nodes()
         self._add_moved(cameras_m)
         self._add_marks()
@@ -130,10 +131,16 @@ class DeliveryDrawing:
             used = "" if now is None else f" · {now.energy_j:.3g} J"
             state = "off" if node.row < 0 else f"{100.0 * share:.0f} %{used}"
             self._names[row].text = f"{node.name} · {state}"
-            self._frusta[row].image = _dark(node.aspect) if now is None else now.picture
+            self._show_picture(row)
             self._frusta[row].color = _state_color(node.row < 0, share)
             self._show_cloud(row, None if now is None or not len(now.points_m) else now)
         self._show_mesh(b"" if moment is None else moment.glb)
+
+    def _show_picture(self, row: int) -> None:
+        """What has arrived of a node's picture."""
+        shown = self._shown
+        dark = _dark(self._view.nodes[row].aspect)
+        self._frusta[row].image = dark if shown is None else shown.nodes[row].picture
 
     def _show_batteries(self, moment: MomentView | None, most_j: float) -> None:
         for row, battery in enumerate(self._batteries):
@@ -147,13 +154,14 @@ class DeliveryDrawing:
         name = f"{self._below}/lit"
         if self._scene.get_handle_by_name(name) is not None:
             self._scene.remove_by_name(name)
-        shown, self._shown = self._shown, None
-        self._show_pictures(shown)
+        if self._lit_row >= 0:
+            self._show_picture(self._lit_row)
+        self._lit_row = -1 if packet is None else packet.row
         if packet is None:
             return
         self._frusta[packet.row].image = packet.picture
         if len(packet.points_m):
-            pose = self._pose(packet.row, shown)
+            pose = self._pose(packet.row, self._shown)
             cloud = self._scene.add_point_cloud(
                 name, packet.points_m, np.array(LIT, np.uint8), point_size=4 * POINT_M, precision="float32"
             )
