@@ -1,0 +1,99 @@
+"""Make docs/surface.jpg and docs/kinect.jpg again: ``python tests/browser/pictures.py [surface] [kinect]``.
+
+``surface`` opens the app in Chromium; ``kinect`` reconstructs the two real frames of ``--frames``, a folder
+with ``kinect_desk`` and ``kinect_basket``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from conftest import ARGUMENTS, chromium_path
+from hands import canvas, go
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+import packetmesh as pm
+from app.drawing.colors import INFERRED, TARGET
+from app.server import build_server
+from lab.claims.depth.scenes import DATA
+from pipeline.rays import Camera
+from pipeline.surface.pictures import mesh_picture
+from pipeline.types import PointSource
+
+DOCS = Path(__file__).parents[2] / "docs"
+WINDOW_PX = {"width": 1400, "height": 860}
+PANEL_PX, TITLE_PX = (400, 300), 24
+QUALITY = 88
+FRAMES = ("kinect_desk", "kinect_basket")
+
+
+def surface(frames: Path) -> Image.Image:
+    """The Surface screen with the living room."""
+    app = build_server("living-room", port=0)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium_path(), args=ARGUMENTS)
+        page = browser.new_page(viewport=WINDOW_PX)
+        page.goto(app.url)
+        go(page, "Surface")
+        page.get_by_text("Up to date").wait_for(timeout=120_000)
+        for close in page.locator(".mantine-Notification-closeButton").all():
+            close.click()
+        canvas(page)
+        shot = page.screenshot()
+        browser.close()
+    app.stop()
+    return Image.fromarray(cv2.cvtColor(cv2.imdecode(np.frombuffer(shot, np.uint8), 1), cv2.COLOR_BGR2RGB))
+
+
+def kinect(frames: Path) -> Image.Image:
+    """A row a frame: colour image, surface before and after fusion, and what of it was inferred."""
+    return Image.fromarray(np.vstack([_row(frames / name) for name in FRAMES]))
+
+
+def _row(folder: Path) -> np.ndarray:
+    frame = pm.load_frame(folder / "color.png", folder / "depth.png", folder / "intrinsics.json")
+    result = pm.reconstruct(pm.Rig(folder.name, (frame,)))
+    camera = Camera(frame.intrinsics, result.placement.T_world_camera[0])
+    palette = np.array([TARGET, INFERRED], np.uint8)
+    origin = replace(result.after, colors=palette[(result.after.source == PointSource.INFERRED).astype(int)])
+    misses = (one.quality.no_hit_ray_share for one in (result.before, result.after))
+    before, after = (f"{share:.1%}" for share in misses)
+    panels = (
+        ("colour image", frame.rgb),
+        (f"before fusion: {before} of rays miss", mesh_picture(result.before, camera)),
+        (f"after fusion: {after}", mesh_picture(result.after, camera)),
+        ("blue: measured, violet: inferred", mesh_picture(origin, camera)),
+    )
+    return np.hstack([_panel(*panel) for panel in panels])
+
+
+def _panel(title: str, rgb: np.ndarray) -> np.ndarray:
+    width, height = PANEL_PX
+    panel = np.full((height + TITLE_PX, width + 4, 3), 255, np.uint8)
+    panel[TITLE_PX:, 2:-2] = cv2.resize(rgb, PANEL_PX, interpolation=cv2.INTER_AREA)
+    cv2.putText(panel, title, (4, 17), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 1, cv2.LINE_AA)
+    return panel
+
+
+PICTURES = {"surface": surface, "kinect": kinect}
+
+
+def main() -> None:
+    """Make the named pictures, or both."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", default=list(PICTURES), help=" or ".join(PICTURES))
+    data = Path(os.environ.get("PACKETMESH_SHARED_DATA", DATA))
+    parser.add_argument("--frames", type=Path, default=data, help="folder with the real frames")
+    options = parser.parse_args()
+    for name in options.names:
+        PICTURES[name](options.frames).save(DOCS / f"{name}.jpg", quality=QUALITY)
+
+
+if __name__ == "__main__":
+    main()
