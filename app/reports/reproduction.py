@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
 from app.reports.exhibits import exhibit_html
 from app.reports.html import table, write_page
-from lab.claims.claim import Verdict
+from lab.claims.claim import VERDICTS, Verdict
+
+MARKS = {
+    **dict.fromkeys(("reproduced", "holds"), "reproduced"),
+    **dict.fromkeys(("not reproduced", "does not hold"), "not-reproduced"),
+}
+"""Classes of the page's style; the other verdicts are neither good nor bad."""
 
 
 def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
@@ -29,19 +36,15 @@ def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
 
 
 def _counted(verdicts: Sequence[Verdict]) -> str:
-    agreed = sum(_agrees(verdict) for verdict in verdicts)
-    return (
-        f"{agreed} of {len(verdicts)} claims {'hold' if verdicts and verdicts[0].beyond else 'reproduced'}."
-    )
-
-
-def _agrees(verdict: Verdict) -> bool:
-    return verdict.verdict in ("reproduced", "holds")
+    """How many claims have which verdict."""
+    counts = Counter(verdict.verdict for verdict in verdicts)
+    parts = (f"{count} {word}" for word in VERDICTS if (count := counts[word]))
+    return f"Claims: {', '.join(parts)}."
 
 
 def _section(verdict: Verdict) -> str:
-    mark = "reproduced" if _agrees(verdict) else "not-reproduced"
-    judged = "It holds if" if verdict.beyond else f"The thesis: {verdict.thesis}. Counts as reproduced"
+    mark = MARKS.get(verdict.verdict, "")
+    judged = "It holds if" if verdict.beyond else f"The thesis: {verdict.thesis}. What tests it"
     rows = []
     for name, value in verdict.ours.items():
         low, high = verdict.ci95.get(name, (None, None))
@@ -50,6 +53,6 @@ def _section(verdict: Verdict) -> str:
         f'<h2>{escape(verdict.id)} <span class="{mark}">{escape(verdict.verdict)}</span></h2>'
         f"<p>{escape(verdict.claim)}. {escape(judged)}: {escape(verdict.tolerance)}.</p>"
         f"<p><b>Ours:</b> {escape(verdict.why)}.</p>"
-        + table(("measured", "value", "95 % interval"), rows)
+        + (table(("measured", "value", "95 % interval"), rows) if rows else "")
         + "".join(map(exhibit_html, verdict.exhibits))
     )

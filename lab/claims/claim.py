@@ -13,6 +13,12 @@ from lab.claims.exhibits import Curve, Exhibit, exhibit_record
 from packetmesh.progress import Progress
 from pipeline.types import FloatArray
 
+VERDICTS = (
+    *("reproduced", "not reproduced", "true by definition", "cannot be tested"),
+    *("holds", "does not hold"),
+)
+"""The last two are of claims of ours."""
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -22,8 +28,8 @@ class Outcome:
     """Measured values by name; shares from 0 to 1, lengths in metres."""
     ci95: dict[str, tuple[float, float]]
     """95 % intervals of those values that vary from case to case."""
-    reproduced: bool
-    """Of ours: whether it holds."""
+    reproduced: bool | None
+    """Of ours: whether it holds. None: nothing that we have can test it."""
     why: str
     """One sentence that a reader can check against ``ours``."""
     exhibits: tuple[Exhibit, ...] = ()
@@ -41,7 +47,7 @@ class Verdict:
     ours: dict[str, float]
     ci95: dict[str, tuple[float, float]]
     verdict: str
-    """``reproduced`` or ``not reproduced``; of ours ``holds`` or ``does not hold``."""
+    """One of ``VERDICTS``."""
     why: str
     exhibits: tuple[Exhibit, ...] = ()
 
@@ -74,12 +80,13 @@ class Claim:
     function share one call of it."""
     prepare_full: Callable[[Path, str | None], Generator[Progress, None, Any]] | None = None
     """Where ``prepare`` runs a subset of the trials: all of them."""
+    by_definition: bool = False
+    """Whether a check of it cannot tell anything of the world: settings, file formats, sums of what is
+    printed. It is no finding if it comes out, but one if it does not."""
 
     def judge(self, *prepared: Any) -> Verdict:
         """Run the experiment and compare."""
         outcome = self.experiment(*prepared)
-        words = ("does not hold", "holds") if is_beyond(self.id) else ("not reproduced", "reproduced")
-        verdict = words[outcome.reproduced]
         return Verdict(
             self.id,
             self.claim,
@@ -87,10 +94,19 @@ class Claim:
             self.tolerance,
             outcome.ours,
             outcome.ci95,
-            verdict,
+            self._word(outcome.reproduced),
             outcome.why,
             outcome.exhibits,
         )
+
+    def _word(self, reproduced: bool | None) -> str:
+        if reproduced is None:
+            return "cannot be tested"
+        if is_beyond(self.id):
+            return "holds" if reproduced else "does not hold"
+        if not reproduced:
+            return "not reproduced"
+        return "true by definition" if self.by_definition else "reproduced"
 
 
 def is_beyond(name: str) -> bool:

@@ -73,4 +73,5 @@ C10 = Claim(
     thesis="N = 4, t = 1.0",
     tolerance="the same points kept as by the printed formulae, exactly",
     experiment=_experiment,
+    by_definition=True,
 )

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from lab.claims import outliers
+from lab.claims import outliers, settings
 from lab.claims.calibration import biased_sensors
 from lab.claims.calibration.box_claim import C25
 from lab.claims.calibration.claims import CLAIMS as CALIBRATION
@@ -26,6 +26,7 @@ from packetmesh.progress import Progress
 
 _ALL: tuple[Claim, ...] = (
     *CALIBRATION,
+    *settings.CLAIMS,
     outliers.C10,
     *DEPTH,
     *REGISTRATION,

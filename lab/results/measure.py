@@ -23,6 +23,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
         "C01,C02,C03,C04,C05,C06,C07,C08",
     ),
     "board_claims": ("packetmesh", "reproduce", "--only", "C25,D09"),
+    "setting_claims": ("packetmesh", "reproduce", "--only", "C09,C11,C15,C37,C38,C39"),
     "outlier_claims": ("packetmesh", "reproduce", "--only", "C10"),
     "depth_claims": ("packetmesh", "reproduce", "--only", "C12,C13,C14"),
     "registration_claims": ("packetmesh", "reproduce", "--only", "C16,C17,C18,C19,C20"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from lab.claims.claim import is_beyond
+from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
 from lab.results import tables
 from lab.results.markdown import Row, change, listed
@@ -32,6 +32,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "network_claims": ("The camera network: the thesis's claims", tables.claims),
     "bench_network": ("The camera network: speed", tables.network_speed),
     "delivery_claims": ("What a lost packet costs: ours, beyond the thesis", tables.our_claims),
+    "setting_claims": ("Settings, and what cannot be tested", tables.claims),
     "ns3_saturation": ("The camera network: throughput beside ns-3", tables.ns3_throughput),
 }
 """Heading and body by record, in the order of the page; a section without its record is left out."""
@@ -146,7 +147,7 @@ def _exchange(numbers: Row) -> str:
         return f"{rates['ours'][name]:.3f} [{low:.3f}, {high:.3f}]"
 
     kept, ratio = aim["ours"]["kept_layered"], aim["ours"]["bytes_over_jpeg"]
-    sure = "" if rates["verdict"] == "reproduced" else "; which of them costs least is not certain"
+    sure = "" if rates["verdict"] == "holds" else "; which of them costs least is not certain"
     return (
         f"**What a lost packet costs.** One per cent of lost packets costs {rate('raw')} points of F-score "
         f"at 5 cm with raster, {rate('tiles')} with tiles, {rate('layered')} layered (95 % over seeds and "
@@ -156,11 +157,15 @@ def _exchange(numbers: Row) -> str:
 
 
 def _unreproduced(claims: Row) -> str:
-    missing = [name for name in sorted(claims) if claims[name]["verdict"] != "reproduced"]
+    by_verdict: dict[str, list[str]] = {word: [] for word in VERDICTS}
+    for name in sorted(claims):
+        by_verdict[claims[name]["verdict"]].append(name)
+    reproduced, missing, defined, untested = (by_verdict[word] for word in VERDICTS[:4])
     everyone = {name for name in CLAIMS if not is_beyond(name)}
     waiting = sorted(everyone - set(claims))
     sentence = (
-        f"**The thesis's claims.** Of {len(everyone)}, {len(claims)} are on record: "
-        f"{len(claims) - len(missing)} reproduced; not reproduced: {listed(missing)}. [Why](docs/results.md)."
+        f"**The thesis's claims.** Of {len(everyone)}, {len(claims)} are on record: {len(reproduced)} "
+        f"reproduced, {len(defined)} true by definition, {len(untested)} that nothing here can test; not "
+        f"reproduced: {listed(missing)}. [Why](docs/results.md)."
     )
     return sentence + (f" Not measured since the last change: {listed(waiting)}." if waiting else "")

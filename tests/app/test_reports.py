@@ -48,11 +48,18 @@ def test_text_from_outside_cannot_become_markup():
 def test_the_reproduction_report_counts_what_was_reproduced(tmp_path):
     verdicts = [
         Verdict(id_, "claim", "thesis", "tolerance", {"x": 0.5}, {"x": (0.4, 0.6)}, verdict, "why")
-        for id_, verdict in (("C1", "reproduced"), ("C2", "not reproduced"))
+        for id_, verdict in (
+            ("C1", "reproduced"),
+            ("C2", "not reproduced"),
+            ("C3", "true by definition"),
+            ("C4", "cannot be tested"),
+        )
     ]
     write_reproduction_report(verdicts, tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text()
-    assert "1 of 2 claims reproduced" in text
+    words = "1 reproduced, 1 not reproduced, 1 true by definition, 1 cannot be tested"
+    assert f"Claims: {words}." in text
+    assert text.count('class="reproduced"') == text.count('class="not-reproduced"') == 1
     assert "0.4 to 0.6" in text
     assert "beyond the thesis" not in text
 
@@ -66,5 +73,5 @@ def test_claims_of_ours_stand_apart_from_the_thesis_s(tmp_path):
     text = (tmp_path / "r.html").read_text()
     places = [text.index(words) for words in ("claim C1", "Ours, beyond the thesis", "claim D1", "claim D2")]
     assert places == sorted(places)
-    assert "1 of 1 claims reproduced" in text
-    assert "1 of 2 claims hold" in text
+    assert "Claims: 1 reproduced." in text
+    assert "Claims: 1 holds, 1 does not hold." in text

@@ -299,5 +299,6 @@ CLAIMS = (
         ".3535, .3422, .5001, .0035, 40794, .0071",
         "the last row is the standard deviation of the five above within 5 %, without its misprints",
         _c08,
+        by_definition=True,
     ),
 )

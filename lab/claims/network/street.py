@@ -204,6 +204,7 @@ CLAIMS = (
         thesis="Table 4.7: 200; 2 s; 10 s; 600 s; 60 s; 3; 8",
         tolerance="the preset's own values, each under a name",
         experiment=_c31,
+        by_definition=True,
     ),
     Claim(
         id="C33",
@@ -212,6 +213,7 @@ CLAIMS = (
         tolerance="what the study does, with an interval for every case",
         experiment=_c33,
         prepare=street_study,
+        by_definition=True,
     ),
     Claim(
         id="C34",
