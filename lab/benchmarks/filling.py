@@ -19,6 +19,8 @@ from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 OURS = "packetmesh"
 HIDDEN_SHARE = 0.15
+ROOMS, VIEWS = 5, 3
+"""Of each held-out scene, and of each room."""
 REAL_DRAWS = 10
 """How often another part of each real frame is hidden: there are few of them."""
 CLOSE = 0.05
@@ -68,7 +70,7 @@ def hidden_cases(seed: int = 0) -> Iterator[HoleCase]:
     That very depth judges. Where the truth is known the images come a second time with nothing hidden: their
     sensor's own holes, judged by the truth.
     """
-    for site in (*held_out_scenes(), *demo_scenes()):
+    for site in (*held_out_scenes(ROOMS, VIEWS), *demo_scenes()):
         for number, example in enumerate(site.examples()):
             place, sensor = f"{site.name}/{number}", example.sensor
             yield hidden_case(place, f"{site.group}, hidden", example.rgb, sensor, seed)

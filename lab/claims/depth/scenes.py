@@ -17,8 +17,9 @@ from pipeline.types import DepthMap, RgbdFrame
 
 HELD_OUT = "held-out rooms"
 HELD_OUT_SCENES = 3
-ROOMS_PER_SCENE = 5
-VIEWS_PER_ROOM = 3
+ROOMS_PER_SCENE = 50
+VIEWS_PER_ROOM = 2
+"""A scene has 100 images, as the thesis's have."""
 INDOOR_CAP_M = 10.0
 OUTDOOR_CAP_M = 80.0
 OUTDOOR_SETS = ("kitti",)

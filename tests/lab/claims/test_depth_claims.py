@@ -274,7 +274,7 @@ def test_the_held_out_rooms_are_of_the_test_split_and_overlap_nowhere():
     assert [site.name for site in held_out_scenes()] == ["Scene 1", "Scene 2", "Scene 3"]
     seeds = [seed for room in rooms for seed in room]
     assert min(seeds) == FIRST_SEED["test"] > FIRST_SEED["validation"] > FIRST_SEED["train"]
-    assert len(set(seeds)) == len(seeds) == 15
+    assert len(set(seeds)) == len(seeds) == 150
 
 
 def test_the_shipped_network_errs_less_than_half_of_a_flat_wall_and_of_its_own_depth_mirrored():
