@@ -21,11 +21,14 @@ from pipeline.points import distinct_rows
 from pipeline.surface import radii, reconstruct_surface, smooth, spacing, voxel_average, voxel_for_count
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.normals import oriented_normals, turned_to_viewpoint
+from pipeline.surface.surrounding import surrounding_radii
 from pipeline.types import FloatArray, PointCloud, SurfaceResult
 
 _log = logging.getLogger(__name__)
 
 LEAST_POINTS = 3
+USUAL_M = 100.0
+"""Wide is no room or house."""
 LARGEST_M, SMALLEST_M = 1e9, 1e-12
 """No place is farther from the origin; a smaller cloud is a point."""
 _COARSE = 0.1
@@ -48,12 +51,14 @@ class MeshOptions:
     """
 
     radii_m: tuple[float, ...] | None = None
-    """Ball radii; None chooses r_F + {0, 1, 2, 4} sigma_D."""
+    """Ball radii; None takes them from the points (``chosen_radii``)."""
     viewpoint_m: tuple[float, float, float] | None = None
     """Where the normals point to; without it they stay as given, or are estimated to point outwards."""
     max_points: int | None = None
     """Thin to about this many points first."""
     smoothing_passes: int = 0
+    metres_per_unit: float = 1.0
+    """Of the cloud's coordinates; 0.001 for millimetres."""
 
     def __post_init__(self) -> None:
         for radius_m in self.radii_m or ():
@@ -67,6 +72,10 @@ class MeshOptions:
             raise InputError(f"At most {self.max_points} points make no surface; try at least {LEAST_POINTS}")
         if self.smoothing_passes < 0:
             raise InputError(f"There cannot be {self.smoothing_passes} smoothing passes; try 0 or more")
+        if not (math.isfinite(self.metres_per_unit) and self.metres_per_unit > 0.0):
+            raise InputError(
+                f"There cannot be {self.metres_per_unit:g} metres in a unit; try 0.001 for millimetres"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +125,7 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
         ReconstructionError: the balls fall through everywhere.
     """
     yield Progress("looking for repeated points", 0.05)
-    cloud = usable_points(cloud)
+    cloud = in_metres(usable_points(cloud), options.metres_per_unit)
     if options.max_points is not None and len(cloud) > options.max_points:
         yield Progress(f"thinning {len(cloud)} points", 0.1)
         cloud = voxel_average(cloud, voxel_for_count(cloud.points_m, options.max_points))
@@ -128,7 +137,7 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
         yield Progress(f"smoothing {len(cloud)} points", 0.4)
         cloud = smooth(cloud, options.smoothing_passes)
     yield Progress("spacing of the points", 0.5)
-    radii_m = chosen_radii(cloud.points_m, options.radii_m)
+    radii_m = chosen_radii(cloud, options.radii_m)
     _check_resolution(cloud.points_m, radii_m[0])
     sizes = ", ".join(f"{1000.0 * radius_m:.4g}" for radius_m in radii_m)
     yield Progress(f"rolling balls of {sizes} mm over {len(cloud)} points", 0.55)
@@ -170,6 +179,19 @@ def usable_points(cloud: PointCloud) -> PointCloud:
     return cloud
 
 
+def in_metres(cloud: PointCloud, metres_per_unit: float) -> PointCloud:
+    """The cloud in metres; one that no room or house is as large as is named."""
+    if metres_per_unit != 1.0:
+        cloud = replace(cloud, points_m=metres_per_unit * cloud.points_m)
+    wide_m = float(np.ptp(cloud.points_m, axis=0).max())
+    if wide_m > USUAL_M:
+        _log.warning(
+            "The cloud is %.3g m wide; if its numbers are millimetres, try --metres-per-unit %.3g",
+            *(wide_m, 0.001 * metres_per_unit),
+        )
+    return cloud
+
+
 def with_normals(cloud: PointCloud, viewpoint_m: Sequence[float] | None) -> tuple[PointCloud, str]:
     """The cloud with unit normals, and where they came from."""
     place_m = None if viewpoint_m is None else np.array(viewpoint_m, dtype=np.float64)
@@ -181,21 +203,27 @@ def with_normals(cloud: PointCloud, viewpoint_m: Sequence[float] | None) -> tupl
     return turned_to_viewpoint(cloud, place_m), GIVEN_TURNED
 
 
-def chosen_radii(points_m: FloatArray, radii_m: tuple[float, ...] | None) -> tuple[float, ...]:
-    """The ball radii, ascending; those of the rule that are no larger than the cloud if none are given.
+def chosen_radii(cloud: PointCloud, radii_m: tuple[float, ...] | None) -> tuple[float, ...]:
+    """The ball radii, ascending and no larger than the cloud.
+
+    Without given ones those by which a point's neighbours surround it; for a cloud whose points are not
+    surrounded the rule r_F + {0, 1, 2, 4} sigma_D.
 
     Raises:
         InputError: a given radius larger than the cloud.
     """
+    points_m = cloud.points_m
     extent_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
-    r_F_m, sigma_D_m = spacing(points_m)
+    assert cloud.normals is not None
+    surrounding_m = surrounding_radii(points_m, cloud.normals)
     if radii_m is None:
-        chosen = radii(SurfaceConfig("thesis+"), r_F_m, sigma_D_m)
-        return tuple(radius_m for radius_m in chosen if radius_m <= extent_m)
+        by_rule_m = surrounding_m or radii(SurfaceConfig("thesis+"), *spacing(points_m))
+        return tuple(radius_m for radius_m in by_rule_m if radius_m <= extent_m)
     if max(radii_m) > extent_m:
+        fits_m = surrounding_m[-1] if surrounding_m else spacing(points_m)[0]
         raise InputError(
             f"The ball radius {max(radii_m):.4g} m is larger than the cloud, which is {extent_m:.4g} m "
-            f"across; try about {min(r_F_m + 2.0 * sigma_D_m, extent_m):.3g} m"
+            f"across; try about {min(fits_m, extent_m):.3g} m"
         )
     return tuple(sorted(radii_m))
 

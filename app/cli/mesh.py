@@ -18,6 +18,7 @@ def mesh(
     viewpoint: tuple[float, float, float] | None = None,
     max_points: int | None = None,
     smoothing_passes: int = 0,
+    metres_per_unit: float = 1.0,
     json: bool = False,
 ) -> None:
     """Roll a ball over a point cloud: PLY, PCD, NPZ or text (XYZ, TXT, ASC, CSV), in metres, give a mesh.
@@ -30,6 +31,7 @@ def mesh(
             are, or point outwards if there are none.
         max_points: Thin the cloud to about so many points first; all are used without it.
         smoothing_passes: How often every point is moved onto the plane of its neighbours.
+        metres_per_unit: Of the coordinates in the file: 0.001 if they are millimetres.
         json: Print the quality of the mesh as one JSON object.
     """
     from pipeline.mesh_cloud import MeshOptions, iterate_mesh_file
@@ -37,7 +39,7 @@ def mesh(
     if radii_m == ():
         wrong_use("--radii-m needs at least one radius, or auto")
     given_m = None if radii_m == "auto" else radii_m
-    options = MeshOptions(given_m, viewpoint, max_points, smoothing_passes)
+    options = MeshOptions(given_m, viewpoint, max_points, smoothing_passes, metres_per_unit)
     steps = iterate_mesh_file(cloud, out, options)
     report = drain(steps, say_progress)
     if json:

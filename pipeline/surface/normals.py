@@ -20,6 +20,12 @@ GRAPH_NEIGHBOURS = 10
 """Neighbours of a point that it can get its side from."""
 _LEAST_WEIGHT = 1e-6
 """An edge of weight zero would be no edge."""
+MOST_NEIGHBOURS = 320
+"""Of points whose nearer neighbours all lie on a line, as along a LiDAR's ring."""
+LINE = 0.05
+"""Of the largest variance of the neighbours' places: below it the second largest makes no plane."""
+_CHUNK = 400_000
+"""Neighbours that are held at a time."""
 _FLAT = 0.02
 """A part whose volume is a smaller share of what it could be has no outside."""
 
@@ -60,10 +66,12 @@ def oriented_normals(cloud: PointCloud, viewpoint_m: FloatArray | None = None) -
     """
     middle_m = np.median(cloud.points_m, axis=0) if len(cloud) else np.zeros(3)
     near = PointCloud(cloud.points_m - middle_m)  # the principal components lose digits far away
-    if viewpoint_m is not None:
-        return replace(cloud, normals=estimate_normals(near, viewpoint_m - middle_m).normals)
     near = _with_normals(near, NEIGHBOURS)
     assert near.normals is not None
+    near = replace(near, normals=_off_lines(near.points_m, near.normals))
+    assert near.normals is not None
+    if viewpoint_m is not None:
+        return replace(cloud, normals=turned_to_viewpoint(near, viewpoint_m - middle_m).normals)
     return replace(cloud, normals=_turned_outwards(near.points_m, near.normals))
 
 
@@ -90,6 +98,24 @@ def _with_normals(cloud: PointCloud, neighbours: int) -> PointCloud:
     points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
     points.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(neighbours))
     return replace(cloud, normals=np.array(points.normals))
+
+
+def _off_lines(points_m: FloatArray, normals: FloatArray) -> FloatArray:
+    """(N, 3) normals; where the neighbours lie on a line, from two, four and more times as many."""
+    tree, normals = cKDTree(points_m), normals.copy()
+    count, left = NEIGHBOURS, np.arange(len(points_m))
+    while len(left) and count <= min(MOST_NEIGHBOURS, len(points_m)):
+        on_line = []
+        for rows in np.array_split(left, 1 + len(left) * count // _CHUNK):
+            _, near = tree.query(points_m[rows], k=count, workers=-1)
+            arms_m = points_m[near] - points_m[near].mean(axis=1, keepdims=True)
+            variances, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", arms_m, arms_m))
+            line = variances[:, 1] < LINE * variances[:, 2]
+            if count > NEIGHBOURS:
+                normals[rows[~line]] = axes[~line, :, 0]
+            on_line.append(rows[line])
+        left, count = np.concatenate(on_line), 2 * count
+    return normals
 
 
 def _turned_outwards(points_m: FloatArray, normals: FloatArray) -> FloatArray:

@@ -20,8 +20,9 @@ from pipeline.mesh_cloud import (
     usable_points,
 )
 from pipeline.surface import spacing
+from pipeline.surface.surrounding import surrounding_radii
 from pipeline.types import PointCloud
-from tests.pipeline.surface.shapes import perforated_plane, sphere
+from tests.pipeline.surface.shapes import lidar_room, perforated_plane, sphere, with_outliers
 
 
 def meshed(cloud, **options):
@@ -120,15 +121,45 @@ def test_a_file_whose_normals_say_nothing_counts_as_one_without(caplog, value):
     assert "estimated from the points" in caplog.text
 
 
-def test_radii_come_from_the_spacing_and_none_is_larger_than_the_cloud():
-    points_m = perforated_plane(0.5, 0.02, 0.0).points_m
-    r_F_m, sigma_D_m = spacing(points_m)
-    expected = [r_F_m + factor * sigma_D_m for factor in (0.0, 1.0, 2.0, 4.0)]
-    assert chosen_radii(points_m, None) == pytest.approx(expected)
-    assert chosen_radii(points_m, (0.2, 0.1)) == (0.1, 0.2)
+def test_radii_come_from_the_points_and_none_is_larger_than_the_cloud():
+    plane = perforated_plane(0.5, 0.02, 0.0)
+    chosen_m = chosen_radii(plane, None)
+    assert chosen_m == surrounding_radii(plane.points_m, plane.normals)
+    assert 0.018 < chosen_m[0] < chosen_m[-1] < 0.025
+    assert chosen_radii(plane, (0.2, 0.1)) == (0.1, 0.2)
     lonely_m = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [1.0, 0.0, 0.0]])
+    lonely = PointCloud(lonely_m, normals=np.tile([0.0, 0.0, 1.0], (4, 1)))
     r_F_m, sigma_D_m = spacing(lonely_m)
-    assert max(chosen_radii(lonely_m, None)) <= np.sqrt(1.0 + 0.01**2) < r_F_m + 4.0 * sigma_D_m
+    assert max(chosen_radii(lonely, None)) <= np.sqrt(1.0 + 0.01**2) < r_F_m + 4.0 * sigma_D_m
+
+
+def test_outliers_stay_unused_and_do_not_spoil_the_surface():
+    report = mesh_report(meshed(with_outliers(PointCloud(sphere(4000).points_m), 0.05)))
+    assert report["area_m2"] == pytest.approx(4.0 * np.pi, rel=0.02)
+    assert (report["components"], report["genus"]) == (1, 0)
+    assert 190 < report["unused_points"] <= 200  # a few lie on the sphere
+
+
+def test_the_rings_of_a_lidar_become_one_surface():
+    room = lidar_room(32, 0.005)
+    seen_m2 = 126.0  # what lies between its lowest and highest ring
+    surface = meshed(PointCloud(room.points_m)).surface
+    assert surface.quality.area_m2 > 0.8 * seen_m2
+    assert surface.quality.components < 10
+
+
+def test_a_cloud_as_large_as_a_town_is_named_with_what_to_try_and_millimetres_are_turned_into_metres(caplog):
+    caplog.set_level(logging.WARNING)
+    small = mesh_report(meshed(PointCloud(sphere(800).points_m)))
+    assert "millimetres" not in caplog.text
+    large = PointCloud(1000.0 * sphere(800).points_m)
+    meshed(large)
+    assert "The cloud is 2e+03 m wide" in caplog.text
+    assert "--metres-per-unit 0.001" in caplog.text
+    again = mesh_report(meshed(large, metres_per_unit=0.001))
+    assert again["area_m2"] == pytest.approx(small["area_m2"])
+    with pytest.raises(InputError, match=r"0 metres in a unit.*try 0\.001"):
+        MeshOptions(metres_per_unit=0.0)
 
 
 def test_a_ball_larger_than_the_cloud_is_refused_with_a_radius_to_try():

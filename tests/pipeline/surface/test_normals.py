@@ -7,7 +7,7 @@ from packetmesh.errors import InputError
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.surface.normals import oriented_normals, turned_to_viewpoint
 from pipeline.types import PointCloud
-from tests.pipeline.surface.shapes import perforated_plane, sphere
+from tests.pipeline.surface.shapes import lidar_room, perforated_plane, sphere, torus_knot
 
 
 def agreement(cloud: PointCloud) -> np.ndarray:
@@ -28,6 +28,18 @@ def torus(around: int = 120, across: int = 40, radius_m: float = 1.0, tube_m: fl
 @pytest.mark.parametrize("cloud", [sphere(3000), torus(), sphere(60)], ids=["sphere", "torus", "coarse"])
 def test_a_closed_shape_is_seen_from_outside(cloud):
     assert agreement(cloud).min() > 0.9
+
+
+@pytest.mark.parametrize("tube_m", [0.3, 0.45])
+def test_a_torus_knot_is_seen_from_outside(tube_m):
+    assert (agreement(torus_knot(6000, tube_m)) > 0.5).mean() > 0.999
+
+
+def test_normals_of_a_lidar_s_rings_are_those_of_the_walls():
+    """The twenty nearest points of most lie on one ring, and make no plane."""
+    room = lidar_room(16, 0.002)
+    found = oriented_normals(PointCloud(room.points_m), np.zeros(3)).normals
+    assert (np.sum(found * room.normals, axis=1) > np.cos(np.radians(10.0))).mean() > 0.9
 
 
 def test_every_separate_part_has_its_own_outside():
