@@ -54,7 +54,8 @@ def test_a_run_leaves_its_pose_numbers_steps_and_cloud(capsys, tmp_path, files):
     assert metrics == json.loads((tmp_path / "metrics.json").read_text())
     assert set(metrics) == {"ceicp-a"}
     row = metrics["ceicp-a"]
-    assert set(row) == KEYS | {"point_error_m"}
+    assert set(row) == KEYS | {"point_error_m", "draws", "spread_m", "draws_agree"}
+    assert row["draws_agree"]
     assert row["point_error_m"] < 0.003
     T = np.loadtxt(tmp_path / "transform.txt")
     np.testing.assert_array_equal(T, row["T_target_source"])
