@@ -38,7 +38,7 @@ class PoseEdge:
     """Median distance of the source's points from the target where they overlap; of edges that
     contradict each other, the one with the largest is dropped first."""
     agrees: bool = True
-    """False for an edge that other evidence contradicts: it makes no pose, but loops are checked by it."""
+    """False for an edge that other evidence contradicts: it makes no pose and checks no loop."""
 
     @property
     def pairs(self) -> float:
@@ -53,8 +53,8 @@ class PoseGraph:
     T_reference_node: tuple[FloatArray, ...]
     """(4, 4) pose of every node in the frame of the reference; NaN for nodes that no used edge reaches."""
     loop_error_m: tuple[float, ...]
-    """Point error between each edge and the other way between its nodes, along used edges, that agrees
-    with it best; NaN without another way."""
+    """Point error between each edge and the other way between its nodes, along edges that nothing else
+    contradicts, that agrees with it best; NaN without another way."""
     used: tuple[bool, ...]
     """False for the edges that were rejected because they contradict the loops."""
 
@@ -126,7 +126,9 @@ def solve_pose_graph(
     used = _consistent(points_m, edges)
     kept = [edge for edge, keep in zip(edges, used, strict=True) if keep]
     poses = _optimised(chained(len(points_m), kept, reference), kept, reference)
-    return PoseGraph(tuple(poses), tuple(_loop_error_m(points_m, edge, edges) for edge in edges), tuple(used))
+    agreeing = [edge for edge in edges if edge.agrees]
+    loop_error_m = tuple(_loop_error_m(points_m, edge, agreeing) for edge in edges)
+    return PoseGraph(tuple(poses), loop_error_m, tuple(used))
 
 
 def chained(nodes: int, edges: Sequence[PoseEdge], reference: int = 0) -> list[FloatArray]:

@@ -44,6 +44,14 @@ def test_a_stranger_with_a_plausible_pose_is_doubted(room):
     assert sentence.startswith("stranger fits the others badly")
 
 
+def test_a_given_pose_beyond_the_gate_is_corrected_by_a_wider_one(room):
+    first, second, third = room.frames
+    aside = rigid(rotation_exp(np.radians([0.0, 15.0, 0.0])), np.zeros(3))
+    placement = placed(first, second, replace(third, T_world_camera=third.T_world_camera @ aside))
+    assert placement.sentences == []
+    check_relative_poses(placement.T_world_camera, room.truth.T_world_camera)
+
+
 def check_relative_poses(poses, true, turn_deg=2.0, shift_m=0.05):
     for pose, true_pose in zip(poses[1:], true[1:], strict=True):
         T, T_true = inverse(poses[0]) @ pose, inverse(true[0]) @ true_pose
