@@ -319,14 +319,14 @@ def _lost(nodes: Sequence[NodeClouds], index: int, tried: Sequence[_Tried]) -> s
     """Why a node hangs together with none."""
     mine = [trial for trial in tried if index in (trial.source, trial.target)]
     best = max(mine, key=lambda trial: (_score(trial.agreement), trial.agreement.shared))
-    near = ""
+    other = nodes[best.target if best.source == index else best.source].name
+    why = f"beside {other}: {best.result.stop_reason.partition(';')[0].rstrip('.')}"
     if best.agreement.shared:
-        other = nodes[best.target if best.source == index else best.source].name
-        near = (
-            f" (of what it and {other} both measured where it fits best, "
-            f"{best.agreement.within_2pct_share:.0%} is within 2 %)"
+        why = (
+            f"of what it and {other} both measured where it fits best, "
+            f"{best.agreement.within_2pct_share:.0%} is within 2 %"
         )
     return (
-        f"{nodes[index].name} is left out: its pose is not known, and it fits nowhere beside the "
-        f"others{near}; try to give its pose, or images that share more of the place"
+        f"{nodes[index].name} is left out: its pose is not known, and it fits nowhere beside the others "
+        f"({why}); try to give its pose, or images that share more of the place"
     )

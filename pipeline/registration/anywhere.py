@@ -5,14 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+from scipy.spatial import cKDTree
+
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
+from pipeline.geometry import apply
 from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.registration.loop import register
+from pipeline.registration.neighbourhood import median_spacing_m, pca_normals
+from pipeline.registration.observability import open_motions
+from pipeline.registration.sample import draw
 from pipeline.types import FloatArray, PointCloud, RegistrationResult
 
 VOXELS = (1.6, 1.0)
 """Voxels of the start poses tried, in default voxels: the coarse one is the quickest."""
+SHAPE_POINTS = 3000
+MEETING_SPACINGS = 3.0
+"""Points nearer than so many spacings to the other cloud are where the two meet."""
 
 
 def register_anywhere(
@@ -35,7 +45,7 @@ def register_anywhere(
         thorough: whether features of the second size are tried where those of the first do not suffice.
 
     Raises:
-        ReconstructionError: no start pose was found.
+        ReconstructionError: no start pose was found, or the surfaces that meet leave a motion open.
     """
     best: tuple[float, RegistrationResult] | None = None
     reason = ""
@@ -46,6 +56,9 @@ def register_anywhere(
         except ReconstructionError as error:
             reason = str(error)
             continue
+        if motions := _open_where_they_meet(source, target, result.T_target_source, config.seed):
+            reason = f"Where the clouds lie on each other, {motions} changes nothing; give a start pose."
+            continue
         scored = score(result.T_target_source)
         if best is None or scored > best[0]:
             best = scored, result
@@ -54,3 +67,12 @@ def register_anywhere(
     if best is None:
         raise ReconstructionError(reason)
     return best[1]
+
+
+def _open_where_they_meet(source: PointCloud, target: PointCloud, T: FloatArray, seed: int) -> str:
+    """The motions, in words, that what both clouds have at a pose does not determine."""
+    moving, fixed = (draw(cloud, SHAPE_POINTS, seed, "").points_m for cloud in (source, target))
+    reach_m = MEETING_SPACINGS * median_spacing_m(fixed)
+    distances_m, _ = cKDTree(apply(T, moving)).query(fixed, distance_upper_bound=reach_m, workers=-1)
+    met = np.isfinite(distances_m)
+    return open_motions(fixed[met], pca_normals(fixed)[met]) if met.any() else ""

@@ -7,7 +7,7 @@ import pytest
 
 from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.geometry import LEVEL_POSE, inverse, rigid, rotation_exp
+from pipeline.geometry import LEVEL_POSE, inverse, pixel_rays, rigid, rotation_exp
 from pipeline.io.demos import load_demo
 from pipeline.io.rigs import load_rig, save_rig
 from pipeline.reconstruct import reconstruct
@@ -16,7 +16,7 @@ from pipeline.run_folder import metrics_of
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import RunCache, run
-from pipeline.types import RgbdFrame, Rig
+from pipeline.types import CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
 pytestmark = pytest.mark.xdist_group("reconstruct")
 
@@ -50,6 +50,30 @@ def test_a_given_pose_beyond_the_gate_is_corrected_by_a_wider_one(room):
     placement = placed(first, second, replace(third, T_world_camera=third.T_world_camera @ aside))
     assert placement.sentences == []
     check_relative_poses(placement.T_world_camera, room.truth.T_world_camera)
+
+
+@pytest.mark.parametrize(
+    ("normals", "motion"),
+    [([(0.0, 0.0, 1.0)], "sliding across"), ([(1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)], "sliding along y")],
+    ids=["one wall", "two walls"],
+)
+def test_views_of_walls_alone_do_not_place_a_node(normals, motion):
+    """Bare walls agree wherever one slides along them."""
+    placement = placed(walls("one", normals, 0.0), walls("other", normals, 0.05))
+    assert placement.placed(["one", "other"]) == ["one"]
+    assert motion in placement.sentences[0]
+
+
+def walls(name: str, normals, turn_rad: float) -> RgbdFrame:
+    """What a camera measures of planes 2 m away, seen a little from the side, with a Kinect's noise."""
+    camera, rng = CameraIntrinsics.pinhole(262.0, 262.0, 159.5, 119.5, 320, 240), np.random.default_rng(0)
+    rays = pixel_rays(camera) @ rotation_exp(np.array([0.0, turn_rad, 0.0])).T
+    along = rays @ (np.array(normals) / np.linalg.norm(normals, axis=1, keepdims=True)).T
+    z_m = np.min(np.where(along > 0.0, 2.0 / along, np.inf), axis=-1)
+    z_m += 0.0012 * z_m**2 * rng.standard_normal(z_m.shape)
+    rgb = np.full((240, 320, 3), 128, np.uint8)
+    depth = DepthMap(z_m.astype(np.float32))
+    return RgbdFrame(name, rgb, depth, camera, LEVEL_POSE.copy(), pose_known=False)
 
 
 def check_relative_poses(poses, true, turn_deg=2.0, shift_m=0.05):
