@@ -18,7 +18,14 @@ from pipeline.placement import NodeAgreement, NodeRegistration, NodeVerdict, Pla
 from pipeline.registration import register
 from pipeline.registration.agreement import NOTHING_SHARED, Agreement, agreement
 from pipeline.registration.anywhere import register_anywhere
-from pipeline.registration.pose_graph import PoseEdge, graph_points, groups_of, pose_edge, solve_pose_graph
+from pipeline.registration.pose_graph import (
+    PoseEdge,
+    graph_points,
+    groups_of,
+    pose_edge,
+    solve_pose_graph,
+    strongest_alike,
+)
 from pipeline.types import FloatArray, PointCloud, RegistrationResult, RgbdFrame
 
 SHARED_VIEW = 0.25
@@ -27,10 +34,10 @@ LEAST_OVERLAP = 0.05
 """Share of two nodes' points that the other camera can judge from which on their agreement counts."""
 LEAST_AGREEMENT = 0.4
 """A node whose pose is given is left out if less of what it and the others both measured is within 2 %."""
-SURE_OVERLAP, SURE_AGREEMENT = 0.15, 0.8
+SURE_OVERLAP, SURE_AGREEMENT = 0.15, 0.88
 """What a pose that was found without a first guess must reach; a given one with less is doubted. Where they
-stand right, nodes of the demo rigs reach .92 to .98, 3 degrees and 6 cm off .09 to .54; two different rooms,
-wall on wall, reach .72."""
+stand right, nodes of rendered rigs reach .92 to .98 and those of a real SR300 .92 to .99; .09 to .54 where
+they are 3 degrees and 6 cm off, up to .72 in another room, .86 with one corner taken for the opposite."""
 WIDER_GATES = 2.0, 4.0
 """Times the configured gate: tried where given poses lead to what the cameras' measurements contradict."""
 
@@ -97,6 +104,8 @@ def place_nodes(
         pose_edge(trial.source, trial.target, points_m, trial.result.T_target_source, trial.agrees)
         for trial in (tried[place] for place in good)
     ]
+    if not all(known):
+        edges = strongest_alike(points_m, edges, [tried[place].agreement.within_2pct_share for place in good])
     reference, group = _reference(known, edges)
     graph = solve_pose_graph(points_m, edges, reference)
     found = {place: (graph.loop_error_m[k], graph.used[k]) for k, place in enumerate(good)}

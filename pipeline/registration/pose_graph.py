@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -111,6 +111,34 @@ def groups_of(nodes: int, links: Iterable[tuple[int, int]]) -> list[set[int]]:
             one |= other
             groups.remove(other)
     return sorted(groups, key=min)
+
+
+def strongest_alike(
+    points_m: Sequence[FloatArray], edges: Sequence[PoseEdge], strengths: Sequence[float]
+) -> list[PoseEdge]:
+    """The edges, of which one does not agree if it contradicts the way along stronger ones.
+
+    Poses found from anywhere can be wrong alike, a view taken for the one of the opposite corner: two such
+    edges confirm each other by a loop. The stronger evidence is believed.
+
+    Args:
+        points_m: as for ``solve_pose_graph``.
+        edges: registrations.
+        strengths: of each edge.
+    """
+    judged = list(edges)
+    kept: list[PoseEdge] = []
+    for place in sorted(range(len(edges)), key=lambda place: -strengths[place]):
+        edge = edges[place]
+        if not edge.agrees:
+            continue
+        T_target_source = chained(len(points_m), kept, edge.target)[edge.source]
+        error_m = point_error_m(T_target_source, edge.T_target_source, points_m[edge.source])
+        if error_m > LOOP_TOLERANCE_M:
+            judged[place] = replace(edge, agrees=False)
+        else:  # NaN, where there is no other way, is no contradiction
+            kept.append(edge)
+    return judged
 
 
 def solve_pose_graph(

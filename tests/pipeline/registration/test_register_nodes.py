@@ -89,6 +89,15 @@ def test_two_nodes_are_where_their_registration_says():
     assert np.isnan(row.loop_error_m)
 
 
+def test_views_taken_for_those_of_the_opposite_corner_do_not_confirm_each_other(six):
+    """Nodes a third of a turn apart fit each other wall on wall, two of them in the same wrong way."""
+    scene, frames, works = six
+    placement = place_nodes([replace(frame, pose_known=False) for frame in frames], works, CONFIG)
+    assert placement.sentences == []
+    T = scene.cameras[0] @ inverse(placement.T_world_camera[0])
+    assert worst_error_m(scene, works, [T @ pose for pose in placement.T_world_camera]) < 0.02
+
+
 def test_nodes_that_do_not_know_where_they_are_find_out():
     scene, frames, works = rig_of(3)
     lost = [frames[0], *(replace(frame, T_world_camera=frames[0].T_world_camera) for frame in frames[1:])]
