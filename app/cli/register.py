@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from app.cli.text import answers_table, print_json, say, wrong_use
 from packetmesh.errors import InputError
+
+if TYPE_CHECKING:
+    from pipeline.register_pair import Answer
 
 
 def register(
@@ -77,8 +81,15 @@ def register(
     else:
         print(answers_table(metrics))
     if alone and not answers[0].agreed:
-        say(
-            f"{answers[0].draws} draws of the points end up to {100.0 * answers[0].spread_m:.2g} cm from "
-            "this answer, not within 0.5 cm: it is no surer than that; try --init with a closer start pose, "
-            "--start global or another --gate-m"
-        )
+        say(_parted(answers[0]))
+
+
+def _parted(answer: Answer) -> str:
+    """That the draws of the points do not agree, and what may help."""
+    ends = f"end up to {100.0 * answer.spread_m:.1f} cm from this answer, not within 0.5 cm"
+    if not math.isfinite(answer.spread_m):
+        ends = "do not all find a pose"
+    return (
+        f"{answer.draws} draws of the points {ends}: it is no surer than that; try --init with a closer "
+        "start pose, --start global or another --gate-m"
+    )

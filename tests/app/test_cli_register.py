@@ -100,6 +100,19 @@ def test_the_alias_and_other_formats_give_the_same_pose(capsys, tmp_path, files)
     np.testing.assert_array_equal(first, second)
 
 
+def test_clouds_that_have_nothing_in_common_end_elsewhere_with_every_draw_and_it_is_said(capsys, tmp_path):
+    rng = np.random.default_rng(0)
+    for name in ("one", "other"):
+        np.savez(tmp_path / f"{name}.npz", points=rng.uniform(0.0, 1.0, (500, 3)))
+    clouds = (tmp_path / "one.npz", tmp_path / "other.npz")
+    code, out, err = run(capsys, *clouds, "--json", "--out", tmp_path / "out")
+    row = json.loads(out)["ceicp-a"]
+    assert code == 0
+    assert not row["draws_agree"]
+    assert row["spread_m"] > 0.005
+    assert f"10 draws of the points end up to {100 * row['spread_m']:.1f} cm" in err.splitlines()[-1]
+
+
 def test_a_start_pose_a_voxel_and_a_gate_are_heeded(capsys, tmp_path, files):
     away = rigid(np.eye(3), [3.0, 0.0, 0.0])
     far = apply(inverse(away), read_cloud(files / "source.ply").points_m)
