@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from itertools import pairwise
+from itertools import combinations, pairwise
 from operator import add
 
 import numpy as np
@@ -109,7 +109,31 @@ def place_nodes(
     reference, group = _reference(known, edges)
     graph = solve_pose_graph(points_m, edges, reference)
     found = {place: (graph.loop_error_m[k], graph.used[k]) for k, place in enumerate(good)}
-    registrations = tuple(
+    poses = _poses(frames, graph.T_reference_node, reference, group, tried)
+    agreements = {
+        (source, target): _both_ways(
+            frames, nodes, source, target, geometry.inverse(poses[target]) @ poses[source]
+        )
+        for target, source in combinations(group, 2)
+    }
+    verdicts = _verdicts(nodes, group, agreements, tried)
+    return Placement(
+        _registrations(nodes, tried, found),
+        tuple(poses),
+        tuple(verdicts),
+        tuple(
+            NodeAgreement(nodes[source].name, nodes[target].name, pair)
+            for (source, target), pair in agreements.items()
+            if verdicts[source].placed and verdicts[target].placed
+        ),
+    )
+
+
+def _registrations(
+    nodes: Sequence[NodeClouds], tried: Sequence[_Tried], found: dict[int, tuple[float, bool]]
+) -> tuple[NodeRegistration, ...]:
+    """What was tried, with the loop error and the use of each that has a pose."""
+    return tuple(
         NodeRegistration(
             nodes[trial.source].name,
             nodes[trial.target].name,
@@ -118,25 +142,6 @@ def place_nodes(
             trial.agreement,
         )
         for place, trial in enumerate(tried)
-    )
-    poses = _poses(frames, graph.T_reference_node, reference, group, tried)
-    agreements = {
-        (source, target): _both_ways(frames, nodes, source, target, T)
-        for target in group
-        for source in group
-        if source > target
-        for T in [geometry.inverse(poses[target]) @ poses[source]]
-    }
-    verdicts = _verdicts(nodes, group, agreements, tried)
-    return Placement(
-        registrations,
-        tuple(poses),
-        tuple(verdicts),
-        tuple(
-            NodeAgreement(nodes[source].name, nodes[target].name, pair)
-            for (source, target), pair in agreements.items()
-            if verdicts[source].placed and verdicts[target].placed
-        ),
     )
 
 
