@@ -1,27 +1,21 @@
-"""What each node sees and infers, and where the nodes stand beside each other."""
+"""What each node sees and infers."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from packetmesh.errors import ReconstructionError
-from pipeline import geometry
 from pipeline.acquisition import Acquired, FilterResult, back_project
-from pipeline.config import DepthConfig, FusionMode, NodePoints, RegistrationConfig
+from pipeline.config import DepthConfig, FusionMode, RegistrationConfig
 from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, judge
 from pipeline.pixels import near
 from pipeline.registration import fuse, register
-from pipeline.registration.pose_graph import graph_points, pose_edge, solve_pose_graph
-from pipeline.types import DepthMap, FloatArray, PointCloud, PointSource, RegistrationResult, RgbdFrame
+from pipeline.types import DepthMap, PointCloud, PointSource, RegistrationResult, RgbdFrame
 
 COLOR_REACH_PX = 8
 """How far from a pixel that has arrived a filled-in colour still shows what is there."""
-SHARED_VIEW = 0.25
-"""Share of a node's points in another's image from which on the two are worth registering."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,30 +45,6 @@ class NodeClouds:
     """The believed depth, or in ``union`` mode all of it, as in the thesis."""
     inferred_registration: RegistrationResult | None
     fused: PointCloud
-
-
-@dataclass(frozen=True, slots=True)
-class NodeRegistration:
-    """How one node found its place beside another."""
-
-    source: str
-    target: str
-    result: RegistrationResult
-    loop_error_m: float = float("nan")
-    """How far it is from what the other registrations say about these two nodes; NaN where they say
-    nothing."""
-    used: bool = True
-    """False if it degenerated, or contradicts the loops and was left out."""
-
-
-@dataclass(frozen=True, slots=True)
-class Placement:
-    """The nodes beside each other."""
-
-    registrations: tuple[NodeRegistration, ...]
-    """Those that place each node beside an earlier one first."""
-    T_world_camera: tuple[FloatArray, ...]
-    """Corrected poses."""
 
 
 def infer_depth(network: DepthNetwork, frame: RgbdFrame, crop: bool = False) -> InferredDepth:
@@ -173,90 +143,3 @@ def _guesses(frame: RgbdFrame, inferred: DepthMap) -> DepthMap:
     if frame.coarse is not None:
         z_m = np.where(frame.coarse.valid, frame.coarse.z_m, z_m)
     return inferred if z_m is inferred.z_m else DepthMap(z_m, inferred.kind)
-
-
-def place_nodes(
-    frames: Sequence[RgbdFrame],
-    nodes: Sequence[NodeClouds],
-    config: RegistrationConfig,
-    align_with: NodePoints = "sensor",
-) -> Placement:
-    """Place the nodes beside each other by all pairs that share enough of their view.
-
-    The first node keeps the pose it believes in. Registrations that contradict the loops they are part
-    of are left out, and the rest make the poses by least squares. A node that no good registration
-    reaches is placed beside the earlier node that it shares most of its view with; where their
-    registration degenerates, as it believes.
-
-    Args:
-        frames: the nodes' images with their believed poses.
-        nodes: their clouds.
-        config: how a pair is registered.
-        align_with: which of a node's clouds is registered.
-    """
-    clouds = [getattr(node, align_with) for node in nodes]
-    partners, others = _node_pairs(frames, nodes, config.start == "global")
-    pairs = [*partners, *others]
-    results = [_register_pair(frames, clouds, config, *pair) for pair in pairs]
-    points_m = [graph_points(cloud) for cloud in clouds]
-    good = [
-        place
-        for place, result in enumerate(results)
-        if result.steps and not result.stop_reason.startswith("degenerate")
-    ]
-    edges = [pose_edge(*pairs[place], points_m, results[place].T_target_source) for place in good]
-    graph = solve_pose_graph(points_m, edges)
-    found = {place: (graph.loop_error_m[k], graph.used[k]) for k, place in enumerate(good)}
-    registrations = tuple(
-        NodeRegistration(
-            nodes[source].name, nodes[target].name, result, *found.get(place, (float("nan"), False))
-        )
-        for place, ((source, target), result) in enumerate(zip(pairs, results, strict=True))
-    )
-    poses = [frames[0].T_world_camera]
-    for (index, partner), result in zip(partners, results, strict=False):
-        T = graph.T_reference_node[index]
-        placed = poses[0] @ T if np.isfinite(T).all() else poses[partner] @ result.T_target_source
-        poses.append(placed)
-    return Placement(registrations, tuple(poses))
-
-
-def _node_pairs(
-    frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], unknown: bool
-) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    """(later, earlier) node: every node's best partner, and the other pairs that share enough.
-
-    Where poses are ``unknown``, so is what is shared, and all pairs are tried.
-    """
-    partners, others = [], []
-    for index in range(1, len(nodes)):
-        shares = [_shared_view(frames[index], nodes[index].sensor, frames[k]) for k in range(index)]
-        partner = index - 1 if unknown else int(np.argmax(shares))
-        partners.append((index, partner))
-        others += [(index, k) for k in range(index) if k != partner and (unknown or shares[k] >= SHARED_VIEW)]
-    return partners, others
-
-
-def _register_pair(
-    frames: Sequence[RgbdFrame],
-    clouds: Sequence[PointCloud],
-    config: RegistrationConfig,
-    index: int,
-    partner: int,
-) -> RegistrationResult:
-    """One node's cloud onto another's, from the believed poses or from anywhere."""
-    T_init = geometry.inverse(frames[partner].T_world_camera) @ frames[index].T_world_camera
-    try:
-        return register(clouds[index], clouds[partner], config, T_init)
-    except ReconstructionError as error:
-        return RegistrationResult(T_init, (), False, str(error))
-
-
-def _shared_view(frame: RgbdFrame, cloud: PointCloud, other: RgbdFrame) -> float:
-    """Share of a node's points that fall into another node's image, by the believed poses."""
-    T_other_camera = geometry.inverse(other.T_world_camera) @ frame.T_world_camera
-    points_m = geometry.apply(T_other_camera, cloud.points_m[::50])
-    points_m = points_m[points_m[:, 2] > 0.1]
-    uv = geometry.project(other.intrinsics, points_m)
-    size_px = (other.intrinsics.width_px, other.intrinsics.height_px)
-    return float(np.all((uv >= 0) & (uv < size_px), axis=1).sum()) / max(1, len(cloud) // 50)

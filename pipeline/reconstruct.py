@@ -10,7 +10,8 @@ from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.findings import Kept
 from pipeline.merging import MergedClouds
-from pipeline.nodes import NodeClouds, Placement
+from pipeline.nodes import NodeClouds
+from pipeline.placement import Placement
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import Cache, Steps, run

@@ -28,7 +28,16 @@ def answer_metrics(answers: Iterable[Answer], with_truth: bool) -> dict[str, dic
     names = ["T_target_source", "iterations", "stop_reason", "rmse_m", "average_hausdorff_m", "elapsed_s"]
     if with_truth:
         names.append("point_error_m")
-    return {answer.method: {name: getattr(answer, name) for name in names} for answer in answers}
+    return {
+        answer.method: {name: getattr(answer, name) for name in names} | _draws(answer) for answer in answers
+    }
+
+
+def _draws(answer: Answer) -> dict[str, Any]:
+    """How far the draws of the points agree, where there were several."""
+    if answer.draws == 1:
+        return {}
+    return {"draws": answer.draws, "spread_m": answer.spread_m, "draws_agree": answer.agreed}
 
 
 def chosen_pose(answers: Sequence[Answer]) -> FloatArray:

@@ -36,6 +36,8 @@ UNIT_RATIOS = (300.0, 3000.0)
 EVALUATED_POINTS = 20_000
 """The clouds are thinned alike to about this many points before their distance is measured."""
 SHAPE_POINTS = 3000
+AGREEMENT_M = 0.005
+"""Draws of the points whose answers are nearer to each other than this agree."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,15 @@ class Answer:
     """None of a peer."""
     step_times_s: tuple[float, ...] = ()
     """Since the start, for every step."""
+    draws: int = 1
+    """How many draws of the points were registered; this is the answer of one of them."""
+    spread_m: float = float("nan")
+    """Largest point error of another draw's answer from this one; infinite if one has none, NaN of one."""
+
+    @property
+    def agreed(self) -> bool:
+        """Whether all draws of the points lead to one place."""
+        return self.spread_m <= AGREEMENT_M
 
     @property
     def failed(self) -> bool:
@@ -95,14 +106,15 @@ def chosen_methods(name: str) -> tuple[str, ...]:
 def config_for(
     methods: tuple[str, ...],
     metric: Metric | None,
-    gate_m: float,
+    gate_m: float | None,
     start: Literal["given", "global"],
     with_scale: bool,
 ) -> RegistrationConfig:
     """The settings of a comparison.
 
     A scale needs the point metric, and pairs of both directions: source points that look for their
-    nearest partners come nearer to them by shrinking.
+    nearest partners come nearer to them by shrinking. Without a gate it is the default one, until the data
+    give another (``with_gate``).
 
     Raises:
         InputError: settings that do not go together.
@@ -111,7 +123,7 @@ def config_for(
     return RegistrationConfig(
         method=method,
         metric=metric or ("point" if with_scale else "plane"),
-        gate_m=gate_m,
+        gate_m=RegistrationConfig().gate_m if gate_m is None else gate_m,
         start=start,
         with_scale=with_scale,
         direction="both" if with_scale else "q2p",

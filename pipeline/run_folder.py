@@ -14,8 +14,9 @@ from packetmesh.settings import settings
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
 from pipeline.merging import MergedClouds
-from pipeline.nodes import NodeRegistration
+from pipeline.placement import NodeRegistration, NodeVerdict
 from pipeline.reconstruct import Reconstruction
+from pipeline.registration.agreement import Agreement
 from pipeline.spec import Spec
 from pipeline.types import PointCloud, PointSource, SurfaceResult
 
@@ -31,9 +32,10 @@ def write_run_folder(reconstruction: Reconstruction, metrics: dict[str, Any], fo
     Raises:
         InputError: the folder cannot be written.
     """
-    files = [folder / "config.json", folder / "metrics.json"]
+    files = [folder / "config.json", folder / "metrics.json", folder / "poses.json"]
     write_json(files[0], config_of(reconstruction.spec))
     write_json(files[1], metrics)
+    write_json(files[2], metrics["poses"])
     for name, cloud in clouds_of(reconstruction.clouds).items():
         files.append(folder / name)
         write_cloud(files[-1], cloud)
@@ -63,7 +65,7 @@ def clouds_of(clouds: MergedClouds) -> dict[str, PointCloud]:
 
 def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
     """The numbers of a run; every length in metres, every share from 0 to 1."""
-    before, after = reconstruction.before, reconstruction.after
+    before, after, placement = reconstruction.before, reconstruction.after, reconstruction.placement
     truth = None
     if reconstruction.truth_before or reconstruction.truth_after:
         truth = {"surface_before": reconstruction.truth_before, "surface_after": reconstruction.truth_after}
@@ -84,20 +86,30 @@ def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
                     "coefficients": node.alignment.coefficients,
                 },
                 "filled_points": int(np.sum(node.fused.source == PointSource.INFERRED)),
+                "place": _place(verdict),
             }
-            for node, frame in zip(reconstruction.nodes, reconstruction.rig.frames, strict=True)
+            for node, frame, verdict in zip(
+                reconstruction.nodes, reconstruction.rig.frames, placement.verdicts, strict=True
+            )
         ],
-        "registration": [
-            _registration(item, reconstruction) for item in reconstruction.placement.registrations
+        "registration": [_registration(item, reconstruction) for item in placement.registrations],
+        "agreement": [
+            {"nodes": [pair.source, pair.target]} | _agreement(pair.agreement)
+            for pair in placement.agreements
         ],
-        "poses": {
-            node.name: pose
-            for node, pose in zip(reconstruction.nodes, reconstruction.placement.T_world_camera, strict=True)
-        },
+        "poses": dict(
+            placement.placed(
+                [
+                    (node.name, pose)
+                    for node, pose in zip(reconstruction.nodes, placement.T_world_camera, strict=True)
+                ]
+            )
+        ),
         "spacing": {"r_F_m": reconstruction.clouds.r_F_m, "sigma_D_m": reconstruction.clouds.sigma_D_m},
         "surface_before": surface_metrics(before),
         "surface_after": surface_metrics(after),
-        "measured": asdict(reconstruction.kept),
+        "measured": asdict(reconstruction.kept)
+        | {"agreement_between_nodes": placement.agreement.within_2pct_share},
         "truth": truth,
         "timings_s": reconstruction.timings_s,
         "peak_memory_bytes": peak_memory_bytes(),
@@ -117,7 +129,17 @@ def _registration(item: NodeRegistration, reconstruction: Reconstruction) -> dic
         "T_target_source": item.result.T_target_source,
         "loop_error_m": item.loop_error_m,
         "used": item.used,
-    }
+    } | _agreement(item.agreement)
+
+
+def _agreement(found: Agreement) -> dict[str, float]:
+    """Of what two cameras both measured."""
+    return {"overlap_share": found.overlap_share, "within_2pct_share": found.within_2pct_share}
+
+
+def _place(verdict: NodeVerdict) -> dict[str, Any]:
+    """Whether a node found its place, and how well it fits all others there."""
+    return {"placed": verdict.placed, "sentence": verdict.sentence} | _agreement(verdict.agreement)
 
 
 def surface_metrics(surface: SurfaceResult) -> dict[str, Any]:

@@ -30,12 +30,12 @@ from pipeline.merging import FusedCloud, MergedClouds, merge, merge_fused
 from pipeline.nodes import (
     InferredDepth,
     NodeClouds,
-    Placement,
     infer_depth,
     nothing_inferred,
-    place_nodes,
     prepare_node,
 )
+from pipeline.placement import Placement, whole_placement
+from pipeline.placing import place_nodes
 from pipeline.sources import Source
 from pipeline.spec import CHAIN, NEEDS, Spec, StageName, key
 from pipeline.surface import (
@@ -48,7 +48,7 @@ from pipeline.surface import (
     yardstick_of,
 )
 from pipeline.surface.baselines import alpha_surface, poisson_surface
-from pipeline.types import PointCloud, Rig, SurfaceResult
+from pipeline.types import DepthMap, PointCloud, Rig, SurfaceResult
 
 Result = TypeVar("Result")
 Steps = Generator[Progress, None, Result]
@@ -179,7 +179,14 @@ def fused_cloud(
 ) -> Steps[FusedCloud]:
     """The cloud that the ball rolls over."""
     yield Progress("merging the clouds", 0.6)
-    return merge_fused(rig.frames, nodes, placement.T_world_camera, mode, max_points, smoothing_passes)
+    return merge_fused(
+        placement.placed(rig.frames),
+        placement.placed(nodes),
+        placement.placed(placement.T_world_camera),
+        mode,
+        max_points,
+        smoothing_passes,
+    )
 
 
 def both_clouds(
@@ -188,8 +195,9 @@ def both_clouds(
     """The same beside the sensors' own points, thinned alike."""
     yield Progress("merging the sensors' clouds", 0.75)
     if fused.measured is None:
-        own = [node.sensor for node in nodes]
-        sensor = merge(own, placement.T_world_camera, fused.voxel_m, smoothing_passes)
+        own = [node.sensor for node in placement.placed(nodes)]
+        poses = placement.placed(placement.T_world_camera)
+        sensor = merge(own, poses, fused.voxel_m, smoothing_passes)
     else:
         sensor = fused.fused.select(np.arange(fused.measured))
     return MergedClouds(sensor, fused.fused, fused.r_F_m, fused.sigma_D_m)
@@ -207,7 +215,7 @@ def roll_over(
     yield Progress(f"rolling the ball over the {name} cloud", fraction)
     cloud: PointCloud = getattr(clouds, name)
     surface = roll_or_nothing(cloud, radii(config, clouds.r_F_m, clouds.sigma_D_m))
-    return measured(surface, cameras_of(rig, placement), len(cloud), [frame.depth for frame in rig.frames])
+    return measured(surface, cameras_of(rig, placement), len(cloud), _sensed(rig, placement))
 
 
 Truth = tuple[dict[str, float] | None, dict[str, float] | None]
@@ -240,7 +248,7 @@ def with_rays(surface: SurfaceResult, rig: Rig, placement: Placement) -> Surface
     """The surface with what the registered cameras' rays measure of it."""
     cameras, quality = cameras_of(rig, placement), surface.quality
     points = len(surface.vertices_m) + quality.unused_points
-    return measured(surface, cameras, points, [frame.depth for frame in rig.frames])
+    return measured(surface, cameras, points, _sensed(rig, placement))
 
 
 def yardstick_of_rig(rig: Rig) -> Yardstick | None:
@@ -254,16 +262,21 @@ def compared(
     """A surface against the truth of its rig; None without truth or without a triangle."""
     if rig.truth is None or not len(surface.triangles):
         return None
-    cameras = cameras_of(rig, placement)
+    cameras = cameras_of(rig, whole_placement(rig, range(len(rig.frames)), placement))
     return compare_with_truth(surface.vertices_m, surface.triangles, rig.truth, cameras, yardstick)
 
 
 def cameras_of(rig: Rig, placement: Placement) -> list[Camera]:
-    """The registered cameras, whose rays measure a surface."""
+    """The registered cameras, whose rays measure a surface; none of a node that found no place."""
     return [
         Camera(frame.intrinsics, pose)
-        for frame, pose in zip(rig.frames, placement.T_world_camera, strict=True)
+        for frame, pose in placement.placed(list(zip(rig.frames, placement.T_world_camera, strict=True)))
     ]
+
+
+def _sensed(rig: Rig, placement: Placement) -> list[DepthMap]:
+    """What the registered cameras measured."""
+    return [frame.depth for frame in placement.placed(rig.frames)]
 
 
 STAGES: dict[StageName, Callable[..., Steps[Any]]] = {

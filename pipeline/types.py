@@ -119,6 +119,8 @@ class RgbdFrame:
     """(H, W) depth known only coarsely, where ``depth`` is unknown: a guess, as inferred depth is."""
     noise: DepthNoise | None = None
     """Of ``depth`` as its sensor's calibration found it; None is that of a Kinect."""
+    pose_known: bool = True
+    """False if nobody gave the pose, so that registration must find it from anywhere."""
 
 
 @dataclass(frozen=True, slots=True)

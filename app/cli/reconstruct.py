@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.cli.options import Images, PresetName, Settings
 from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
 from packetmesh.settings import config_named, with_settings
 from pipeline.config import PRESETS
+
+if TYPE_CHECKING:
+    from pipeline.placement import Placement
 
 
 def reconstruct(
@@ -22,7 +27,7 @@ def reconstruct(
 
     Args:
         images: What is reconstructed.
-        out: Folder for config.json, metrics.json, the clouds, the surfaces and report.html.
+        out: Folder for config.json, metrics.json, poses.json, the clouds, the surfaces and report.html.
         preset: Settings to start from.
         set: Settings to change, for example `--set depth.alignment=median surface.max_points=20000`.
         json: Print the metrics as one JSON object.
@@ -55,3 +60,18 @@ def reconstruct(
         say("The ball falls through everywhere; try larger surface.radii_m")
     if json:
         print_json(metrics)
+    say_places(result.placement)
+
+
+def say_places(placement: Placement) -> None:
+    """How far the nodes of a rig agree, and which found no place; exits with 1 if no two did."""
+    if len(placement.verdicts) < 2:
+        return
+    if placement.agreements:
+        share = placement.agreement.within_2pct_share
+        say(f"Of what two cameras both measured, {share:.1%} is within 2 %")
+    for sentence in placement.sentences:
+        say(sentence)
+    if not placement.agreements:
+        say("No two nodes stand beside each other: the surface is of one node only")
+        sys.exit(1)

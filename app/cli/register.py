@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from app.cli.text import answers_table, print_json, say, wrong_use
 from packetmesh.errors import InputError
+
+if TYPE_CHECKING:
+    from pipeline.register_pair import Answer
 
 
 def register(
@@ -20,7 +24,7 @@ def register(
     init: Path | None = None,
     truth: Path | None = None,
     voxel_m: float | None = None,
-    gate_m: float = 0.3,
+    gate_m: float | None = None,
     start: Literal["given", "global"] = "given",
     scale: bool = False,
     json: bool = False,
@@ -36,7 +40,7 @@ def register(
         init: Start pose of the source in the target's frame, 4 x 4 numbers; the identity without it.
         truth: The true pose, where it is known, to measure errors by.
         voxel_m: Thin both clouds to one point per cube of this edge first.
-        gate_m: Largest distance of a pair.
+        gate_m: Largest distance of a pair; without it, of a ladder of gates the one that the data bear out.
         start: `global` finds the start pose by matching features.
         scale: Estimate a scale as well (our methods, point metric).
         json: Print the metrics as one JSON object.
@@ -44,8 +48,10 @@ def register(
     from packetmesh.files import writable_folder
     from pipeline.io.clouds import read_cloud
     from pipeline.io.poses import read_pose
+    from pipeline.register_draws import run_draws, with_gate
     from pipeline.register_folder import answer_metrics, chosen_pose, write_register_folder
     from pipeline.register_pair import chosen_methods, config_for, prepared_pair, run_methods
+    from pipeline.registration.methods import METHODS
 
     try:
         methods = chosen_methods(method)
@@ -54,8 +60,13 @@ def register(
     config = config_for(methods, metric=metric, gate_m=gate_m, start=start, with_scale=scale)
     T_init, T_true = (None if path is None else read_pose(path) for path in (init, truth))
     moving, fixed = read_cloud(source), read_cloud(target)
+    pair = prepared_pair(moving, fixed, config, voxel_m, T_init, T_true)
+    if gate_m is None:
+        config = with_gate(pair, config)
+        say(f"The gate that the data bear out is {config.gate_m:.3g} m")
     answers = []
-    for answer in run_methods(methods, prepared_pair(moving, fixed, config, voxel_m, T_init, T_true), config):
+    alone = len(methods) == 1 and methods[0] in METHODS
+    for answer in run_draws(methods[0], pair, config) if alone else run_methods(methods, pair, config):
         answers.append(answer)
         say(f"{answer.method}: {answer.stop_reason}")
     chosen_pose(answers)  # a run without a pose leaves no folder
@@ -69,3 +80,16 @@ def register(
         print_json(metrics)
     else:
         print(answers_table(metrics))
+    if alone and not answers[0].agreed:
+        say(_parted(answers[0]))
+
+
+def _parted(answer: Answer) -> str:
+    """That the draws of the points do not agree, and what may help."""
+    ends = f"end up to {100.0 * answer.spread_m:.1f} cm from this answer, not within 0.5 cm"
+    if not math.isfinite(answer.spread_m):
+        ends = "do not all find a pose"
+    return (
+        f"{answer.draws} draws of the points {ends}: it is no surer than that; try --init with a closer "
+        "start pose, --start global or another --gate-m"
+    )

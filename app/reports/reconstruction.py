@@ -11,7 +11,7 @@ from typing import Any
 from app.drawing.pictures import depth_picture, depth_range_m
 from app.reports.html import picture, pictures, table, write_page
 from pipeline.reconstruct import Reconstruction
-from pipeline.surface import Camera
+from pipeline.stages import cameras_of
 from pipeline.surface.pictures import mesh_picture
 
 QUALITY_ROWS = (
@@ -46,8 +46,10 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
     yield (
         f'<p class="lead">Preset <code>{escape(metrics["preset"])}</code>. Of all camera rays, '
         f"<b>{before['no_hit_ray_share']:.1%}</b> find no surface before fusion and "
-        f"<b>{after['no_hit_ray_share']:.1%}</b> after it.{_kept(metrics['measured'])}</p>"
+        f"<b>{after['no_hit_ray_share']:.1%}</b> after it.{_kept(metrics['measured'])}"
+        f"{_agreeing(metrics['measured'])}</p>"
     )
+    yield from _places(metrics)
     yield from _surfaces(result, before, after)
     yield from _truth(metrics)
     yield from _nodes(result, metrics)
@@ -72,6 +74,21 @@ def _kept(measured: dict[str, float]) -> str:
     )
 
 
+def _agreeing(measured: dict[str, float]) -> str:
+    """How far the cameras of a rig agree, in a sentence; nothing where no two measured the same place."""
+    share = measured["agreement_between_nodes"]
+    if not math.isfinite(share):
+        return ""
+    return f" Of what two cameras both measured, <b>{share:.1%}</b> is within 2 %."
+
+
+def _places(metrics: dict[str, Any]) -> Iterator[str]:
+    """What must be known of nodes that found no place, or one that little speaks for."""
+    for node in metrics["nodes"]:
+        if node["place"]["sentence"]:
+            yield f'<p class="lead"><b>{escape(node["place"]["sentence"])}.</b></p>'
+
+
 def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, Any]) -> Iterator[str]:
     yield "<h2>The surface before and after fusion</h2>"
     radii = ", ".join(f"{1000 * radius:.1f}" for radius in before["radii_m"])
@@ -79,8 +96,8 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
         f'<p class="note">Ball radii {radii} mm on both. Magenta: a ray that hits nothing. '
         f"Seen from each node's camera.</p>"
     )
-    for frame, pose in zip(result.rig.frames, result.placement.T_world_camera, strict=True):
-        camera = Camera(frame.intrinsics, pose)
+    frames, placed = result.placement.placed(result.rig.frames), cameras_of(result.rig, result.placement)
+    for frame, camera in zip(frames, placed, strict=True):
         surfaces = (("before", result.before), ("after", result.after))
         figures = (
             picture(mesh_picture(surface, camera, colored), f"{frame.name}, {when} fusion{how}")
@@ -173,8 +190,11 @@ def _registrations(metrics: dict[str, Any]) -> Iterator[str]:
             *(item[key] for key in ("source", "target", "method", "iterations", "stop_reason")),
             None if item["rmse_m"] is None else 1000 * item["rmse_m"],
             1000 * item["loop_error_m"] if math.isfinite(item["loop_error_m"]) else None,
+            100 * item["within_2pct_share"] if math.isfinite(item["within_2pct_share"]) else None,
             "yes" if item["used"] else "no",
         )
         for item in metrics["registration"]
     )
-    yield table((*head, "weighted RMSE (mm)", "loop error (mm)", "used"), rows)
+    yield table(
+        (*head, "weighted RMSE (mm)", "loop error (mm)", "both measured within 2 % (%)", "used"), rows
+    )

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from network_sim.types import to_s
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import Progress
-from pipeline import geometry
 from pipeline.delivery.coding import Received
 from pipeline.delivery.memory import Memory
 from pipeline.delivery.sending import Sending, arrived_bytes, frames_at_sink, received_at
 from pipeline.delivery.sink import heard
-from pipeline.nodes import Placement
+from pipeline.placement import whole_placement
 from pipeline.sources import LoadedRig
 from pipeline.spec import REBUILD, Spec
 from pipeline.stages import compared, run, with_rays, yardstick_of_rig
@@ -54,7 +53,7 @@ class Moment:
     """The same with the computers and cameras that carry them."""
     nodes: tuple[NodeArrival, ...]
     T_world_camera: dict[str, FloatArray]
-    """(4, 4) registered poses of the nodes that were heard by then."""
+    """(4, 4) registered poses of the nodes that were heard by then and found their place."""
     surface: SurfaceResult | None
     """Measured by the rays of all cameras, heard or not; None where nothing can be rebuilt."""
     truth: dict[str, float] | None
@@ -132,9 +131,12 @@ def _rebuilt(
         return NOTHING
     placement, surface = results["placement"].value, results["after"].value
     everyone = whole_placement(sending.rig, present, placement)
-    if len(present) < len(frames):
+    if len(placement.placed(present)) < len(frames):
         surface = with_rays(surface, sending.rig, everyone)
-    poses = {frames[index].name: pose for index, pose in zip(present, placement.T_world_camera, strict=True)}
+    poses = {
+        frames[index].name: pose
+        for index, pose in placement.placed(list(zip(present, placement.T_world_camera, strict=True)))
+    }
     return surface, compared(sending.rig, everyone, surface, yardstick), poses
 
 
@@ -143,14 +145,3 @@ def spec_of(sending: Sending, frames: Sequence[RgbdFrame], present: Sequence[int
     asked = sending.spec.spec
     rig = Rig(sending.rig.name, tuple(frames[index] for index in present))
     return Spec(LoadedRig(rig), asked.preset, asked.config)
-
-
-def whole_placement(rig: Rig, present: Sequence[int], placement: Placement) -> Placement:
-    """The registered nodes, and the others beside the first of them, as the truth or the rig believes."""
-    believed = [frame.T_world_camera for frame in rig.frames]
-    reference = believed if rig.truth is None else rig.truth.T_world_camera
-    T_here_reference = placement.T_world_camera[0] @ geometry.inverse(reference[present[0]])
-    poses: list[FloatArray] = [T_here_reference @ pose for pose in reference]
-    for index, pose in zip(present, placement.T_world_camera, strict=True):
-        poses[index] = pose
-    return Placement(placement.registrations, tuple(poses))

@@ -76,7 +76,7 @@ def load_frame(
     shape = (camera.height_px, camera.width_px)
     _check_size("intrinsics file", intrinsics, shape, "colour image", color, rgb.shape)
     T_world_camera = LEVEL_POSE.copy() if pose is None else read_pose(pose)
-    return RgbdFrame(name, rgb, sensed, camera, T_world_camera, noise=noise)
+    return RgbdFrame(name, rgb, sensed, camera, T_world_camera, noise=noise, pose_known=pose is not None)
 
 
 def _registered(
@@ -180,7 +180,8 @@ def save_rig(directory: AnyPath, rig: Rig) -> None:
         write_color(folder / "color.png", frame.rgb)
         write_depth_mm(folder / "depth.png", frame.depth)
         write_intrinsics(folder / "intrinsics.json", frame.intrinsics)
-        write_pose(folder / "pose.txt", frame.T_world_camera)
+        if frame.pose_known:
+            write_pose(folder / "pose.txt", frame.T_world_camera)
         _write_noise(folder, frame)
     if rig.truth is not None:
         write_truth(directory, dict(zip(names, rig.frames, strict=True)), rig.truth)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -37,6 +37,8 @@ class PoseEdge:
     misfit_m: float
     """Median distance of the source's points from the target where they overlap; of edges that
     contradict each other, the one with the largest is dropped first."""
+    agrees: bool = True
+    """False for an edge that other evidence contradicts: it makes no pose and checks no loop."""
 
     @property
     def pairs(self) -> float:
@@ -49,10 +51,10 @@ class PoseGraph:
     """The outcome; edges in the order in which they were given."""
 
     T_reference_node: tuple[FloatArray, ...]
-    """(4, 4) pose of every node in the frame of node 0; NaN for nodes that no used edge reaches."""
+    """(4, 4) pose of every node in the frame of the reference; NaN for nodes that no used edge reaches."""
     loop_error_m: tuple[float, ...]
-    """Point error between each edge and the other way between its nodes, along used edges, that agrees
-    with it best; NaN without another way."""
+    """Point error between each edge and the other way between its nodes, along edges that nothing else
+    contradicts, that agrees with it best; NaN without another way."""
     used: tuple[bool, ...]
     """False for the edges that were rejected because they contradict the loops."""
 
@@ -65,7 +67,11 @@ def graph_points(cloud: PointCloud) -> FloatArray:
 
 
 def pose_edge(
-    source: int, target: int, points_m: Sequence[FloatArray], T_target_source: FloatArray
+    source: int,
+    target: int,
+    points_m: Sequence[FloatArray],
+    T_target_source: FloatArray,
+    agrees: bool = True,
 ) -> PoseEdge:
     """The evidence for a registered pose in the nodes' own points.
 
@@ -83,6 +89,7 @@ def pose_edge(
         np.asarray(T_target_source, dtype=np.float64),
         _information(close),
         float(np.median(overlap_m)) if len(overlap_m) else float("inf"),
+        agrees,
     )
 
 
@@ -95,22 +102,67 @@ def _information(points_m: FloatArray) -> FloatArray:
     return np.einsum("nki,nkj->ij", jacobian, jacobian)
 
 
-def solve_pose_graph(points_m: Sequence[FloatArray], edges: Sequence[PoseEdge]) -> PoseGraph:
+def groups_of(nodes: int, links: Iterable[tuple[int, int]]) -> list[set[int]]:
+    """The nodes that hang together, in the order of their first ones."""
+    groups = [{node} for node in range(nodes)]
+    for link in links:
+        one, other = (next(group for group in groups if node in group) for node in link)
+        if one is not other:
+            one |= other
+            groups.remove(other)
+    return sorted(groups, key=min)
+
+
+def strongest_alike(
+    points_m: Sequence[FloatArray], edges: Sequence[PoseEdge], strengths: Sequence[float]
+) -> list[PoseEdge]:
+    """The edges, of which one does not agree if it contradicts the way along stronger ones.
+
+    Poses found from anywhere can be wrong alike, a view taken for the one of the opposite corner: two such
+    edges confirm each other by a loop. The stronger evidence is believed.
+
+    Args:
+        points_m: as for ``solve_pose_graph``.
+        edges: registrations.
+        strengths: of each edge.
+    """
+    judged = list(edges)
+    kept: list[PoseEdge] = []
+    for place in sorted(range(len(edges)), key=lambda place: -strengths[place]):
+        edge = edges[place]
+        if not edge.agrees:
+            continue
+        T_target_source = chained(len(points_m), kept, edge.target)[edge.source]
+        error_m = point_error_m(T_target_source, edge.T_target_source, points_m[edge.source])
+        if error_m > LOOP_TOLERANCE_M:
+            judged[place] = replace(edge, agrees=False)
+        else:  # NaN, where there is no other way, is no contradiction
+            kept.append(edge)
+    return judged
+
+
+def solve_pose_graph(
+    points_m: Sequence[FloatArray], edges: Sequence[PoseEdge], reference: int = 0
+) -> PoseGraph:
     """Poses that agree best with the edges, after those that contradict the loops are taken out.
 
     Args:
         points_m: (N, 3) points of every node, in its own frame: errors are measured at them.
         edges: registrations, at most one for each pair of nodes.
+        reference: the node whose pose is the identity.
     """
     used = _consistent(points_m, edges)
     kept = [edge for edge, keep in zip(edges, used, strict=True) if keep]
-    poses = _optimised(chained(len(points_m), kept), kept)
-    return PoseGraph(tuple(poses), tuple(_loop_error_m(points_m, edge, edges) for edge in edges), tuple(used))
+    poses = _optimised(chained(len(points_m), kept, reference), kept, reference)
+    agreeing = [edge for edge in edges if edge.agrees]
+    loop_error_m = tuple(_loop_error_m(points_m, edge, agreeing) for edge in edges)
+    return PoseGraph(tuple(poses), loop_error_m, tuple(used))
 
 
-def chained(nodes: int, edges: Sequence[PoseEdge]) -> list[FloatArray]:
+def chained(nodes: int, edges: Sequence[PoseEdge], reference: int = 0) -> list[FloatArray]:
     """T_reference_node along the tree of the edges with the most pairs; NaN for nodes out of reach."""
-    poses: list[FloatArray | None] = [np.eye(4), *[None] * (nodes - 1)]
+    poses: list[FloatArray | None] = [None] * nodes
+    poses[reference] = np.eye(4)
     while True:
         bridges = [edge for edge in edges if (poses[edge.source] is None) != (poses[edge.target] is None)]
         if not bridges:
@@ -125,7 +177,7 @@ def chained(nodes: int, edges: Sequence[PoseEdge]) -> list[FloatArray]:
 
 def _consistent(points_m: Sequence[FloatArray], edges: Sequence[PoseEdge]) -> list[bool]:
     """Which edges stay when the worst fitting of those that no loop confirms goes, until all loops close."""
-    used = [True] * len(edges)
+    used = [edge.agrees for edge in edges]
     while True:
         left = [edge for edge, keep in zip(edges, used, strict=True) if keep]
         suspects = [
@@ -162,8 +214,8 @@ def _ways(start: int, end: int, edges: Sequence[PoseEdge]) -> Iterator[FloatArra
             yield T @ step
 
 
-def _optimised(start: Sequence[FloatArray], edges: Sequence[PoseEdge]) -> list[FloatArray]:
-    """Open3D's Levenberg-Marquardt over the nodes that have a start, node 0 held."""
+def _optimised(start: Sequence[FloatArray], edges: Sequence[PoseEdge], reference: int) -> list[FloatArray]:
+    """Open3D's Levenberg-Marquardt over the nodes that have a start, the reference held."""
     reached = [node for node, pose in enumerate(start) if np.isfinite(pose).all()]
     if len(edges) < len(reached):
         return list(start)  # a tree: nothing to agree about
@@ -183,7 +235,7 @@ def _optimised(start: Sequence[FloatArray], edges: Sequence[PoseEdge]) -> list[F
         graph,
         o3d_registration.GlobalOptimizationLevenbergMarquardt(),
         o3d_registration.GlobalOptimizationConvergenceCriteria(),
-        o3d_registration.GlobalOptimizationOption(INFORMATION_GATE_M, 0.25, 1.0, 0),
+        o3d_registration.GlobalOptimizationOption(INFORMATION_GATE_M, 0.25, 1.0, place[reference]),
     )
     poses = list(start)
     for node in reached:

@@ -54,7 +54,8 @@ def test_a_run_leaves_its_pose_numbers_steps_and_cloud(capsys, tmp_path, files):
     assert metrics == json.loads((tmp_path / "metrics.json").read_text())
     assert set(metrics) == {"ceicp-a"}
     row = metrics["ceicp-a"]
-    assert set(row) == KEYS | {"point_error_m"}
+    assert set(row) == KEYS | {"point_error_m", "draws", "spread_m", "draws_agree"}
+    assert row["draws_agree"]
     assert row["point_error_m"] < 0.003
     T = np.loadtxt(tmp_path / "transform.txt")
     np.testing.assert_array_equal(T, row["T_target_source"])
@@ -97,6 +98,19 @@ def test_the_alias_and_other_formats_give_the_same_pose(capsys, tmp_path, files)
     assert run(capsys, *other, "--out", tmp_path / "other")[0] == 0
     first, second = (np.loadtxt(tmp_path / name / "transform.txt") for name in ("ply", "other"))
     np.testing.assert_array_equal(first, second)
+
+
+def test_clouds_that_have_nothing_in_common_end_elsewhere_with_every_draw_and_it_is_said(capsys, tmp_path):
+    rng = np.random.default_rng(0)
+    for name in ("one", "other"):
+        np.savez(tmp_path / f"{name}.npz", points=rng.uniform(0.0, 1.0, (500, 3)))
+    clouds = (tmp_path / "one.npz", tmp_path / "other.npz")
+    code, out, err = run(capsys, *clouds, "--json", "--out", tmp_path / "out")
+    row = json.loads(out)["ceicp-a"]
+    assert code == 0
+    assert not row["draws_agree"]
+    assert row["spread_m"] > 0.005
+    assert f"10 draws of the points end up to {100 * row['spread_m']:.1f} cm" in err.splitlines()[-1]
 
 
 def test_a_start_pose_a_voxel_and_a_gate_are_heeded(capsys, tmp_path, files):

@@ -8,14 +8,16 @@ import pytest
 from app.screens.fuse.capture import capture_html, capture_sentence, cell_name
 from app.screens.fuse.draw import gizmo_pose, start_of
 from app.screens.fuse.histogram import kernel, weights
-from app.screens.fuse.numbers import race_table, verdict
+from app.screens.fuse.numbers import places_table, race_table, verdict
 from app.screens.fuse.view import (
     CAPTURE_SHIFTS_M,
     CAPTURE_TURNS_DEG,
     CaptureView,
+    FuseView,
     PairHistogram,
     RaceLane,
     RaceStep,
+    RegistrationRow,
     Start,
 )
 
@@ -98,3 +100,13 @@ def test_the_map_names_every_cell_and_marks_what_arrives():
     assert html.count("✓ 0.1") == 10
     assert html.count("✗ 30") == 15
     assert "ICP point 0, CEICP-A plane 10" in capture_sentence(view)
+
+
+@pytest.mark.parametrize("share", [0.977, float("nan")])
+def test_the_places_say_how_far_the_cameras_agree_and_which_node_is_left_out(share):
+    row = RegistrationRow("b", "a", "icp", 3, "converged", 0.01, None, None, float("nan"), False)
+    poses = (np.eye(4), np.eye(4))
+    said = places_table(FuseView(poses, poses, (row,), share, ("b is left out: of <what> both measured",)))
+    assert ("97.7% is within 2 %" in said) == np.isfinite(share)
+    assert "nan" not in said.lower()
+    assert "b is left out: of &lt;what&gt; both measured" in said

@@ -78,12 +78,15 @@ def test_progress_rises_and_an_abandoned_run_stops(rig):
     assert len(fractions) == 3
 
 
-def test_a_node_that_overlaps_nothing_keeps_its_believed_pose(rig):
+def test_a_node_that_overlaps_nothing_keeps_its_believed_pose_and_says_so(rig):
     away = geometry.rigid(np.eye(3), [500.0, 0.0, 0.0])
     frames = (rig.frames[0], replace(rig.frames[1], T_world_camera=away))
     result = reconstruct(Rig("apart", frames), PRESETS["packetmesh"])
     assert not result.placement.registrations[0].result.converged
     np.testing.assert_allclose(result.placement.T_world_camera[1], away, atol=1e-9)
+    assert all(verdict.placed for verdict in result.placement.verdicts)
+    assert all("by its given pose alone" in sentence for sentence in result.placement.sentences)
+    assert len(result.placement.sentences) == 2
 
 
 def test_depth_without_a_value_is_one_sentence(rig):

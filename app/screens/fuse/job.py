@@ -9,7 +9,8 @@ from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
 from pipeline import geometry
-from pipeline.nodes import NodeClouds, NodeRegistration
+from pipeline.nodes import NodeClouds
+from pipeline.placement import NodeRegistration
 from pipeline.registration import point_error_m
 from pipeline.types import FloatArray, Rig
 
@@ -22,7 +23,8 @@ def fuse_job(store: Store, spec: Spec) -> Generator[Progress, None, FuseView]:
         _registration_row(rig, row, nodes, spec.config.node_registration.method)
         for row in placement.registrations
     )
-    return FuseView(believed, placement.T_world_camera, rows)
+    share = placement.agreement.within_2pct_share
+    return FuseView(believed, placement.T_world_camera, rows, share, tuple(placement.sentences))
 
 
 def _registration_row(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from html import escape
 
 import numpy as np
 
@@ -107,9 +108,17 @@ def places_table(view: FuseView) -> str:
     if not view.rows:
         return ""
     rows = [_place_row(row) for row in view.rows]
-    return "<div style='padding: 0 0.8em; font-size: 13px'><b>The chain's own result</b></div>" + table(
+    said = [f"<b>The chain's own result.</b>{_agreeing(view)}", *map(escape, view.sentences)]
+    return f"<div style='padding: 0 0.8em; font-size: 13px'>{'<br>'.join(said)}</div>" + table(
         rows, ("iterations", "error before", "after")
     )
+
+
+def _agreeing(view: FuseView) -> str:
+    """How far the cameras agree; nothing where no two measured the same place."""
+    if not np.isfinite(view.agreement_share):
+        return ""
+    return f" Of what two cameras both measured, {view.agreement_share:.1%} is within 2 %."
 
 
 def _place_row(row: RegistrationRow) -> Row:
@@ -126,7 +135,7 @@ def _place_row(row: RegistrationRow) -> Row:
 def _loop(row: RegistrationRow) -> str:
     """How well the other registrations agree with this one."""
     if not row.used:
-        return "Not used: it degenerated or contradicts the other registrations."
+        return "Not used: it degenerated, or the other registrations or both measurements contradict it."
     if not np.isfinite(row.loop_error_m):
         return "No loop checks it."
     return f"The way round by the other nodes ends {number(row.loop_error_m, 1, 'cm', 100)} from it."

@@ -36,7 +36,7 @@ class RegistrationRow:
     loop_error_m: float
     """How far it is from what the other registrations say about these two nodes; NaN where nothing."""
     used: bool
-    """False if it degenerated or contradicts the other registrations."""
+    """False if it degenerated or contradicts the other registrations or what both measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +48,10 @@ class FuseView:
     registered: tuple[FloatArray, ...]
     """T_world_camera after."""
     rows: tuple[RegistrationRow, ...]
+    agreement_share: float
+    """Of what two placed cameras both measured, the share within 2 %; NaN where no two did."""
+    sentences: tuple[str, ...]
+    """What is to be said of nodes that found no place, or one that little speaks for."""
 
 
 @dataclass(frozen=True, slots=True)

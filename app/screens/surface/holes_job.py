@@ -43,7 +43,9 @@ def views_of(store: Store, spec: Spec) -> Generator[Progress, None, list[View]]:
     rig, nodes, placement = yield from store.stages(spec, "rig", "nodes", "placement")
     return [
         View(camera, frame.depth.valid, node.alignment.depth.valid)
-        for camera, frame, node in zip(cameras_of(rig, placement), rig.frames, nodes, strict=True)
+        for camera, frame, node in zip(
+            cameras_of(rig, placement), placement.placed(rig.frames), placement.placed(nodes), strict=True
+        )
     ]
 
 

@@ -16,9 +16,9 @@ from packetmesh.progress import drain
 from pipeline.config import AlignmentMode, DepthConfig, PipelineConfig
 from pipeline.delivery import coding_named
 from pipeline.delivery.coding import Received
-from pipeline.delivery.moments import whole_placement
 from pipeline.delivery.sink import frame_at_sink, heard, images_of
 from pipeline.io.demos import load_demo
+from pipeline.placement import whole_placement
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import compared, run, with_rays, yardstick_of_rig

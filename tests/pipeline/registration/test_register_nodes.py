@@ -7,10 +7,12 @@ import pytest
 
 from lab.worlds import box_room
 from lab.worlds.demos import disturbed
-from pipeline import nodes
+from lab.worlds.render import Renderer
+from pipeline import placing
 from pipeline.config import PRESETS, RegistrationConfig
 from pipeline.geometry import inverse, rigid, rotation_exp
-from pipeline.nodes import NodeClouds, place_nodes
+from pipeline.nodes import NodeClouds
+from pipeline.placing import place_nodes
 from pipeline.registration import point_error_m, register
 from pipeline.types import DepthMap, RgbdFrame
 from tests.pipeline.registration.rooms import seen_by
@@ -21,11 +23,12 @@ CONFIG = PRESETS["packetmesh"].node_registration
 def rig_of(nodes: int):
     """Frames whose nodes are wrong about their poses by 3 degrees and 6 cm, and their sensor clouds."""
     scene, rng = box_room(6, nodes=nodes), np.random.default_rng(1)
+    renderer = Renderer(scene, threads=1)
     frames, works = [], []
     for index, (camera, cloud) in enumerate(zip(scene.cameras, seen_by(scene, 0.002), strict=True)):
         believed = camera if index == 0 else disturbed(camera, rng)
         image = np.zeros((240, 320, 3), np.uint8)
-        depth = DepthMap(np.ones((240, 320), np.float32))
+        depth = DepthMap(renderer.depth(scene.intrinsics, camera))
         frames.append(RgbdFrame(f"node_{index:02d}", image, depth, scene.intrinsics, believed))
         works.append(NodeClouds(frames[-1].name, cloud, *[None] * 6, fused=cloud))
     return scene, frames, works
@@ -68,7 +71,7 @@ def test_a_registration_that_went_wrong_is_left_out(six, monkeypatch):
         wrong = source is works[3].sensor and target is works[2].sensor
         return replace(result, T_target_source=damage @ result.T_target_source) if wrong else result
 
-    monkeypatch.setattr(nodes, "register", misled)
+    monkeypatch.setattr(placing, "register", misled)
     registrations, poses = placed(frames, works)
     assert [(row.source, row.target) for row in registrations if not row.used] == [("node_03", "node_02")]
     assert max(row.loop_error_m for row in registrations) > 0.1
@@ -84,6 +87,15 @@ def test_two_nodes_are_where_their_registration_says():
     np.testing.assert_allclose(poses[1], poses[0] @ alone.T_target_source, atol=1e-12)
     assert row.used
     assert np.isnan(row.loop_error_m)
+
+
+def test_views_taken_for_those_of_the_opposite_corner_do_not_confirm_each_other(six):
+    """Nodes a third of a turn apart fit each other wall on wall, two of them in the same wrong way."""
+    scene, frames, works = six
+    placement = place_nodes([replace(frame, pose_known=False) for frame in frames], works, CONFIG)
+    assert placement.sentences == []
+    T = scene.cameras[0] @ inverse(placement.T_world_camera[0])
+    assert worst_error_m(scene, works, [T @ pose for pose in placement.T_world_camera]) < 0.02
 
 
 def test_nodes_that_do_not_know_where_they_are_find_out():

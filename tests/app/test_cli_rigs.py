@@ -1,0 +1,42 @@
+"""What ``reconstruct`` says of a rig whose nodes do not know where they stand."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.io.demos import load_demo
+from pipeline.io.rigs import save_rig
+from pipeline.types import RgbdFrame, Rig
+from tests.app.commands import run
+
+QUICK = ("--set", "surface.max_points=3000")
+
+
+def lost(*frames: RgbdFrame) -> Rig:
+    return Rig("lost", tuple(replace(frame, pose_known=False) for frame in frames))
+
+
+def test_two_rooms_are_no_rig_and_the_command_says_so(capsys, tmp_path):
+    save_rig(tmp_path / "rig", lost(load_demo("office").frames[0], load_demo("living-room").frames[0]))
+    code, _, err = run(capsys, "reconstruct", "--rig", tmp_path / "rig", "--out", tmp_path / "out", *QUICK)
+    assert code == 1
+    *_, left_out, last = err.splitlines()
+    assert left_out.startswith("node_01 is left out: its pose is not known")
+    assert last == "No two nodes stand beside each other: the surface is of one node only"
+    assert list(json.loads((tmp_path / "out" / "poses.json").read_text())) == ["node_00"]
+    assert left_out in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_rig_that_finds_its_places_says_how_well_it_agrees(capsys, tmp_path):
+    save_rig(tmp_path / "rig", lost(*load_demo("office").frames[:2]))
+    words = ["reconstruct", "--rig", tmp_path / "rig", "--out", tmp_path / "out", *QUICK, "--json"]
+    code, out, err = run(capsys, *words)
+    metrics = json.loads(out)
+    share = metrics["measured"]["agreement_between_nodes"]
+    assert code == 0
+    assert share > 0.9
+    assert err.splitlines()[-1] == f"Of what two cameras both measured, {share:.1%} is within 2 %"
+    poses = json.loads((tmp_path / "out" / "poses.json").read_text())
+    assert poses == metrics["poses"]
+    assert np.shape(poses["node_01"]) == (4, 4)
