@@ -1,15 +1,17 @@
 """Surfaces of clouds as others have them: points alone, unevenly sampled, with outliers.
 
 ``python tests/benchmarks/other_clouds.py`` prints what `packetmesh mesh` makes of each cloud, what the rule
-r_F + {0, 1, 2, 4} sigma_D makes of it with the same normals, and Open3D and MeshLab with their usual radii: the
-area over the true one, facets on the side of most true normals, points that no facet uses, loops of the
+r_F + {0, 1, 2, 4} sigma_D makes of it with the same normals, and Open3D and MeshLab with their usual radii:
+the area over the true one, facets on the side of most true normals, points that no facet uses, loops of the
 boundary, seconds. The seeds of these clouds had no part in choosing any number.
 """
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pymeshlab
@@ -22,6 +24,9 @@ from pipeline.open3d_runtime import o3d
 from pipeline.surface import radii, spacing
 from pipeline.surface.boundary import boundary_loops
 from pipeline.types import PointCloud, Surface
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
 from tests.pipeline.surface.shapes import lidar_room, sphere, torus_knot, with_outliers
 
 SEED = 77
