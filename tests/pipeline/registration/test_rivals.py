@@ -104,7 +104,7 @@ def test_the_order_of_points_does_not_matter(many, config, max_points):
         source.select(rng.permutation(len(source))), target.select(rng.permutation(len(target))), config
     )
     result = register(source, target, config)
-    np.testing.assert_allclose(shuffled.T_target_source, result.T_target_source, atol=1e-9)
+    np.testing.assert_allclose(shuffled.T_target_source, result.T_target_source, atol=1e-7)
     assert len(shuffled.steps) == len(result.steps)
     assert len(result.steps[-1].pairs) > 1000 or config.method in SPREADING
 
