@@ -26,6 +26,8 @@ FILLED = 0.8
 """Share of the window that all of it takes."""
 PACKET_M, POINT_M = 0.011, 0.008
 """Sizes over the same distance, and of a point."""
+NAME_ABOVE = 0.07
+"""Of a camera, over the same distance."""
 LIT = (255, 230, 0)
 BUSY, DOWN = BRAND, LOSS
 FULL, EMPTY = DELIVERED, SOURCE
@@ -131,10 +133,16 @@ class DeliveryDrawing:
             used = "" if now is None else f" · {now.energy_j:.3g} J"
             state = "off" if node.row < 0 else f"{100.0 * share:.0f} %{used}"
             self._names[row].text = f"{node.name} · {state}"
+            self._stand(row, self._pose(row, moment))
             self._show_picture(row)
             self._frusta[row].color = _state_color(node.row < 0, share)
             self._show_cloud(row, None if now is None or not len(now.points_m) else now)
         self._show_mesh(b"" if moment is None else moment.glb)
+
+    def _stand(self, row: int, T_world_camera: FloatArray) -> None:
+        """The camera where its cloud is: a rig may not know its poses before they are found."""
+        place(self._frusta[row], T_world_camera)
+        self._names[row].position = T_world_camera[:3, 3] + (0.0, 0.0, NAME_ABOVE * self._size_m)
 
     def _show_picture(self, row: int) -> None:
         """What has arrived of a node's picture."""
@@ -261,7 +269,7 @@ class DeliveryDrawing:
             )
             place(frustum, node.T_world_camera)
             self._frusta.append(frustum)
-            above_m = node.T_world_camera[:3, 3] + (0.0, 0.0, 0.07 * self._size_m)
+            above_m = node.T_world_camera[:3, 3] + (0.0, 0.0, NAME_ABOVE * self._size_m)
             battery = f"battery-{node.name}"
             self._batteries.append(self._mark(battery, self.place_m(node.name), FULL, 0.5))
             self._names.append(self._label(f"name-{node.name}", f"{node.name} · 0 %", above_m, 0.9))
@@ -285,7 +293,7 @@ class DeliveryDrawing:
             text = role
             if role == "sink":
                 away_m = float(np.linalg.norm(positions_m[row] - cameras_m.mean(axis=0)))
-                text = f"sink, {away_m:.0f} m away"
+                text = f"sink, {away_m:.0f} m away" if away_m >= 0.5 else "sink, amid the nodes"
             self._label(f"name-{role}", text, self._places_m[row] + (0.0, 0.0, 0.05 * self._size_m), 0.9)
         if "cloud" in roles:
             cloud_m = self._places_m[roles.index("cloud")]
