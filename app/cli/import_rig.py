@@ -19,12 +19,13 @@ def import_rig(
     intrinsics: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Make a rig of a few frames of a recording: TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood or Open3D.
+    """Make a rig of a few frames of a recording: TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood, Open3D, ROS.
 
     Args:
-        path: The recording's folder, unpacked.
+        path: The recording's folder, unpacked; or a bag of ROS 1 or 2 (.bag, .db3, .mcap or its folder).
         out: The rig's folder, new or empty; `packetmesh reconstruct --rig` takes it.
-        frames: How many frames become nodes, at most 6; chosen apart from each other but overlapping.
+        frames: How many frames become nodes, at most 6; chosen apart from each other but overlapping. A
+            bag of several cameras gives a node a camera.
         depth_scale: Depth units per metre; without it what the kind of recording uses.
         intrinsics: The colour camera, if there is no file of it beside the images or another is meant.
         json: Print what was found and taken as one JSON object.

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import secrets
-import shutil
-from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,17 +12,15 @@ from scipy.spatial.transform import Rotation
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.geometry import rigid
+from pipeline.importing.bag import is_bag, read_bag
 from pipeline.importing.choosing import choose
 from pipeline.importing.depth_units import depth_in, scale_note
 from pipeline.importing.kinds import recognise
+from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
 from pipeline.importing.sequence import Candidate, Sequence
-from pipeline.io.calibrations import FILES
-from pipeline.io.extrinsics import write_extrinsics
-from pipeline.io.images import read_color, write_color, write_depth_mm
-from pipeline.io.intrinsics import write_intrinsics
-from pipeline.io.poses import write_pose
+from pipeline.io.images import read_color
 from pipeline.io.rigs import MAX_NODES
-from pipeline.types import AnyPath, CameraIntrinsics, FloatArray
+from pipeline.types import AnyPath, FloatArray
 
 MOST_TILT_DEG = 35.0
 """Of the cameras' mean upward direction from the world's; more is another world, which is turned."""
@@ -40,6 +35,12 @@ class ImportedFrame:
     depth: str
     time_s: float | None
     median_depth_m: float
+
+    @staticmethod
+    def of(node: NodeImages, index: int, time_s: float | None) -> ImportedFrame:
+        """What is told of a node that was written."""
+        median_m = float(np.nanmedian(node.depth.z_m))
+        return ImportedFrame(f"node_{index:02d}", node.color_name, node.depth_name, time_s, median_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +84,12 @@ def iterate_import(
     out = Path(out)
     if out.exists() and not (out.is_dir() and not any(out.iterdir())):
         raise InputError(f"{out} is there already; try another name for the rig")
+    if is_bag(Path(path)):
+        if intrinsics is not None:
+            raise InputError(
+                f"The cameras of the bag {path} are those it has recorded; try without intrinsics"
+            )
+        return (yield from _from_bag(Path(path), out, frames, depth_scale))
     kind, folder = recognise(Path(path))
     yield Progress("files", 0.0)
     sequence = kind.read(folder, None if intrinsics is None else Path(intrinsics))
@@ -92,12 +99,14 @@ def iterate_import(
     middle = depth_in(sequence.candidates[len(sequence.candidates) // 2].depth, sequence)
     chosen = choose(sequence, frames, middle.median_m)
     written = []
-    with _new_folder(out) as folder_of_rig:
+    with new_folder(out) as folder_of_rig:
         T_up_world = _upright([sequence.candidates[index] for index in chosen])
         for done, index in enumerate(chosen):
             yield Progress("images", 0.3 + 0.7 * done / len(chosen))
-            node = folder_of_rig / f"node_{done:02d}"
-            written.append(_write_node(node, sequence.candidates[index], sequence, T_up_world))
+            candidate = sequence.candidates[index]
+            node = _node_of(candidate, sequence, T_up_world)
+            write_node(folder_of_rig / f"node_{done:02d}", node)
+            written.append(ImportedFrame.of(node, done, candidate.time_s))
     notes = [*sequence.notes, *middle.notes]
     if T_up_world is not None:
         notes.append("The world was turned so that z is up")
@@ -114,56 +123,33 @@ def iterate_import(
     )
 
 
-@contextmanager
-def _new_folder(out: Path) -> Iterator[Path]:
-    """A sibling that becomes ``out`` if the body succeeds and vanishes if not."""
-    sibling = out.with_name(f".{out.name}-{secrets.token_hex(4)}")
-    try:
-        sibling.mkdir(parents=True)
-        yield sibling
-        if out.is_dir():
-            out.rmdir()
-        sibling.rename(out)
-    except OSError as error:
-        raise InputError(
-            f"{out} cannot be written ({error.strerror or error}); try another folder for the rig"
-        ) from None
-    finally:
-        shutil.rmtree(sibling, ignore_errors=True)
+def _from_bag(
+    path: Path, out: Path, frames: int, depth_scale: float | None
+) -> Generator[Progress, None, ImportReport]:
+    yield Progress("files", 0.0)
+    bag = read_bag(path, frames, depth_scale)
+    written = []
+    with new_folder(out) as folder_of_rig:
+        for done, (time_s, node) in enumerate(bag.nodes):
+            yield Progress("images", 0.7 + 0.3 * done / len(bag.nodes))
+            write_node(folder_of_rig / f"node_{done:02d}", node)
+            written.append(ImportedFrame.of(node, done, time_s))
+    notes = [*bag.notes, *scale_note([frame.median_depth_m for frame in written], bag.units_per_metre)]
+    return ImportReport("bag", str(path), bag.candidates, bag.units_per_metre, tuple(written), tuple(notes))
 
 
-def _write_node(
-    node: Path, candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | None
-) -> ImportedFrame:
-    rgb, read = read_color(candidate.color), depth_in(candidate.depth, sequence)
-    _check_size(rgb.shape, sequence.camera, candidate.color, "colour")
-    depth_camera = sequence.depth_camera
-    if depth_camera is None and read.depth.z_m.shape != rgb.shape[:2]:
-        height_px, width_px = read.depth.z_m.shape
-        raise InputError(
-            f"{candidate.depth} has {width_px} x {height_px} pixels but {candidate.color} has "
-            f"{rgb.shape[1]} x {rgb.shape[0]}; try a recording whose depth is registered to the colour images"
-        )
-    write_color(node / "color.png", rgb)
-    write_depth_mm(node / "depth.png", read.depth)
-    write_intrinsics(node / "intrinsics.json", sequence.camera)
-    if depth_camera is not None and sequence.T_color_depth is not None:
-        _check_size(read.depth.z_m.shape, depth_camera, candidate.depth, "depth")
-        write_intrinsics(node / FILES["depth_intrinsics"], depth_camera)
-        write_extrinsics(node / FILES["extrinsics"], sequence.T_color_depth)
-    if candidate.T_world_camera is not None:
-        T = candidate.T_world_camera
-        write_pose(node / "pose.txt", T if T_up_world is None else T_up_world @ T)
-    paths = str(candidate.color), str(candidate.depth)
-    return ImportedFrame(node.name, *paths, candidate.time_s, read.median_m)
-
-
-def _check_size(shape: tuple[int, ...], camera: CameraIntrinsics, path: Path, what: str) -> None:
-    if shape[:2] != (camera.height_px, camera.width_px):
-        raise InputError(
-            f"The {what} image {path} has {shape[1]} x {shape[0]} pixels, others of the recording "
-            f"{camera.width_px} x {camera.height_px}; try a recording of one camera"
-        )
+def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | None) -> NodeImages:
+    T = candidate.T_world_camera
+    return NodeImages(
+        str(candidate.color),
+        str(candidate.depth),
+        read_color(candidate.color),
+        depth_in(candidate.depth, sequence).depth,
+        sequence.camera,
+        T if T is None or T_up_world is None else T_up_world @ T,
+        sequence.depth_camera,
+        sequence.T_color_depth,
+    )
 
 
 def _upright(candidates: list[Candidate]) -> FloatArray | None:

@@ -53,7 +53,7 @@ def recognise(path: Path) -> tuple[Kind, Path]:
     if not path.exists():
         raise InputError(f"{path} does not exist; check the path")
     if not path.is_dir():
-        raise InputError(f"{path} is a file; try the folder of an unpacked recording: {_known()}")
+        raise InputError(f"{path} is a file but no bag; try the folder of an unpacked recording: {_known()}")
     kind = _kind_of(path)
     if kind is not None:
         return kind, path
@@ -72,4 +72,5 @@ def _kind_of(folder: Path) -> Kind | None:
 
 
 def _known() -> str:
-    return "; ".join(f"{kind.name} ({kind.looks_like})" for kind in KINDS)
+    folders = (f"{kind.name} ({kind.looks_like})" for kind in KINDS)
+    return "; ".join([*folders, "bags of ROS (.bag, .db3, .mcap)"])

@@ -185,7 +185,7 @@ def all_unknown(folder):
     [
         (lambda folder: None, "does not exist"),
         (lambda folder: folder.mkdir(), "TUM .*7-Scenes .*ScanNet .*SUN RGB-D .*Redwood or Open3D"),
-        (lambda folder: folder.write_text("a bag"), "is a file"),
+        (lambda folder: folder.write_text("a letter"), "is a file"),
         (no_depth, "frame-000000.depth.png"),
         (clocks_disagree, "20 ms"),
         (other_size, "20 x 15 pixels"),
