@@ -74,7 +74,6 @@ def read_bag(path: Path, frames: int, depth_scale: float | None) -> BagNodes:
     Raises:
         InputError: no bag, no colour, depth or camera_info, or clocks that disagree.
     """
-    scale = 1000.0 if depth_scale is None else depth_scale
     with _opened(path) as reader:
         topics = _image_topics(reader)
         pairs = _pairs(path, *topics)[:MAX_NODES]
@@ -91,8 +90,9 @@ def read_bag(path: Path, frames: int, depth_scale: float | None) -> BagNodes:
         for chosen in moments:
             for (color, depth), T_world_color, (color_s, depth_s) in zip(pairs, poses, chosen, strict=True):
                 messages = _message(reader, color, color_s), _message(reader, depth, depth_s)
-                node = _node(color, depth, *messages, scale, T_world_color, transforms)
+                node = _node(color, depth, *messages, depth_scale, T_world_color, transforms)
                 nodes.append((float(color_s), node))
+        scale = depth_units_of(messages[1], depth.name)[1] if depth_scale is None else depth_scale
         return BagNodes(tuple(nodes), len(first.times_s), scale, tuple(notes))
 
 
@@ -239,13 +239,14 @@ def _node(
     depth: _Topic,
     color_message: Any,
     depth_message: Any,
-    scale: float,
+    depth_scale: float | None,
     T_world_color: FloatArray | None,
     transforms: dict[str, dict[str, FloatArray]],
 ) -> NodeImages:
     assert color.camera is not None
-    units, in_metres = depth_units_of(depth_message, depth.name)
-    z_m = (units if in_metres else np.where(units == NO_VALUE, 0.0, units) / scale).astype(np.float32)
+    units, usual_scale = depth_units_of(depth_message, depth.name)
+    scale = usual_scale if depth_scale is None else depth_scale
+    z_m = (np.where(units == NO_VALUE, 0.0, units) / scale).astype(np.float32)
     z_m[(z_m <= 0.0) | (z_m > FARTHEST_M)] = np.nan
     if not np.isfinite(z_m).any():
         raise InputError(f"A depth image of {depth.name} is empty; try another recording of the scene")

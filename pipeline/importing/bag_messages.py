@@ -62,8 +62,8 @@ def color_of(message: Any, topic: str) -> ByteArray:
     return np.ascontiguousarray(values.reshape(message.height, message.width, channels)[..., order])
 
 
-def depth_units_of(message: Any, topic: str) -> tuple[FloatArray, bool]:
-    """(H, W) values, 0 where unknown, and whether they are metres (32FC1) and not units (16UC1).
+def depth_units_of(message: Any, topic: str) -> tuple[FloatArray, float]:
+    """(H, W) values, 0 where unknown, and how many make a metre: 1 of 32FC1, 1000 of 16UC1 (REP 118).
 
     Raises:
         InputError: an encoding that is not known, or a damaged image.
@@ -72,7 +72,7 @@ def depth_units_of(message: Any, topic: str) -> tuple[FloatArray, bool]:
         return _compressed_depth(message, topic)
     type_ = _DEPTHS[message.encoding].newbyteorder(">" if message.is_bigendian else "<")
     values = _rows(message, type_, 1, topic).astype(np.float64)
-    return np.where(np.isfinite(values), values, 0.0), message.encoding == "32FC1"
+    return np.where(np.isfinite(values), values, 0.0), 1.0 if message.encoding == "32FC1" else 1000.0
 
 
 def camera_in(message: Any, topic: str) -> CameraIntrinsics:
@@ -100,7 +100,7 @@ def transform_in(message: Any) -> FloatArray:
     return rigid(rotation, np.array([t.x, t.y, t.z]))
 
 
-def _compressed_depth(message: Any, topic: str) -> tuple[FloatArray, bool]:
+def _compressed_depth(message: Any, topic: str) -> tuple[FloatArray, float]:
     data = np.asarray(message.data)
     values = None
     if "rvl" not in message.format.lower():
@@ -111,10 +111,10 @@ def _compressed_depth(message: Any, topic: str) -> tuple[FloatArray, bool]:
             "topic without compression"
         )
     if not message.format.startswith("32FC1"):
-        return values.astype(np.float64), False
+        return values.astype(np.float64), 1000.0
     _, a, b = struct.unpack_from("<iff", data.tobytes())
     known = values > 0
-    return np.where(known, a / np.where(known, values - b, 1.0), 0.0), True
+    return np.where(known, a / np.where(known, values - b, 1.0), 0.0), 1.0
 
 
 def _rows(message: Any, type_: np.dtype, channels: int, topic: str) -> np.ndarray:

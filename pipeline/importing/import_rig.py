@@ -86,9 +86,7 @@ def iterate_import(
         raise InputError(f"{out} is there already; try another name for the rig")
     if is_bag(Path(path)):
         if intrinsics is not None:
-            raise InputError(
-                f"The cameras of the bag {path} are those it has recorded; try without intrinsics"
-            )
+            raise InputError(f"The bag {path} has recorded its own cameras; try without intrinsics")
         return (yield from _from_bag(Path(path), out, frames, depth_scale))
     kind, folder = recognise(Path(path))
     yield Progress("files", 0.0)

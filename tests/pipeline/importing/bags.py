@@ -93,37 +93,48 @@ def write_bag(
     late_s: float = 0.01,
     leave_out: str = "nothing",
     moments: int = 3,
+    T_color_depth: np.ndarray | None = None,
 ) -> None:
-    """Cameras whose depth is ``late_s`` after their colour; topics with ``leave_out`` are not recorded."""
+    """Cameras whose depth is ``late_s`` after their colour; topics with ``leave_out`` are not recorded.
+
+    With ``T_color_depth``, depth has a frame of its own there, and the same lens.
+    """
     bag = BagWriter(path, kind)
+    depth_frame = "optical" if T_color_depth is None else "depth"
     with bag.writer:
 
         def write(topic: str, message: Any, time_s: float) -> None:
             if leave_out not in topic:
                 bag.write(topic, message, time_s)
 
-        write("/tf_static", _tree(bag, rig), 100.0)
+        write("/tf_static", _tree(bag, rig, T_color_depth), 100.0)
         for moment in range(moments):
             for index, frame in enumerate(rig.frames):
                 name, time_s = f"/cam{index}", 100.0 + 0.5 * moment + 0.002 * index
                 header = bag.header(f"cam{index}_optical", time_s)
-                late = bag.header(f"cam{index}_optical", time_s + late_s)
+                late = bag.header(f"cam{index}_{depth_frame}", time_s + late_s)
                 write(f"{name}/color/image", color(bag, frame, header), time_s)
                 write(f"{name}/color/camera_info", _camera_info(bag, frame, header), time_s)
+                if T_color_depth is not None:
+                    write(f"{name}/depth/camera_info", _camera_info(bag, frame, late), time_s)
                 write(f"{name}/depth/{depth}", DEPTHS[depth](bag, frame, late), time_s)
 
 
-def _tree(bag: BagWriter, rig: Rig) -> Any:
-    links = []
+def _tree(bag: BagWriter, rig: Rig, T_color_depth: np.ndarray | None) -> Any:
+    links: list[Any] = []
     for index, frame in enumerate(rig.frames):
-        T = frame.T_world_camera
-        place = bag.make("geometry_msgs/msg/Vector3", *T[:3, 3].tolist())
-        quaternion = Rotation.from_matrix(T[:3, :3]).as_quat().tolist()
-        turn = bag.make("geometry_msgs/msg/Quaternion", *quaternion)
-        transform = bag.make("geometry_msgs/msg/Transform", place, turn)
-        header, child = bag.header("map", 100.0), f"cam{index}_optical"
-        links.append(bag.make("geometry_msgs/msg/TransformStamped", header, child, transform))
+        links.append(_link(bag, "map", f"cam{index}_optical", frame.T_world_camera))
+        if T_color_depth is not None:
+            links.append(_link(bag, f"cam{index}_optical", f"cam{index}_depth", T_color_depth))
     return bag.make("tf2_msgs/msg/TFMessage", links)
+
+
+def _link(bag: BagWriter, parent: str, child: str, T: np.ndarray) -> Any:
+    place = bag.make("geometry_msgs/msg/Vector3", *T[:3, 3].tolist())
+    quaternion = Rotation.from_matrix(T[:3, :3]).as_quat().tolist()
+    turn = bag.make("geometry_msgs/msg/Quaternion", *quaternion)
+    transform = bag.make("geometry_msgs/msg/Transform", place, turn)
+    return bag.make("geometry_msgs/msg/TransformStamped", bag.header(parent, 100.0), child, transform)
 
 
 def _camera_info(bag: BagWriter, frame: RgbdFrame, header: Any) -> Any:

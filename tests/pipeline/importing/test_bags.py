@@ -7,8 +7,11 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from packetmesh.settings import with_settings
 from pipeline.config import PRESETS
+from pipeline.geometry import rigid, rotation_exp
 from pipeline.importing import iterate_import
 from pipeline.io.demos import load_demo
+from pipeline.io.extrinsics import read_extrinsics
+from pipeline.io.images import read_depth
 from pipeline.io.rigs import load_rig
 from pipeline.reconstruct import iterate_reconstruction
 from pipeline.run_folder import metrics_of
@@ -88,6 +91,34 @@ def test_a_bag_that_lacks_something_gets_one_sentence_and_leaves_nothing(tmp_pat
         imported(tmp_path)
     assert "\n" not in str(error.value)
     assert [path.name for path in tmp_path.iterdir()] == ["recording"]
+
+
+def test_depth_with_a_frame_of_its_own_keeps_its_camera_and_its_place(tmp_path):
+    T_color_depth = rigid(rotation_exp(np.array([0.0, 0.02, 0.0])), np.array([0.05, 0.0, 0.01]))
+    written = orbit(2)
+    write_bag(tmp_path / "recording", written, T_color_depth=T_color_depth)
+    _, rig = imported(tmp_path)
+    node = tmp_path / "rig" / "node_01"
+    np.testing.assert_allclose(read_extrinsics(node / "extrinsics.json"), T_color_depth, atol=1e-9)
+    np.testing.assert_allclose(read_depth(node / "depth.png").z_m, written.frames[1].depth.z_m, atol=1e-6)
+    np.testing.assert_allclose(rig.frames[1].T_world_camera, written.frames[1].T_world_camera, atol=1e-9)
+
+
+def test_depth_with_a_frame_that_nothing_links_is_refused(tmp_path):
+    write_bag(tmp_path / "recording", orbit(1), T_color_depth=np.eye(4), leave_out="tf_static")
+    with pytest.raises(InputError, match="static transform"):
+        imported(tmp_path)
+
+
+@pytest.mark.parametrize(("depth", "usual"), [("image", 1000.0), ("image/metres", 1.0)])
+def test_the_scale_is_the_encodings_own_or_the_one_that_is_given(tmp_path, depth, usual):
+    write_bag(tmp_path / "recording", orbit(1), depth=depth)
+    report, rig = imported(tmp_path)
+    assert report.depth_scale == usual
+    given = drain(iterate_import(tmp_path / "recording", tmp_path / "half", depth_scale=2.0 * usual))
+    half = load_rig(tmp_path / "half").frames[0]
+    assert given.depth_scale == 2.0 * usual
+    np.testing.assert_allclose(half.depth.z_m, rig.frames[0].depth.z_m / 2.0, atol=6e-4)
 
 
 def test_a_bag_has_its_own_cameras(tmp_path):
