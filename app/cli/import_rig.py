@@ -35,9 +35,9 @@ def import_rig(
     from pipeline.importing import iterate_import
 
     report = drain(iterate_import(path, out, frames, depth_scale, intrinsics), say_progress)
-    say(f"100%  {report.kind}: {len(report.frames)} of {report.candidates} frames of {report.folder}")
+    say(f"100%  {report.kind}: {len(report.frames)} nodes of {report.candidates} moments in {report.folder}")
     for frame in report.frames:
-        say(f"{frame.node}  {Path(frame.color).name}, {Path(frame.depth).name}")
+        say(f"{frame.node}  {frame.color}, {frame.depth}")
     for note in report.notes:
         say(note)
     say(f"Next: packetmesh reconstruct --rig {out} --out runs/{out.name}")
