@@ -67,6 +67,8 @@ class RigFolder:
     """A folder with node_00, node_01 and so on."""
 
     path: str
+    depth_scale: float = MILLIMETRES
+    """Depth image units in one metre."""
 
     @property
     def title(self) -> str:
@@ -79,10 +81,10 @@ class RigFolder:
         """The rig with a calibration's folder laid over it."""
         from pipeline.io.rigs import load_rig
 
-        return load_rig(self.path, calibration)
+        return load_rig(self.path, calibration, self.depth_scale)
 
     def arguments(self) -> list[str]:
-        return ["--rig", self.path]
+        return ["--rig", self.path, *_depth_scale_argument(self.depth_scale)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +131,7 @@ class ImagePair:
         words = ["--color", self.color, "--depth", self.depth]
         for name, path in self._files().items():
             words += [f"--{name.replace('_', '-')}", str(path)]
-        return (
-            words if self.depth_scale == MILLIMETRES else [*words, "--depth-scale", f"{self.depth_scale:g}"]
-        )
+        return [*words, *_depth_scale_argument(self.depth_scale)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,6 +168,10 @@ class LoadedRig:
 
     def arguments(self) -> list[str]:
         return ["--rig", self.rig.name]
+
+
+def _depth_scale_argument(depth_scale: float) -> list[str]:
+    return [] if depth_scale == MILLIMETRES else ["--depth-scale", f"{depth_scale:g}"]
 
 
 FileSource: TypeAlias = Demo | RigFolder | ImagePair | Calibrated

@@ -17,6 +17,7 @@ from app.cli.bench import bench
 from app.cli.calibrate import calibrate
 from app.cli.deliver import deliver
 from app.cli.doctor import doctor
+from app.cli.import_rig import import_rig
 from app.cli.infer_depth import infer_depth
 from app.cli.mesh import mesh
 from app.cli.reconstruct import reconstruct
@@ -32,6 +33,7 @@ from packetmesh.errors import PacketMeshError
 COMMANDS: dict[str, Any] = {
     "serve": serve,
     "reconstruct": reconstruct,
+    "import": import_rig,
     "calibrate": calibrate,
     "target": target,
     "register": register,

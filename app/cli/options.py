@@ -33,7 +33,7 @@ class SourceOptions:
     intrinsics: Path | None = None
     """Its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info."""
     depth_scale: float = 1000.0
-    """Depth units per metre in the depth image."""
+    """Depth units per metre in the depth images of a pair or a rig."""
     depth_intrinsics: Path | None = None
     """The camera of a depth image that is not registered to the colour image."""
     extrinsics: Path | None = None
@@ -60,7 +60,7 @@ class SourceOptions:
         if self.scene is not None:
             return Demo(self.scene)
         if self.rig is not None:
-            return RigFolder(str(self.rig))
+            return RigFolder(str(self.rig), self.depth_scale)
         if self.color is None or self.depth is None or self.intrinsics is None:
             wrong_use("a single pair needs all of --color, --depth and --intrinsics")
         if (self.depth_intrinsics is None) != (self.extrinsics is None):

@@ -11,15 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from lab.datasets.pair import Load, Pair
-from pipeline.io.images import read_color, read_depth
-from pipeline.types import FloatArray
+from pipeline.importing.depth_units import unrotated
+from pipeline.io.images import read_color, read_depth_units
 
 FARTHEST_M = 8.0
 """The set's toolbox (read3dPoints.m) caps depth here."""
 DEPTH_FOLDERS = ("depth_bfx", "depth")
 """Depth merged from several frames where it is there, else the sensor's."""
-UNITS_PER_METRE = 8000.0
-"""Rotation by three bits makes an eighth of a millimetre of each unit below 8.192 m."""
 
 
 def find(root: Path) -> list[Load]:
@@ -34,14 +32,7 @@ def find(root: Path) -> list[Load]:
 
 
 def _load(picture: Path, depth: Path) -> Pair:
-    z_m = decoded(read_depth(depth, UNITS_PER_METRE).z_m)
+    millimetres = unrotated(read_depth_units(depth))
+    z_m = np.where(millimetres > 0, millimetres / np.float32(1000.0), np.float32(np.nan))
     capped_m = np.minimum(z_m, np.float32(FARTHEST_M))
     return Pair(picture, read_color(picture), capped_m, judged=~(z_m > FARTHEST_M))
-
-
-def decoded(raw_m: FloatArray) -> FloatArray:
-    """(H, W) depths in metres from those that were read as if the bits were not rotated."""
-    known = np.isfinite(raw_m)
-    units = np.rint(np.where(known, raw_m, 0.0).astype(np.float64) * UNITS_PER_METRE).astype(np.uint16)
-    millimetres = (units >> 3) | (units << 13)
-    return np.where(known, millimetres.astype(np.float32) / np.float32(1000.0), np.float32(np.nan))

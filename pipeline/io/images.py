@@ -7,6 +7,7 @@ import zlib
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, atomic_path, read_bytes
@@ -15,6 +16,8 @@ from pipeline.types import AnyPath, ByteArray, DepthMap
 COMMON_DEPTH_SCALES = (1.0, 100.0, 256.0, 1000.0, 5000.0, 10000.0)
 """Units per metre that RGB-D data sets use."""
 PLAUSIBLE_MEDIAN_M = (0.01, 100.0)
+NO_VALUE = 65535
+"""What some data sets (7-Scenes) write where the depth is unknown, beside 0."""
 _TYPICAL_DEPTH_M = 2.0
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _JPEG_SIGNATURE = b"\xff\xd8"
@@ -36,7 +39,7 @@ def read_color(path: AnyPath) -> ByteArray:
 
 
 def read_depth(path: AnyPath, depth_scale: float = 1000.0) -> DepthMap:
-    """Metric depth of a 16-bit PNG, whose value 0 means unknown.
+    """Metric depth of a 16-bit PNG, whose values 0 and 65535 mean unknown.
 
     Args:
         path: the PNG file.
@@ -48,6 +51,20 @@ def read_depth(path: AnyPath, depth_scale: float = 1000.0) -> DepthMap:
     """
     if not (np.isfinite(depth_scale) and depth_scale > 0):
         raise InputError(f"The depth scale for {path} is {depth_scale}; try 1000 for an image in millimetres")
+    units = read_depth_units(path)
+    known = units > 0
+    _check_scale(path, float(np.median(units[known])), depth_scale)
+    z_m = (units / depth_scale).astype(np.float32)
+    z_m[~known] = np.nan
+    return DepthMap(z_m)
+
+
+def read_depth_units(path: AnyPath) -> NDArray[np.uint16]:
+    """(H, W) values of a 16-bit PNG, 0 where the depth is unknown; 65535 becomes 0, too.
+
+    Raises:
+        InputError: missing, truncated, too large, not 16-bit grey, or without any depth.
+    """
     units = _decode(path, cv2.IMREAD_UNCHANGED, "depth image")
     if units.dtype != np.uint16 or units.ndim != 2:
         channels = 1 if units.ndim == 2 else units.shape[2]
@@ -55,13 +72,10 @@ def read_depth(path: AnyPath, depth_scale: float = 1000.0) -> DepthMap:
             f"The depth image {path} has {channels} channel(s) of {8 * units.itemsize} bits where one of 16 "
             "is needed; try the file with the raw depth, not a preview of it"
         )
-    known = units > 0
-    if not known.any():
+    units[units == NO_VALUE] = 0
+    if not units.any():
         raise InputError(f"The depth image {path} is zero everywhere; try another exposure of the scene")
-    _check_scale(path, float(np.median(units[known])), depth_scale)
-    z_m = (units / depth_scale).astype(np.float32)
-    z_m[~known] = np.nan
-    return DepthMap(z_m)
+    return units
 
 
 def write_color(path: AnyPath, rgb: ByteArray) -> None:
@@ -81,7 +95,7 @@ def write_depth_mm(path: AnyPath, depth: DepthMap) -> None:
         InputError: a depth that 16 bits cannot hold, or a folder that cannot be written.
     """
     depth_mm = np.rint(np.where(depth.valid, depth.z_m, 0.0).astype(np.float64) * 1000.0)
-    if depth_mm.min() < 0 or depth_mm.max() > np.iinfo(np.uint16).max:
+    if depth_mm.min() < 0 or depth_mm.max() >= NO_VALUE:
         raise InputError(
             f"{path} cannot hold depths from {depth_mm.min() / 1000:.1f} m to {depth_mm.max() / 1000:.1f} m; "
             "try to keep to 0 to 65.5 m"
@@ -157,9 +171,14 @@ def _check_scale(path: AnyPath, median_units: float, depth_scale: float) -> None
     median_m = median_units / depth_scale
     if nearest_m <= median_m <= farthest_m:
         return
-    typical_scale = median_units / _TYPICAL_DEPTH_M
-    suggestion = min(COMMON_DEPTH_SCALES, key=lambda scale: abs(np.log(scale / typical_scale)))
+    suggestion = likely_depth_scale(median_units)
     raise InputError(
         f"The depth image {path} has a median depth of {median_m:.3g} m at depth scale {depth_scale:g}; "
         f"try depth scale {suggestion:g}, which makes it {median_units / suggestion:.3g} m"
     )
+
+
+def likely_depth_scale(median_units: float) -> float:
+    """The usual depth scale at which this median comes nearest to 2 m."""
+    typical_scale = median_units / _TYPICAL_DEPTH_M
+    return min(COMMON_DEPTH_SCALES, key=lambda scale: abs(np.log(scale / typical_scale)))

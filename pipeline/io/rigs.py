@@ -122,7 +122,7 @@ def _check_size(
         )
 
 
-def load_rig(directory: AnyPath, calibration: AnyPath | None = None) -> Rig:
+def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale: float = 1000.0) -> Rig:
     """The nodes below ``directory`` in the order of their folders' names.
 
     Args:
@@ -130,6 +130,7 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None) -> Rig:
             are known, node_NN/pose.txt with a 4 x 4 T_world_camera, metres.
         calibration: a folder whose node_NN/intrinsics.json, pose.txt and so on take the place of the rig's
             own; what is true of a rendered rig stays.
+        depth_scale: depth units in a metre, of every node.
 
     Raises:
         InputError: no folder, no node or more than six, a file of a node that cannot be used, or the
@@ -155,7 +156,7 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None) -> Rig:
             f"{MAX_NODES} remain"
         )
     over = {} if calibration is None else calibration_files(calibration, [folder.name for folder in folders])
-    frames = tuple(_load_node(folder, over.get(folder.name, NodeFiles())) for folder in folders)
+    frames = tuple(_load_node(folder, over.get(folder.name, NodeFiles()), depth_scale) for folder in folders)
     return Rig(directory.resolve().name, frames, read_truth(directory, [frame.name for frame in frames]))
 
 
@@ -202,6 +203,8 @@ def _node_folders(directory: Path) -> list[Path]:
     return sorted(folder for folder in directory.glob("node_*") if folder.is_dir())
 
 
-def _load_node(folder: Path, over: NodeFiles) -> RgbdFrame:
+def _load_node(folder: Path, over: NodeFiles, depth_scale: float) -> RgbdFrame:
     files: NodeFiles = {"intrinsics": folder / "intrinsics.json", **node_files(folder), **over}
-    return load_frame(folder / "color.png", folder / "depth.png", name=folder.name, **files)
+    return load_frame(
+        folder / "color.png", folder / "depth.png", depth_scale=depth_scale, name=folder.name, **files
+    )

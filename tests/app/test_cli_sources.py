@@ -23,6 +23,7 @@ UNREGISTERED = ImagePair("c.png", "d.png", "k.json", 5000.0, "kd.json", "e.json"
     [
         Demo("office"),
         RigFolder("my rig"),
+        RigFolder("my rig", 5000.0),
         PAIR,
         UNREGISTERED,
         Calibrated(Demo("office"), "cal"),

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from lab.datasets import open_set
-from lab.datasets.tum import associate
 from packetmesh.errors import InputError
+from pipeline.importing.tum import associate
 from tests.lab.datasets.setfiles import cut, picture, write_rgb, write_units
 
-MILLIMETRES = np.array([[0, 1, 7, 8, 500], [1234, 4095, 8000, 8001, 8191], [8192, 9999, 20000, 40000, 65535]])
+MILLIMETRES = np.array([[0, 1, 7, 8, 500], [1234, 4095, 8000, 8001, 8191], [8192, 9999, 20000, 40000, 65534]])
 
 
 def _rotated(millimetres):

@@ -39,7 +39,8 @@ def test_images_of_machine_vision_cameras_are_read(name, tmp_path):
 
 
 def test_every_millimetre_survives(tmp_path):
-    depth_mm = np.arange(65536, dtype=np.uint16).reshape(256, 256)
+    """65535 is no millimetre: it stands for an unknown depth."""
+    depth_mm = np.append(np.arange(65535, dtype=np.uint16), np.uint16(0)).reshape(256, 256)
     z_m = (depth_mm / 1000.0).astype(np.float32)
     z_m[depth_mm == 0] = np.nan
     write_depth_mm(tmp_path / "depth.png", DepthMap(z_m))

@@ -76,6 +76,14 @@ def test_a_pair_is_a_node(tmp_path):
     np.testing.assert_allclose(frame.depth.z_m, 2 * small_frame(0).depth.z_m, rtol=1e-6)
 
 
+def test_a_rig_may_have_another_depth_scale(tmp_path):
+    save_rig(tmp_path / "rig", rig_of(2))
+    for frame, expected in zip(
+        load_rig(tmp_path / "rig", depth_scale=5000.0).frames, rig_of(2).frames, strict=True
+    ):
+        np.testing.assert_allclose(frame.depth.z_m, expected.depth.z_m / 5.0, rtol=1e-6)
+
+
 def test_poses_may_have_comments_and_commas(tmp_path):
     save_rig(tmp_path / "rig", rig_of(1))
     pose = "# by hand\n1, 0, 0, 0.5\n0, 1, 0, -1\n\n0, 0, 1, 2\n0, 0, 0, 1\n"

@@ -1,0 +1,264 @@
+"""Bags of ROS 1 and ROS 2 (.bag, .db3, .mcap or a bag's folder): cameras, and the moments they share."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.geometry import inverse
+from pipeline.importing.bag_messages import (
+    camera_in,
+    color_of,
+    depth_units_of,
+    is_depth,
+    stamp_s,
+    transform_in,
+)
+from pipeline.importing.depth_units import FARTHEST_M
+from pipeline.importing.rig_folder import NodeImages
+from pipeline.io.images import NO_VALUE
+from pipeline.io.rigs import MAX_NODES
+from pipeline.types import CameraIntrinsics, DepthMap, FloatArray
+
+LARGEST_GAP_S = 0.05
+"""Between images that are taken as of one moment: more than a frame at 30 Hz."""
+_SUFFIXES = (".bag", ".db3", ".mcap")
+_IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+_TRANSPORTS = ("compressed", "compressedDepth")
+
+
+@dataclass(frozen=True, slots=True)
+class BagNodes:
+    """The nodes that a bag gives."""
+
+    nodes: tuple[tuple[float, NodeImages], ...]
+    """With the time of each, seconds."""
+    candidates: int
+    """Colour images of the first camera."""
+    units_per_metre: float
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Topic:
+    """The images of one topic."""
+
+    connection: Any
+    frame: str
+    camera: CameraIntrinsics | None
+    times_s: FloatArray
+    """(N,) when each was taken, by its header."""
+    recorded_ns: list[int]
+    """(N,) when each came into the bag, by which it is found again."""
+
+    @property
+    def name(self) -> str:
+        return str(self.connection.topic)
+
+
+def is_bag(path: Path) -> bool:
+    """Whether it is a bag's file or the folder of a ROS 2 bag."""
+    return (path.is_file() and path.suffix in _SUFFIXES) or (path / "metadata.yaml").is_file()
+
+
+def read_bag(path: Path, frames: int, depth_scale: float | None) -> BagNodes:
+    """Of several cameras the images of one moment, of one camera ``frames`` moments spread over the bag.
+
+    Raises:
+        InputError: no bag, no colour, depth or camera_info, or clocks that disagree.
+    """
+    with _opened(path) as reader:
+        topics = _image_topics(reader)
+        pairs = _pairs(path, *topics)[:MAX_NODES]
+        transforms, parents = _static_transforms(reader)
+        notes: list[str] = []
+        moments = _moments(path, pairs, frames)
+        first = pairs[0][0]
+        poses = [transforms.get(_root(first.frame, parents), {}).get(color.frame) for color, _ in pairs]
+        if len(pairs) == 1 or any(pose is None for pose in poses):
+            poses = [None] * len(pairs)
+            advice = "try reconstruct with --set node_registration.start=global"
+            notes.append(f"No static transforms place the cameras: poses are not known; {advice}")
+        nodes = []
+        for chosen in moments:
+            for (color, depth), T_world_color, (color_s, depth_s) in zip(pairs, poses, chosen, strict=True):
+                messages = _message(reader, color, color_s), _message(reader, depth, depth_s)
+                node = _node(color, depth, *messages, depth_scale, T_world_color, transforms)
+                nodes.append((float(color_s), node))
+        scale = depth_units_of(messages[1], depth.name)[1] if depth_scale is None else depth_scale
+        return BagNodes(tuple(nodes), len(first.times_s), scale, tuple(notes))
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    import apsw  # by which rosbags reads .db3
+    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.rosbag1 import ReaderError as ReaderError1
+    from rosbags.rosbag2 import ReaderError as ReaderError2
+    from rosbags.typesys import Stores, get_typestore
+
+    broken = (AnyReaderError, ReaderError1, ReaderError2, OSError, ValueError, LookupError, apsw.Error)
+    try:
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            yield reader
+    except (*broken, AssertionError, struct.error) as error:
+        why = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"The bag {path} cannot be read ({why}); try to record or copy it again") from None
+
+
+def _image_topics(reader: Any) -> tuple[list[_Topic], list[_Topic]]:
+    """Colour and depth, in the order of their names."""
+    found: tuple[list[_Topic], list[_Topic]] = ([], [])
+    for connection in sorted(reader.connections, key=lambda connection: connection.topic):
+        if connection.msgtype not in _IMAGES:
+            continue
+        first, times_s, recorded_ns = None, [], []
+        for _, at_ns, raw in reader.messages([connection]):
+            first = reader.deserialize(raw, connection.msgtype) if first is None else first
+            times_s.append(stamp_s(raw, reader.is2))
+            recorded_ns.append(at_ns)
+        if first is not None:
+            camera = _camera_info(reader, connection.topic)
+            frame = first.header.frame_id.lstrip("/")
+            topic = _Topic(connection, frame, camera, np.array(times_s), recorded_ns)
+            found[is_depth(first)].append(topic)
+    return found
+
+
+def _camera_info(reader: Any, topic: str) -> CameraIntrinsics | None:
+    parts = [part for part in topic.split("/") if part not in _TRANSPORTS]
+    wanted = "/".join([*parts[:-1], "camera_info"])
+    connections = [own for own in reader.connections if own.topic == wanted]
+    for connection, _, raw in reader.messages(connections) if connections else ():
+        return camera_in(reader.deserialize(raw, connection.msgtype), wanted)
+    return None
+
+
+def _pairs(path: Path, colors: list[_Topic], depths: list[_Topic]) -> list[tuple[_Topic, _Topic]]:
+    """Each depth topic with the colour topic of its frame, or else of the most similar name; one a colour."""
+    for topics, what in ((colors, "colour"), (depths, "depth")):
+        if not topics:
+            known = ", ".join(topic.name for topic in [*colors, *depths]) or "no images at all"
+            raise InputError(f"The bag {path} has no {what} images, but {known}; try to record both")
+    usable = [color for color in colors if color.camera is not None]
+    if not usable:
+        raise InputError(f"The bag {path} has no camera_info of {colors[0].name}; try to record it, too")
+    best: dict[str, tuple[tuple[bool, int], _Topic, _Topic]] = {}
+    for depth in depths:
+        scored = [((color.frame == depth.frame, _common(color.name, depth.name)), color) for color in usable]
+        score, color = max(scored, key=lambda pair: pair[0])
+        if color.name not in best or score > best[color.name][0]:
+            best[color.name] = score, color, depth
+    return [best[name][1:] for name in sorted(best)]
+
+
+def _common(first: str, second: str) -> int:
+    """Parts that two topics' names begin with alike."""
+    same = [a == b for a, b in zip(first.split("/"), second.split("/"), strict=False)]
+    return same.index(False) if False in same else len(same)
+
+
+def _moments(path: Path, pairs: list[tuple[_Topic, _Topic]], frames: int) -> list[FloatArray]:
+    """(cameras, 2) times of colour and depth of each chosen moment."""
+    reference_s = pairs[0][0].times_s
+    times_s = np.stack(
+        [np.stack([_nearest(topic.times_s, reference_s) for topic in pair], axis=1) for pair in pairs], axis=1
+    )
+    gaps_s = np.ptp(times_s.reshape(len(reference_s), -1), axis=1)
+    together = np.flatnonzero(gaps_s <= LARGEST_GAP_S)
+    if not len(together):
+        raise InputError(
+            f"The images of the bag {path} are never less than {gaps_s.min():.3g} s apart, more than the "
+            f"{LARGEST_GAP_S:g} s of one moment; try to record with the cameras' clocks set alike"
+        )
+    if len(pairs) > 1:
+        middle = together[np.abs(together - len(reference_s) / 2).argmin()]
+        return [times_s[middle]]
+    spread = np.linspace(0, len(together) - 1, min(frames, len(together))).round().astype(int)
+    return list(times_s[together[spread]])
+
+
+def _nearest(times_s: FloatArray, wanted_s: FloatArray) -> FloatArray:
+    times_s = np.sort(times_s)
+    after = np.searchsorted(times_s, wanted_s).clip(1, max(1, len(times_s) - 1))
+    around = times_s[np.stack([after - 1, after.clip(max=len(times_s) - 1)])]
+    return around[np.abs(around - wanted_s).argmin(axis=0), np.arange(len(wanted_s))]
+
+
+def _static_transforms(reader: Any) -> tuple[dict[str, dict[str, FloatArray]], dict[str, str]]:
+    """T_a_b of all frames a and b that static transforms link, metres; and the parent of each frame."""
+    parents: dict[str, str] = {}
+    links: dict[str, dict[str, FloatArray]] = {}
+    connections = [own for own in reader.connections if own.topic.lstrip("/") == "tf_static"]
+    for connection, _, raw in reader.messages(connections) if connections else ():
+        for message in reader.deserialize(raw, connection.msgtype).transforms:
+            parent, child = message.header.frame_id.lstrip("/"), message.child_frame_id.lstrip("/")
+            T_parent_child, parents[child] = transform_in(message), parent
+            links.setdefault(parent, {})[child] = T_parent_child
+            links.setdefault(child, {})[parent] = inverse(T_parent_child)
+    return {start: _reached(start, links) for start in links}, parents
+
+
+def _root(frame: str, parents: dict[str, str]) -> str:
+    """The frame above all, which by ROS's convention (REP 103) has z up."""
+    above = [frame]
+    while above[-1] in parents and parents[above[-1]] not in above:
+        above.append(parents[above[-1]])
+    return above[-1]
+
+
+def _reached(start: str, links: dict[str, dict[str, FloatArray]]) -> dict[str, FloatArray]:
+    found: dict[str, FloatArray] = {start: np.eye(4)}
+    waiting = [start]
+    while waiting:
+        frame = waiting.pop()
+        for neighbour, T in links[frame].items():
+            if neighbour not in found:
+                found[neighbour] = found[frame] @ T
+                waiting.append(neighbour)
+    return found
+
+
+def _message(reader: Any, topic: _Topic, time_s: float) -> Any:
+    at_ns = topic.recorded_ns[int(np.abs(topic.times_s - time_s).argmin())]
+    for connection, _, raw in reader.messages([topic.connection], start=at_ns, stop=at_ns + 1):
+        if stamp_s(raw, reader.is2) == time_s:
+            return reader.deserialize(raw, connection.msgtype)
+    raise InputError(f"The bag has lost an image of {topic.name}; try to record again")
+
+
+def _node(
+    color: _Topic,
+    depth: _Topic,
+    color_message: Any,
+    depth_message: Any,
+    depth_scale: float | None,
+    T_world_color: FloatArray | None,
+    transforms: dict[str, dict[str, FloatArray]],
+) -> NodeImages:
+    assert color.camera is not None
+    units, usual_scale = depth_units_of(depth_message, depth.name)
+    scale = usual_scale if depth_scale is None else depth_scale
+    z_m = (np.where(units == NO_VALUE, 0.0, units) / scale).astype(np.float32)
+    z_m[(z_m <= 0.0) | (z_m > FARTHEST_M)] = np.nan
+    if not np.isfinite(z_m).any():
+        raise InputError(f"A depth image of {depth.name} is empty; try another recording of the scene")
+    depth_camera = T_color_depth = None
+    if depth.frame != color.frame:
+        T_color_depth = transforms.get(color.frame, {}).get(depth.frame)
+        depth_camera = depth.camera
+        if depth_camera is None or T_color_depth is None:
+            raise InputError(
+                f"{depth.name} is not registered to {color.name} ({depth.frame}, {color.frame}), and its "
+                "camera_info or a static transform between both is missing; try to record them, too"
+            )
+    rgb = color_of(color_message, color.name)
+    images = color.name, depth.name, rgb, DepthMap(z_m), color.camera
+    return NodeImages(*images, T_world_color, depth_camera, T_color_depth)

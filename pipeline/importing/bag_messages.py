@@ -1,0 +1,126 @@
+"""Images, cameras and transforms as ROS messages hold them."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from packetmesh.errors import InputError
+from pipeline.geometry import rigid
+from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
+
+_COLORS = {"rgb8": (3, [0, 1, 2]), "bgr8": (3, [2, 1, 0]), "rgba8": (4, [0, 1, 2]), "bgra8": (4, [2, 1, 0])}
+_COLORS |= {"mono8": (1, [0, 0, 0]), "8UC1": (1, [0, 0, 0]), "8UC3": (3, [2, 1, 0])}
+_DEPTHS: dict[str, np.dtype[Any]] = {
+    "16UC1": np.dtype(np.uint16),
+    "mono16": np.dtype(np.uint16),
+    "32FC1": np.dtype(np.float32),
+}
+_COMPRESSED_DEPTH = "compressedDepth"
+_CONFIG_BYTES = 12
+"""Before the PNG of a compressed depth image: its format and two numbers by which 32FC1 is quantised."""
+
+
+def is_depth(message: Any) -> bool:
+    """Whether an Image or CompressedImage holds depth."""
+    if hasattr(message, "format"):
+        return _COMPRESSED_DEPTH in message.format
+    return message.encoding in _DEPTHS
+
+
+def stamp_s(raw: bytes, is_ros2: bool) -> float:
+    """Time in the header of a message, before anything else of it is read.
+
+    It comes after a sequence number of ROS 1, or after four bytes that describe ROS 2's encoding.
+    """
+    order = ">" if is_ros2 and raw[1] == 0 else "<"
+    seconds, nanoseconds = struct.unpack_from(f"{order}II", raw, 4)
+    return seconds + 1e-9 * nanoseconds
+
+
+def color_of(message: Any, topic: str) -> ByteArray:
+    """(H, W, 3) RGB of an Image or CompressedImage.
+
+    Raises:
+        InputError: an encoding that is not known, or a damaged image.
+    """
+    if hasattr(message, "format"):
+        bgr = cv2.imdecode(np.asarray(message.data), cv2.IMREAD_COLOR)
+        if bgr is None:
+            raise InputError(f"An image of {topic} is damaged; try to record again")
+        return np.ascontiguousarray(bgr[..., ::-1])
+    if message.encoding not in _COLORS:
+        raise InputError(
+            f"{topic} has images of the encoding {message.encoding}; those known are {', '.join(_COLORS)}"
+        )
+    channels, order = _COLORS[message.encoding]
+    values = _rows(message, np.dtype(np.uint8), channels, topic)
+    return np.ascontiguousarray(values.reshape(message.height, message.width, channels)[..., order])
+
+
+def depth_units_of(message: Any, topic: str) -> tuple[FloatArray, float]:
+    """(H, W) values, 0 where unknown, and how many make a metre: 1 of 32FC1, 1000 of 16UC1 (REP 118).
+
+    Raises:
+        InputError: an encoding that is not known, or a damaged image.
+    """
+    if hasattr(message, "format"):
+        return _compressed_depth(message, topic)
+    type_ = _DEPTHS[message.encoding].newbyteorder(">" if message.is_bigendian else "<")
+    values = _rows(message, type_, 1, topic).astype(np.float64)
+    return np.where(np.isfinite(values), values, 0.0), 1.0 if message.encoding == "32FC1" else 1000.0
+
+
+def camera_in(message: Any, topic: str) -> CameraIntrinsics:
+    """Of a CameraInfo, whose fields ROS 1 writes in capitals.
+
+    Raises:
+        InputError: a lens that is not Brown-Conrady of five coefficients, or no calibration.
+    """
+    d = np.asarray(message.d if hasattr(message, "d") else message.D, float)
+    matrix = np.asarray(message.k if hasattr(message, "k") else message.K, float).reshape(3, 3)
+    if message.distortion_model not in ("", "plumb_bob", "rational_polynomial") or np.any(d[5:]):
+        raise InputError(
+            f"The camera of {topic} has the lens {message.distortion_model} with {len(d)} coefficients; try "
+            "a recording of rectified images, or plumb_bob"
+        )
+    if not (matrix[0, 0] > 0 and matrix[1, 1] > 0):
+        raise InputError(f"The camera of {topic} is not calibrated; try to record its real camera_info")
+    return CameraIntrinsics(matrix, np.pad(d[:5], (0, max(0, 5 - len(d)))), message.width, message.height)
+
+
+def transform_in(message: Any) -> FloatArray:
+    """(4, 4) T_parent_child of a TransformStamped, metres."""
+    q, t = message.transform.rotation, message.transform.translation
+    rotation = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
+    return rigid(rotation, np.array([t.x, t.y, t.z]))
+
+
+def _compressed_depth(message: Any, topic: str) -> tuple[FloatArray, float]:
+    data = np.asarray(message.data)
+    values = None
+    if "rvl" not in message.format.lower():
+        values = cv2.imdecode(data[_CONFIG_BYTES:], cv2.IMREAD_UNCHANGED)
+    if values is None or values.ndim != 2:
+        raise InputError(
+            f"A depth image of {topic} has the format '{message.format}' and is no PNG; try to record the "
+            "topic without compression"
+        )
+    if not message.format.startswith("32FC1"):
+        return values.astype(np.float64), 1000.0
+    _, a, b = struct.unpack_from("<iff", data.tobytes())
+    known = values > 0
+    return np.where(known, a / np.where(known, values - b, 1.0), 0.0), 1.0
+
+
+def _rows(message: Any, type_: np.dtype, channels: int, topic: str) -> np.ndarray:
+    """(H, W * channels) values without what pads the rows."""
+    wanted = message.width * channels * type_.itemsize
+    if message.step < wanted or len(message.data) < message.step * message.height:
+        raise InputError(f"An image of {topic} is shorter than its size says; try to record again")
+    rows = np.asarray(message.data)[: message.step * message.height].reshape(message.height, message.step)
+    return np.ascontiguousarray(rows[:, :wanted]).view(type_)

@@ -1,0 +1,165 @@
+"""From a recording to a rig folder."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from pipeline.geometry import rigid
+from pipeline.importing.bag import is_bag, read_bag
+from pipeline.importing.choosing import choose
+from pipeline.importing.depth_units import depth_in, scale_note
+from pipeline.importing.kinds import recognise
+from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
+from pipeline.importing.sequence import Candidate, Sequence
+from pipeline.io.images import read_color
+from pipeline.io.rigs import MAX_NODES
+from pipeline.types import AnyPath, FloatArray
+
+MOST_TILT_DEG = 35.0
+"""Of the cameras' mean upward direction from the world's; more is another world, which is turned."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedFrame:
+    """One frame of a recording that became a node."""
+
+    node: str
+    color: str
+    depth: str
+    time_s: float | None
+    median_depth_m: float
+
+    @staticmethod
+    def of(node: NodeImages, index: int, time_s: float | None) -> ImportedFrame:
+        """What is told of a node that was written."""
+        median_m = float(np.nanmedian(node.depth.z_m))
+        return ImportedFrame(f"node_{index:02d}", node.color_name, node.depth_name, time_s, median_m)
+
+
+@dataclass(frozen=True, slots=True)
+class ImportReport:
+    """What was found, what was taken, and what had to be assumed."""
+
+    kind: str
+    folder: str
+    candidates: int
+    """Frames of the recording that were looked at."""
+    depth_scale: float
+    """Depth units in a metre that were used."""
+    frames: tuple[ImportedFrame, ...]
+    notes: tuple[str, ...]
+    """One sentence each."""
+
+
+def iterate_import(
+    path: AnyPath,
+    out: AnyPath,
+    frames: int = 3,
+    depth_scale: float | None = None,
+    intrinsics: AnyPath | None = None,
+) -> Generator[Progress, None, ImportReport]:
+    """Write a few frames of another program's recording as a rig folder, all of it or nothing.
+
+    Args:
+        path: the recording's folder, or one that holds nothing else.
+        out: the rig's folder, new or empty.
+        frames: how many nodes the rig gets, 1 to 6; fewer where the recording has no more that overlap.
+        depth_scale: depth units in a metre; without it what the kind of recording uses.
+        intrinsics: of the colour camera; without it those beside the images, or the kind's own.
+
+    Raises:
+        InputError: no recording, one that cannot be used, or a folder that cannot be written.
+    """
+    if not 1 <= frames <= MAX_NODES:
+        raise InputError(f"A rig of {frames} frames cannot be; try 1 to {MAX_NODES}")
+    if depth_scale is not None and not (np.isfinite(depth_scale) and depth_scale > 0):
+        raise InputError(f"The depth scale is {depth_scale}; try 1000 for images in millimetres")
+    out = Path(out)
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise InputError(f"{out} is there already; try another name for the rig")
+    if is_bag(Path(path)):
+        if intrinsics is not None:
+            raise InputError(f"The bag {path} has recorded its own cameras; try without intrinsics")
+        return (yield from _from_bag(Path(path), out, frames, depth_scale))
+    kind, folder = recognise(Path(path))
+    yield Progress("files", 0.0)
+    sequence = kind.read(folder, None if intrinsics is None else Path(intrinsics))
+    if depth_scale is not None:
+        sequence = replace(sequence, units_per_metre=depth_scale, rotated_bits=False)
+    yield Progress("choice of frames", 0.2)
+    middle = depth_in(sequence.candidates[len(sequence.candidates) // 2].depth, sequence)
+    chosen = choose(sequence, frames, middle.median_m)
+    written = []
+    with new_folder(out) as folder_of_rig:
+        T_up_world = _upright([sequence.candidates[index] for index in chosen])
+        for done, index in enumerate(chosen):
+            yield Progress("images", 0.3 + 0.7 * done / len(chosen))
+            candidate = sequence.candidates[index]
+            node = _node_of(candidate, sequence, T_up_world)
+            write_node(folder_of_rig / f"node_{done:02d}", node)
+            written.append(ImportedFrame.of(node, done, candidate.time_s))
+    notes = [*sequence.notes, *middle.notes]
+    if T_up_world is not None:
+        notes.append("The world was turned so that z is up")
+    if len(chosen) < min(frames, len(sequence.candidates)):
+        notes.append(f"No more than {len(chosen)} of the frames overlap by half")
+    notes += scale_note([frame.median_depth_m for frame in written], middle.units_per_metre)
+    return ImportReport(
+        kind.name,
+        str(folder),
+        len(sequence.candidates),
+        middle.units_per_metre,
+        tuple(written),
+        tuple(notes),
+    )
+
+
+def _from_bag(
+    path: Path, out: Path, frames: int, depth_scale: float | None
+) -> Generator[Progress, None, ImportReport]:
+    yield Progress("files", 0.0)
+    bag = read_bag(path, frames, depth_scale)
+    written = []
+    with new_folder(out) as folder_of_rig:
+        for done, (time_s, node) in enumerate(bag.nodes):
+            yield Progress("images", 0.7 + 0.3 * done / len(bag.nodes))
+            write_node(folder_of_rig / f"node_{done:02d}", node)
+            written.append(ImportedFrame.of(node, done, time_s))
+    notes = [*bag.notes, *scale_note([frame.median_depth_m for frame in written], bag.units_per_metre)]
+    return ImportReport("bag", str(path), bag.candidates, bag.units_per_metre, tuple(written), tuple(notes))
+
+
+def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | None) -> NodeImages:
+    T = candidate.T_world_camera
+    return NodeImages(
+        str(candidate.color),
+        str(candidate.depth),
+        read_color(candidate.color),
+        depth_in(candidate.depth, sequence).depth,
+        sequence.camera,
+        T if T is None or T_up_world is None else T_up_world @ T,
+        sequence.depth_camera,
+        sequence.T_color_depth,
+    )
+
+
+def _upright(candidates: list[Candidate]) -> FloatArray | None:
+    """The turn that makes the cameras' mean upward direction +z; None where the world's z is up as it is.
+
+    Many recordings have the first camera's axes as the world's; a rig's world has z up.
+    """
+    poses = [candidate.T_world_camera for candidate in candidates if candidate.T_world_camera is not None]
+    if not poses:
+        return None
+    up = -np.mean([T[:3, 1] for T in poses], axis=0)
+    if up[2] >= np.cos(np.deg2rad(MOST_TILT_DEG)) * np.linalg.norm(up):
+        return None
+    turn, _ = Rotation.align_vectors([[0.0, 0.0, 1.0]], [up])
+    return rigid(turn.as_matrix(), np.zeros(3))

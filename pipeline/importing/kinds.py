@@ -1,0 +1,76 @@
+"""The kinds of recordings that are known, and how each is recognised."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from packetmesh.errors import InputError
+from pipeline.importing import numbered, tum
+from pipeline.importing.sequence import Sequence
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """One layout of files."""
+
+    name: str
+    looks_like: str
+    """What is in its folder, for people."""
+    recognised: Callable[[Path], bool]
+    """Whether a folder is of this kind, from the names of its files alone."""
+    read: Callable[[Path, Path | None], Sequence]
+    """The frames of a folder; the second path is of intrinsics that the person names."""
+
+
+KINDS = (
+    Kind("TUM", "rgb.txt and depth.txt", tum.is_tum, tum.read_tum),
+    Kind(
+        "7-Scenes",
+        "frame-000000.color.png, .depth.png and .pose.txt",
+        numbered.is_seven_scenes,
+        numbered.read_seven_scenes,
+    ),
+    Kind("ScanNet", "color/, depth/, pose/ and intrinsic/", numbered.is_scannet, numbered.read_scannet),
+    Kind("SUN RGB-D", "image/, depth_bfx/ and intrinsics.txt", numbered.is_sunrgbd, numbered.read_sunrgbd),
+    Kind(
+        "Redwood or Open3D",
+        "color/ and depth/, with a trajectory .log",
+        numbered.is_open3d,
+        numbered.read_open3d,
+    ),
+)
+"""In the order in which they are tried: each is told from those after it."""
+
+
+def recognise(path: Path) -> tuple[Kind, Path]:
+    """The kind of a recording and its folder: ``path``, or the only one in it that is of a kind.
+
+    Raises:
+        InputError: no folder, of no kind, or with several recordings in it.
+    """
+    if not path.exists():
+        raise InputError(f"{path} does not exist; check the path")
+    if not path.is_dir():
+        raise InputError(f"{path} is a file but no bag; try the folder of an unpacked recording: {_known()}")
+    kind = _kind_of(path)
+    if kind is not None:
+        return kind, path
+    inner = [folder for folder in sorted(path.iterdir()) if folder.is_dir()]
+    found = [(kind, folder) for folder in inner if (kind := _kind_of(folder)) is not None]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        names = ", ".join(folder.name for _, folder in found[:6])
+        raise InputError(f"{path} holds {len(found)} recordings; try one of them: {names}")
+    raise InputError(f"{path} is of no known kind; the kinds are {_known()}")
+
+
+def _kind_of(folder: Path) -> Kind | None:
+    return next((kind for kind in KINDS if kind.recognised(folder)), None)
+
+
+def _known() -> str:
+    folders = (f"{kind.name} ({kind.looks_like})" for kind in KINDS)
+    return "; ".join([*folders, "bags of ROS (.bag, .db3, .mcap)"])

@@ -1,0 +1,49 @@
+"""What every kind of recording is read into."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.types import CameraIntrinsics, FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A colour and a depth image of one moment, not read yet."""
+
+    color: Path
+    depth: Path
+    T_world_camera: FloatArray | None = None
+    """(4, 4) of the colour camera, metres."""
+    time_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """The frames of one recording, in the order of time, with what they have in common."""
+
+    candidates: tuple[Candidate, ...]
+    """All of them with poses or none."""
+    camera: CameraIntrinsics
+    units_per_metre: float = 1000.0
+    """Of the depth images."""
+    rotated_bits: bool = False
+    """Whether the depth images may have their bits rotated as those of SUN RGB-D."""
+    depth_camera: CameraIntrinsics | None = None
+    """Of depth images that are not registered to the colour images."""
+    T_color_depth: FloatArray | None = None
+    """(4, 4) where that camera stands, metres."""
+    notes: tuple[str, ...] = ()
+    """What was assumed, one sentence each."""
+
+
+def posed(candidates: list[Candidate], what: str) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
+    """Those with a pose and a note on what was left out; all of them if none has one."""
+    known = [candidate for candidate in candidates if candidate.T_world_camera is not None]
+    if not known:
+        note = f"No {what}: poses are not known; try reconstruct with --set node_registration.start=global"
+        return tuple(candidates), (note,)
+    lost = len(candidates) - len(known)
+    note = f"{lost} of {len(candidates)} frames have no pose and were left out"
+    return tuple(known), (note,) if lost else ()

@@ -1,0 +1,138 @@
+"""TUM RGB-D sequences: pictures, depth and poses with their own clocks.
+
+Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from packetmesh.errors import InputError
+from packetmesh.files import MAX_TEXT_BYTES, read_bytes
+from pipeline.geometry import rigid
+from pipeline.importing.cameras import PRIMESENSE, camera_of
+from pipeline.importing.sequence import Candidate, Sequence, posed
+from pipeline.types import CameraIntrinsics, FloatArray
+
+UNITS_PER_METRE = 5000.0
+LARGEST_GAP_S = 0.02
+_CAMERAS = {
+    "1": ((517.3, 516.5, 318.6, 255.3), (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)),
+    "2": ((520.9, 521.0, 325.1, 249.7), (0.2312, -0.7849, -0.0033, -0.0001, 0.9172)),
+    "3": ((535.4, 539.2, 320.1, 247.6), (0.0, 0.0, 0.0, 0.0, 0.0)),
+}
+"""The colour cameras of the sequences freiburg1 to 3 as the benchmark's page gives them."""
+
+
+def is_tum(folder: Path) -> bool:
+    """Whether it has the two lists."""
+    return (folder / "rgb.txt").is_file() and (folder / "depth.txt").is_file()
+
+
+def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
+    """The frames whose pictures, depth and, if there is groundtruth.txt, poses are less than 20 ms apart.
+
+    Raises:
+        InputError: a list with a line that cannot be read, or no two images of one moment.
+    """
+    (rgb_s, pictures), (depth_s, depths) = listed(folder / "rgb.txt"), listed(folder / "depth.txt")
+    pairs = associate(rgb_s, depth_s)
+    if not pairs:
+        raise InputError(
+            f"No images in {folder} are less than {1000 * LARGEST_GAP_S:g} ms apart in rgb.txt and "
+            "depth.txt; check that both clocks are the same"
+        )
+    poses = _poses(folder / "groundtruth.txt", rgb_s)
+    candidates, notes = posed(
+        [
+            Candidate(folder / pictures[i], folder / depths[j], poses.get(i), float(rgb_s[i]))
+            for i, j in pairs
+        ],
+        "pose in groundtruth.txt at the time of an image",
+    )
+    camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *_known_camera(folder))
+    return Sequence(candidates, camera, UNITS_PER_METRE, notes=(*assumed, *notes))
+
+
+def associate(first_s: FloatArray, second_s: FloatArray) -> list[tuple[int, int]]:
+    """Indices of times less than 20 ms apart, nearest pairs first, each time used once (associate.py).
+
+    Args:
+        first_s: (N,) times, seconds, ascending.
+        second_s: (M,) times, seconds, ascending.
+    """
+    first = np.searchsorted(second_s, first_s - LARGEST_GAP_S, side="right")
+    last = np.searchsorted(second_s, first_s + LARGEST_GAP_S, side="left")
+    near = [
+        (abs(first_s[i] - second_s[j]), i, j) for i in range(len(first_s)) for j in range(first[i], last[i])
+    ]
+    of_first: dict[int, int] = {}
+    taken = set()
+    for _, i, j in sorted(near):
+        if i not in of_first and j not in taken:
+            of_first[i] = j
+            taken.add(j)
+    return sorted(of_first.items())
+
+
+def listed(file: Path) -> tuple[FloatArray, list[str]]:
+    """Times in ascending order and the files that belong to them.
+
+    Raises:
+        InputError: a line that is no time and file.
+    """
+    rows = _rows(file, "list of a TUM sequence", 1, "a time in seconds and a file")
+    return np.array([time_s for time_s, _ in rows]), [words[0] for _, words in rows]
+
+
+def _rows(file: Path, what: str, least: int, form: str) -> list[tuple[float, list[str]]]:
+    """Time and words of each line, in the order of time."""
+    rows = []
+    text = read_bytes(file, 100 * MAX_TEXT_BYTES, what).decode("utf-8", "replace")
+    for line in text.splitlines():
+        if not line.strip() or line.startswith("#"):
+            continue
+        words = line.replace(",", " ").split()
+        try:
+            time_s = float(words[0])
+        except ValueError:
+            time_s = np.nan
+        if not np.isfinite(time_s) or len(words) <= least:
+            raise InputError(f"The {what} {file} has the line '{line[:80]}'; try lines with {form}")
+        rows.append((time_s, words[1:]))
+    rows.sort(key=lambda row: row[0])
+    return rows
+
+
+def _poses(file: Path, wanted_s: FloatArray) -> dict[int, FloatArray]:
+    """T_world_camera by the indices of the (N,) times that have one at most 20 ms away."""
+    if not file.is_file():
+        return {}
+    rows = _rows(file, "trajectory", 7, "a time, tx ty tz in metres and a quaternion qx qy qz qw")
+    times_s = np.array([time_s for time_s, _ in rows])
+    try:
+        values = np.array([words[:7] for _, words in rows], dtype=np.float64).reshape(-1, 7)
+    except ValueError:
+        raise InputError(f"The trajectory {file} holds words where numbers belong; check the file") from None
+    found = {}
+    for index, time_s in enumerate(wanted_s):
+        nearest = int(np.abs(times_s - time_s).argmin()) if len(times_s) else 0
+        if len(times_s) and abs(times_s[nearest] - time_s) <= LARGEST_GAP_S:
+            position_m, quaternion = values[nearest, :3], values[nearest, 3:]
+            if np.isfinite(values[nearest]).all() and np.linalg.norm(quaternion) > 0.5:
+                found[index] = rigid(Rotation.from_quat(quaternion).as_matrix(), position_m)
+    return found
+
+
+def _known_camera(folder: Path) -> tuple[CameraIntrinsics, str]:
+    series = re.search(r"(?:freiburg|fr)([123])(?!\d)", folder.resolve().name)
+    if series is None:
+        return PRIMESENSE, "a Kinect's from the factory"
+    values, distortion = _CAMERAS[series[1]]
+    pinhole = CameraIntrinsics.pinhole(*values, 640, 480)
+    camera = CameraIntrinsics(pinhole.matrix, np.array(distortion), 640, 480)
+    return camera, f"those the benchmark gives for freiburg{series[1]}"

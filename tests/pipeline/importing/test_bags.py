@@ -1,0 +1,149 @@
+"""Bags become the rig that was recorded."""
+
+import numpy as np
+import pytest
+
+from packetmesh.errors import InputError
+from packetmesh.progress import drain
+from packetmesh.settings import with_settings
+from pipeline.config import PRESETS
+from pipeline.geometry import rigid, rotation_exp
+from pipeline.importing import iterate_import
+from pipeline.io.demos import load_demo
+from pipeline.io.extrinsics import read_extrinsics
+from pipeline.io.images import read_depth
+from pipeline.io.rigs import load_rig
+from pipeline.reconstruct import iterate_reconstruction
+from pipeline.run_folder import metrics_of
+from pipeline.sources import RigFolder
+from pipeline.spec import Spec
+from tests.pipeline.importing.bags import DEPTHS, write_bag
+from tests.pipeline.importing.recordings import orbit
+
+
+def file_of(tmp_path, kind):
+    return tmp_path / ("recording.bag" if kind == "ros1" else "recording")
+
+
+def imported(tmp_path, kind="ros2", **options):
+    report = drain(iterate_import(file_of(tmp_path, kind), tmp_path / "rig", **options))
+    return report, load_rig(tmp_path / "rig")
+
+
+def assert_same(frame, expected):
+    np.testing.assert_array_equal(frame.rgb, expected.rgb)
+    np.testing.assert_allclose(frame.depth.z_m, expected.depth.z_m, atol=1e-6)
+    np.testing.assert_array_equal(frame.intrinsics.matrix, expected.intrinsics.matrix)
+    np.testing.assert_allclose(frame.T_world_camera, expected.T_world_camera, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "depth"), [*(("ros2", depth) for depth in DEPTHS), ("ros1", "image"), ("mcap", "image")]
+)
+def test_cameras_of_a_bag_are_the_nodes_that_were_recorded(tmp_path, kind, depth):
+    written = orbit(3)
+    write_bag(file_of(tmp_path, kind), written, kind, depth)
+    report, rig = imported(tmp_path, kind)
+    assert report.kind == "bag"
+    for frame, expected in zip(rig.frames, written.frames, strict=True):
+        assert_same(frame, expected)
+
+
+def test_a_single_file_of_a_bag_is_enough(tmp_path):
+    write_bag(tmp_path / "recording", orbit(2), "mcap")
+    (file,) = (tmp_path / "recording").glob("*.mcap")
+    drain(iterate_import(file, tmp_path / "rig"))
+    assert len(load_rig(tmp_path / "rig").frames) == 2
+
+
+def test_one_camera_gives_moments_spread_over_the_bag(tmp_path):
+    write_bag(tmp_path / "recording", orbit(1), moments=9)
+    report, rig = imported(tmp_path, frames=3)
+    assert len(rig.frames) == 3
+    assert [frame.time_s for frame in report.frames] == pytest.approx([100.0, 102.0, 104.0])
+    assert any("poses are not known" in note for note in report.notes)
+
+
+def test_a_demo_that_went_through_a_bag_is_reconstructed(tmp_path):
+    demo = load_demo("living-room")
+    write_bag(tmp_path / "recording", demo, moments=1)
+    imported(tmp_path)
+    config = with_settings(PRESETS["packetmesh"], ["surface.max_points=5000"])
+    spec = Spec(RigFolder(str(tmp_path / "rig")), "packetmesh", config)
+    after = metrics_of(drain(iterate_reconstruction(spec)))["surface_after"]
+    assert after["triangles"] > 1000
+    assert after["within_2pct_share"] > 0.8
+
+
+@pytest.mark.parametrize(
+    ("spoiled", "says"),
+    [
+        ({"leave_out": "depth"}, "no depth images"),
+        ({"leave_out": "color"}, "no colour images"),
+        ({"leave_out": "camera_info"}, "no camera_info"),
+        ({"leave_out": "cam"}, "no images at all"),
+        ({"late_s": 7.0}, "clocks"),
+    ],
+)
+def test_a_bag_that_lacks_something_gets_one_sentence_and_leaves_nothing(tmp_path, spoiled, says):
+    write_bag(tmp_path / "recording", orbit(2), **spoiled)
+    with pytest.raises(InputError, match=says) as error:
+        imported(tmp_path)
+    assert "\n" not in str(error.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["recording"]
+
+
+def test_depth_with_a_frame_of_its_own_keeps_its_camera_and_its_place(tmp_path):
+    T_color_depth = rigid(rotation_exp(np.array([0.0, 0.02, 0.0])), np.array([0.05, 0.0, 0.01]))
+    written = orbit(2)
+    write_bag(tmp_path / "recording", written, T_color_depth=T_color_depth)
+    _, rig = imported(tmp_path)
+    node = tmp_path / "rig" / "node_01"
+    np.testing.assert_allclose(read_extrinsics(node / "extrinsics.json"), T_color_depth, atol=1e-9)
+    np.testing.assert_allclose(read_depth(node / "depth.png").z_m, written.frames[1].depth.z_m, atol=1e-6)
+    np.testing.assert_allclose(rig.frames[1].T_world_camera, written.frames[1].T_world_camera, atol=1e-9)
+
+
+def test_depth_with_a_frame_that_nothing_links_is_refused(tmp_path):
+    write_bag(tmp_path / "recording", orbit(1), T_color_depth=np.eye(4), leave_out="tf_static")
+    with pytest.raises(InputError, match="static transform"):
+        imported(tmp_path)
+
+
+@pytest.mark.parametrize(("depth", "usual"), [("image", 1000.0), ("image/metres", 1.0)])
+def test_the_scale_is_the_encodings_own_or_the_one_that_is_given(tmp_path, depth, usual):
+    write_bag(tmp_path / "recording", orbit(1), depth=depth)
+    report, rig = imported(tmp_path)
+    assert report.depth_scale == usual
+    given = drain(iterate_import(tmp_path / "recording", tmp_path / "half", depth_scale=2.0 * usual))
+    half = load_rig(tmp_path / "half").frames[0]
+    assert given.depth_scale == 2.0 * usual
+    np.testing.assert_allclose(half.depth.z_m, rig.frames[0].depth.z_m / 2.0, atol=6e-4)
+
+
+def test_a_bag_has_its_own_cameras(tmp_path):
+    write_bag(tmp_path / "recording", orbit(1))
+    with pytest.raises(InputError, match="without intrinsics"):
+        imported(tmp_path, intrinsics=tmp_path / "camera.json")
+
+
+@pytest.mark.parametrize("name", ["broken.bag", "broken.mcap", "broken.db3"])
+def test_a_damaged_bag_gets_one_sentence(tmp_path, name):
+    (tmp_path / name).write_bytes(b"not a bag at all" * 20)
+    with pytest.raises(InputError, match="cannot be read") as error:
+        drain(iterate_import(tmp_path / name, tmp_path / "rig"))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
+@pytest.mark.parametrize("kind", ["ros1", "ros2", "mcap"])
+def test_a_bag_that_was_cut_off_gets_one_sentence(tmp_path, kind, share):
+    write_bag(file_of(tmp_path, kind), orbit(2), kind)
+    folder = tmp_path if kind == "ros1" else tmp_path / "recording"
+    (file,) = (path for path in folder.iterdir() if path.suffix in (".bag", ".db3", ".mcap"))
+    data = file.read_bytes()
+    file.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(InputError, match="The bag") as error:
+        imported(tmp_path, kind)
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "rig").exists()
