@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from pipeline.depth import DepthNetwork
     from pipeline.types import DepthMap
 
-FARTHEST_M = 65.535
-"""What 16 bits of millimetres hold."""
+FARTHEST_M = 65.534
+"""What 16 bits of millimetres hold; 65535 means unknown."""
 PREVIEW_PERCENTILES = (2.0, 98.0)
 
 
@@ -40,7 +40,7 @@ def infer_depth(
     Args:
         photos: Colour images; the orientation that a camera noted in them is not applied.
         out: Folder for NAME_depth.png, 16 bits, and NAME_preview.png. Metric depth is in millimetres, 0
-            where unknown; relative depth is scaled so that its largest value is 65535.
+            where unknown; relative depth is scaled so that its largest value is 65534.
         model: An ONNX depth network; the one that ships without it.
         preset: How that network wants its image; without it, what its metadata say.
         kind: What it gives: metres, depth up to scale, or disparity up to scale and shift.

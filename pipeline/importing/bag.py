@@ -21,9 +21,8 @@ from pipeline.importing.bag_messages import (
     stamp_s,
     transform_in,
 )
-from pipeline.importing.depth_units import FARTHEST_M
 from pipeline.importing.rig_folder import NodeImages
-from pipeline.io.images import NO_VALUE
+from pipeline.io.images import FARTHEST_M, NO_VALUE
 from pipeline.io.rigs import MAX_NODES
 from pipeline.types import CameraIntrinsics, DepthMap, FloatArray
 
@@ -84,8 +83,7 @@ def read_bag(path: Path, frames: int, depth_scale: float | None) -> BagNodes:
         poses = [transforms.get(_root(first.frame, parents), {}).get(color.frame) for color, _ in pairs]
         if len(pairs) == 1 or any(pose is None for pose in poses):
             poses = [None] * len(pairs)
-            advice = "try reconstruct with --set node_registration.start=global"
-            notes.append(f"No static transforms place the cameras: poses are not known; {advice}")
+            notes.append("No static transforms place the cameras; reconstruct looks for their poses")
         nodes = []
         for chosen in moments:
             for (color, depth), T_world_color, (color_s, depth_s) in zip(pairs, poses, chosen, strict=True):

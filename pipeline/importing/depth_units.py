@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from packetmesh.errors import InputError
 from pipeline.importing.sequence import Sequence
-from pipeline.io.images import likely_depth_scale, read_depth_units
+from pipeline.io.images import FARTHEST_M, likely_depth_scale, read_depth_units
 from pipeline.types import DepthMap
 
 ROOM_M = (0.2, 15.0)
 """Median depths between which nothing is said."""
-FARTHEST_M = 65.534
-"""What a rig's depth image holds; beyond it depth is unknown."""
 _ROTATED_SHARE = 0.95
 
 

@@ -18,6 +18,8 @@ COMMON_DEPTH_SCALES = (1.0, 100.0, 256.0, 1000.0, 5000.0, 10000.0)
 PLAUSIBLE_MEDIAN_M = (0.01, 100.0)
 NO_VALUE = 65535
 """What some data sets (7-Scenes) write where the depth is unknown, beside 0."""
+FARTHEST_M = 65.534
+"""What is left for 16 bits of millimetres."""
 _TYPICAL_DEPTH_M = 2.0
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _JPEG_SIGNATURE = b"\xff\xd8"

@@ -50,7 +50,7 @@ def test_a_photograph_becomes_shares_of_its_largest_depth(capsys, tmp_path):
     assert report["provider"].endswith("ExecutionProvider")
     assert (record["height_px"], record["width_px"]) == z.shape
     assert 0.0 < record["inference_ms"] < 60_000.0
-    np.testing.assert_allclose(values(record["depth"]), 65535.0 * z / z.max(), atol=1.0)
+    np.testing.assert_allclose(values(record["depth"]), 65534.0 * z / z.max(), atol=1.0)
     assert read_color(record["preview"]).shape == (*z.shape, 3)
     assert report["provider"] in err
     assert " ms" in err
@@ -67,7 +67,7 @@ def test_metres_are_written_in_millimetres_and_what_16_bits_cannot_hold_is_left_
     assert record["known"] == pytest.approx(0.8)
     assert record["too_far"] == pytest.approx(0.25)
     assert (record["nearest_m"], record["farthest_m"]) == pytest.approx((2.5, 80.0))
-    assert "65.535" in err
+    assert "65.534" in err
     unknown = (read_color(record["preview"]) == HOLE).all(axis=-1)
     np.testing.assert_array_equal(unknown, metres < 0.0)
 
@@ -78,7 +78,7 @@ def test_disparity_is_written_as_shares_of_the_largest(capsys, tmp_path):
     code, out, _ = run(capsys, photo(tmp_path), "--out", tmp_path, "--model", network, "--json")
     (record,) = json.loads(out)["photos"].values()
     assert code == 0
-    np.testing.assert_allclose(values(record["depth"]), 65535.0 * disparity / 8.0, atol=1.0)
+    np.testing.assert_allclose(values(record["depth"]), 65534.0 * disparity / 8.0, atol=1.0)
     assert values(record["depth"])[0, 0] == 0
     shades = read_color(record["preview"])[0, 1:].astype(int).sum(axis=-1)
     assert (np.diff(shades) >= 0).all(), "the nearer, the lighter"

@@ -204,7 +204,7 @@ class WhatIf:
         self._drawn.append(wall)
 
     def _draw_arrows(self, name: str, at_m: FloatArray) -> None:
-        scale = 0.35 * float(np.linalg.norm(np.subtract(at_m, self._at_m(SINK)))) if self._at_m else 1.0
+        scale = 0.5 * float(np.linalg.norm(np.subtract(at_m, self._at_m(SINK)))) if self._at_m else 1.0
         arrows = self._ui.scene.add_transform_controls(
             f"{self._below}/arrows",
             scale=max(scale, 0.3),

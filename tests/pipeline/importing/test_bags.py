@@ -61,7 +61,7 @@ def test_one_camera_gives_moments_spread_over_the_bag(tmp_path):
     report, rig = imported(tmp_path, frames=3)
     assert len(rig.frames) == 3
     assert [frame.time_s for frame in report.frames] == pytest.approx([100.0, 102.0, 104.0])
-    assert any("poses are not known" in note for note in report.notes)
+    assert any("reconstruct looks for their poses" in note for note in report.notes)
 
 
 def test_a_demo_that_went_through_a_bag_is_reconstructed(tmp_path):
