@@ -5,17 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from pipeline.calibration.thesis_table import TABLE_4_1
+
 NAMES = ("fx", "fy", "cx", "cy", "k1", "k2")
 TRUE = (500.0, 500.0, 300.0, 250.0, 0.05, 0.1)
 """Of its camera."""
-TABLE_4_1 = {
-    0.2: (500.013, 500.009, 300.132, 249.855, 0.0503, 0.1023),
-    0.4: (499.738, 500.343, 300.273, 249.762, 0.0443, 0.1048),
-    0.6: (498.836, 501.538, 299.317, 249.346, 0.0634, 0.0936),
-    0.8: (501.329, 500.938, 299.021, 250.829, 0.0849, 0.1274),
-    1.0: (502.474, 497.638, 301.327, 251.043, 0.1382, 0.0632),
-}
-"""By the noise in px: one estimate for each."""
 
 
 @dataclass(frozen=True, slots=True)

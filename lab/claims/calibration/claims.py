@@ -18,18 +18,12 @@ from lab.claims.calibration.protocol import (
 )
 from lab.claims.claim import Claim, Outcome, bootstrap_ci95
 from lab.claims.exhibits import Table
+from pipeline.calibration.thesis_table import TABLE_4_1
 from pipeline.types import FloatArray
 
 PLACES = ("fx", "fy", "cx", "cy")
 WITHIN, WITHIN_POSE = 0.005, 0.05
 EXACT = 1e-3
-TABLE_4_1 = {
-    0.2: (500.013, 500.009, 300.132, 249.855, 0.0503, 0.1023),
-    0.4: (499.738, 500.343, 300.273, 249.762, 0.0443, 0.1048),
-    0.6: (498.836, 501.538, 299.317, 249.346, 0.0634, 0.0936),
-    0.8: (501.329, 500.938, 299.021, 250.829, 0.0849, 0.1274),
-    1.0: (502.474, 497.638, 301.327, 251.043, 0.1382, 0.0632),
-}
 TABLE_4_2 = (
     (60.173, -10.193, 17.757, 30.0027, 19.9969, 18.0053),
     (60.237, -9.661, 18.329, 29.9965, 20.0053, 18.0072),
