@@ -43,6 +43,7 @@ else:
 Metric = Literal["point", "plane"]
 Direction = Literal["q2p", "p2q", "both"]
 FusionMode = Literal["union", "fill"]
+Fill = Literal["auto", "completion", "network"]
 RadiusRule = Literal["thesis", "thesis+", "manual"]
 NodePoints = Literal["sensor", "fused"]
 
@@ -99,6 +100,9 @@ class DepthConfig:
     """Infer on the thesis's 304 x 228 centre crop instead of the whole image."""
     alignment: AlignmentMode = "local"
     """How inferred depth is made metric against the sensor (SPEC 3.5)."""
+    fill: Fill = "auto"
+    """What fills the sensor's holes: depth completed from colours and measured depth together, or the
+    colour network's aligned depth; auto completes unless a network of one's own is named."""
     reach: float = 0.1
     """How far from measured pixels inferred depth counts, as a share of the image's diagonal."""
     least_confidence: float = 0.0
@@ -108,8 +112,17 @@ class DepthConfig:
         """Only the settings of the network itself, which is all that its inference depends on."""
         plain = DepthConfig()
         return replace(
-            self, alignment=plain.alignment, reach=plain.reach, least_confidence=plain.least_confidence
+            self,
+            alignment=plain.alignment,
+            fill=plain.fill,
+            reach=plain.reach,
+            least_confidence=plain.least_confidence,
         )
+
+    @property
+    def completes(self) -> bool:
+        """Whether the sensor's holes are filled by completion."""
+        return self.fill == "completion" or (self.fill == "auto" and self.model is None)
 
     def __post_init__(self) -> None:
         _above("depth.reach", self.reach, 0.0)
@@ -232,7 +245,7 @@ PRESETS: dict[str, PipelineConfig] = {
     "packetmesh": PipelineConfig(),
     "thesis": PipelineConfig(
         acquisition=AcquisitionConfig(outlier_mode="thesis", average=False),
-        depth=DepthConfig(crop=True, alignment="median"),
+        depth=DepthConfig(crop=True, alignment="median", fill="network"),
         inferred_registration=RegistrationConfig(method="ceicp-n", metric="point"),
         node_registration=RegistrationConfig(method="ceicp-n", metric="point"),
         fusion=FusionConfig(mode="union", align_nodes_with="fused", register_inferred=True),

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.acquisition import Acquired, FilterResult, back_project
 from pipeline.config import DepthConfig, FusionMode, RegistrationConfig
-from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, judge
+from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, complete, judge
 from pipeline.pixels import near
 from pipeline.registration import fuse, register
 from pipeline.types import DepthMap, PointCloud, PointSource, RegistrationResult, RgbdFrame
@@ -82,8 +82,10 @@ def prepare_node(
     """
     filtered = acquired.cloud(frame)
     sensor = filtered.kept
-    alignment = _aligned(frame, inferred, depth)
-    judged = judge(alignment, frame.depth, frame.rgb, depth.reach, depth.least_confidence)
+    guide = _guide(frame)
+    alignment = _aligned(inferred, guide, depth)
+    completed = complete(guide, frame.rgb) if _completes(guide, inferred, depth) else None
+    judged = judge(alignment, frame.depth, frame.rgb, depth.reach, depth.least_confidence, completed)
     believed = _guesses(frame, judged.depth if mode == "fill" else alignment.depth)
     if not believed.valid.any():
         return _measured_only(frame, sensor, filtered, inferred, alignment, judged)
@@ -119,16 +121,22 @@ def _measured_only(
     return NodeClouds(frame.name, sensor, filtered, inferred, alignment, judged, nothing, None, labelled)
 
 
-def _aligned(frame: RgbdFrame, inferred: InferredDepth, config: DepthConfig) -> AlignmentResult:
-    """Inferred depth made metric; none where nothing could be inferred.
+def _guide(frame: RgbdFrame) -> DepthMap:
+    """What inferred depth is brought to: measured depth, and the coarse depth that arrived."""
+    if frame.coarse is None:
+        return frame.depth
+    return DepthMap(np.where(frame.depth.valid, frame.depth.z_m, frame.coarse.z_m))
 
-    Coarse depth guides the alignment as measured depth does.
-    """
+
+def _completes(guide: DepthMap, inferred: InferredDepth, config: DepthConfig) -> bool:
+    """Whether there are colours and depth to complete from."""
+    return config.completes and inferred.provider != "none" and bool(guide.valid.any())
+
+
+def _aligned(inferred: InferredDepth, guide: DepthMap, config: DepthConfig) -> AlignmentResult:
+    """Inferred depth made metric; none where nothing could be inferred."""
     if inferred.provider == "none":
         return AlignmentResult(DepthMap(inferred.depth.z_m), config.alignment, {}, float("nan"), 0.0)
-    guide = frame.depth
-    if frame.coarse is not None:
-        guide = DepthMap(np.where(guide.valid, guide.z_m, frame.coarse.z_m))
     return align_depth(inferred.depth, guide, config.alignment, inferred.disparity)
 
 

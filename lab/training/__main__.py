@@ -1,4 +1,4 @@
-"""``python -m lab.training render|trace|train|export|evaluate``."""
+"""``python -m lab.training``: rooms rendered or traced, networks trained, exported and evaluated."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
+from lab.training.completion.config import CompletionConfig
 from lab.training.config import WIDTHS, TrainingConfig
 from packetmesh.errors import PacketMeshError
 
@@ -33,10 +34,12 @@ class Rooms:
     """Folder for furniture made ready; kept between runs."""
 
     def catalogue(self) -> Catalogue | None:
-        """What furnishes the rooms; None for procedural pieces."""
+        """What furnishes the rooms of the split; None for procedural pieces."""
         from lab.training.furniture import Catalogue
 
-        return Catalogue.open(self.furniture, self.cache) if self.furniture else None
+        if self.furniture is None:
+            return None
+        return Catalogue.open(self.furniture, self.cache).of_split(self.split)
 
 
 def render(rooms: Rooms) -> None:
@@ -83,6 +86,25 @@ def export(checkpoint: Path, data: Path, out: Path) -> None:
     print(export(checkpoint, data, out))
 
 
+def train_completion(config: CompletionConfig) -> None:
+    """Train a network that completes a sensor's depth, for so many minutes."""
+    from lab.training.completion.train import train_completion
+
+    train_completion(config)
+
+
+def export_completion(checkpoint: Path, out: Path) -> None:
+    """Write the ONNX file of a completion network, and say its size.
+
+    Args:
+        checkpoint: last.pt of a training run.
+        out: the ONNX file.
+    """
+    from lab.training.completion.export import export_completion
+
+    print(f"{out}: {export_completion(checkpoint, out) / 1e6:.1f} MB")
+
+
 def evaluate(model: Path | None = None, real: Path | None = None, rooms: int = 60) -> None:
     """Print a network's errors; needs no torch.
 
@@ -99,7 +121,8 @@ def evaluate(model: Path | None = None, real: Path | None = None, rooms: int = 6
 
 def main() -> None:
     """Parse the command line and run one step of making a network."""
-    steps = {step.__name__: step for step in (render, trace, train, export, evaluate)}
+    commands = (render, trace, train, train_completion, export, export_completion, evaluate)
+    steps = {step.__name__: step for step in commands}
     try:
         tyro.extras.subcommand_cli_from_dict(
             steps, prog="python -m lab.training", config=(tyro.conf.OmitArgPrefixes,)

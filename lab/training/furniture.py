@@ -10,7 +10,7 @@ import hashlib
 import re
 import tempfile
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -34,6 +34,8 @@ _OUTDOORS = re.compile(
 )
 _TABLES = ("table", "desk", "nightstand", "commode", "chest of drawers", "sideboard", "counter", "workbench")
 _CHAIRS = ("chair", "stool", "pouf", "ottoman")
+OTHER_AUTHORS = {"validation": ("katorlegaz",), "test": ("blendswap-cc-by",)}
+"""Folders of a catalogue's archives, one an author or two, that these splits alone are furnished from."""
 _HUNG = ("picture", "painting", "poster", "frame", "mirror", "clock", "board")
 
 
@@ -54,6 +56,11 @@ class Entry:
     file: Path
     model: str
     role: Role
+
+    @property
+    def author(self) -> str:
+        """The archive's folder that the model lies in: a contributor, or a collection of a licence."""
+        return self.model.partition("/")[0]
 
     @property
     def key(self) -> str:
@@ -104,6 +111,22 @@ class Catalogue:
                 f"'{source}' holds no FurnitureCatalog.properties; name sweethome3d's furniture."
             )
         return cls(tuple(entries), tuple(images), folder)
+
+    def of_split(self, split: str) -> Catalogue:
+        """The part that rooms of a split are furnished from: no author's models are in two splits.
+
+        Raises:
+            InputError: the catalogue has no model for the split.
+        """
+        other = OTHER_AUTHORS.get(split, ())
+        away = tuple(name for names in OTHER_AUTHORS.values() for name in names)
+        entries = tuple(e for e in self.entries if (e.author in other if other else e.author not in away))
+        if not entries:
+            raise InputError(
+                f"The furniture holds none by {' or '.join(other) or 'the authors for training'}, which "
+                f"{split} rooms are furnished from: name all of sweethome3d-furniture."
+            )
+        return replace(self, entries=entries)
 
     def of_role(self, role: Role) -> tuple[Entry, ...]:
         """The entries that belong in one kind of place."""

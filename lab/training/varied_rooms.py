@@ -20,7 +20,6 @@ from pipeline.types import CameraIntrinsics, FloatArray
 CAMERA = CameraIntrinsics.pinhole(262.5, 262.5, 159.5, 119.5, 320, 240)
 """A Kinect's colour camera at half its size."""
 _THEMES = ("Living room", "Living room", "Bedroom", "Kitchen", "Bathroom", "Office")
-_VARIANTS = 400
 _MOST_LIGHTS = 3
 _FLAT_M = 0.012
 """A thing stands where the support's heights under it differ by less."""
@@ -45,6 +44,7 @@ class Placed:
 class RoomPlan:
     """A room while it is being furnished; parts[0] is the floor slab, parts[:6] the shell."""
 
+    seed: int
     size_m: FloatArray
     """(3,) inner width (x), depth (y) and height."""
     theme: str
@@ -103,7 +103,7 @@ def plan_room(seed: int, catalogue: Catalogue) -> RoomPlan:
     daylight = float(rng.choice([0.0, rng.uniform(0.8, 4.0)], p=[0.3, 0.7]))
     theme = str(rng.choice(_THEMES))
     parts = photographed_shell(rng, size_m, catalogue.images)
-    plan = RoomPlan(size_m, theme, daylight, catalogue, rng, parts)
+    plan = RoomPlan(seed, size_m, theme, daylight, catalogue, rng, parts)
     if rng.random() < 0.6:
         plan.parts += skirting(rng, size_m)
     _dress_walls(plan)
@@ -142,7 +142,7 @@ def _dress_walls(plan: RoomPlan) -> None:
 
 def _hang_made(plan: RoomPlan, wall: int, along_m: float) -> float:
     """Hangs a procedural window, door, picture or shelf; returns its width, little if it does not fit."""
-    piece = pieces.stocked(pieces.random_wall_piece, int(plan.rng.integers(_VARIANTS)))
+    piece = pieces.from_stock(pieces.random_wall_piece, plan.seed, plan.rng)
     T = wall_pose(plan.size_m, wall, along_m + 0.5 * piece.width_m, 0.0, piece.height_m)
     if not _add_made(plan, pieces.moved(piece.parts, T)):
         return 0.1
@@ -220,7 +220,7 @@ def _furnish_middle(plan: RoomPlan) -> None:
         if thing is not None and role == "table":
             _seat(plan, thing)
     for _ in range(int(rng.integers(0, 4))):
-        piece = pieces.stocked(pieces.random_floor_thing, int(rng.integers(_VARIANTS)))
+        piece = pieces.from_stock(pieces.random_floor_thing, plan.seed, rng)
         x, y = rng.uniform(-0.45, 0.45, 2) * plan.size_m[:2]
         moved = pieces.moved(piece, placing.place(x, y, rng.uniform(0.0, 2.0 * np.pi)))
         low, high = pieces.bounds(moved)

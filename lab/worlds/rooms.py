@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -19,15 +17,12 @@ from lab.worlds.textures import paint
 from lab.worlds.viewpoints import random_views
 from pipeline.types import CameraIntrinsics, FloatArray
 
-_Piece = TypeVar("_Piece")
-_VARIANTS = 400
-"""Pieces of a kind that rooms draw from, before recolouring."""
-
 
 @dataclass(slots=True)
 class _Plan:
     """A room while it is being furnished."""
 
+    seed: int
     size_m: FloatArray
     """(3,) inner width (x), depth (y) and height."""
     parts: list[Part]
@@ -54,7 +49,7 @@ def random_room(seed: int) -> Scene:
     size_m = np.array([rng.uniform(2.5, 6.0), rng.uniform(2.5, 6.0), rng.uniform(2.3, 3.0)])
     if rng.random() < 0.12:
         size_m[:2] *= 1.5
-    plan = _Plan(size_m, shell(rng, size_m, 0.55))
+    plan = _Plan(seed, size_m, shell(rng, size_m, 0.55))
     windows = _dress_walls(plan, rng)
     _furnish_walls(plan, rng)
     _furnish_middle(plan, rng)
@@ -74,7 +69,7 @@ def _dress_walls(plan: _Plan, rng: Rng) -> list[FloatArray]:
             plan.parts.append(Part(*mesh, skirting, wall_pose(plan.size_m, wall, 0.0, 0.009, 0.03)))
         start = -0.5 * length + rng.uniform(0.1, 0.5)
         while True:
-            piece = _stocked(pieces.random_wall_piece, rng)
+            piece = pieces.from_stock(pieces.random_wall_piece, plan.seed, rng)
             start += 0.5 * piece.width_m
             if start + 0.5 * piece.width_m > 0.5 * length - 0.05:
                 break
@@ -89,7 +84,7 @@ def _dress_walls(plan: _Plan, rng: Rng) -> list[FloatArray]:
 def _furnish_walls(plan: _Plan, rng: Rng) -> None:
     """Sofas, shelves, cabinets, desks and clutter with their backs to the walls."""
     for _ in range(int(rng.integers(4, 10))):
-        piece = _varied(_stocked(pieces.random_wall_furniture, rng), rng)
+        piece = _varied(pieces.from_stock(pieces.random_wall_furniture, plan.seed, rng), rng)
         low, high = pieces.bounds(piece)
         for _ in range(10):
             wall = int(rng.integers(4))
@@ -111,16 +106,11 @@ def _furnish_middle(plan: _Plan, rng: Rng) -> None:
     half = 0.5 * plan.size_m[:2]
     for k in range(int(rng.integers(4, 13))):
         maker = pieces.random_group if k < 2 else pieces.random_floor_thing
-        piece = _varied(_stocked(maker, rng), rng)
+        piece = _varied(pieces.from_stock(maker, plan.seed, rng), rng)
         for _ in range(8):
             x, y = rng.uniform(-half, half)
             if plan.add_free(piece, placing.place(x, y, rng.uniform(0.0, 2.0 * np.pi))):
                 break
-
-
-def _stocked(maker: Callable[[Rng], _Piece], rng: Rng) -> _Piece:
-    """One of the pieces that a maker has in stock."""
-    return pieces.stocked(maker, int(rng.integers(_VARIANTS)))
 
 
 def _varied(piece: list[Part], rng: Rng) -> list[Part]:

@@ -1,6 +1,7 @@
 """Inferred depth: the network, its metric alignment with the sensor, and its errors (SPEC 3)."""
 
 from pipeline.depth.alignment import AlignmentResult, align_depth
+from pipeline.depth.completion import CompletedDepth, complete
 from pipeline.depth.confidence import JudgedDepth, judge
 from pipeline.depth.conventions import Convention, Overrides
 from pipeline.depth.inference import DepthNetwork
@@ -8,12 +9,14 @@ from pipeline.depth.metrics import DepthErrors, depth_errors
 
 __all__ = [
     "AlignmentResult",
+    "CompletedDepth",
     "Convention",
     "DepthErrors",
     "DepthNetwork",
     "JudgedDepth",
     "Overrides",
     "align_depth",
+    "complete",
     "depth_errors",
     "judge",
 ]

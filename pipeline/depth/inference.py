@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 
 import cv2
 import numpy as np
-import onnxruntime
 
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import DepthConfig
 from pipeline.depth.conventions import Convention, Overrides, convention_of
 from pipeline.depth.preprocessing import centre_crop, fitted, free_size, padded, resized, unpad
+from pipeline.depth.sessions import modified_ns, open_session
 from pipeline.depth.signature import signature_of
 from pipeline.types import ByteArray, DepthMap, FloatArray
 
 SHIPPED_MODEL = Path(__file__).resolve().parents[2] / "assets" / "depth" / "resnet50.onnx"
-PREFERRED_PROVIDERS = ("CUDAExecutionProvider", "CPUExecutionProvider")
-THREADS = 2
 
 
 class DepthNetwork:
@@ -44,7 +41,7 @@ class DepthNetwork:
         if model_path is None and preset not in (None, "packetmesh"):
             raise InputError(f"The preset {preset} is for a network of that kind: name its ONNX file as well")
         self.model_path = SHIPPED_MODEL if model_path is None else Path(model_path)
-        self._session = _open_session(self.model_path, _modified_ns(self.model_path))
+        self._session = open_session(self.model_path, modified_ns(self.model_path))
         self._signature = signature_of(self._session, str(self.model_path))
         self.convention = convention_of(self._session, preset, overrides, str(self.model_path))
 
@@ -160,28 +157,3 @@ def depth_of(output: FloatArray, size_px: tuple[int, int], convention: Conventio
             return np.where(disparity > 0.0, 1.0 / disparity, np.float32(np.nan))
         logarithm = np.where(output > 0.0, np.log(output), np.float32(np.nan))
         return np.exp(cv2.resize(logarithm, size_px, interpolation=cv2.INTER_LINEAR))
-
-
-def _modified_ns(model_path: Path) -> int:
-    """When a network's file was last written."""
-    if not model_path.is_file():
-        raise InputError(f"There is no depth network at {model_path}: name an ONNX file, or none at all.")
-    return model_path.stat().st_mtime_ns
-
-
-@lru_cache(maxsize=1)
-def _open_session(model_path: Path, modified_ns: int) -> onnxruntime.InferenceSession:
-    """A session with few, non-spinning threads; the newest is kept, as opening takes as long as inferring."""
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = THREADS
-    options.inter_op_num_threads = 1
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    options.log_severity_level = 4
-    available = onnxruntime.get_available_providers()
-    providers = [name for name in PREFERRED_PROVIDERS if name in available]
-    try:
-        return onnxruntime.InferenceSession(str(model_path), options, providers=providers)
-    except Exception as error:  # onnxruntime raises a dozen unrelated types for damaged files
-        raise InputError(
-            f"{model_path} is not a readable ONNX network, or is cut short: export or download it again."
-        ) from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,7 +18,7 @@ from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.config import DepthConfig
-from pipeline.depth import align_depth
+from pipeline.depth import align_depth, complete
 from pipeline.depth.confidence import judge
 from pipeline.depth.fillers import PEERS
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
@@ -40,10 +41,10 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
     frame, node = rig.frames[request.node], nodes[request.node]
     hidden = hidden_pixels(frame.depth, request.discs)
     rest = DepthMap(np.where(hidden, np.float32(np.nan), frame.depth.z_m))
+    filled_by = partial(believed, node.network.depth, rest, frame.rgb, disparity=node.alignment.disparity)
     ways: dict[str, Callable[[], DepthMap]] = {
-        "ours": partial(
-            believed, node.network.depth, rest, frame.rgb, spec.config.depth, node.alignment.disparity
-        ),
+        "ours": partial(filled_by, spec.config.depth),
+        "network": partial(filled_by, replace(spec.config.depth, fill="network")),
         **{name: partial(peer, rest, frame.rgb) for name, peer in PEERS.items()},
     }
     rows, maps = [], {"measured": frame.depth, "hidden": rest}
@@ -79,9 +80,10 @@ def hidden_pixels(sensor: DepthMap, discs: Sequence[Disc]) -> BoolArray:
 def believed(
     inferred: DepthMap, rest: DepthMap, rgb: ByteArray, config: DepthConfig, disparity: bool = False
 ) -> DepthMap:
-    """The inferred depth as it is aligned and believed without knowing what is hidden."""
+    """The depth that these settings believe without knowing what is hidden."""
     alignment = align_depth(inferred, rest, config.alignment, disparity)
-    return judge(alignment, rest, rgb, config.reach, config.least_confidence).depth
+    completed = complete(rest, rgb) if config.completes else None
+    return judge(alignment, rest, rgb, config.reach, config.least_confidence, completed).depth
 
 
 def fill_row(name: str, filled_m: FloatArray, measured_m: FloatArray, elapsed_s: float) -> FillRow:

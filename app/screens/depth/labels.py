@@ -28,7 +28,8 @@ DRAWN = (HOLES, EVERYWHERE, UNSEEN)
 FILLS = {
     "measured": "as measured",
     "hidden": "hidden",
-    "ours": "inferred and aligned",
+    "ours": "as the settings fill it",
+    "network": "colour network, aligned",
     "nearest": "nearest fill",
     "inpaint-telea": "OpenCV inpainting, Telea",
     "inpaint-ns": "OpenCV inpainting, Navier-Stokes",

@@ -21,6 +21,15 @@ FIRST = (
             "local": "scale, shift, local",
         },
     ),
+    Choice(
+        "Holes filled by",
+        "depth.fill",
+        {
+            "auto": "completion (a network of your own: it)",
+            "completion": "completion: colours and depth",
+            "network": "the colour network, aligned",
+        },
+    ),
 )
 CONFIDENCE_CONTROLS = (
     Number(

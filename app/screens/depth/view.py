@@ -49,7 +49,7 @@ class FillRow:
     """How well one way filled what was hidden."""
 
     name: str
-    """"ours" or one of ``pipeline.depth.fillers.PEERS``."""
+    """"ours", "network" or one of ``pipeline.depth.fillers.PEERS``."""
     abs_rel: float
     """Mean of |filled - measured| / measured over the hidden pixels it filled; NaN if it filled none."""
     within_share: float

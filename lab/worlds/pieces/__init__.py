@@ -9,17 +9,17 @@ from lab.worlds.pieces.random_furniture import (
     random_rug,
     random_wall_furniture,
 )
-from lab.worlds.pieces.stock import bounds, moved, stocked
+from lab.worlds.pieces.stock import bounds, from_stock, moved
 from lab.worlds.pieces.walls import WallPiece, random_wall_piece
 
 __all__ = [
     "WallPiece",
     "bounds",
+    "from_stock",
     "moved",
     "random_floor_thing",
     "random_group",
     "random_rug",
     "random_wall_furniture",
     "random_wall_piece",
-    "stocked",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from lab.worlds.furniture import fixtures, lights, plants, seating, storage, tables
 from lab.worlds.pieces.groups import bed, dining, filled_crate, office, sofa, television
 from lab.worlds.pieces.small import laden, small_thing
-from lab.worlds.pieces.solids import basket, random_solid, stack
+from lab.worlds.pieces.solids import random_solid, stack
 from lab.worlds.pieces.stock import Makers, draw
 from lab.worlds.scene import Part, Rng
 
@@ -43,7 +43,7 @@ def random_group(rng: Rng) -> list[Part]:
 
 
 def random_floor_thing(rng: Rng) -> list[Part]:
-    """Something that stands about: a chair, box, basket, plant or plain solid."""
+    """Something that stands about: a chair, box, bucket, plant or plain solid."""
     makers: Makers[list[Part]] = [
         (1.0, lambda: seating.dining_chair(rng)),
         (1.0, lambda: seating.office_chair(rng)),
@@ -51,8 +51,7 @@ def random_floor_thing(rng: Rng) -> list[Part]:
         (0.7, lambda: seating.cushion(rng, size_m=rng.uniform(0.35, 0.7))),
         (1.2, lambda: storage.cardboard_box(rng, size_m=rng.uniform(0.2, 0.7, 3))),
         (0.8, lambda: filled_crate(rng)),
-        (0.8, lambda: basket(rng)),
-        (0.5, lambda: storage.bucket(rng)),
+        (1.3, lambda: storage.bucket(rng)),
         (0.5, lambda: storage.waste_bin(rng)),
         (0.6, lambda: plants.potted_plant(rng, height_m=rng.uniform(0.5, 1.3))),
         (0.4, lambda: lights.floor_lamp(rng)),

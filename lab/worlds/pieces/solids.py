@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from lab.worlds.furniture import storage
-from lab.worlds.furniture.placing import ORIGIN, board, place, solid
+from lab.worlds.furniture.placing import place, solid
 from lab.worlds.pieces.stock import Makers, bounds, draw, moved
 from lab.worlds.primitives import Mesh, box, cylinder, frustum, lathe, rounded_box, sphere, tube
 from lab.worlds.primitives import moved as shifted
@@ -44,30 +44,6 @@ def random_solid(rng: Rng, smallest_m: float, largest_m: float) -> list[Part]:
         piece = moved(piece, rigid(rotation_exp(np.array([np.pi / 2.0, 0.0, 0.0])), np.zeros(3)))
         piece = moved(piece, place(0.0, 0.0, 0.0, -bounds(piece)[0][2]))
     return piece
-
-
-def basket(rng: Rng) -> list[Part]:
-    """An open box of any material, heaped with clothes."""
-    x, y, z = rng.uniform((0.3, 0.25, 0.2), (0.7, 0.5, 0.45))
-    wicker = random_material(rng)
-    walls = [
-        ((x, y, 0.012), (0, 0, 0.006)),
-        ((x, 0.015, z), (0, y / 2, z / 2)),
-        ((x, 0.015, z), (0, -y / 2, z / 2)),
-        ((0.015, y, z), (x / 2, 0, z / 2)),
-        ((0.015, y, z), (-x / 2, 0, z / 2)),
-    ]
-    parts = [board(size, wicker, ORIGIN, at) for size, at in walls]
-    for _ in range(int(rng.integers(0, 8))):
-        heap = rng.uniform((0.3 * x, 0.3 * y, 0.1), (0.7 * x, 0.7 * y, 0.2))
-        lump = rounded_box(heap, 0.04, 0.02, 2, 2)
-        at = (rng.uniform(-0.15, 0.15) * x, rng.uniform(-0.15, 0.15) * y, rng.uniform(0.3, 0.95) * z)
-        parts.append(solid(lump, random_material(rng), ORIGIN, at, rng.normal(0.0, 0.25, 3)))
-    if rng.random() < 0.4:
-        tilt = (-rng.uniform(0.3, 1.2), 0.0, 0.0)
-        parts.append(board((x, y, 0.015), wicker, ORIGIN, (0.0, -y / 2 - 0.4 * y, 0.5 * z), tilt))
-    low = bounds(parts)[0][2]
-    return moved(parts, place(0.0, 0.0, 0.0, max(0.0, -float(low))))
 
 
 def stack(rng: Rng) -> list[Part]:

@@ -14,6 +14,8 @@ from pipeline.geometry import apply
 from pipeline.types import FloatArray
 
 _Made = TypeVar("_Made")
+VARIANTS = 400
+SEEDS_OF_A_SPLIT = 1_000_000
 Makers = Sequence[tuple[float, Callable[[], _Made]]]
 """Weights, and what makes a piece (or another thing) where its turn comes."""
 
@@ -22,6 +24,15 @@ Makers = Sequence[tuple[float, Callable[[], _Made]]]
 def stocked(maker: Callable[[Rng], _Made], variant: int) -> _Made:
     """The piece that a maker builds from its own seed, kept: building costs more than rendering."""
     return maker(np.random.default_rng([variant, 404]))
+
+
+def from_stock(maker: Callable[[Rng], _Made], room_seed: int, rng: Rng) -> _Made:
+    """One of the pieces of a kind that rooms of this split draw from, before recolouring.
+
+    Seeds below a million are for training, below two for validation, the others for tests; no piece is in
+    the stock of two.
+    """
+    return stocked(maker, room_seed // SEEDS_OF_A_SPLIT * VARIANTS + int(rng.integers(VARIANTS)))
 
 
 def bounds(parts: list[Part]) -> tuple[FloatArray, FloatArray]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lab.worlds.boxes import box_room
-from lab.worlds.pieces import stocked
+from lab.worlds.pieces.stock import stocked
 from lab.worlds.raycast import world_mesh
 from lab.worlds.render import Renderer
 from lab.worlds.rooms import random_room

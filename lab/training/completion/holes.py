@@ -1,0 +1,128 @@
+"""Frames with holes to learn from: what sensors lose, and shapes of every size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from lab.training.dataset import augment
+from pipeline.depth.slopes import GRID_WIDTH_PX, Grid
+from pipeline.types import BoolArray, ByteArray, FloatArray
+
+NEAR_M, FAR_M = 0.2, 20.0
+NOISE = 0.012
+"""Greatest standard deviation of the noise, in shares of the depth."""
+STEP = 0.03
+"""Coarsest steps of inverse depth, 1/m; a Kinect's are 0.003."""
+BIAS = 0.02
+OBJECT_STEP = 0.02
+LARGEST_OBJECT = 0.3
+MOST_HIDDEN = 0.85
+
+
+@dataclass(frozen=True, slots=True)
+class Lesson:
+    """One frame to learn from, on the coarse grid."""
+
+    grid: Grid
+    log_z: FloatArray
+    """(H, W) what the sensor would have measured without holes and noise; NaN where nothing is."""
+
+
+def lesson(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> Lesson:
+    """A view of a room as some sensor sees it.
+
+    Args:
+        rgb: (240, 320, 3).
+        depth_m: (240, 320) true depth, NaN where there is none.
+        rng: draws colours, the sensor's faults, and the holes.
+    """
+    rgb, depth_m = augment(rgb, depth_m, rng)
+    step = depth_m.shape[1] // GRID_WIDTH_PX
+    y, x = rng.integers(step, size=2)
+    z_m = np.ascontiguousarray(depth_m[y::step, x::step]) * np.exp(rng.normal(0.0, 0.3))
+    colors = cv2.resize(rgb, z_m.shape[::-1], interpolation=cv2.INTER_AREA)
+    there = np.isfinite(z_m) & (z_m > NEAR_M) & (z_m < FAR_M)
+    true = np.log(np.where(there, z_m, 1.0)).astype(np.float32)
+    if rng.random() < 0.5:  # the sensor's bias goes on in its holes
+        true += field(z_m.shape, rng.uniform(10.0, 40.0), rng) * np.float32(rng.uniform(0.0, BIAS))
+    known = there & ~hidden(true, there, colors, rng)
+    if known.sum() < 50:
+        known = there
+    noisy = true + rng.standard_normal(true.shape) * rng.uniform(0.0, NOISE)
+    if rng.random() < 0.6:
+        coarse = rng.uniform(0.0, STEP) + 1e-6
+        noisy = -np.log(np.maximum(np.rint(np.exp(-noisy) / coarse), 1.0) * coarse)
+    seen = np.where(known, noisy, 0.0).astype(np.float32)
+    return Lesson(Grid(seen, known, colors), np.where(there, true, np.nan).astype(np.float32))
+
+
+def hidden(log_z: FloatArray, there: BoolArray, rgb: ByteArray, rng: np.random.Generator) -> BoolArray:
+    """(H, W) what this sensor does not see: margins, edges, dark, far and random shapes, whole objects."""
+    rows, columns = log_z.shape
+    lost = np.zeros(log_z.shape, bool)
+    top, bottom, left, right = rng.integers(0, 7, 4) if rng.random() < 0.7 else (0, 0, 0, 0)
+    lost[:top] = lost[rows - bottom :] = lost[:, :left] = lost[:, columns - right :] = True
+    if rng.random() < 0.7:
+        lost |= around_edges(log_z, int(rng.integers(1, 4)), rng)
+    if rng.random() < 0.3:
+        grey = cv2.GaussianBlur(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), (0, 0), 1.0)
+        lost |= grey < np.quantile(grey, rng.uniform(0.0, 0.3))
+    if rng.random() < 0.15:
+        grey = cv2.GaussianBlur(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), (0, 0), 1.0)
+        lost |= grey > np.quantile(grey, rng.uniform(0.85, 1.0))
+    if rng.random() < 0.3:
+        lost |= log_z > np.quantile(log_z[there], rng.uniform(0.6, 1.0))
+    if rng.random() < 0.4:
+        lost |= field(log_z.shape, rng.uniform(1.0, 8.0), rng) > rng.uniform(1.0, 2.5)
+    for _ in range(int(rng.choice([0, 1, 2, 4], p=[0.2, 0.3, 0.3, 0.2]))):
+        lost |= ellipse(log_z.shape, rng)
+    for _ in range(int(rng.choice([0, 1, 2], p=[0.5, 0.3, 0.2]))):
+        lost |= an_object(log_z, there, rng)
+    return lost if lost[there].mean() < MOST_HIDDEN else ellipse(log_z.shape, rng)
+
+
+def around_edges(log_z: FloatArray, width_px: int, rng: np.random.Generator) -> BoolArray:
+    """A ragged band along the steps of depth, sometimes only on the far side, as a projector's shadow."""
+    window = np.ones((3, 3), np.uint8)
+    low, high = cv2.erode(log_z, window), cv2.dilate(log_z, window)
+    edge = high - low > rng.uniform(0.03, 0.15)
+    band = cv2.dilate(edge.astype(np.uint8), np.ones((width_px, 2 * width_px - 1), np.uint8)) > 0
+    if rng.random() < 0.5:
+        near = cv2.blur(log_z, (7, 7)) > log_z + 0.01
+        band &= ~near
+    return band & (field(log_z.shape, 2.0, rng) > rng.uniform(-2.0, 0.5))
+
+
+def ellipse(shape: tuple[int, int], rng: np.random.Generator) -> BoolArray:
+    """A turned ellipse anywhere, with half axes of 2 to 35 cells, every size as often."""
+    rows, columns = shape
+    radius = np.exp(rng.uniform(np.log(2.0), np.log(35.0)))
+    axes = radius * np.exp(rng.normal(0.0, 0.25, 2))
+    y, x = np.indices(shape) - rng.uniform(0.0, 1.0, (2, 1, 1)) * np.array([rows, columns]).reshape(2, 1, 1)
+    angle = rng.uniform(0.0, np.pi)
+    along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    return (along / axes[0]) ** 2 + (across / axes[1]) ** 2 <= 1.0
+
+
+def an_object(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> BoolArray:
+    """The smooth piece of surface about a random pixel, if it is not too large, and a little around it."""
+    seeds = np.argwhere(there)
+    y, x = seeds[rng.integers(len(seeds))]
+    mask = np.zeros((log_z.shape[0] + 2, log_z.shape[1] + 2), np.uint8)
+    flags = 4 | cv2.FLOODFILL_MASK_ONLY | 255 << 8
+    filled = cv2.floodFill(log_z.copy(), mask, (int(x), int(y)), 0.0, OBJECT_STEP, OBJECT_STEP, flags)[2]
+    piece = filled[1:-1, 1:-1]
+    if piece.mean() > 255.0 * LARGEST_OBJECT:
+        return np.zeros(log_z.shape, bool)
+    size = int(rng.integers(1, 4))
+    return cv2.dilate(piece, np.ones((size, size), np.uint8)) > 0
+
+
+def field(shape: tuple[int, int], sigma_px: float, rng: np.random.Generator) -> FloatArray:
+    """(H, W) float32 smooth noise of unit variance."""
+    noise = rng.standard_normal(shape, dtype=np.float32)
+    blurred = cv2.GaussianBlur(noise, (0, 0), sigma_px, borderType=cv2.BORDER_REFLECT)
+    return blurred / np.float32(blurred.std() + 1e-9)
