@@ -170,5 +170,5 @@ def _stiffness(log_scale: FloatArray) -> FloatArray:
 def _ends(rows: int, columns: int) -> Iterator[tuple[tuple[slice, ...], tuple[slice, ...]]]:
     """Where the near and the far ends of the differences lie: of every distance, along x then y."""
     for distance in DISTANCES:
-        yield np.s_[:, : columns - distance], np.s_[:, distance:]
-        yield np.s_[: rows - distance, :], np.s_[distance:, :]
+        yield np.s_[:, : max(0, columns - distance)], np.s_[:, distance:]
+        yield np.s_[: max(0, rows - distance), :], np.s_[distance:, :]

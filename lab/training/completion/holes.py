@@ -20,6 +20,11 @@ BIAS = 0.02
 OBJECT_STEP = 0.02
 LARGEST_OBJECT = 0.3
 MOST_HIDDEN = 0.85
+FLYING_STEP = 0.05
+MOST_FLYING = 0.15
+"""Share of the pixels at edges that report a depth between front and back."""
+COLORLESS = 0.12
+"""Share of frames without a picture, so that depth alone is learned to be continued too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +33,9 @@ class Lesson:
 
     grid: Grid
     log_z: FloatArray
-    """(H, W) what the sensor would have measured without holes and noise; NaN where nothing is."""
+    """(H, W) what the sensor measured, in its holes what it would have measured; NaN where nothing is. A
+    difference from a measured pixel starts at what was measured, noise and all, as it does when depth is
+    completed."""
 
 
 def lesson(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> Lesson:
@@ -51,12 +58,42 @@ def lesson(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> Les
     known = there & ~hidden(true, there, colors, rng)
     if known.sum() < 50:
         known = there
-    noisy = true + rng.standard_normal(true.shape) * rng.uniform(0.0, NOISE)
+    noisy = ragged(true, there, rng) if rng.random() < 0.6 else true
+    noisy = noisy + rng.standard_normal(true.shape) * rng.uniform(0.0, NOISE)
+    if rng.random() < 0.4:
+        noisy = noisy + field(true.shape, rng.uniform(1.5, 4.0), rng) * rng.uniform(0.0, NOISE)
     if rng.random() < 0.6:
         coarse = rng.uniform(0.0, STEP) + 1e-6
         noisy = -np.log(np.maximum(np.rint(np.exp(-noisy) / coarse), 1.0) * coarse)
     seen = np.where(known, noisy, 0.0).astype(np.float32)
-    return Lesson(Grid(seen, known, colors), np.where(there, true, np.nan).astype(np.float32))
+    learned = np.where(known, seen, np.where(there, true, np.nan)).astype(np.float32)
+    return Lesson(Grid(seen, known, astray(colors, rng)), learned)
+
+
+def ragged(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> FloatArray:
+    """Depth whose edges are displaced by up to a cell, with a few pixels between front and back."""
+    window = np.ones((3, 3), np.uint8)
+    front, back = cv2.erode(log_z, window), cv2.dilate(log_z, window)
+    rows, columns = log_z.shape
+    y, x = np.indices(log_z.shape) + rng.integers(-1, 2, (2, rows, columns))
+    y, x = np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)
+    moved = np.where(there[y, x], log_z[y, x], log_z)
+    share = rng.random(log_z.shape)
+    flying = (back - front > FLYING_STEP) & (rng.random(log_z.shape) < rng.uniform(0.0, MOST_FLYING))
+    return np.where(flying & there, front + share * (back - front), moved)
+
+
+def astray(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
+    """Colours as a badly registered camera sees them; sometimes there is hardly any picture."""
+    if rng.random() < COLORLESS:
+        level = rng.integers(0, 256, 3)
+        noise = rng.normal(0.0, rng.uniform(1.0, 20.0), rgb.shape)
+        return np.clip(level + noise, 0, 255).astype(np.uint8)
+    if rng.random() < 0.5:
+        (right, down), turn = rng.normal(0.0, 1.0, 2), rng.normal(0.0, 0.005)
+        motion = np.array([[1.0, -turn, right], [turn, 1.0, down]])
+        rgb = cv2.warpAffine(rgb, motion, rgb.shape[1::-1], borderMode=cv2.BORDER_REPLICATE)
+    return rgb
 
 
 def hidden(log_z: FloatArray, there: BoolArray, rgb: ByteArray, rng: np.random.Generator) -> BoolArray:
