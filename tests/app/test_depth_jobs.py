@@ -19,7 +19,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from pipeline.acquisition import acquire
 from pipeline.config import DepthConfig
-from pipeline.depth import DepthNetwork
+from pipeline.depth import DepthNetwork, complete
 from pipeline.depth.confidence import judge
 from pipeline.depth.conventions import PRESETS
 from pipeline.depth.fillers import PEERS
@@ -79,7 +79,9 @@ def test_wide_images_are_thinned_alike(store, rig, monkeypatch):
 def test_the_confidence_of_every_drawn_point_is_that_of_its_pixel(store, rig, view):
     config = SPEC.config.depth
     for frame, clouds, node in zip(rig.frames, end(store.stage(SPEC, "nodes")), view.nodes, strict=True):
-        judged = judge(clouds.alignment, frame.depth, frame.rgb, config.reach, config.least_confidence)
+        completed = complete(frame.depth, frame.rgb)
+        limits = config.reach, config.least_confidence
+        judged = judge(clouds.alignment, frame.depth, frame.rgb, *limits, completed)
         rows = {tuple(point): row for row, point in enumerate(clouds.inferred.points_m.astype(np.float32))}
         for drawn, colors in (
             (node.inferred, node.inferred_confidence),
@@ -181,7 +183,7 @@ def test_the_hidden_disc_is_blank_then_filled_and_nothing_else_changes(rig, hidd
     disc = hidden_pixels(rig.frames[0].depth, FLAT.discs)
     assert hidden.hidden_px == disc.sum() > 1000
     assert hidden.node == rig.frames[0].name
-    names = ["ours", *PEERS]
+    names = ["ours", "network", *PEERS]
     assert [row.name for row in hidden.rows] == names
     assert list(hidden.pictures) == ["measured", "hidden", *names]
     before, blank = hidden.pictures["measured"], hidden.pictures["hidden"]
@@ -237,7 +239,7 @@ def test_a_node_that_is_not_there_is_one_sentence(store):
 
 def test_the_words_of_the_screen_are_those_of_the_pipeline():
     assert set(NETWORK_PRESETS) == {AS_IT_SAYS, *PRESETS}
-    assert set(FILLS) == {"measured", "hidden", "ours", *PEERS}
+    assert set(FILLS) == {"measured", "hidden", "ours", "network", *PEERS}
 
 
 def test_the_network_that_ships_says_what_it_is():
