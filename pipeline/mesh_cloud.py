@@ -27,8 +27,10 @@ from pipeline.types import FloatArray, PointCloud, SurfaceResult
 _log = logging.getLogger(__name__)
 
 LEAST_POINTS = 3
-USUAL_M = 100.0
-"""Wide is no room or house."""
+USUAL_M = 0.05, 100.0
+"""Between these widths are things, rooms and houses."""
+OUTER_PERCENT = 1.0
+"""On either side of the middle of a cloud: what may be outliers does not count for its width."""
 LARGEST_M, SMALLEST_M = 1e9, 1e-12
 """No place is farther from the origin; a smaller cloud is a point."""
 _COARSE = 0.1
@@ -87,6 +89,10 @@ class MeshedCloud:
     """How many points the ball rolled over."""
     normals: str
     """Origin of the points' normals: ``GIVEN``, ``GIVEN_TURNED``, ``ESTIMATED_...``."""
+    width_m: float
+    """Of the cloud, without its outermost points."""
+    doubt: str | None
+    """Why its unit may be another than the metre."""
 
 
 def iterate_mesh_file(
@@ -126,6 +132,10 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
     """
     yield Progress("looking for repeated points", 0.05)
     cloud = in_metres(usable_points(cloud), options.metres_per_unit)
+    width_m = width_of(cloud)
+    doubt = doubtful_unit(width_m, options.metres_per_unit)
+    if doubt is not None:
+        _log.warning(doubt)
     if options.max_points is not None and len(cloud) > options.max_points:
         yield Progress(f"thinning {len(cloud)} points", 0.1)
         cloud = voxel_average(cloud, voxel_for_count(cloud.points_m, options.max_points))
@@ -141,7 +151,7 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
     _check_resolution(cloud.points_m, radii_m[0])
     sizes = ", ".join(f"{1000.0 * radius_m:.4g}" for radius_m in radii_m)
     yield Progress(f"rolling balls of {sizes} mm over {len(cloud)} points", 0.55)
-    return MeshedCloud(reconstruct_surface(cloud, radii_m), len(cloud), normals)
+    return MeshedCloud(reconstruct_surface(cloud, radii_m), len(cloud), normals, width_m, doubt)
 
 
 def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
@@ -154,6 +164,8 @@ def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
         del measures[of_cameras]  # a cloud from a file has none
     return {
         "points": meshed.points,
+        "width_m": meshed.width_m,
+        "unit_doubt": meshed.doubt,
         "normals": meshed.normals,
         "radii_m": surface.radii_m,
         "vertices": len(surface.vertices_m),
@@ -180,16 +192,27 @@ def usable_points(cloud: PointCloud) -> PointCloud:
 
 
 def in_metres(cloud: PointCloud, metres_per_unit: float) -> PointCloud:
-    """The cloud in metres; one that no room or house is as large as is named."""
-    if metres_per_unit != 1.0:
-        cloud = replace(cloud, points_m=metres_per_unit * cloud.points_m)
-    wide_m = float(np.ptp(cloud.points_m, axis=0).max())
-    if wide_m > USUAL_M:
-        _log.warning(
-            "The cloud is %.3g m wide; if its numbers are millimetres, try --metres-per-unit %.3g",
-            *(wide_m, 0.001 * metres_per_unit),
-        )
-    return cloud
+    """The cloud in metres."""
+    if metres_per_unit == 1.0:
+        return cloud
+    return replace(cloud, points_m=metres_per_unit * cloud.points_m)
+
+
+def width_of(cloud: PointCloud) -> float:
+    """Longest side of the box around all but the outermost percents of the points along each axis."""
+    low_m, high_m = np.percentile(cloud.points_m, [OUTER_PERCENT, 100.0 - OUTER_PERCENT], axis=0)
+    return float((high_m - low_m).max())
+
+
+def doubtful_unit(width_m: float, metres_per_unit: float) -> str | None:
+    """What to say of a cloud that is larger than houses, or smaller than what a depth camera measures."""
+    if USUAL_M[0] <= width_m <= USUAL_M[1]:
+        return None
+    if width_m > USUAL_M[1]:
+        advice = f"if its numbers are millimetres, try --metres-per-unit {0.001 * metres_per_unit:.3g}"
+    else:
+        advice = "if it is wider in truth, say so with --metres-per-unit"
+    return f"The cloud is {width_m:.3g} m wide; {advice}"
 
 
 def with_normals(cloud: PointCloud, viewpoint_m: Sequence[float] | None) -> tuple[PointCloud, str]:

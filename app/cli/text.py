@@ -51,6 +51,7 @@ def mesh_lines(report: dict[str, Any]) -> str:
     closed = "" if report["genus"] is None else f", closed, genus {report['genus']}"
     sizes = ", ".join(f"{1000.0 * radius_m:.4g}" for radius_m in report["radii_m"])
     rows = {
+        "width": f"{report['width_m']:.4g} m" + (" (doubtful: see above)" if report["unit_doubt"] else ""),
         "normals": report["normals"],
         "radii": f"{sizes} mm",
         "mesh": f"{report['triangles']} triangles of {report['vertices']} points{closed}",

@@ -15,9 +15,11 @@ from pipeline.mesh_cloud import (
     GIVEN_TURNED,
     MeshOptions,
     chosen_radii,
+    doubtful_unit,
     iterate_mesh_cloud,
     mesh_report,
     usable_points,
+    width_of,
 )
 from pipeline.surface import spacing
 from pipeline.surface.surrounding import surrounding_radii
@@ -152,12 +154,21 @@ def test_a_cloud_as_large_as_a_town_is_named_with_what_to_try_and_millimetres_ar
     caplog.set_level(logging.WARNING)
     small = mesh_report(meshed(PointCloud(sphere(800).points_m)))
     assert "millimetres" not in caplog.text
+    assert small["unit_doubt"] is None
+    assert small["width_m"] == pytest.approx(2.0, rel=0.03)
     large = PointCloud(1000.0 * sphere(800).points_m)
-    meshed(large)
-    assert "The cloud is 2e+03 m wide" in caplog.text
-    assert "--metres-per-unit 0.001" in caplog.text
+    doubt = mesh_report(meshed(large))["unit_doubt"]
+    assert (
+        doubt == "The cloud is 1.96e+03 m wide; if its numbers are millimetres, try --metres-per-unit 0.001"
+    )
+    assert doubt in caplog.text
     again = mesh_report(meshed(large, metres_per_unit=0.001))
     assert again["area_m2"] == pytest.approx(small["area_m2"])
+    assert again["unit_doubt"] is None
+    tiny = mesh_report(meshed(PointCloud(0.01 * sphere(800).points_m)))
+    assert "0.0196 m wide; if it is wider in truth" in tiny["unit_doubt"]
+    with_stray = np.vstack([sphere(800).points_m, [[500.0, 0.0, 0.0]]])
+    assert doubtful_unit(width_of(PointCloud(with_stray)), 1.0) is None  # one outlier is no town
     with pytest.raises(InputError, match=r"0 metres in a unit.*try 0\.001"):
         MeshOptions(metres_per_unit=0.0)
 
