@@ -14,7 +14,8 @@ from tests.app import commands
 from tests.pipeline.surface.shapes import perforated_plane, sphere
 
 KEYS = {
-    "input", "out", "points", "width_m", "unit_doubt", "normals", "radii_m", "vertices", "triangles", "unused_points",
+    "input", "out", "points", "width_m", "unit_doubt", "normals", "radii_m", "vertices", "triangles",
+    "unused_points",
     "boundary_loops", "boundary_length_m", "hole_area_m2", "non_manifold_edges", "components", "area_m2",
     "euler", "genus", "elapsed_s",
 }  # fmt: skip
