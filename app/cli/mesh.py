@@ -21,7 +21,7 @@ def mesh(
     metres_per_unit: float = 1.0,
     json: bool = False,
 ) -> None:
-    """Roll a ball over a point cloud: PLY, PCD, NPZ or text (XYZ, TXT, ASC, CSV), in metres, give a mesh.
+    """Roll a ball over a point cloud (PLY, PCD, LAS, E57, NPY, text, the vertices of models), in metres.
 
     Args:
         cloud: The points, with or without normals.

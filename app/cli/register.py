@@ -29,7 +29,7 @@ def register(
     scale: bool = False,
     json: bool = False,
 ) -> None:
-    """Move one point cloud onto another: PLY, PCD, NPZ or text (XYZ, TXT, ASC, CSV), in metres.
+    """Move one point cloud onto another, of the kinds that `packetmesh mesh` reads, in metres.
 
     Args:
         source: The cloud that moves.

@@ -1,11 +1,13 @@
-"""PCD files, the format of the Point Cloud Library, version 0.7 and before: ASCII and binary."""
+"""PCD files, the format of the Point Cloud Library, version 0.7 and before: ASCII, binary and compressed."""
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count, table_of
+from packetmesh.files import MAX_GEOMETRY_BYTES
+from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count, table_of, truncated
 from pipeline.types import AnyPath
 
 _MAX_HEADER_BYTES = 10_000
@@ -20,7 +22,7 @@ def parse_pcd(path: AnyPath, data: bytes) -> np.ndarray:
     """The points as a structured array with the names of PLY files; packed colours unpacked.
 
     Raises:
-        InputError: truncated, compressed, too many points or not a PCD file.
+        InputError: truncated, damaged, too many points or not a PCD file.
     """
     mark = data.find(b"\nDATA ", 0, _MAX_HEADER_BYTES)
     start = data.find(b"\n", mark + 1) + 1
@@ -28,18 +30,70 @@ def parse_pcd(path: AnyPath, data: bytes) -> np.ndarray:
         raise InputError(f"The point cloud {path} is not a PCD file; try to export it as PLY")
     header = _header(data[:start].decode("ascii", "replace"))
     kind = " ".join(header["DATA"])
-    if kind == "binary_compressed":
-        raise InputError(
-            f"The point cloud {path} is a compressed PCD file; try to save it as binary or ASCII"
-        )
     try:
         count, dtype = _layout(header)
     except (KeyError, ValueError, IndexError):
         kind = ""
-    if kind not in ("ascii", "binary"):
+    if kind not in ("ascii", "binary", "binary_compressed"):
         raise InputError(f"The point cloud {path} has an unusual PCD header; try to export it as PLY")
     check_count(path, count)
+    if kind == "binary_compressed":
+        return _unpacked(_compressed(path, data[start:], count, dtype))
     return _unpacked(table_of(path, data[start:], count, dtype, ascii_text=kind == "ascii"))
+
+
+def _compressed(path: AnyPath, body: bytes, count: int, dtype: np.dtype) -> np.ndarray:
+    """The rows of a body that holds two sizes and, packed by LZF, one field after the other."""
+    whole = count * dtype.itemsize
+    packed_bytes, unpacked_bytes = np.frombuffer(body[:8], "<u4") if len(body) >= 8 else (0, -1)
+    if unpacked_bytes != whole or whole > MAX_GEOMETRY_BYTES:
+        raise InputError(
+            f"The point cloud {path} is damaged: its {count} points take {whole} bytes, and it says "
+            f"{unpacked_bytes}; try to copy or export it again"
+        )
+    if len(body) < 8 + packed_bytes:
+        raise truncated(path, 0, count)
+    columns = np.empty(whole, np.uint8)
+    if _lzf_unpacked(np.frombuffer(body, np.uint8, int(packed_bytes), 8), columns) != whole:
+        raise InputError(f"The point cloud {path} is damaged; try to copy or export it again")
+    table, start = np.empty(count, dtype), 0
+    for name in dtype.names or ():
+        end = start + count * dtype[name].itemsize
+        table[name] = columns[start:end].view(dtype[name].base).reshape(table[name].shape)
+        start = end
+    return table
+
+
+@numba.njit(cache=True, nogil=True)
+def _lzf_unpacked(packed, out):  # type: ignore[no-untyped-def]
+    """Unpack Marc Lehmann's LZF: literal runs and copies from up to 8 KB back; returns the bytes written."""
+    read = written = 0
+    while read < len(packed):
+        control = packed[read]
+        read += 1
+        if control < 32:
+            length = control + 1
+            if read + length > len(packed) or written + length > len(out):
+                return -1
+            out[written : written + length] = packed[read : read + length]
+            read += length
+        else:
+            length = (control >> 5) + 2
+            if length == 9:
+                if read >= len(packed):
+                    return -1
+                length += packed[read]
+                read += 1
+            if read >= len(packed):
+                return -1
+            back = written - ((control & 31) << 8) - packed[read] - 1
+            read += 1
+            if back < 0 or written + length > len(out):
+                return -1
+            for k in range(length):  # may overlap itself
+                out[written + k] = out[back + k]
+        written += length
+    return written
 
 
 def _header(text: str) -> dict[str, list[str]]:

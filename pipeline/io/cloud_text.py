@@ -1,11 +1,11 @@
-"""Points as lines of numbers, separated by blanks, tabs, commas or semicolons: XYZ, TXT, ASC, CSV."""
+"""Points as lines of numbers, separated by blanks, tabs, commas or semicolons: XYZ, TXT, ASC, CSV, PTS."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count, number_rows
+from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count, number_rows, truncated
 from pipeline.types import AnyPath
 
 _NAMES = {"r": "red", "g": "green", "b": "blue", "normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
@@ -37,7 +37,36 @@ def parse_text(path: AnyPath, data: bytes) -> np.ndarray:
         raise InputError(f"The point cloud {path} has no lines of three numbers or more; try another file")
     check_count(path, len(lines))
     rows = number_rows(path, "\n".join(lines).encode(), len(lines), len(lines[0].split()))
-    return _table(rows, names if names is not None and len(names) == rows.shape[1] else _guessed(rows))
+    if names is not None and len(names) == rows.shape[1]:
+        return _table(rows, names)
+    return table_of_columns(rows)
+
+
+def table_of_columns(rows: np.ndarray) -> np.ndarray:
+    """(N, 3 or more) numbers as a structured array: positions, then normals or colours by what is in them."""
+    return _table(rows, _guessed(rows))
+
+
+def parse_pts(path: AnyPath, data: bytes) -> np.ndarray:
+    """Leica's PTS: a line with the number of points, then x, y, z, intensity and perhaps r, g, b.
+
+    Raises:
+        InputError: not such a file, or one that ends before its last point.
+    """
+    first, _, rest = data.partition(b"\n")
+    if not first.strip().isdigit():
+        return parse_text(path, data)  # many a PTS file goes without its first line
+    count = int(first)
+    check_count(path, count)
+    lines = [line for line in rest.splitlines() if line.strip()]
+    if len(lines) < count:
+        raise truncated(path, len(lines), count)
+    width = len(lines[0].split()) if lines else 0
+    if width not in (3, 4, 6, 7):
+        raise InputError(f"The point cloud {path} has {width} columns; a PTS file has 3, 4, 6 or 7")
+    rows = number_rows(path, rest, count, width)
+    colors = list(COLOR) if width >= 6 else []
+    return _table(rows, [*POSITION, *(["intensity"] if width in (4, 7) else []), *colors])
 
 
 def _is_number(word: str) -> bool:

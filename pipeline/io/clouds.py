@@ -1,4 +1,4 @@
-"""Point clouds as files: PLY, PCD, NPZ and text are read, PLY is written."""
+"""Point clouds as files: many kinds are read, PLY is written."""
 
 from __future__ import annotations
 
@@ -9,18 +9,29 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
+from pipeline.io.cloud_arrays import parse_npy, parse_sweep
+from pipeline.io.cloud_models import parse_model
 from pipeline.io.cloud_npz import parse_npz
 from pipeline.io.cloud_pcd import parse_pcd
 from pipeline.io.cloud_ply import TYPES, parse_ply
+from pipeline.io.cloud_surveys import parse_e57, parse_las
 from pipeline.io.cloud_table import COLOR, LABEL, NORMAL, POSITION, cloud_of
-from pipeline.io.cloud_text import parse_text
+from pipeline.io.cloud_text import parse_pts, parse_text
+from pipeline.io.cloud_vtk import parse_vtk
 from pipeline.types import AnyPath, PointCloud
 
 _PARSERS: dict[str, Callable[[AnyPath, bytes], np.ndarray]] = {
     ".ply": parse_ply,
     ".pcd": parse_pcd,
     ".npz": parse_npz,
+    ".npy": parse_npy,
     **dict.fromkeys((".xyz", ".txt", ".asc", ".csv"), parse_text),
+    ".pts": parse_pts,
+    ".vtk": parse_vtk,
+    ".bin": parse_sweep,
+    **dict.fromkeys((".obj", ".stl", ".glb"), parse_model),
+    **dict.fromkeys((".las", ".laz"), parse_las),
+    ".e57": parse_e57,
 }
 """Formats by suffix. A new one is a file with a parser that gives a table, and a line here."""
 
@@ -28,8 +39,9 @@ _PARSERS: dict[str, Callable[[AnyPath, bytes], np.ndarray]] = {
 def read_cloud(path: AnyPath) -> PointCloud:
     """Points with normals, colours and source labels, where the file has them.
 
-    The suffix decides the format: .ply (also without a suffix), .pcd, .npz, or text in .xyz, .txt, .asc and
-    .csv. Further elements (faces) and points that are not finite are left out.
+    The suffix decides the format: .ply (also without a suffix), .pcd, .npz, .npy, text in .xyz, .txt, .asc
+    and .csv, .pts, legacy .vtk, KITTI's .bin, the vertices of .obj, .stl and .glb, and with the extra
+    ``clouds`` .las, .laz and .e57. Faces and points that are not finite are left out.
 
     Returns:
         (N, 3) points in the file's unit, which should be metres.

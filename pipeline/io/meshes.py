@@ -14,7 +14,7 @@ from pipeline.geometry import rigid
 from pipeline.types import AnyPath, Surface
 
 MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")
-_T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.zeros(3))
+T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.zeros(3))
 """glTF has y up and the world frame z; the file's root node carries this rotation."""
 
 
@@ -41,7 +41,7 @@ def write_mesh(path: AnyPath, surface: Surface) -> None:
     with atomic_path(path) as sibling:
         if suffix == ".glb":
             scene = trimesh.Scene()
-            scene.add_geometry(mesh, transform=_T_GLTF_WORLD)
+            scene.add_geometry(mesh, transform=T_GLTF_WORLD)
             scene.export(str(sibling))
         else:
             mesh.export(str(sibling))
@@ -69,7 +69,7 @@ def read_mesh(path: AnyPath) -> Surface:
     try:
         loaded = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
         if suffix == ".glb":
-            loaded.apply_transform(_T_GLTF_WORLD.T)
+            loaded.apply_transform(T_GLTF_WORLD.T)
         mesh = loaded.to_mesh()
         triangles = np.asarray(mesh.faces, dtype=np.int32)
         vertices_m = np.asarray(mesh.vertices, dtype=np.float64)

@@ -105,7 +105,6 @@ BAD = {
     "truncated.pcd": (pcd("binary", bytes(60)), "after 5 of its 9 points"),
     "missing_lines.pcd": (pcd("ascii", b"1 2 3\n"), "after 1 of its 9 points"),
     "short_lines.pcd": (pcd("ascii", b"1 2 3\n4 5\n", 2), "not 3 numbers"),
-    "compressed.pcd": (pcd("binary_compressed", bytes(60)), "compressed PCD"),
     "huge.pcd": (pcd("binary", b"", 10**9), "more than the 20 million"),
     "negative.pcd": (pcd("binary", b"", -3), "unusual PCD header"),
     "words.pcd": (pcd("binary", b"", "many"), "unusual PCD header"),
@@ -125,7 +124,7 @@ BAD = {
     "flat.npz": (npz(points=POINTS[:, :2]), "try 40 x 3 numbers"),
     "words.npz": (npz(points=np.full((4, 3), "a")), "try 4 x 3 numbers"),
     "short_colors.npz": (npz(points=POINTS, colors=COLORS[:5]), "array 'colors'"),
-    "cloud.las": (b"LASF", "of a kind that is not read"),
+    "cloud.dxf": (b"SECTION", "of a kind that is not read"),
 }
 
 

@@ -1,0 +1,57 @@
+"""Points as bare numbers: NumPy arrays, and the sweeps of the KITTI benchmark."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.io.cloud_table import POSITION, check_count
+from pipeline.io.cloud_text import table_of_columns
+from pipeline.types import AnyPath
+
+SWEEP_ROW = np.dtype([(name, "<f4") for name in (*POSITION, "reflectance")])
+FARTHEST_M = 1e5
+"""A number beyond is no position of a sweep, but the file another thing."""
+
+
+def parse_npy(path: AnyPath, data: bytes) -> np.ndarray:
+    """The points of an array (N, 3 or more), its further columns understood as those of text files.
+
+    Raises:
+        InputError: damaged, or no such array of numbers.
+    """
+    try:
+        array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    except (ValueError, OSError, EOFError, MemoryError):
+        raise InputError(
+            f"The point cloud {path} is a truncated or damaged array, or holds more than numbers; "
+            "try numpy.save(file, points)"
+        ) from None
+    if array.ndim != 2 or array.shape[1] < 3 or array.dtype.kind not in "fiu":
+        raise InputError(
+            f"The array in {path} is {array.dtype} of shape {array.shape}; try N x 3 numbers, or N x 6 with "
+            "colours or normals"
+        )
+    check_count(path, len(array))
+    return table_of_columns(array.astype(np.float64))
+
+
+def parse_sweep(path: AnyPath, data: bytes) -> np.ndarray:
+    """A sweep of a LiDAR as KITTI stores it: x, y, z and reflectance, four bytes each (Geiger et al. 2013).
+
+    Raises:
+        InputError: another length, or numbers that are no positions.
+    """
+    if not data or len(data) % SWEEP_ROW.itemsize:
+        raise InputError(
+            f"The point cloud {path} has {len(data)} bytes, which are no rows of four 4-byte numbers; "
+            "a .bin file is read as a sweep of KITTI"
+        )
+    table = np.frombuffer(data, SWEEP_ROW)
+    check_count(path, len(table))
+    positions = np.stack([table[name] for name in POSITION])
+    if not (np.abs(np.nan_to_num(positions, nan=np.inf)) < FARTHEST_M).any(axis=1).all():
+        raise InputError(f"The numbers in {path} are no positions; a .bin file is read as a sweep of KITTI")
+    return table

@@ -1,0 +1,101 @@
+"""Surveyors' files, LAS, LAZ and E57, by libraries that come with the extra ``clouds``."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import PurePath
+from types import ModuleType
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.io.cloud_table import COLOR, POSITION, check_count, truncated
+from pipeline.types import AnyPath
+
+_E57_POSITION = ("cartesianX", "cartesianY", "cartesianZ")
+_E57_COLORS = ("colorRed", "colorGreen", "colorBlue")
+_DAMAGED = "The point cloud {} is truncated or damaged; try to copy or export it again"
+
+
+def parse_las(path: AnyPath, data: bytes) -> np.ndarray:
+    """The points of a LAS or LAZ file; colours of 16 bits become bytes.
+
+    Raises:
+        InputError: the extra is not installed, or the file is damaged.
+    """
+    laspy = _library("laspy", path)
+    try:
+        with laspy.open(io.BytesIO(data)) as reader:
+            check_count(path, reader.header.point_count)
+            points, count = reader.read(), reader.header.point_count
+        if len(points) < count:  # laspy gives what there is
+            raise truncated(path, len(points), count)
+        xyz = np.stack([np.asarray(points[name], np.float64) for name in ("x", "y", "z")], axis=1)
+        named = set(points.point_format.dimension_names)
+        rgb = None
+        if set(COLOR) <= named:
+            rgb = np.stack([np.asarray(points[name]) for name in COLOR], axis=1)
+    except InputError:
+        raise
+    except Exception:  # a parser fails on damaged data in more ways than can be listed
+        raise InputError(_DAMAGED.format(path)) from None
+    if rgb is not None and rgb.max(initial=0) > 255:
+        rgb = rgb >> 8
+    return _table(xyz, rgb)
+
+
+def parse_e57(path: AnyPath, data: bytes) -> np.ndarray:
+    """The points of all scans of an E57 file, each moved to its pose.
+
+    Raises:
+        InputError: the extra is not installed, or the file is damaged.
+    """
+    pye57 = _library("pye57", path)
+    try:
+        with pye57.E57(str(path)) as file:
+            check_count(path, sum(file.get_header(k).point_count for k in range(file.scan_count)))
+            scans = [
+                file.read_scan(k, ignore_missing_fields=True, colors=_colored(file, k))
+                for k in range(file.scan_count)
+            ]
+        xyz = _joined(scans, _E57_POSITION)
+        rgb = _joined(scans, _E57_COLORS) if all(set(_E57_COLORS) <= scan.keys() for scan in scans) else None
+    except InputError:
+        raise
+    except Exception:  # libE57 has one exception for everything
+        raise InputError(_DAMAGED.format(path)) from None
+    return _table(xyz, rgb)
+
+
+def _joined(scans: Sequence[dict[str, np.ndarray]], names: Sequence[str]) -> np.ndarray:
+    """(N, 3) of three columns of all scans."""
+    return np.concatenate([np.stack([scan[name] for name in names], axis=1) for scan in scans])
+
+
+def _colored(file: object, scan: int) -> bool:
+    """Whether the points of a scan have colours."""
+    return set(_E57_COLORS) <= set(file.get_header(scan).point_fields)  # type: ignore[attr-defined]
+
+
+def _library(name: str, path: AnyPath) -> ModuleType:
+    """The reader's module."""
+    try:
+        return __import__(name)
+    except ImportError:
+        suffix = PurePath(path).suffix
+        raise InputError(
+            f"The point cloud {path} takes a reader of {suffix} files that is not installed; "
+            "try pip install 'packetmesh[clouds]'"
+        ) from None
+
+
+def _table(xyz: np.ndarray, rgb: np.ndarray | None) -> np.ndarray:
+    """Positions and colours as a structured array."""
+    table = np.empty(len(xyz), [(n, "f8") for n in POSITION] + [(n, "u1") for n in COLOR if rgb is not None])
+    for name, column in zip(POSITION, np.asarray(xyz).T, strict=True):
+        table[name] = column
+    if rgb is not None:
+        for name, column in zip(COLOR, np.asarray(rgb).T, strict=True):
+            table[name] = column
+    return table
