@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -32,8 +32,8 @@ class SourceOptions:
     """Its 16-bit depth image."""
     intrinsics: Path | None = None
     """Its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info."""
-    depth_scale: float = 1000.0
-    """Depth units per metre in the depth images of a pair or a rig."""
+    depth_scale: float | None = None
+    """Depth units per metre in the depth images of a pair or a rig; 1000 without it."""
     depth_intrinsics: Path | None = None
     """The camera of a depth image that is not registered to the colour image."""
     extrinsics: Path | None = None
@@ -48,6 +48,13 @@ class SourceOptions:
         source = self._images()
         return source if self.calibration is None else Calibrated(source, str(self.calibration))
 
+    def nothing_but_scale(self, option: str) -> None:
+        """Exit if they name anything; only the depth scale goes with this option."""
+        if replace(self, depth_scale=None) != SourceOptions():
+            wrong_use(
+                f"{option} takes no other images: leave out --scene, --rig, --color and what goes with them"
+            )
+
     def _images(self) -> Demo | RigFolder | ImagePair:
         pair = (self.color, self.depth, self.intrinsics, self.depth_intrinsics, self.extrinsics)
         ways = [self.scene is not None, self.rig is not None, any(part is not None for part in pair)]
@@ -55,19 +62,21 @@ class SourceOptions:
             wrong_use(
                 "say what to reconstruct: --scene NAME, --rig DIR, or --color C --depth D --intrinsics K"
             )
-        from pipeline.sources import Demo, ImagePair, RigFolder
+        from pipeline.sources import MILLIMETRES, Demo, ImagePair, RigFolder
+
+        scale = MILLIMETRES if self.depth_scale is None else self.depth_scale
 
         if self.scene is not None:
             return Demo(self.scene)
         if self.rig is not None:
-            return RigFolder(str(self.rig), self.depth_scale)
+            return RigFolder(str(self.rig), scale)
         if self.color is None or self.depth is None or self.intrinsics is None:
             wrong_use("a single pair needs all of --color, --depth and --intrinsics")
         if (self.depth_intrinsics is None) != (self.extrinsics is None):
             wrong_use("a depth image that is not registered needs both --depth-intrinsics and --extrinsics")
         beside = (None if part is None else str(part) for part in (self.depth_intrinsics, self.extrinsics))
         images = str(self.color), str(self.depth), str(self.intrinsics)
-        return ImagePair(*images, self.depth_scale, *beside)
+        return ImagePair(*images, scale, *beside)
 
 
 Images = Annotated[SourceOptions, tyro.conf.arg(name="")]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.cli.options import Images, PresetName, Settings
-from app.cli.text import print_json, say, say_progress
+from app.cli.text import aligned, print_json, say, say_progress, wrong_use
 from packetmesh.progress import drain
 from packetmesh.settings import config_named, with_settings
 from pipeline.config import PRESETS
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 def reconstruct(
     images: Images,
     out: Path,
+    rigs: Path | None = None,
+    scheduler: str | None = None,
     preset: PresetName = "packetmesh",
     set: Settings = (),
     json: bool = False,
@@ -28,27 +30,27 @@ def reconstruct(
     Args:
         images: What is reconstructed.
         out: Folder for config.json, metrics.json, poses.json, the clouds, the surfaces and report.html.
+        rigs: Instead of one: a folder of rigs and of recordings that `import` knows. Each gets a folder of
+            its own in OUT, and all a table (rigs.html, rigs.csv, rigs.json). The same command goes on where
+            it was stopped.
+        scheduler: Address of a Dask scheduler that does many rigs; this machine's cores without it. Its
+            workers must see the same folders.
         preset: Settings to start from.
         set: Settings to change, for example `--set depth.alignment=median surface.max_points=20000`.
         json: Print the metrics as one JSON object.
     """
+    if rigs is not None:
+        images.nothing_but_scale("--rigs")
+        _many(rigs, out, images.depth_scale, scheduler, preset, set, json)
+        return
+    if scheduler is not None:
+        wrong_use("--scheduler is for many rigs: it takes --rigs FOLDER")
     source = images.source()
     config = with_settings(config_named(preset, PRESETS), set)
 
-    from app.reports.reconstruction import write_reconstruction_report
-    from packetmesh.files import writable_folder
-    from pipeline.reconstruct import iterate_reconstruction
-    from pipeline.run_folder import metrics_of, write_run_folder
-    from pipeline.spec import Spec
-    from pipeline.stages import RunCache, run
+    from app.runs import iterate_run
 
-    spec, cache = Spec(source, preset, config), RunCache()
-    drain(run(spec, cache, ["rig"]))  # images that cannot be used leave no folder
-    writable_folder(out)
-    result = drain(iterate_reconstruction(spec, cache), say_progress)
-    metrics = metrics_of(result)
-    write_run_folder(result, metrics, out)
-    write_reconstruction_report(result, metrics, out / "report.html")
+    result, metrics = drain(iterate_run(source, preset, config, out), say_progress)
     before, after = metrics["surface_before"], metrics["surface_after"]
     say(
         f"100%  rays without a surface: {before['no_hit_ray_share']:.1%} before fusion, "
@@ -61,6 +63,41 @@ def reconstruct(
     if json:
         print_json(metrics)
     say_places(result.placement)
+
+
+def _many(
+    rigs: Path,
+    out: Path,
+    depth_scale: float | None,
+    scheduler: str | None,
+    preset: str,
+    set: tuple[str, ...],
+    json: bool,
+) -> None:
+    """Every rig of a folder; exits with 1 if one failed."""
+    config = with_settings(config_named(preset, PRESETS), set)
+
+    from dataclasses import asdict
+
+    from app.runs import HEADINGS, RigTask, iterate_rigs, rigs_in, rigs_row, write_rigs_table
+    from packetmesh.files import writable_folder
+
+    found = rigs_in(rigs)
+    writable_folder(out)
+    tasks = [
+        RigTask(path.name, str(path.resolve()), str(out.resolve() / path.name), preset, config, depth_scale)
+        for path in found
+    ]
+    outcomes = drain(iterate_rigs(tasks, scheduler), say_progress)
+    write_rigs_table(outcomes, out)
+    if json:
+        print_json([asdict(outcome) for outcome in outcomes])
+    else:
+        print(aligned([HEADINGS, *map(rigs_row, outcomes)]))
+    failed = sum(outcome.state == "failed" for outcome in outcomes)
+    say(f"{len(outcomes) - failed} of {len(outcomes)} rigs reconstructed; see {out / 'rigs.html'}")
+    if failed:
+        sys.exit(1)
 
 
 def say_places(placement: Placement) -> None:

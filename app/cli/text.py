@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from packetmesh.progress import Progress
@@ -31,6 +32,13 @@ def print_json(value: Any) -> None:
     from packetmesh.files import finite
 
     sys.stdout.write(f"{json.dumps(finite(value), allow_nan=False)}\n")
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> str:
+    """Rows of a table, their columns as wide as what is in them."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
+    return "\n".join(line.rstrip() for line in lines)
 
 
 def answers_table(metrics: dict[str, dict[str, Any]]) -> str:

@@ -15,7 +15,7 @@ from pipeline.geometry import rigid
 from pipeline.importing.bag import is_bag, read_bag
 from pipeline.importing.choosing import choose
 from pipeline.importing.depth_units import depth_in, scale_note
-from pipeline.importing.kinds import recognise
+from pipeline.importing.kinds import kind_of, recognise
 from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
 from pipeline.importing.sequence import Candidate, Sequence
 from pipeline.io.images import read_color
@@ -56,6 +56,11 @@ class ImportReport:
     frames: tuple[ImportedFrame, ...]
     notes: tuple[str, ...]
     """One sentence each."""
+
+
+def is_recording(path: Path) -> bool:
+    """Whether ``iterate_import`` knows its kind."""
+    return is_bag(path) or (path.is_dir() and kind_of(path) is not None)
 
 
 def iterate_import(

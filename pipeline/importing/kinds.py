@@ -54,11 +54,11 @@ def recognise(path: Path) -> tuple[Kind, Path]:
         raise InputError(f"{path} does not exist; check the path")
     if not path.is_dir():
         raise InputError(f"{path} is a file but no bag; try the folder of an unpacked recording: {_known()}")
-    kind = _kind_of(path)
+    kind = kind_of(path)
     if kind is not None:
         return kind, path
     inner = [folder for folder in sorted(path.iterdir()) if folder.is_dir()]
-    found = [(kind, folder) for folder in inner if (kind := _kind_of(folder)) is not None]
+    found = [(kind, folder) for folder in inner if (kind := kind_of(folder)) is not None]
     if len(found) == 1:
         return found[0]
     if found:
@@ -67,7 +67,8 @@ def recognise(path: Path) -> tuple[Kind, Path]:
     raise InputError(f"{path} is of no known kind; the kinds are {_known()}")
 
 
-def _kind_of(folder: Path) -> Kind | None:
+def kind_of(folder: Path) -> Kind | None:
+    """What a folder is a recording of; None if it is none."""
     return next((kind for kind in KINDS if kind.recognised(folder)), None)
 
 

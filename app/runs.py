@@ -1,0 +1,250 @@
+"""One reconstruction with its folder and report, and many of them, each in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Generator, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+
+from app.reports.html import picture, pictures, table, write_page
+from app.reports.reconstruction import write_reconstruction_report
+from packetmesh.batch import run_batch
+from packetmesh.errors import InputError, PacketMeshError
+from packetmesh.files import atomic_path, finite, writable_folder, write_json
+from packetmesh.progress import Progress, drain
+from packetmesh.settings import settings
+from pipeline.config import PipelineConfig
+from pipeline.importing import is_recording, iterate_import
+from pipeline.reconstruct import Reconstruction, iterate_reconstruction
+from pipeline.run_folder import metrics_of, write_run_folder
+from pipeline.sources import MILLIMETRES, FileSource, RigFolder
+from pipeline.spec import Spec
+from pipeline.stages import RunCache, cameras_of, run
+from pipeline.surface.pictures import mesh_picture
+
+REPORT, PICTURE, TASK = "report.html", "picture.jpg", "task.json"
+PICTURE_WIDTH_PX = 360
+State = Literal["done", "kept", "failed"]
+
+
+@dataclass(frozen=True, slots=True)
+class RigTask:
+    """One rig or recording of many, and where its run is written."""
+
+    name: str
+    path: str
+    out: str
+    preset: str
+    config: PipelineConfig
+    depth_scale: float | None
+    """Depth units in a metre; None takes millimetres, or what the kind of recording uses."""
+
+
+@dataclass(frozen=True, slots=True)
+class RigOutcome:
+    """What became of one; shares from 0 to 1, NaN where it failed or does not apply."""
+
+    name: str
+    state: State
+    """``kept``: an earlier run with the same settings had done it."""
+    sentence: str
+    """Why it failed, or which nodes are left out; empty if there is nothing to say."""
+    nodes: int = 0
+    no_hit_before: float = float("nan")
+    no_hit_after: float = float("nan")
+    within_2pct_before: float = float("nan")
+    within_2pct_after: float = float("nan")
+    agreement: float = float("nan")
+    elapsed_s: float = float("nan")
+
+
+def iterate_run(
+    source: FileSource, preset: str, config: PipelineConfig, out: Path
+) -> Generator[Progress, None, tuple[Reconstruction, dict[str, Any]]]:
+    """Reconstruct, and write a run folder with its report; images that cannot be used leave no folder.
+
+    Returns:
+        The reconstruction and its metrics.
+
+    Raises:
+        PacketMeshError: images, settings or a folder that cannot be used.
+    """
+    spec, cache = Spec(source, preset, config), RunCache()
+    drain(run(spec, cache, ["rig"]))
+    writable_folder(out)
+    result = yield from iterate_reconstruction(spec, cache)
+    metrics = metrics_of(result)
+    write_run_folder(result, metrics, out)
+    write_reconstruction_report(result, metrics, out / REPORT)
+    return result, metrics
+
+
+def rigs_in(folder: Path) -> list[Path]:
+    """The rigs and recordings directly in a folder, by name.
+
+    Raises:
+        InputError: there is no such folder, or nothing of the kind in it.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; give one that holds rigs or recordings")
+    found = [path for path in sorted(folder.iterdir()) if is_rig(path) or is_recording(path)]
+    if not found:
+        raise InputError(
+            f"{folder} holds no rig (a folder with node_00/...) and no recording that import knows; "
+            "give the folder around them"
+        )
+    return found
+
+
+def is_rig(path: Path) -> bool:
+    """Whether it is a folder of nodes."""
+    return any(node.is_dir() for node in path.glob("node_*"))
+
+
+def iterate_rigs(
+    tasks: list[RigTask], scheduler: str | None
+) -> Generator[Progress, None, tuple[RigOutcome, ...]]:
+    """Reconstruct all of them, on every core or on a Dask cluster that sees the same folders.
+
+    One that fails leaves its sentence, and the others go on.
+
+    Returns:
+        What became of each, in the order of the tasks.
+    """
+    outcomes: dict[int, RigOutcome] = {}
+    for index, outcome in run_batch(reconstruct_one, tasks, scheduler):
+        outcomes[index] = outcome
+        said = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays find no surface"
+        yield Progress(f"{outcome.name} {outcome.state}: {said}", len(outcomes) / len(tasks))
+    return tuple(outcomes[index] for index in range(len(tasks)))
+
+
+def reconstruct_one(task: RigTask) -> RigOutcome:
+    """Do one task, unless an earlier run has, and never raise for what is wrong with its images."""
+    out = Path(task.out)
+    try:
+        if _is_done(task):
+            return _outcome(task, "kept", json.loads((out / "metrics.json").read_text(encoding="utf-8")))
+        (out / TASK).unlink(missing_ok=True)
+        result, metrics = drain(iterate_run(_source_of(task), task.preset, task.config, out))
+        _write_picture(result, out)
+        write_json(out / TASK, _record(task))
+        return _outcome(task, "done", finite(metrics))
+    except PacketMeshError as error:
+        return RigOutcome(task.name, "failed", str(error))
+    except OSError as error:
+        return RigOutcome(task.name, "failed", f"{error.filename or task.path}: {error.strerror or error}")
+
+
+def _source_of(task: RigTask) -> RigFolder:
+    """The rig itself, or the one that a recording is imported to, beside its run."""
+    if is_rig(Path(task.path)):
+        return RigFolder(task.path, MILLIMETRES if task.depth_scale is None else task.depth_scale)
+    rig = Path(task.out) / "rig"
+    if rig.is_dir():
+        shutil.rmtree(rig)  # of other settings
+    drain(iterate_import(task.path, rig, depth_scale=task.depth_scale))
+    return RigFolder(str(rig))
+
+
+def _record(task: RigTask) -> dict[str, Any]:
+    """What a run is of; as a file, written last, it says that all of it is there."""
+    return {"path": task.path, "depth_scale": task.depth_scale, "settings": settings(task.config)}
+
+
+def _is_done(task: RigTask) -> bool:
+    """Whether the folder holds a whole run of the same."""
+    try:
+        written = json.loads((Path(task.out) / TASK).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return bool(written == json.loads(json.dumps(_record(task))))
+
+
+def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome:
+    """The numbers of a run that stand in the table."""
+    before, after, measured = metrics["surface_before"], metrics["surface_after"], metrics["measured"]
+    numbers = (
+        before["no_hit_ray_share"],
+        after["no_hit_ray_share"],
+        measured["within_2pct_before"],
+        measured["within_2pct_after"],
+        measured["agreement_between_nodes"],
+        sum(metrics["timings_s"].values()),
+    )
+    known = (float("nan") if number is None else float(number) for number in numbers)
+    sentences = [sentence for node in metrics["nodes"] if (sentence := node["place"]["sentence"])]
+    return RigOutcome(task.name, state, "; ".join(sentences), len(metrics["nodes"]), *known)
+
+
+def _write_picture(result: Reconstruction, out: Path) -> None:
+    """The surface as the first camera sees it, small."""
+    rgb = mesh_picture(result.after, cameras_of(result.rig, result.placement)[0])
+    height_px = round(rgb.shape[0] * PICTURE_WIDTH_PX / rgb.shape[1])
+    small = cv2.resize(rgb, (PICTURE_WIDTH_PX, height_px), interpolation=cv2.INTER_AREA)
+    with atomic_path(out / PICTURE) as temporary:
+        Path(temporary).write_bytes(cv2.imencode(".jpg", small[..., ::-1])[1].tobytes())
+
+
+def write_rigs_table(outcomes: tuple[RigOutcome, ...], out: Path) -> None:
+    """``rigs.json``, ``rigs.csv`` and ``rigs.html`` with a picture of each, which links its report."""
+    rows = [asdict(outcome) for outcome in outcomes]
+    write_json(out / "rigs.json", finite(rows))
+    lines = [",".join(rows[0]), *(",".join(_cell(value) for value in row.values()) for row in rows)]
+    with atomic_path(out / "rigs.csv") as temporary:
+        Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_page(out / "rigs.html", "PacketMesh: many rigs", "".join(_page(outcomes, out)))
+
+
+def _cell(value: str | float) -> str:
+    """A value in a CSV file."""
+    return '"' + value.replace('"', '""') + '"' if isinstance(value, str) else str(value)
+
+
+def _page(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[str]:
+    failed = sum(outcome.state == "failed" for outcome in outcomes)
+    yield f"<h1>{len(outcomes)} rigs</h1>"
+    yield f'<p class="lead">{len(outcomes) - failed} reconstructed, {failed} failed.</p>'
+    yield table(HEADINGS, [rigs_row(outcome) for outcome in outcomes])
+    yield "<h2>Their surfaces, each as its first camera sees it</h2>"
+    yield pictures(_figures(outcomes, out), 3)
+
+
+def _figures(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[str]:
+    for outcome in outcomes:
+        image = cv2.imread(str(out / outcome.name / PICTURE)) if outcome.state != "failed" else None
+        if image is not None:
+            yield f'<a href="{outcome.name}/{REPORT}">{picture(image[..., ::-1], outcome.name)}</a>'
+
+
+HEADINGS = (
+    "rig",
+    "nodes",
+    "missing rays before",
+    "after",
+    "within 2 % before",
+    "after",
+    "agreement",
+    "s",
+    "",
+)
+
+
+def rigs_row(outcome: RigOutcome) -> tuple[str, ...]:
+    """One line of the table, as text."""
+    shares = (
+        outcome.no_hit_before,
+        outcome.no_hit_after,
+        outcome.within_2pct_before,
+        outcome.within_2pct_after,
+        outcome.agreement,
+    )
+    numbers = [f"{share:.1%}" if share == share else "–" for share in shares]
+    seconds = f"{outcome.elapsed_s:.1f}" if outcome.elapsed_s == outcome.elapsed_s else "–"
+    said = "; ".join(text for text in (outcome.state, outcome.sentence) if text)
+    return outcome.name, str(outcome.nodes or "–"), *numbers, seconds, said

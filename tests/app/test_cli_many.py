@@ -1,0 +1,95 @@
+"""``reconstruct --rigs``: a folder of rigs and recordings, one bad, stopped and gone on with."""
+
+import csv
+import json
+import shutil
+
+import pytest
+
+from app.runs import is_rig, rigs_in
+from packetmesh.errors import InputError
+from pipeline.io.demos import load_demo
+from pipeline.io.rigs import save_rig
+from pipeline.types import Rig
+from tests.app.commands import check_one_sentence, run
+
+QUICK = ("--set", "surface.max_points=3000")
+
+
+@pytest.fixture(scope="module")
+def rigs(tmp_path_factory):
+    """A rig of one node, a recording of TUM's kind made from another node, and a rig without images."""
+    folder = tmp_path_factory.mktemp("rigs")
+    first, second = load_demo("office").frames[:2]
+    save_rig(folder / "a-rig", Rig("a", (first,)))
+    save_rig(folder / "made", Rig("b", (second,)))
+    tum = folder / "b-recording"
+    for kind, name in (("rgb", "color.png"), ("depth", "depth.png")):
+        (tum / kind).mkdir(parents=True)
+        shutil.copy(folder / "made" / "node_00" / name, tum / kind / "1.000000.png")
+        (tum / f"{kind}.txt").write_text(f"# {kind}\n1.000000 {kind}/1.000000.png\n")
+    shutil.copy(folder / "made" / "node_00" / "intrinsics.json", tum / "intrinsics.json")
+    shutil.rmtree(folder / "made")
+    (folder / "c-empty" / "node_00").mkdir(parents=True)
+    (folder / "notes.txt").write_text("no rig")
+    return folder
+
+
+def table(out):
+    return {row["name"]: row for row in csv.DictReader((out / "rigs.csv").read_text().splitlines())}
+
+
+def test_every_good_one_is_done_and_a_bad_one_gets_a_sentence(capsys, rigs, tmp_path):
+    out = tmp_path / "out"
+    words = ["reconstruct", "--rigs", rigs, "--out", out, "--depth-scale", "1000", *QUICK]
+    code, printed, err = run(capsys, *words)
+    assert code == 1
+    rows = table(out)
+    assert [row["state"] for row in rows.values()] == ["done", "done", "failed"]
+    assert "node_00" in rows["c-empty"]["sentence"]
+    assert "Traceback" not in err
+    assert err.splitlines()[-1] == f"2 of 3 rigs reconstructed; see {out / 'rigs.html'}"
+    assert [line.split()[0] for line in printed.splitlines()] == ["rig", "a-rig", "b-recording", "c-empty"]
+    for name in ("a-rig", "b-recording"):
+        metrics = json.loads((out / name / "metrics.json").read_text())
+        assert float(rows[name]["no_hit_after"]) == metrics["surface_after"]["no_hit_ray_share"]
+        assert (out / name / "report.html").exists()
+    assert is_rig(out / "b-recording" / "rig")
+    page = (out / "rigs.html").read_text()
+    assert page.count("data:image/jpeg;base64") == 2
+    assert 'href="a-rig/report.html"' in page
+
+
+def test_the_same_again_goes_on_and_other_settings_begin_anew(capsys, rigs, tmp_path):
+    out = tmp_path / "out"
+    words = ["reconstruct", "--rigs", rigs, "--out", out, "--depth-scale", "1000"]
+    run(capsys, *words, *QUICK)
+    (out / "b-recording" / "task.json").unlink()  # as if stopped in the middle of it
+    written = (out / "a-rig" / "metrics.json").stat().st_mtime_ns
+    code, printed, _ = run(capsys, *words, *QUICK, "--json")
+    assert code == 1
+    assert [row["state"] for row in json.loads(printed)] == ["kept", "done", "failed"]
+    assert (out / "a-rig" / "metrics.json").stat().st_mtime_ns == written
+    _, printed, _ = run(capsys, *words, "--set", "surface.max_points=2500", "--json")
+    assert [row["state"] for row in json.loads(printed)] == ["done", "done", "failed"]
+
+
+def test_what_is_taken_for_a_rig(rigs, tmp_path):
+    assert [path.name for path in rigs_in(rigs)] == ["a-rig", "b-recording", "c-empty"]
+    with pytest.raises(InputError, match="is no folder"):
+        rigs_in(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="holds no rig"):
+        rigs_in(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["--rigs", "x", "--scene", "office"], 2, "--rigs takes no other images"),
+        (["--scene", "office", "--scheduler", "tcp://localhost:1"], 2, "--scheduler is for many rigs"),
+        (["--rigs", "nowhere"], 1, "is no folder"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence_and_leaves_no_folder(capsys, tmp_path, words, code, says):
+    check_one_sentence(run(capsys, "reconstruct", *words, "--out", tmp_path / "out"), code, says)
+    assert not (tmp_path / "out").exists()
