@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Generator, Iterator
 from dataclasses import asdict, dataclass
+from html import escape
 from pathlib import Path
 from typing import Any, Literal
 
@@ -210,8 +211,12 @@ def _page(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[str]:
     failed = sum(outcome.state == "failed" for outcome in outcomes)
     yield f"<h1>{len(outcomes)} rigs</h1>"
     yield f'<p class="lead">{len(outcomes) - failed} reconstructed, {failed} failed.</p>'
-    yield table(HEADINGS, [rigs_row(outcome) for outcome in outcomes])
+    yield table((*HEADINGS[:-1], "state"), [(*rigs_row(outcome)[:-1], outcome.state) for outcome in outcomes])
+    said = [f"<li><b>{escape(o.name)}</b>: {escape(o.sentence)}</li>" for o in outcomes if o.sentence]
+    if said:
+        yield f"<h2>What there is to say</h2><ul>{''.join(said)}</ul>"
     yield "<h2>Their surfaces, each as its first camera sees it</h2>"
+    yield '<p class="note">Magenta: the camera\'s ray meets no surface. A click opens the report.</p>'
     yield pictures(_figures(outcomes, out), 3)
 
 
