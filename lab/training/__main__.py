@@ -105,6 +105,18 @@ def export_completion(checkpoint: Path, out: Path) -> None:
     print(f"{out}: {export_completion(checkpoint, out) / 1e6:.1f} MB")
 
 
+def fit_confidence(rooms: int = 60) -> None:
+    """Fit how sure completed depth is, on validation rooms, and print how well that holds.
+
+    Args:
+        rooms: how many; half of them fit, half of them judge.
+    """
+    from lab.training.completion.fit import fit_confidence
+
+    for line in fit_confidence(rooms):
+        print(line, flush=True)
+
+
 def evaluate(model: Path | None = None, real: Path | None = None, rooms: int = 60) -> None:
     """Print a network's errors; needs no torch.
 
@@ -121,7 +133,7 @@ def evaluate(model: Path | None = None, real: Path | None = None, rooms: int = 6
 
 def main() -> None:
     """Parse the command line and run one step of making a network."""
-    commands = (render, trace, train, train_completion, export, export_completion, evaluate)
+    commands = (render, trace, train, train_completion, export, export_completion, fit_confidence, evaluate)
     steps = {step.__name__: step for step in commands}
     try:
         tyro.extras.subcommand_cli_from_dict(

@@ -1,4 +1,4 @@
-"""A sensor's depth completed: colours and depth with holes in, dense depth and confidence out (SPEC 3.6)."""
+"""A sensor's depth completed: colours and depth with holes in, dense depth and its spread out (SPEC 3.6)."""
 
 from __future__ import annotations
 
@@ -11,20 +11,12 @@ import numpy as np
 from packetmesh.errors import InputError
 from pipeline.depth.extension import extrapolated
 from pipeline.depth.sessions import modified_ns, open_session
-from pipeline.depth.slopes import GRID_WIDTH_PX, Grid, coarse, network_input, solved
+from pipeline.depth.slopes import GRID_WIDTH_PX, coarse, network_input, solved
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 SHIPPED_COMPLETION = Path(__file__).resolve().parents[2] / "assets" / "depth" / "completion.onnx"
 LARGEST_MISMATCH = 0.1
 """Logarithmic depth; a measured pixel that differs more from the grid's depth there is on another surface."""
-LOG_ODDS = 1.4
-TYPICAL_LOG_SCALE = -2.67
-ODDS_OF_SCALE = -1.9
-ODDS_OF_DISTANCE = -0.3
-ODDS_OF_DISAGREEMENT = -5.0
-"""Log odds of being within 5 % of the truth: constant, per log of the network's own scale, per log of the
-distance to measured depth in cells, and per logarithmic depth between the network's guess of the pixel alone
-and what all its differences make of it; logistic regression on hidden depth of the validation rooms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +25,8 @@ class CompletedDepth:
 
     depth: DepthMap
     """(H, W) metres; the sensor's own where it measured."""
-    confidence: FloatArray
-    """(H, W) float32, estimated probability of lying within 5 % of the truth; 1 where measured."""
+    log_scale: FloatArray
+    """(H, W) float32, the network's own logarithm of how far it may be off, in logarithmic depth."""
 
 
 def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION) -> CompletedDepth:
@@ -63,22 +55,13 @@ def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION)
     session = open_session(model, modified_ns(model))
     (output,) = session.run(None, {session.get_inputs()[0].name: planes[None]})
     log_z = solved(grid, start, output[0])
-    guess = start + output[0, 0, : start.shape[0], : start.shape[1]]
-    confidence = confidence_of(grid, output[0, 1, : start.shape[0], : start.shape[1]], np.abs(log_z - guess))
+    log_scale = output[0, 1, : start.shape[0], : start.shape[1]]
     shape = sensor.z_m.shape
     met_m = meeting(enlarged(log_z, shape), sensor, rgb)
     return CompletedDepth(
         DepthMap(np.where(sensor.valid, sensor.z_m, met_m).astype(np.float32)),
-        np.where(sensor.valid, np.float32(1.0), enlarged(confidence, shape)),
+        enlarged(log_scale, shape),
     )
-
-
-def confidence_of(grid: Grid, log_scale: FloatArray, disagreement: FloatArray) -> FloatArray:
-    """(H, W) probability on the grid of lying within 5 % of the truth."""
-    distance = cv2.distanceTransform((~grid.known).astype(np.uint8), cv2.DIST_L2, 5)
-    odds = LOG_ODDS + ODDS_OF_SCALE * (log_scale - TYPICAL_LOG_SCALE)
-    odds += ODDS_OF_DISTANCE * np.log(np.maximum(distance, 0.5)) + ODDS_OF_DISAGREEMENT * disagreement
-    return (1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0)))).astype(np.float32)
 
 
 def enlarged(plane: FloatArray, shape: tuple[int, int]) -> FloatArray:
