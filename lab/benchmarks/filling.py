@@ -1,28 +1,41 @@
-"""Filling realistic holes: sensor depth is hidden, filled by us and by the obvious peers, and compared."""
+"""Filling holes: sensor depth is hidden, filled by us and by the obvious peers, and all of it compared."""
 
 from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
-from lab.benchmarks.hidden_depth import hide
-from lab.claims.depth.scenes import demo_scenes, held_out_scenes, load_real, real_folders
+from lab.benchmarks.hidden_depth import disc, hide
+from lab.claims.claim import bootstrap_ci95
+from lab.claims.depth.scenes import (
+    HELD_OUT,
+    Site,
+    demo_scenes,
+    held_out_scenes,
+    load_real,
+    real_folders,
+)
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork, align_depth
 from pipeline.depth.confidence import judge
-from pipeline.depth.fillers import PEERS
-from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
+from pipeline.depth.fillers import PEERS, nearest
+from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, IntArray
 
 OURS = "packetmesh"
+FLAT, PIXELS = "flat guess", "pixel baseline"
 HIDDEN_SHARE = 0.15
 ROOMS, VIEWS = 5, 3
 """Of each held-out scene, and of each room."""
 REAL_DRAWS = 10
 """How often another part of each real frame is hidden: there are few of them."""
+RADII_PX = (10, 20, 40, 75, 120)
+"""Of the discs that are hidden, in images ``RADII_WIDTH_PX`` wide; in others in proportion."""
+RADII_WIDTH_PX = 640
 CLOSE = 0.05
 Filler = Callable[[DepthMap, ByteArray], DepthMap]
 
@@ -31,7 +44,8 @@ Filler = Callable[[DepthMap, ByteArray], DepthMap]
 class HoleCase:
     """One image whose holes can be judged."""
 
-    name: str
+    place: str
+    """The room, demo scene or draw that it belongs to: what intervals resample."""
     group: str
     rgb: ByteArray
     """(H, W, 3)."""
@@ -51,15 +65,17 @@ class Filling:
     group: str
     images: int
     abs_rel: float
-    """Of the hole pixels it filled, all images pooled."""
-    abs_rel_shared: float
-    """Of the hole pixels that every program filled."""
+    """Of all hole pixels, all images pooled; those it leaves empty take the nearest measured depth."""
+    abs_rel_ci95: tuple[float, float]
+    """Of ``abs_rel``, by resampling rooms, demo scenes, or draws of the real frames."""
+    abs_rel_filled: float
+    """Of the hole pixels it filled; NaN if it filled none."""
     close_share: float
     """Of all hole pixels: filled within 5 % of what judges."""
     filled_share: float
     """Of all hole pixels."""
     median_error_m: float
-    """Of the hole pixels that every program filled."""
+    """Of all hole pixels, as ``abs_rel``."""
     elapsed_s: float
     """Median for an image; ours infers, aligns and judges."""
 
@@ -72,41 +88,102 @@ def hidden_cases(seed: int = 0) -> Iterator[HoleCase]:
     """
     for site in (*held_out_scenes(ROOMS, VIEWS), *demo_scenes()):
         for number, example in enumerate(site.examples()):
-            place, sensor = f"{site.name}/{number}", example.sensor
-            yield hidden_case(place, f"{site.group}, hidden", example.rgb, sensor, seed)
-            hole = np.isfinite(example.truth_m) & ~sensor.valid
-            yield HoleCase(place, f"{site.group}, own holes", example.rgb, sensor, hole, example.truth_m)
+            place, rng = place_of(site, number), _rng(seed, f"{site.name}/{number}")
+            yield hidden_case(place, f"{site.group}, hidden", example.rgb, example.sensor, rng)
+            hole = np.isfinite(example.truth_m) & ~example.sensor.valid
+            yield HoleCase(
+                place, f"{site.group}, own holes", example.rgb, example.sensor, hole, example.truth_m
+            )
     for folder in real_folders():
         frame = load_real(folder)
         for draw in range(REAL_DRAWS):
             place = f"{frame.name}/{draw}"
-            yield hidden_case(place, "real frames, hidden", frame.rgb, frame.depth, seed)
+            yield hidden_case(place, "real frames, hidden", frame.rgb, frame.depth, _rng(seed, place))
 
 
-def hidden_case(name: str, group: str, rgb: ByteArray, depth: DepthMap, seed: int) -> HoleCase:
-    """An image without a part of its sensor depth, which part is drawn from the seed and the name."""
-    hole = hide(depth, np.random.default_rng([seed, *name.encode()]), HIDDEN_SHARE)
+def disc_cases(seed: int = 0) -> Iterator[HoleCase]:
+    """The same images with one disc hidden, of every size that finds a place; that very depth judges."""
+    for site in (*held_out_scenes(ROOMS, VIEWS), *demo_scenes()):
+        for number, example in enumerate(site.examples()):
+            rng = _rng(seed, f"{site.name}/{number}")
+            yield from discs(place_of(site, number), site.group, example.rgb, example.sensor, rng)
+    for folder in real_folders():
+        frame = load_real(folder)
+        for draw in range(REAL_DRAWS):
+            place = f"{frame.name}/{draw}"
+            yield from discs(place, "real frames", frame.rgb, frame.depth, _rng(seed, place))
+
+
+def place_of(site: Site, number: int) -> str:
+    """The room or demo scene of an image: views of one place are alike, and resampled together."""
+    return f"{site.name}/{number // VIEWS}" if site.group == HELD_OUT else site.name
+
+
+def _rng(seed: int, name: str) -> np.random.Generator:
+    """What draws the holes of one image."""
+    return np.random.default_rng([seed, *name.encode()])
+
+
+def hidden_case(
+    place: str, group: str, rgb: ByteArray, depth: DepthMap, rng: np.random.Generator
+) -> HoleCase:
+    """An image without a part of its sensor depth."""
+    return without(hide(depth, rng, HIDDEN_SHARE), place, group, rgb, depth)
+
+
+def discs(
+    place: str, group: str, rgb: ByteArray, depth: DepthMap, rng: np.random.Generator
+) -> Iterator[HoleCase]:
+    """An image without the depth in a disc, for every radius of ``RADII_PX`` that finds a place."""
+    for radius_px in RADII_PX:
+        hole = disc(depth, radius_px * depth.z_m.shape[1] / RADII_WIDTH_PX, rng)
+        if hole is not None:
+            yield without(hole, place, f"{group}, disc of {radius_px} px", rgb, depth)
+
+
+def without(hole: BoolArray, place: str, group: str, rgb: ByteArray, depth: DepthMap) -> HoleCase:
+    """An image whose depth in (H, W) ``hole`` is hidden and judges."""
     left = DepthMap(np.where(hole, np.float32(np.nan), depth.z_m))
-    return HoleCase(name, group, rgb, left, hole, depth.z_m)
+    return HoleCase(place, group, rgb, left, hole, depth.z_m)
 
 
-def our_filling(network: DepthNetwork) -> Filler:
-    """Inferred, aligned and trusted depth, as the chain makes it."""
+def chain_filling(infer: Callable[[ByteArray], DepthMap]) -> Filler:
+    """Inferred, aligned and trusted depth, as the chain makes it of what ``infer`` makes of the colours."""
     config = DepthConfig()
 
     def fill(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
-        aligned = align_depth(network.infer(rgb), sensor, config.alignment)
+        aligned = align_depth(infer(rgb), sensor, config.alignment)
         return judge(aligned, sensor, rgb, config.reach, config.least_confidence).depth
 
     return fill
 
 
-def compare_fillings(cases: Iterator[HoleCase], programs: dict[str, Filler]) -> tuple[Filling, ...]:
+def flat(rgb: ByteArray) -> DepthMap:
+    """One depth everywhere: what alignment and judgement alone make of nothing."""
+    return DepthMap(np.ones(rgb.shape[:2], np.float32))
+
+
+def pixel_filling(network: DepthNetwork) -> Filler:
+    """Inferred depth along a robust line through the pixels that both have (SPEC 4.6), and no more."""
+    return lambda sensor, rgb: align_depth(network.infer(rgb), sensor, "affine_depth").depth
+
+
+def programs(network: DepthNetwork) -> dict[str, Filler]:
+    """Everyone who is compared; another is one line more."""
+    return {
+        OURS: chain_filling(network.infer),
+        FLAT: chain_filling(flat),
+        PIXELS: pixel_filling(network),
+        **PEERS,
+    }
+
+
+def compare_fillings(cases: Iterable[HoleCase], programs: dict[str, Filler]) -> tuple[Filling, ...]:
     """Every program over every case, summed up by group; the programs are warmed up on the first."""
-    judged: dict[str, list[FloatArray]] = {}
+    judged: dict[str, list[tuple[str, FloatArray]]] = {}
     seconds: dict[tuple[str, str], list[float]] = {}
     for number, case in enumerate(cases):
-        rows = []
+        rows = [case.truth_m[case.hole], nearest(case.sensor, case.rgb).z_m[case.hole]]
         for name, fill in programs.items():
             if number == 0:
                 fill(case.sensor, case.rgb)
@@ -114,42 +191,52 @@ def compare_fillings(cases: Iterator[HoleCase], programs: dict[str, Filler]) -> 
             filled = fill(case.sensor, case.rgb)
             seconds.setdefault((case.group, name), []).append(time.perf_counter() - started)
             rows.append(filled.z_m[case.hole])
-        judged.setdefault(case.group, []).append(np.vstack([case.truth_m[case.hole], *rows]))
+        judged.setdefault(case.group, []).append((case.place, np.vstack(rows)))
     return tuple(
         filling
-        for group, columns in judged.items()
-        for filling in group_fillings(group, columns, {name: seconds[group, name] for name in programs})
+        for group, images in judged.items()
+        for filling in group_fillings(group, images, {name: seconds[group, name] for name in programs})
     )
 
 
 def group_fillings(
-    group: str, columns: list[FloatArray], seconds: dict[str, list[float]]
+    group: str, images: list[tuple[str, FloatArray]], seconds: dict[str, list[float]]
 ) -> Iterator[Filling]:
     """Each program's measures over the hole pixels of a group.
 
     Args:
         group: its name.
-        columns: of every image (1 + programs, N) true depth and fillings, metres, NaN where not filled.
+        images: the place of every image, and (2 + programs, N) true depth, nearest measured depth and
+            fillings, metres, NaN where not filled.
         seconds: of every program, in the order of the rows, one for each image.
     """
-    true_m, *fillings = np.hstack(columns).astype(np.float64)
-    shared = np.isfinite(fillings).all(axis=0)
+    _, numbers = np.unique([place for place, _ in images], return_inverse=True)
+    places = np.repeat(numbers, [columns.shape[1] for _, columns in images])
+    true_m, nearest_m, *fillings = np.hstack([columns for _, columns in images]).astype(np.float64)
     for (name, elapsed_s), filled_m in zip(seconds.items(), fillings, strict=True):
-        error_m = np.abs(filled_m - true_m)
+        filled = np.isfinite(filled_m)
+        error_m = np.abs(np.where(filled, filled_m, nearest_m) - true_m)
         relative = error_m / true_m
         yield Filling(
             name,
             group,
-            len(columns),
-            float(np.nanmean(relative)),
-            float(relative[shared].mean()),
-            float((relative <= CLOSE).mean()),
-            float(np.isfinite(filled_m).mean()),
-            float(np.median(error_m[shared])),
+            len(images),
+            float(relative.mean()),
+            mean_ci95(relative, places),
+            float(relative[filled].mean()) if filled.any() else float("nan"),
+            float((filled & (relative <= CLOSE)).mean()),
+            float(filled.mean()),
+            float(np.median(error_m)),
             statistics.median(elapsed_s),
         )
 
 
+def mean_ci95(values: FloatArray, places: IntArray) -> tuple[float, float]:
+    """95 % bootstrap interval of the mean of (N,) values, resampling whole places, numbered from 0."""
+    sums = np.stack([np.bincount(places, values), np.bincount(places).astype(float)], axis=1)
+    return bootstrap_ci95(sums, statistic=lambda sums, axis: np.divide(*sums.sum(axis=axis).T))
+
+
 def fillings(network: DepthNetwork) -> tuple[Filling, ...]:
-    """Ours and every peer on held-out rooms, the demo scenes and the real frames there are, in one run."""
-    return compare_fillings(hidden_cases(), {OURS: our_filling(network), **PEERS})
+    """Everyone on held-out rooms, the demo scenes and the real frames there are, in one run."""
+    return compare_fillings(chain(hidden_cases(), disc_cases()), programs(network))

@@ -1,0 +1,47 @@
+"""The section about filling says what its record says, programs and sizes side by side."""
+
+from lab.results.tables import filling
+
+
+def run(program, group, error):
+    return {
+        "program": program,
+        "group": group,
+        "abs_rel": error,
+        "abs_rel_ci95": [0.5 * error, 2.0 * error],
+        "close_share": 1.0 - error,
+    }
+
+
+RUNS = [
+    run(program, group, error * factor)
+    for group, error in (
+        ("rooms, hidden", 0.02),
+        ("rooms, disc of 10 px", 0.01),
+        ("rooms, disc of 120 px", 0.1),
+    )
+    for program, factor in (("packetmesh", 2.0), ("flat guess", 1.0))
+]
+PAGE = filling(
+    {
+        "depth": {
+            "ours_s": 0.25,
+            "peers": {"flat guess": 0.125},
+            "runs": [{"elapsed_s": 0.02, "rounds": 50}, *RUNS],
+        }
+    }
+)
+
+
+def test_all_hole_pixels_are_the_headline_with_their_interval():
+    assert "| packetmesh | 0.0400 [0.0200, 0.0800] / 96.0 % |" in PAGE
+    assert "| flat guess | 0.0200 [0.0100, 0.0400] / 98.0 % |" in PAGE
+
+
+def test_the_best_is_named_even_if_it_is_not_ours():
+    assert "most pixels within 5 %: rooms, hidden: flat guess and flat guess." in PAGE
+
+
+def test_sizes_stand_side_by_side():
+    assert "**Discs hidden: rooms**\n\n| program | 10 px | 120 px |" in PAGE
+    assert "| packetmesh | 0.0200 [0.0100, 0.0400] | 0.2000 [0.1000, 0.4000] |" in PAGE
