@@ -12,14 +12,8 @@ import numpy as np
 
 from lab.benchmarks.hidden_depth import disc, hide
 from lab.claims.claim import bootstrap_ci95
-from lab.claims.depth.scenes import (
-    HELD_OUT,
-    Site,
-    demo_scenes,
-    held_out_scenes,
-    load_real,
-    real_folders,
-)
+from lab.claims.depth.scenes import HELD_OUT, REAL, Site, demo_scenes, held_out_scenes, real_frames
+from lab.training.evaluate import Example
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork, align_depth
 from pipeline.depth.confidence import judge
@@ -30,7 +24,7 @@ OURS = "packetmesh"
 FLAT, PIXELS = "flat guess", "pixel baseline"
 HIDDEN_SHARE = 0.15
 ROOMS, VIEWS = 5, 3
-"""Of each held-out scene, and of each room."""
+"""Rooms of each held-out scene, and views of each room."""
 REAL_DRAWS = 10
 """How often another part of each real frame is hidden: there are few of them."""
 RADII_PX = (10, 20, 40, 75, 120)
@@ -80,48 +74,39 @@ class Filling:
     """Median for an image; ours infers, aligns and judges."""
 
 
-def hidden_cases(seed: int = 0) -> Iterator[HoleCase]:
-    """Every image of rooms, demo scenes and real frames with a part of the sensor's depth hidden.
+def sites() -> tuple[Site, ...]:
+    """Where holes are hidden: held-out rooms, the demo scenes and the real frames there are."""
+    return (*held_out_scenes(ROOMS, VIEWS), *demo_scenes(), *real_frames())
+
+
+def hidden_cases(site: Site, seed: int = 0) -> Iterator[HoleCase]:
+    """Every image of a site with a part of the sensor's depth hidden, real frames several times.
 
     That very depth judges. Where the truth is known the images come a second time with nothing hidden: their
     sensor's own holes, judged by the truth.
     """
-    for site in (*held_out_scenes(ROOMS, VIEWS), *demo_scenes()):
-        for number, example in enumerate(site.examples()):
-            place, rng = place_of(site, number), _rng(seed, f"{site.name}/{number}")
-            yield hidden_case(place, f"{site.group}, hidden", example.rgb, example.sensor, rng)
+    for place, rng, example in _drawn(site, seed):
+        yield hidden_case(place, f"{site.group}, hidden", example.rgb, example.sensor, rng)
+        if site.truth:
             hole = np.isfinite(example.truth_m) & ~example.sensor.valid
             yield HoleCase(
                 place, f"{site.group}, own holes", example.rgb, example.sensor, hole, example.truth_m
             )
-    for folder in real_folders():
-        frame = load_real(folder)
-        for draw in range(REAL_DRAWS):
-            place = f"{frame.name}/{draw}"
-            yield hidden_case(place, "real frames, hidden", frame.rgb, frame.depth, _rng(seed, place))
 
 
-def disc_cases(seed: int = 0) -> Iterator[HoleCase]:
+def disc_cases(site: Site, seed: int = 0) -> Iterator[HoleCase]:
     """The same images with one disc hidden, of every size that finds a place; that very depth judges."""
-    for site in (*held_out_scenes(ROOMS, VIEWS), *demo_scenes()):
-        for number, example in enumerate(site.examples()):
-            rng = _rng(seed, f"{site.name}/{number}")
-            yield from discs(place_of(site, number), site.group, example.rgb, example.sensor, rng)
-    for folder in real_folders():
-        frame = load_real(folder)
-        for draw in range(REAL_DRAWS):
-            place = f"{frame.name}/{draw}"
-            yield from discs(place, "real frames", frame.rgb, frame.depth, _rng(seed, place))
+    for place, rng, example in _drawn(site, seed):
+        yield from discs(place, site.group, example.rgb, example.sensor, rng)
 
 
-def place_of(site: Site, number: int) -> str:
-    """The room or demo scene of an image: views of one place are alike, and resampled together."""
-    return f"{site.name}/{number // VIEWS}" if site.group == HELD_OUT else site.name
-
-
-def _rng(seed: int, name: str) -> np.random.Generator:
-    """What draws the holes of one image."""
-    return np.random.default_rng([seed, *name.encode()])
+def _drawn(site: Site, seed: int) -> Iterator[tuple[str, np.random.Generator, Example]]:
+    """Every image with its place and with what draws its holes; views of one room are one place."""
+    for number, example in enumerate(site.examples()):
+        for draw in range(1 if site.truth else REAL_DRAWS):
+            room = {HELD_OUT: f"/{number // VIEWS}", REAL: f"/{draw}"}.get(site.group, "")
+            rng = np.random.default_rng([seed, draw, *f"{site.name}/{number}".encode()])
+            yield f"{site.name}{room}", rng, example
 
 
 def hidden_case(
@@ -238,5 +223,6 @@ def mean_ci95(values: FloatArray, places: IntArray) -> tuple[float, float]:
 
 
 def fillings(network: DepthNetwork) -> tuple[Filling, ...]:
-    """Everyone on held-out rooms, the demo scenes and the real frames there are, in one run."""
-    return compare_fillings(chain(hidden_cases(), disc_cases()), programs(network))
+    """Everyone on all there is, in one run."""
+    cases = (make(site) for make in (hidden_cases, disc_cases) for site in sites())
+    return compare_fillings(chain.from_iterable(cases), programs(network))

@@ -25,6 +25,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "outlier_claims": ("Outlier filter: the thesis's claim", tables.claims),
     "depth_claims": ("Inferred depth: the thesis's claims", tables.claims),
     "bench_depth": ("Filling holes", tables.filling),
+    "fill_claims": ("Filling holes: how far its confidence can be trusted", tables.our_claims),
     "registration_claims": ("Registration: the thesis's claims", tables.registration_claims),
     "bench_registration": ("Registration: speed", tables.registration_speed),
     "surface_claims": ("Ball pivoting: the thesis's claims", tables.claims),

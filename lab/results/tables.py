@@ -34,6 +34,7 @@ SHOWN = (
     ("D01", "What is left after losses"),
     ("D07", "What each sixteenth"),
     ("D08", "F-score of some"),
+    ("D10", "Confidence in bins"),
 )
 """Claims, and how the titles begin of those of their tables that the page shows."""
 

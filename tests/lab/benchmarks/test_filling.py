@@ -14,6 +14,7 @@ from lab.benchmarks.filling import (
     OURS,
     PIXELS,
     RADII_PX,
+    REAL_DRAWS,
     HoleCase,
     compare_fillings,
     disc_cases,
@@ -23,6 +24,8 @@ from lab.benchmarks.filling import (
     mean_ci95,
     programs,
 )
+from lab.claims.depth.scenes import HELD_OUT, REAL, Site, held_out_scenes
+from lab.training.evaluate import Example
 from packetmesh.files import finite
 from pipeline.depth import DepthNetwork
 from pipeline.depth.fillers import PEERS
@@ -110,7 +113,7 @@ def test_a_hidden_case_hides_depth_and_nothing_else():
 
 
 def test_rooms_come_with_hidden_depth_and_with_their_own_holes():
-    cases = hidden_cases()
+    cases = hidden_cases(held_out_scenes(1, 1)[0])
     hidden, own = next(cases), next(cases)
     assert hidden.place == own.place
     assert not own.sensor.valid[own.hole].any()
@@ -153,8 +156,27 @@ def test_a_disc_that_finds_no_place_is_left_out():
     assert list(discs("x", "g", rgb, empty, np.random.default_rng(0))) == []
 
 
+@pytest.mark.parametrize(
+    ("group", "truth", "places"),
+    [
+        (HELD_OUT, True, ["s/0", "s/0", "s/0", "s/1"]),
+        ("demo scenes", True, ["s"] * 4),
+        (REAL, False, [f"s/{draw}" for _ in range(4) for draw in range(REAL_DRAWS)]),
+    ],
+)
+def test_views_of_a_room_are_one_place_and_real_frames_are_drawn_again(group, truth, places):
+    """Real frames have no truth, and so no own holes that could be judged."""
+    example = Example(case().rgb, DepthMap(case().truth_m), case().truth_m)
+    site = Site("s", group, lambda: iter([example] * 4), truth)
+    cases = list(hidden_cases(site))
+    hidden = [one for one in cases if one.group == f"{group}, hidden"]
+    assert [one.place for one in hidden] == places
+    assert len(cases) == len(hidden) * (2 if truth else 1)
+    assert len({one.hole.tobytes() for one in hidden}) > 1
+
+
 def test_discs_are_scaled_with_the_image():
-    first = next(disc_cases())
+    first = next(disc_cases(held_out_scenes(1, 1)[0]))
     width_px = first.rgb.shape[1]
     assert width_px < 640
     assert first.hole.sum() == pytest.approx(np.pi * (RADII_PX[0] * width_px / 640) ** 2, rel=0.25)
