@@ -25,7 +25,7 @@ PREDICTED = (
     "The standard error that each trial gives itself, in the mean; like the error if it can be trusted."
 )
 THESIS = (
-    "What the thesis's printed value is off by at the noise of Table 4.1 that is nearest: of f and c the same "
+    "What the thesis's value is off by at the noise of Table 4.1 that is nearest: of f and c the same "
     "share of this camera's, of k1 and k2 the same difference."
 )
 
