@@ -123,8 +123,7 @@ def filling(numbers: Row) -> str:
         (kind, [_sized(run) for run in discs if run["group"].startswith(f"{kind}, disc")]) for kind in kinds
     )
     sizes = "\n\n".join(
-        f"**Discs hidden: {kind}**\n\n{pivot(sized, 'program', ('group',), _error)}"
-        for kind, sized in by_size
+        f"**Discs hidden: {kind}**\n\n{pivot(sized, 'program', ('group',), error)}" for kind, sized in by_size
     )
     best = [
         f"{group}: {_best(shapes, group, 'abs_rel', -1.0)} and {_best(shapes, group, 'close_share', 1.0)}"
@@ -138,7 +137,7 @@ only the hidden parts: they say nothing of other frames. *Flat guess*: one depth
 judged as ours. *Pixel baseline*: our network's depth along one robust line through the pixels that the
 sensor has.
 
-{pivot(shapes, "program", ("group",), lambda run: f"{_error(run)} / {percent(run['close_share'])}")}
+{pivot(shapes, "program", ("group",), lambda run: f"{error(run)} / {percent(run['close_share'])}")}
 
 Smallest error, and most pixels within 5 %: {"; ".join(best)}.
 
@@ -151,7 +150,7 @@ One disc hidden in each image, by its radius in an image 640 pixels wide; AbsRel
 The depth network alone takes {1000.0 * speed["elapsed_s"]:.0f} ms a frame (median of {speed["rounds"]})."""
 
 
-def _error(run: Row) -> str:
+def error(run: Row) -> str:
     """AbsRel over all hole pixels and its interval."""
     low, high = run["abs_rel_ci95"]
     return f"{run['abs_rel']:.4f} [{low:.4f}, {high:.4f}]"
