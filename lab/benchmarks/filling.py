@@ -62,6 +62,8 @@ class Filling:
     """Of all hole pixels, all images pooled; those it leaves empty take the nearest measured depth."""
     abs_rel_ci95: tuple[float, float]
     """Of ``abs_rel``, by resampling rooms, demo scenes, or draws of the real frames."""
+    excess_ci95: tuple[float, float]
+    """Of ``abs_rel`` less that of the first program, ours, on the same pixels: who is above 0 errs more."""
     abs_rel_filled: float
     """Of the hole pixels it filled; NaN if it filled none."""
     close_share: float
@@ -197,17 +199,18 @@ def group_fillings(
     """
     _, numbers = np.unique([place for place, _ in images], return_inverse=True)
     places = np.repeat(numbers, [columns.shape[1] for _, columns in images])
-    true_m, nearest_m, *fillings = np.hstack([columns for _, columns in images]).astype(np.float64)
-    for (name, elapsed_s), filled_m in zip(seconds.items(), fillings, strict=True):
-        filled = np.isfinite(filled_m)
-        error_m = np.abs(np.where(filled, filled_m, nearest_m) - true_m)
-        relative = error_m / true_m
+    true_m, nearest_m, *filled_by = np.hstack([columns for _, columns in images]).astype(np.float64)
+    errors_m = [np.abs(np.where(np.isfinite(z_m), z_m, nearest_m) - true_m) for z_m in filled_by]
+    first = errors_m[0] / true_m
+    for (name, elapsed_s), filled_m, error_m in zip(seconds.items(), filled_by, errors_m, strict=True):
+        filled, relative = np.isfinite(filled_m), error_m / true_m
         yield Filling(
             name,
             group,
             len(images),
             float(relative.mean()),
             mean_ci95(relative, places),
+            mean_ci95(relative - first, places),
             float(relative[filled].mean()) if filled.any() else float("nan"),
             float((filled & (relative <= CLOSE)).mean()),
             float(filled.mean()),

@@ -65,6 +65,8 @@ def test_every_measure_has_its_known_answer():
     assert runs["far"].abs_rel == pytest.approx(0.2, abs=1e-6)
     assert runs["far"].abs_rel_ci95 == pytest.approx((0.2, 0.2), abs=1e-6)
     assert runs["far"].median_error_m == pytest.approx(0.4, abs=1e-6)
+    assert runs["exact"].excess_ci95 == (0.0, 0.0)
+    assert runs["far"].excess_ci95 == pytest.approx((0.2, 0.2), abs=1e-6)
     assert [runs[name].close_share for name in programs] == [1.0, 1.0, 0.0, 0.5]
     assert [runs[name].filled_share for name in programs] == [1.0, 1.0, 1.0, 0.5]
 
@@ -88,6 +90,16 @@ def test_an_interval_resamples_places_not_pixels():
     low, high = mean_ci95(values, np.arange(200))
     assert 0.4 < low < 0.5 < high < 0.6
     assert mean_ci95(np.array([0.0, 1.0, 1.0, 1.0]), np.zeros(4, int)) == (0.75, 0.75)
+
+
+def test_an_excess_is_of_the_same_pixels():
+    """Two places, one far harder: the errors' intervals overlap, but not that of their difference."""
+    easy, hard = case("a"), case("b")
+    hard = replace(hard, truth_m=np.full_like(hard.truth_m, 4.0))
+    better, worse = compare_fillings(iter([easy, hard]), {"a": constant(2.0), "b": constant(1.96)})
+    assert better.abs_rel_ci95 == pytest.approx((0.0, 0.5), abs=1e-6)
+    assert worse.abs_rel_ci95[0] < better.abs_rel_ci95[1]
+    assert worse.excess_ci95 == pytest.approx((0.01, 0.02), abs=1e-6)
 
 
 def test_groups_are_kept_apart_and_programs_see_no_hidden_depth():

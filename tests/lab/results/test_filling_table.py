@@ -11,6 +11,7 @@ def run(program, group, error):
         "group": group,
         "abs_rel": error,
         "abs_rel_ci95": [0.5 * error, 2.0 * error],
+        "excess_ci95": [-0.25 * error, 0.5 * error],
         "close_share": 1.0 - error,
     }
 
@@ -41,6 +42,11 @@ def test_all_hole_pixels_are_the_headline_with_their_interval():
 
 def test_the_best_is_named_even_if_it_is_not_ours():
     assert "most pixels within 5 %: rooms, hidden: flat guess and flat guess." in PAGE
+
+
+def test_everybody_else_has_the_difference_to_ours():
+    assert "| flat guess | -0.0050 to +0.0100 |" in PAGE
+    assert PAGE.count("| packetmesh | ") == 3
 
 
 def test_sizes_stand_side_by_side():
