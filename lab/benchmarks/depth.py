@@ -43,7 +43,8 @@ def benchmark() -> Benchmark:
     network = DepthNetwork()
     speed = network_speed(network, load_demo("living-room").frames[0].rgb)
     groups = fillings(network)
-    chosen = {run.program: run for run in groups if run.group == groups[-1].group}
+    last = [run.group for run in groups if run.group.endswith(", hidden")][-1]
+    chosen = {run.program: run for run in groups if run.group == last}
     seconds = {name: run.elapsed_s for name, run in chosen.items()}
     errors_m = {name: run.median_error_m for name, run in chosen.items()}
     runs = (asdict(speed), *(asdict(run) for run in groups))

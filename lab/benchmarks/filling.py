@@ -1,28 +1,35 @@
-"""Filling realistic holes: sensor depth is hidden, filled by us and by the obvious peers, and compared."""
+"""Filling holes: sensor depth is hidden, filled by us and by the obvious peers, and all of it compared."""
 
 from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
-from lab.benchmarks.hidden_depth import hide
-from lab.claims.depth.scenes import demo_scenes, held_out_scenes, load_real, real_folders
+from lab.benchmarks.hidden_depth import disc, hide
+from lab.claims.claim import bootstrap_ci95
+from lab.claims.depth.scenes import HELD_OUT, REAL, Site, demo_scenes, held_out_scenes, real_frames
+from lab.training.evaluate import Example
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork, align_depth
 from pipeline.depth.confidence import judge
-from pipeline.depth.fillers import PEERS
-from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
+from pipeline.depth.fillers import PEERS, nearest
+from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, IntArray
 
 OURS = "packetmesh"
+FLAT, PIXELS = "flat guess", "pixel baseline"
 HIDDEN_SHARE = 0.15
 ROOMS, VIEWS = 5, 3
-"""Of each held-out scene, and of each room."""
+"""Rooms of each held-out scene, and views of each room."""
 REAL_DRAWS = 10
 """How often another part of each real frame is hidden: there are few of them."""
+RADII_PX = (10, 20, 40, 75, 120)
+"""Of the discs that are hidden, in images ``RADII_WIDTH_PX`` wide; in others in proportion."""
+RADII_WIDTH_PX = 640
 CLOSE = 0.05
 Filler = Callable[[DepthMap, ByteArray], DepthMap]
 
@@ -31,7 +38,8 @@ Filler = Callable[[DepthMap, ByteArray], DepthMap]
 class HoleCase:
     """One image whose holes can be judged."""
 
-    name: str
+    place: str
+    """The room, demo scene or draw that it belongs to: what intervals resample."""
     group: str
     rgb: ByteArray
     """(H, W, 3)."""
@@ -51,62 +59,118 @@ class Filling:
     group: str
     images: int
     abs_rel: float
-    """Of the hole pixels it filled, all images pooled."""
-    abs_rel_shared: float
-    """Of the hole pixels that every program filled."""
+    """Of all hole pixels, all images pooled; those it leaves empty take the nearest measured depth."""
+    abs_rel_ci95: tuple[float, float]
+    """Of ``abs_rel``, by resampling rooms, demo scenes, or draws of the real frames."""
+    excess_ci95: tuple[float, float]
+    """Of ``abs_rel`` less that of the first program, ours, on the same pixels: who is above 0 errs more."""
+    abs_rel_filled: float
+    """Of the hole pixels it filled; NaN if it filled none."""
     close_share: float
     """Of all hole pixels: filled within 5 % of what judges."""
     filled_share: float
     """Of all hole pixels."""
     median_error_m: float
-    """Of the hole pixels that every program filled."""
+    """Of all hole pixels, as ``abs_rel``."""
     elapsed_s: float
     """Median for an image; ours infers, aligns and judges."""
 
 
-def hidden_cases(seed: int = 0) -> Iterator[HoleCase]:
-    """Every image of rooms, demo scenes and real frames with a part of the sensor's depth hidden.
+def sites() -> tuple[Site, ...]:
+    """Where holes are hidden: held-out rooms, the demo scenes and the real frames there are."""
+    return (*held_out_scenes(ROOMS, VIEWS), *demo_scenes(), *real_frames())
+
+
+def hidden_cases(site: Site, seed: int = 0) -> Iterator[HoleCase]:
+    """Every image of a site with a part of the sensor's depth hidden, real frames several times.
 
     That very depth judges. Where the truth is known the images come a second time with nothing hidden: their
     sensor's own holes, judged by the truth.
     """
-    for site in (*held_out_scenes(ROOMS, VIEWS), *demo_scenes()):
-        for number, example in enumerate(site.examples()):
-            place, sensor = f"{site.name}/{number}", example.sensor
-            yield hidden_case(place, f"{site.group}, hidden", example.rgb, sensor, seed)
-            hole = np.isfinite(example.truth_m) & ~sensor.valid
-            yield HoleCase(place, f"{site.group}, own holes", example.rgb, sensor, hole, example.truth_m)
-    for folder in real_folders():
-        frame = load_real(folder)
-        for draw in range(REAL_DRAWS):
-            place = f"{frame.name}/{draw}"
-            yield hidden_case(place, "real frames, hidden", frame.rgb, frame.depth, seed)
+    for place, rng, example in _drawn(site, seed):
+        yield hidden_case(place, f"{site.group}, hidden", example.rgb, example.sensor, rng)
+        if site.truth:
+            hole = np.isfinite(example.truth_m) & ~example.sensor.valid
+            yield HoleCase(
+                place, f"{site.group}, own holes", example.rgb, example.sensor, hole, example.truth_m
+            )
 
 
-def hidden_case(name: str, group: str, rgb: ByteArray, depth: DepthMap, seed: int) -> HoleCase:
-    """An image without a part of its sensor depth, which part is drawn from the seed and the name."""
-    hole = hide(depth, np.random.default_rng([seed, *name.encode()]), HIDDEN_SHARE)
+def disc_cases(site: Site, seed: int = 0) -> Iterator[HoleCase]:
+    """The same images with one disc hidden, of every size that finds a place; that very depth judges."""
+    for place, rng, example in _drawn(site, seed):
+        yield from discs(place, site.group, example.rgb, example.sensor, rng)
+
+
+def _drawn(site: Site, seed: int) -> Iterator[tuple[str, np.random.Generator, Example]]:
+    """Every image with its place and with what draws its holes; views of one room are one place."""
+    for number, example in enumerate(site.examples()):
+        for draw in range(1 if site.truth else REAL_DRAWS):
+            room = {HELD_OUT: f"/{number // VIEWS}", REAL: f"/{draw}"}.get(site.group, "")
+            rng = np.random.default_rng([seed, draw, *f"{site.name}/{number}".encode()])
+            yield f"{site.name}{room}", rng, example
+
+
+def hidden_case(
+    place: str, group: str, rgb: ByteArray, depth: DepthMap, rng: np.random.Generator
+) -> HoleCase:
+    """An image without a part of its sensor depth."""
+    return without(hide(depth, rng, HIDDEN_SHARE), place, group, rgb, depth)
+
+
+def discs(
+    place: str, group: str, rgb: ByteArray, depth: DepthMap, rng: np.random.Generator
+) -> Iterator[HoleCase]:
+    """An image without the depth in a disc, for every radius of ``RADII_PX`` that finds a place."""
+    for radius_px in RADII_PX:
+        hole = disc(depth, radius_px * depth.z_m.shape[1] / RADII_WIDTH_PX, rng)
+        if hole is not None:
+            yield without(hole, place, f"{group}, disc of {radius_px} px", rgb, depth)
+
+
+def without(hole: BoolArray, place: str, group: str, rgb: ByteArray, depth: DepthMap) -> HoleCase:
+    """An image whose depth in (H, W) ``hole`` is hidden and judges."""
     left = DepthMap(np.where(hole, np.float32(np.nan), depth.z_m))
-    return HoleCase(name, group, rgb, left, hole, depth.z_m)
+    return HoleCase(place, group, rgb, left, hole, depth.z_m)
 
 
-def our_filling(network: DepthNetwork) -> Filler:
-    """Inferred, aligned and trusted depth, as the chain makes it."""
+def chain_filling(infer: Callable[[ByteArray], DepthMap]) -> Filler:
+    """Inferred, aligned and trusted depth, as the chain makes it of what ``infer`` makes of the colours."""
     config = DepthConfig()
 
     def fill(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
-        aligned = align_depth(network.infer(rgb), sensor, config.alignment)
+        aligned = align_depth(infer(rgb), sensor, config.alignment)
         return judge(aligned, sensor, rgb, config.reach, config.least_confidence).depth
 
     return fill
 
 
-def compare_fillings(cases: Iterator[HoleCase], programs: dict[str, Filler]) -> tuple[Filling, ...]:
+def flat(rgb: ByteArray) -> DepthMap:
+    """One depth everywhere: what alignment and judgement alone make of nothing."""
+    return DepthMap(np.ones(rgb.shape[:2], np.float32))
+
+
+def pixel_filling(network: DepthNetwork) -> Filler:
+    """Inferred depth along a robust line through the pixels that both have (SPEC 4.6), and no more."""
+    return lambda sensor, rgb: align_depth(network.infer(rgb), sensor, "affine_depth").depth
+
+
+def programs(network: DepthNetwork) -> dict[str, Filler]:
+    """Everyone who is compared; another is one line more."""
+    return {
+        OURS: chain_filling(network.infer),
+        FLAT: chain_filling(flat),
+        PIXELS: pixel_filling(network),
+        **PEERS,
+    }
+
+
+def compare_fillings(cases: Iterable[HoleCase], programs: dict[str, Filler]) -> tuple[Filling, ...]:
     """Every program over every case, summed up by group; the programs are warmed up on the first."""
-    judged: dict[str, list[FloatArray]] = {}
+    judged: dict[str, list[tuple[str, FloatArray]]] = {}
     seconds: dict[tuple[str, str], list[float]] = {}
     for number, case in enumerate(cases):
-        rows = []
+        rows = [case.truth_m[case.hole], nearest(case.sensor, case.rgb).z_m[case.hole]]
         for name, fill in programs.items():
             if number == 0:
                 fill(case.sensor, case.rgb)
@@ -114,42 +178,54 @@ def compare_fillings(cases: Iterator[HoleCase], programs: dict[str, Filler]) -> 
             filled = fill(case.sensor, case.rgb)
             seconds.setdefault((case.group, name), []).append(time.perf_counter() - started)
             rows.append(filled.z_m[case.hole])
-        judged.setdefault(case.group, []).append(np.vstack([case.truth_m[case.hole], *rows]))
+        judged.setdefault(case.group, []).append((case.place, np.vstack(rows)))
     return tuple(
         filling
-        for group, columns in judged.items()
-        for filling in group_fillings(group, columns, {name: seconds[group, name] for name in programs})
+        for group, images in judged.items()
+        for filling in group_fillings(group, images, {name: seconds[group, name] for name in programs})
     )
 
 
 def group_fillings(
-    group: str, columns: list[FloatArray], seconds: dict[str, list[float]]
+    group: str, images: list[tuple[str, FloatArray]], seconds: dict[str, list[float]]
 ) -> Iterator[Filling]:
     """Each program's measures over the hole pixels of a group.
 
     Args:
         group: its name.
-        columns: of every image (1 + programs, N) true depth and fillings, metres, NaN where not filled.
+        images: the place of every image, and (2 + programs, N) true depth, nearest measured depth and
+            fillings, metres, NaN where not filled.
         seconds: of every program, in the order of the rows, one for each image.
     """
-    true_m, *fillings = np.hstack(columns).astype(np.float64)
-    shared = np.isfinite(fillings).all(axis=0)
-    for (name, elapsed_s), filled_m in zip(seconds.items(), fillings, strict=True):
-        error_m = np.abs(filled_m - true_m)
-        relative = error_m / true_m
+    _, numbers = np.unique([place for place, _ in images], return_inverse=True)
+    places = np.repeat(numbers, [columns.shape[1] for _, columns in images])
+    true_m, nearest_m, *filled_by = np.hstack([columns for _, columns in images]).astype(np.float64)
+    errors_m = [np.abs(np.where(np.isfinite(z_m), z_m, nearest_m) - true_m) for z_m in filled_by]
+    first = errors_m[0] / true_m
+    for (name, elapsed_s), filled_m, error_m in zip(seconds.items(), filled_by, errors_m, strict=True):
+        filled, relative = np.isfinite(filled_m), error_m / true_m
         yield Filling(
             name,
             group,
-            len(columns),
-            float(np.nanmean(relative)),
-            float(relative[shared].mean()),
-            float((relative <= CLOSE).mean()),
-            float(np.isfinite(filled_m).mean()),
-            float(np.median(error_m[shared])),
+            len(images),
+            float(relative.mean()),
+            mean_ci95(relative, places),
+            mean_ci95(relative - first, places),
+            float(relative[filled].mean()) if filled.any() else float("nan"),
+            float((filled & (relative <= CLOSE)).mean()),
+            float(filled.mean()),
+            float(np.median(error_m)),
             statistics.median(elapsed_s),
         )
 
 
+def mean_ci95(values: FloatArray, places: IntArray) -> tuple[float, float]:
+    """95 % bootstrap interval of the mean of (N,) values, resampling whole places, numbered from 0."""
+    sums = np.stack([np.bincount(places, values), np.bincount(places).astype(float)], axis=1)
+    return bootstrap_ci95(sums, statistic=lambda sums, axis: np.divide(*sums.sum(axis=axis).T))
+
+
 def fillings(network: DepthNetwork) -> tuple[Filling, ...]:
-    """Ours and every peer on held-out rooms, the demo scenes and the real frames there are, in one run."""
-    return compare_fillings(hidden_cases(), {OURS: our_filling(network), **PEERS})
+    """Everyone on all there is, in one run."""
+    cases = (make(site) for make in (hidden_cases, disc_cases) for site in sites())
+    return compare_fillings(chain.from_iterable(cases), programs(network))

@@ -18,6 +18,8 @@ EDGE_STEP = 1.08
 BLOB_RADII = (0.015, 0.05)
 """Half axes of a blob, in shares of the image's diagonal."""
 LARGEST_SHARE = 0.9
+LEAST_OF_DISC = 0.8
+"""Share of a disc's pixels that have depth to hide."""
 MOST_MISSES = 100
 
 
@@ -56,6 +58,33 @@ def hide(sensor: DepthMap, rng: np.random.Generator, share: float) -> BoolArray:
         if places.any():
             stamp(hidden, valid, np.argwhere(places), lambda: blob(valid.shape, rng), wanted_px, rng)
     return hidden
+
+
+def disc(sensor: DepthMap, radius_px: float, rng: np.random.Generator) -> BoolArray | None:
+    """The pixels with depth in a disc that lies in the image and has depth in four fifths of its pixels.
+
+    Args:
+        sensor: (H, W) depth with its own holes.
+        radius_px: of the disc.
+        rng: draws its place among all that there are.
+
+    Returns:
+        (H, W) True for what is to be hidden; None where there is no place.
+    """
+    reach_px = int(radius_px)
+    across = np.arange(-reach_px, reach_px + 1)
+    shape = (across[:, None] ** 2 + across**2 <= radius_px**2).astype(np.float32)
+    if min(sensor.valid.shape) < len(shape):
+        return None
+    share = cv2.filter2D(sensor.valid.astype(np.float32), -1, shape / shape.sum())
+    inside = np.s_[reach_px : share.shape[0] - reach_px, reach_px : share.shape[1] - reach_px]
+    places = np.argwhere(share[inside] >= LEAST_OF_DISC)
+    if not len(places):
+        return None
+    top, left = places[rng.integers(len(places))]
+    hidden = np.zeros(sensor.valid.shape, bool)
+    hidden[top : top + len(shape), left : left + len(shape)] = shape > 0.0
+    return hidden & sensor.valid
 
 
 def hole_shapes(valid: BoolArray) -> list[BoolArray]:

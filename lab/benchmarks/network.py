@@ -18,7 +18,7 @@ from packetmesh.errors import PacketMeshError
 OBJECTS = 60
 LONGEST_FIRST: tuple[SchemeName, ...] = ("baseline", "pdc", "greedy")
 """So that the cores end together."""
-SATURATED: Counts = {"ieee802154": (1, 5), "ieee80211b": (1, 5, 20)}
+SATURATED: Counts = {"ieee802154": (1, 5), "ieee80211b": (1, 5, 20, 50)}
 SATURATED_S = 10.0
 
 

@@ -32,7 +32,7 @@ PYTHON_VARIABLE = "PACKETMESH_NS3_PYTHON"
 Counts = Mapping[MacKind, tuple[int, ...]]
 """With how many nodes each medium access runs."""
 
-NODES: Counts = {"ieee802154": (1, 2, 3, 4, 5), "ieee80211b": (1, 2, 3, 5, 10, 20)}
+NODES: Counts = {"ieee802154": (1, 2, 3, 4, 5), "ieee80211b": (1, 2, 3, 5, 10, 20, 50)}
 CONFIGS: dict[MacKind, NetworkConfig] = {
     "ieee802154": NetworkConfig(
         mac=MacConfig(kind="ieee802154"), nodes=NodesConfig(payload_bytes=116, spacing_m=RADIUS_M)
@@ -168,7 +168,10 @@ def run_ns3(python: str, counts: Counts, seconds: float) -> tuple[Theirs, dict[s
         }
         for mac, nodes, strict in keys
     ]
-    done = subprocess.run([python, str(RUNS), json.dumps(scenarios)], capture_output=True, text=True)
+    environment = {**os.environ, "PYTHONSAFEPATH": "1"}  # else ``import ns3`` finds this very module
+    done = subprocess.run(
+        [python, str(RUNS), json.dumps(scenarios)], capture_output=True, text=True, env=environment
+    )
     if done.returncode:
         raise PacketMeshError(f"ns-3 failed in {python}: {done.stderr.strip()[-2000:]}")
     got = json.loads(done.stdout.splitlines()[-1])

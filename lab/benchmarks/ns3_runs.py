@@ -1,4 +1,4 @@
-"""Saturated nodes around one sink in ns-3: what ``peer.py`` sets beside network_sim.
+"""Saturated nodes around one sink in ns-3: what ``ns3.py`` sets beside network_sim.
 
 ``python ns3_runs.py '[{"mac": "ieee802154", "nodes": 3, "payload_bytes": 116, "radius_m": 10, "seconds": 10,
 "seed": 1, "strict": false}]'`` prints JSON: what came of each run, and ns-3's own constants. It needs ns-3's

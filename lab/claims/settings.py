@@ -8,6 +8,8 @@ from functools import partial
 import psutil
 
 from lab.claims.claim import Claim, Outcome
+from lab.claims.registration.cases import CONDITIONS
+from lab.claims.registration.setup import ROOMS
 from network_sim.images import ppm_bytes
 from network_sim.mac.ieee802154 import LINK_BPS
 from pipeline.depth.preprocessing import CROP_HEIGHT_PX, CROP_WIDTH_PX
@@ -70,7 +72,8 @@ CLAIMS = (
         "4.3: 3 x 100 frames",
         "nothing that we have: its frames were not published",
         partial(
-            _untested, "C16 to C20 stand on rooms of our own, in eight conditions, and say how many of them"
+            _untested,
+            f"C16 to C20 stand on {len(ROOMS)} rooms of our own, in {len(CONDITIONS)} conditions",
         ),
     ),
     Claim(

@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "setting_claims": ("packetmesh", "reproduce", "--only", "C09,C11,C15,C37,C38,C39"),
     "outlier_claims": ("packetmesh", "reproduce", "--only", "C10"),
     "depth_claims": ("packetmesh", "reproduce", "--only", "C12,C13,C14"),
+    "fill_claims": ("packetmesh", "reproduce", "--only", "D10"),
     "registration_claims": ("packetmesh", "reproduce", "--only", "C16,C17,C18,C19,C20"),
     "surface_claims": ("packetmesh", "reproduce", "--only", "C21,C22,C23,C24"),
     "network_claims": (
@@ -55,7 +56,7 @@ VERDICT_KEYS = ("claim", "thesis", "tolerance", "verdict", "why", "ours", "ci95"
 
 
 def measure(name: str, runs: Path = Path("runs/results")) -> Record:
-    """Run what is behind a record, which takes seconds to half an hour.
+    """Run what is behind a record, which takes seconds to an hour.
 
     Args:
         name: of ``RECORDS``.

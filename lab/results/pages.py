@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
+from lab.benchmarks.filling import FLAT, OURS, PIXELS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
 from lab.results import tables
@@ -25,6 +26,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "outlier_claims": ("Outlier filter: the thesis's claim", tables.claims),
     "depth_claims": ("Inferred depth: the thesis's claims", tables.claims),
     "bench_depth": ("Filling holes", tables.filling),
+    "fill_claims": ("Filling holes: how far its confidence can be trusted", tables.our_claims),
     "registration_claims": ("Registration: the thesis's claims", tables.registration_claims),
     "bench_registration": ("Registration: speed", tables.registration_speed),
     "surface_claims": ("Ball pivoting: the thesis's claims", tables.claims),
@@ -36,6 +38,9 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "ns3_saturation": ("The camera network: throughput beside ns-3", tables.ns3_throughput),
 }
 """Heading and body by record, in the order of the page; a section without its record is left out."""
+
+NETWORK_FILLERS = (OURS, FLAT, PIXELS)
+"""What fills by the network, or by its alignment."""
 
 INTRODUCTION = """# Results
 
@@ -84,6 +89,8 @@ def readme_results(records: Records) -> Iterator[str]:
         yield _registration(records["registration_claims"].numbers)
     if "depth_claims" in records:
         yield _depth(records["depth_claims"].numbers["C12"]["ours"])
+    if "bench_depth" in records:
+        yield _filling(records["bench_depth"].numbers["depth"]["runs"])
     if "delivery_claims" in records:
         yield _exchange(records["delivery_claims"].numbers)
     claims = {
@@ -114,11 +121,12 @@ def _fusion(numbers: Row) -> str:
 def _registration(numbers: Row) -> str:
     medians = tables.point_errors(numbers)
     biased = [float(cells["bias 3 %"].split()[0]) for cells in medians.values() if "bias 3 %" in cells]
-    lost = tables.losses(medians, "icp")
+    lost, gated = (tables.losses(medians, rival) for rival in ("icp", "icp-gated"))
     return (
         f"**CEICP does not always win.** Plain ICP ends nearer to the truth in {len(lost)} of "
-        f"{len(medians['icp'])} conditions: {'; '.join(lost)}. No rigid method repairs a depth bias: 3 % "
-        f"leaves {min(biased):.1f} to {max(biased):.1f} cm."
+        f"{len(medians['icp'])} conditions: {'; '.join(lost)}. ICP with a gate does in {len(gated)} of "
+        f"{len(medians['icp-gated'])}. No rigid method repairs a depth bias: 3 % leaves {min(biased):.1f} to "
+        f"{max(biased):.1f} cm."
     )
 
 
@@ -134,6 +142,23 @@ def _depth(ours: dict[str, float]) -> str:
         f"{min(held_out):.3f} to {max(held_out):.3f} in rooms that it never saw; on real frames "
         + listed([f"{scaled[name]:.3f} (as it comes {raw[name]:.2f}) on {name}" for name in real])
         + ". A sensor has to align it."
+    )
+
+
+def _filling(runs: list[Row]) -> str:
+    """Ours beside the flat guess and the best that needs no network, by group of images."""
+    parts = []
+    for group in dict.fromkeys(run["group"] for run in runs if run.get("group", "").endswith(", hidden")):
+        errors = {run["program"]: run for run in runs if run.get("group") == group}
+        peers = [run for name, run in errors.items() if name not in NETWORK_FILLERS]
+        best = min(peers, key=lambda run: run["abs_rel"])
+        shown = (("ours", errors[OURS]), ("a flat guess", errors[FLAT]), (best["program"], best))
+        cells = ", ".join(f"{name} {tables.error(run)}" for name, run in shown)
+        parts.append(f"{group.removesuffix(', hidden')}: {cells}")
+    return (
+        "**What fills holes, and how much of it the network does.** Relative error over all hidden pixels by "
+        "the network, by one depth everywhere through the same alignment, and by the best of the rest: "
+        f"{'; '.join(parts)}."
     )
 
 

@@ -75,7 +75,7 @@ def test_the_sheet_has_axes_with_units_signs_and_the_thesis_beside_the_trials():
         low, high = figure.layout.xaxis.range
         assert low < min(*inside.x, *truth.x, *printed.x)
         assert max(*inside.x, *truth.x, *printed.x) < high
-    assert "thesis: its trial at 0.4 px (Table 4.1)" in sheet.legend
+    assert "thesis: printed at 0.4 px (Table 4.1)" in sheet.legend
     assert sheet.table.count("<tr>") == 1 + len(NAMES)
     assert "thesis" in sheet.table
     assert "Table 4.1" not in noise_sheet(trials(3, 0.0)).legend

@@ -13,7 +13,7 @@ from app.ui import Ui
 
 TEXT = """What if every circle were seen a little beside its place? The calibration above is taken as the
 **truth**, its views are seen again with this noise on every point, and the camera is estimated anew, 200
-times; the scatter is shown below, across the window. The thesis did it once for each noise (Table 4.1)."""
+times; the scatter is shown below, across the window. Table 4.1 of the thesis has one value for each noise."""
 THIS, OTHER = "this lens", "one of another kind"
 READY = "Drag the slider to begin."
 STOPPED = "Stopped. Drag the slider to begin anew."

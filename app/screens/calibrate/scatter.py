@@ -25,7 +25,7 @@ PREDICTED = (
     "The standard error that each trial gives itself, in the mean; like the error if it can be trusted."
 )
 THESIS = (
-    "What the thesis's one trial is off by at the noise of Table 4.1 that is nearest: of f and c the same "
+    "What the thesis's value is off by at the noise of Table 4.1 that is nearest: of f and c the same "
     "share of this camera's, of k1 and k2 the same difference."
 )
 
@@ -58,7 +58,7 @@ def legend_html(cell: Cell | None) -> str:
     ]
     if cell is not None:
         sign = f'<b style="color: {css(INFERRED)}">◆ </b>'
-        signs.append((sign, f"thesis: its trial at {cell.sigma_px:g} px (Table 4.1)"))
+        signs.append((sign, f"thesis: printed at {cell.sigma_px:g} px (Table 4.1)"))
     return "".join(f"<span>{sign}{html.escape(text)}</span>" for sign, text in signs)
 
 

@@ -141,7 +141,7 @@ def _c03(study: CalibrationStudy) -> Outcome:
                 "Table 4.1 beside E1",
                 ("noise, px", "parameter", "printed", "its error", "RMSE, 4 views", "RMSE, 8 views"),
                 tuple(rows),
-                "The printed values are one run each.",
+                "One value is printed for each noise; of how many runs it is, the table does not say.",
             ),
         ),
     )

@@ -16,6 +16,7 @@ from pipeline.io.rigs import load_frame
 from pipeline.types import DepthMap, RgbdFrame
 
 HELD_OUT = "held-out rooms"
+REAL = "real frames"
 HELD_OUT_SCENES = 3
 ROOMS_PER_SCENE = 50
 VIEWS_PER_ROOM = 2
@@ -67,8 +68,7 @@ def demo_scenes() -> tuple[Site, ...]:
 def real_frames() -> tuple[Site, ...]:
     """Every registered RGB-D pair among the real data; none where there is no such folder."""
     return tuple(
-        Site(folder.name, "real frames", partial(real_frame, folder), truth=False)
-        for folder in real_folders()
+        Site(folder.name, REAL, partial(real_frame, folder), truth=False) for folder in real_folders()
     )
 
 

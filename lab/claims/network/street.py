@@ -37,8 +37,6 @@ from packetmesh.progress import Progress
 IMAGE_PX = (800, 600)
 LARGE_BYTES = 30_000
 LARGE_OBJECTS, LARGE_HORIZON_S = 10, 2700.0
-MOST_IMAGES, LEAST_COVERAGE = 0.5, 0.85
-"""Of BASELINE's: what GREEDY may collect at most and has to cover at least."""
 MOST_SUMMARY_DIFFERENCE = 0.02
 CROWDED = tuple(objects for objects in OBJECTS if objects >= 20)
 
@@ -139,6 +137,7 @@ def _c34(found: Found) -> Outcome:
     )
     grows = sum(all(images[s, a] < images[s, b] for a, b in pairwise(OBJECTS)) for s in SCHEMES)
     ordered = all(images["baseline", n] > images["pdc", n] >= images["greedy", n] for n in CROWDED)
+    wider = sum(seen["greedy", n] > seen["baseline", n] for n in OBJECTS)
     share = max(images["greedy", n] / images["baseline", n] for n in CROWDED)
     kept = min(seen["greedy", n] / seen["baseline", n] for n in CROWDED)
     ours, ci95 = {}, {}
@@ -150,11 +149,12 @@ def _c34(found: Found) -> Outcome:
     return Outcome(
         ours,
         ci95,
-        grows == len(SCHEMES) and ordered and share <= MOST_IMAGES and kept >= LEAST_COVERAGE,
+        grows == len(SCHEMES) and ordered and wider == len(OBJECTS),
         f"from {OBJECTS[0]} to {most} vehicles images grow for {grows} of {len(SCHEMES)} schemes; BASELINE > "
-        f"PDC ≥ GREEDY {'holds' if ordered else 'does not hold'} for {CROWDED[0]} and more, where GREEDY "
-        f"collects at most {share:.0%} of BASELINE's images and covers at least {kept:.0%} of its windows: "
-        f"fewer images of the same streets, not more streets; of what cameras see BASELINE covers "
+        f"PDC ≥ GREEDY {'holds' if ordered else 'does not hold'} for {CROWDED[0]} and more; GREEDY covers "
+        f"more than BASELINE with {wider} of {len(OBJECTS)} numbers of vehicles: from {CROWDED[0]} on it "
+        f"collects at most {share:.0%} of BASELINE's images and covers at least {kept:.0%} of its windows; "
+        f"of what cameras see BASELINE covers "
         f"{seen['baseline', most]:.0%} with {most} vehicles, GREEDY {seen['greedy', most]:.0%}, PDC "
         f"{seen['pdc', most]:.0%}",
         figure_4_10(found),
@@ -217,11 +217,11 @@ CLAIMS = (
     ),
     Claim(
         id="C34",
-        claim="More objects, more images; GREEDY cuts the traffic and keeps the view, PDC cuts less",
+        claim="More objects, more images; GREEDY cuts the traffic and widens coverage, PDC cuts less",
         thesis="Fig. 4.10, 4.4: curves; GREEDY “widens coverage”",
         tolerance=(
-            "images grow with the vehicles for every scheme; from 20 vehicles on BASELINE > PDC ≥ GREEDY, "
-            "and GREEDY has at most 50 % of BASELINE's images and at least 85 % of its covered windows"
+            "images grow with the vehicles for every scheme; BASELINE > PDC ≥ GREEDY in images from 20 "
+            "vehicles on; GREEDY covers more windows than BASELINE with every number of vehicles"
         ),
         experiment=_c34,
         prepare=street_study,

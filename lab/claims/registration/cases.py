@@ -117,7 +117,7 @@ def make_case(condition: Condition, room: int) -> Case:
     if condition.overlap is not None:
         source, target = _with_overlap(source, target, T_true, condition.overlap, room)
     T_init = wrong_start(T_true, source.points_m, condition.start_deg, condition.start_m, rng)
-    return Case(source, target, T_true, T_init, float(_partnered(source, target, T_true).mean()))
+    return Case(source, target, T_true, T_init, float(partnered(source, target, T_true).mean()))
 
 
 def wrong_start(
@@ -175,7 +175,7 @@ def _blurred_edges(z_m: FloatArray) -> FloatArray:
     return np.where(known, 1.0 / np.where(known, blurred, 1.0), np.nan).astype(np.float32)
 
 
-def _partnered(source: PointCloud, target: PointCloud, T_true: FloatArray) -> np.ndarray:
+def partnered(source: PointCloud, target: PointCloud, T_true: FloatArray) -> np.ndarray:
     """(N,) whether each source point has a target point near it at the true pose."""
     tree = cKDTree(target.points_m)
     return tree.query(apply(T_true, source.points_m), distance_upper_bound=PARTNER_M)[0] <= PARTNER_M
@@ -185,10 +185,10 @@ def _with_overlap(
     source: PointCloud, target: PointCloud, T_true: FloatArray, overlap: float, seed: int
 ) -> tuple[PointCloud, PointCloud]:
     """Both clouds with just that overlap: the target cropped at one side, or lone source points dropped."""
-    partnered = _partnered(source, target, T_true)
-    if partnered.mean() < overlap:
-        lone = np.flatnonzero(~partnered)
-        surplus = len(lone) - round((1.0 - overlap) / overlap * np.sum(partnered))
+    shared = partnered(source, target, T_true)
+    if shared.mean() < overlap:
+        lone = np.flatnonzero(~shared)
+        surplus = len(lone) - round((1.0 - overlap) / overlap * np.sum(shared))
         keep = np.ones(len(source), np.bool_)
         keep[np.random.default_rng([seed, 90]).permutation(lone)[:surplus]] = False
         return source.select(keep), target
@@ -197,5 +197,5 @@ def _with_overlap(
     for _ in range(10):
         share = 0.5 * (low + high)
         cropped = degrade(target, Degradation(crop_share=share), seed)
-        low, high = (share, high) if _partnered(probe, cropped, T_true).mean() > overlap else (low, share)
+        low, high = (share, high) if partnered(probe, cropped, T_true).mean() > overlap else (low, share)
     return source, cropped

@@ -12,6 +12,7 @@ from lab.claims.claim import Claim, Outcome, bootstrap_ci95
 from lab.claims.registration.capture import map_capture
 from lab.claims.registration.cases import CONDITIONS
 from lab.claims.registration.curves import capture_maps, captured_shares, convergence_charts
+from lab.claims.registration.entrants import PIXEL_PAIRS
 from lab.claims.registration.results import Results
 from lab.claims.registration.setup import FIXED_GATE, capture_tasks, case_tasks
 from lab.claims.registration.statistics import Comparison, compare, holm
@@ -21,6 +22,7 @@ from lab.claims.registration.tables import (
     compared,
     comparison_table,
     conditions_table,
+    lost,
     table_4_4,
     tuning_table,
 )
@@ -32,8 +34,14 @@ from pipeline.types import FloatArray
 ONE_NODE = tuple(name for name, condition in CONDITIONS.items() if condition.clouds == "inferred")
 BEATEN = ("icp", "picp", "ricp", "mricp")
 """Rivals that C16 says CEICP beats; the others are reported."""
-REPORTED = ("ficp", "hicp", "open3d-gicp", "small-gicp", "small-gicp-staged", "fast-robust-icp")
-OTHERS = ("icp-gated", "trimmed-icp", "ceicp-literal", "ceicp-r", "ceicp-ml", "open3d-plane")
+REPORTED = (
+    *("ficp", "hicp", "icp-gated", PIXEL_PAIRS, "ceicp-a plane"),
+    *("open3d-gicp", "small-gicp", "small-gicp-staged", "fast-robust-icp"),
+)
+OTHERS = (
+    *("trimmed-icp", "ceicp-literal", "ceicp-r", "ceicp-ml", "open3d-plane"),
+    *("icp plane", "icp-gated plane", "ficp plane", "ceicp-n plane", "fast-robust-icp plane"),
+)
 STRICT_P = 0.01
 MEASURES = ("ratio", "p")
 
@@ -47,13 +55,18 @@ def registration_results(folder: Path, scheduler: str | None) -> Generator[Progr
 
 def _c16(results: Results) -> Outcome:
     rivals = (*BEATEN, *REPORTED, *OTHERS)
-    by_method = {ours: compared(results, ours, rivals, ONE_NODE) for ours in ("ceicp-a", "ceicp-n")}
+    by_method = {
+        ours: compared(results, ours, tuple(rival for rival in rivals if rival != ours), ONE_NODE)
+        for ours in ("ceicp-a", "ceicp-n", "ceicp-a plane")
+    }
+    back = compared(results, "ceicp-a", rivals, ONE_NODE, direction="p2q")
     judged = [c for c in by_method["ceicp-a"] if c.rival in BEATEN]
     beaten = [c for c in judged if c.ratio < 1.0 and c.p < STRICT_P]
     ahd = compared(results, "ceicp-a", BEATEN, ONE_NODE, "ahd_cm")
     ours = {f"ahd_ratio_ceicp-a_{c.rival}": c.ratio for c in ahd}
     for name, comparisons in by_method.items():
         ours |= _numbers(name, [c for c in comparisons if c.rival not in OTHERS])
+    ours |= _numbers("ceicp-a_p2q", back)
     ratios = ", ".join(f"{c.rival} {c.ratio:.2f} (p {c.p:.1g})" for c in judged)
     reported = ", ".join(
         f"{c.rival} {c.ratio:.2f} ({c.outcome})" for c in by_method["ceicp-a"] if c.rival in REPORTED
@@ -68,6 +81,11 @@ def _c16(results: Results) -> Outcome:
             for name, comparisons in by_method.items()
         ),
         comparison_table(
+            "One node, all six conditions, target matched to source (p2q): ceicp-a against the rest",
+            "ceicp-a",
+            back,
+        ),
+        comparison_table(
             "Two nodes, sensor and fused: ceicp-a plane against the rest",
             "ceicp-a plane",
             compared(results, "ceicp-a plane", plane_rivals, NODES),
@@ -79,10 +97,32 @@ def _c16(results: Results) -> Outcome:
         {},
         len(beaten) == len(BEATEN),
         f"median ratio of the point errors of CEICP-A and its rivals over {judged[0].cases} trials: "
-        f"{ratios}; beyond the claim {reported}; by average Hausdorff distance the ratio to ICP is "
+        f"{ratios}; beyond the claim {reported}; target matched to source {_backward(back)}. "
+        f"{_losses(results)}. By average Hausdorff distance on the overlap the ratio to ICP is "
         f"{ahd[0].ratio:.2f}",
         exhibits,
     )
+
+
+def _backward(comparisons: Sequence[Comparison]) -> str:
+    """The rivals of the claim, and gated ICP, matched the other way round."""
+    shown = (*BEATEN, "icp-gated")
+    return ", ".join(f"{c.rival} {c.ratio:.2f} ({c.outcome})" for c in comparisons if c.rival in shown)
+
+
+def _losses(results: Results) -> str:
+    """Where CEICP-A's median error is above that of ICP, of gated ICP and of pixel pairs, by metric."""
+    parts = []
+    for ours in ("ceicp-a", "ceicp-a plane"):
+        by_rival = {
+            rival: lost(results, ours, rival, ONE_NODE) for rival in ("icp", "icp-gated", PIXEL_PAIRS)
+        }
+        parts += [
+            f"{ours} loses to {rival} in {len(labels)} of {len(ONE_NODE)} conditions"
+            + (f" ({'; '.join(labels)})" if labels else "")
+            for rival, labels in by_rival.items()
+        ]
+    return ", ".join(parts)
 
 
 def _c17(results: Results) -> Outcome:
@@ -215,8 +255,8 @@ CLAIMS = (
         thesis="Table 4.4: CEICP over ICP 0.53, 0.55 and 0.32",
         tolerance=(
             "median point error of CEICP-N at most 0.6 times ICP's, with its 95 % interval (easy, the "
-            "complete cloud is matched to the sensor's); the ratio of average Hausdorff distances is "
-            "expected near 1"
+            "complete cloud is matched to the sensor's); the ratio of average Hausdorff distances on the "
+            "overlap is reported"
         ),
         experiment=_c17,
         prepare=registration_results,

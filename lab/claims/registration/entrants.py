@@ -11,6 +11,8 @@ from pipeline.registration.peers import PEERS
 from pipeline.registration.weighting import PairWeighting
 from pipeline.types import PointCloud
 
+PIXEL_PAIRS = "pixel-pairs"
+"""The baseline that matches nothing: SPEC 4.6."""
 GATE_SCALE = "gate_scale"
 """The parameter that multiplies the condition's gate."""
 _CONFIG_FIELDS = {part.name for part in fields(RegistrationConfig)}
@@ -18,10 +20,10 @@ _CONFIG_FIELDS = {part.name for part in fields(RegistrationConfig)}
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """One way to register: a method with a metric, a variant of one, or another program."""
+    """One way to register: a method with a metric, a variant of one, another program, or pixel pairs."""
 
     method: str
-    """Name in METHODS, VARIANTS or PEERS."""
+    """Name in METHODS, VARIANTS or PEERS, or ``PIXEL_PAIRS``."""
     metric: Metric = "point"
     """Other programs have their own."""
     label: str = ""

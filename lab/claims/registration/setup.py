@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from lab.claims.registration.capture import CaptureTask
 from lab.claims.registration.cases import CONDITIONS, Condition
-from lab.claims.registration.entrants import Entrant, Lineup
+from lab.claims.registration.entrants import PIXEL_PAIRS, Entrant, Lineup
 from lab.claims.registration.trials import CaseTask
 from lab.claims.registration.tuned import TUNED
 from pipeline.config import Metric
@@ -23,10 +23,12 @@ CURVED = ("icp", "picp", "ricp", "mricp", "ficp", "hicp", "ceicp-n", "ceicp-a", 
 """The entrants with curves: the methods of Table 4.4, and the plane metric."""
 ABLATED = ("easy", "bias-3", "holes-x3", "outliers-20", "nodes-sensor", "nodes-fused")
 """Where the ablations run."""
-BOTH_DIRECTIONS = ("easy", "bias-3", "holes-x3", "outliers-20")
-"""Conditions in which the sensor cloud is matched to the complete one as well."""
-REVERSED = ("icp", "icp-gated", "ficp", "hicp", "ceicp-n", "ceicp-a")
-"""The methods that do both."""
+REVERSED = (
+    *("icp", "icp-gated", "picp", "ricp", "mricp", "ficp", "hicp", "ceicp-literal", "ceicp-n", "ceicp-a"),
+    *("icp plane", "icp-gated plane", "ceicp-n plane", "ceicp-a plane"),
+)
+"""The entrants that match target to source as well: Table 4.4, and the plane metric beside it. The overlap
+series has one direction."""
 OVERLAPPING = ("ficp", "ceicp-a")
 """Methods that run point to point on the overlap series as well; those without a gate are lost there."""
 SLOW = {
@@ -71,18 +73,17 @@ def capture_tasks() -> list[CaptureTask]:
 def standard_lineup(condition: Condition) -> Lineup:
     """The entrants of a condition.
 
-    A node's own two clouds: point to point as in Table 4.4, and the plane metric where there is no bias
-    for it to follow. Two nodes: both metrics.
+    Both metrics everywhere, but on the overlap series, where few run point to point. A node's own two clouds
+    share their pixels, so that pixel pairs take part.
     """
     name, single = condition.name, condition.clouds == "inferred"
     everyone = [e for e in methods() if name in SLOW.get(e.method, CONDITIONS)]
     forward = [e for e in everyone if condition.overlap is None or e.method in OVERLAPPING]
-    forward += methods("plane") if not single or name == "easy" else ()
+    forward += methods("plane")
+    forward += (Entrant(PIXEL_PAIRS),) if single else ()
     forward += ablations("point" if single else "plane") if name in ABLATED else ()
     forward += peers()
-    back = [e for e in everyone if e.method in REVERSED] if name in BOTH_DIRECTIONS else []
-    if name in ABLATED and not single:
-        back = [Entrant("ceicp-a", "plane")]
+    back = [e for e in forward if e.name in REVERSED and condition.overlap is None]
     return (
         *(("q2p", tuned(entrant)) for entrant in forward),
         *(("p2q", tuned(entrant)) for entrant in back),

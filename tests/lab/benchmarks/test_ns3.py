@@ -81,6 +81,19 @@ def test_ns3_is_counted_by_payload_and_by_packets(interpreter):
     assert runs == {("ieee80211b", 3, strict): expected for strict in (False, True)}
 
 
+def test_a_module_beside_the_script_does_not_hide_ns3(tmp_path, monkeypatch):
+    """As ``lab/benchmarks/ns3.py`` did, so that ``from ns import ns`` found no ns-3."""
+    (tmp_path / "ns3.py").touch()
+    (tmp_path / "runs.py").write_text(
+        "import importlib.util, json, os\n"
+        "found = importlib.util.find_spec('ns3')\n"
+        "beside = found is not None and os.path.dirname(found.origin) == os.path.dirname(__file__)\n"
+        "print(json.dumps(dict(runs=[], constants=dict(beside=beside))))\n"
+    )
+    monkeypatch.setattr(peer, "RUNS", tmp_path / "runs.py")
+    assert peer.run_ns3(sys.executable, {}, 1.0) == ({}, {"beside": False})
+
+
 def test_what_went_wrong_in_ns3_is_told(interpreter):
     with pytest.raises(PacketMeshError, match="no such channel"):
         peer.run_ns3(interpreter(FAILS), SATURATED, 1.0)

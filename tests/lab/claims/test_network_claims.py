@@ -34,11 +34,11 @@ def of_case(images, coverage=0.9, requests=0.0, summaries=1000.0):
     }
 
 
-def as_expected():
-    """What SPEC 6.2 says of the schemes without a radio, roughly."""
+def as_claimed():
+    """What the thesis says of the schemes, GREEDY's wider coverage included."""
     cases = {}
     for n in study.OBJECTS:
-        cases[study.Case("baseline", n)] = of_case(30.0 * n, 0.97)
+        cases[study.Case("baseline", n)] = of_case(30.0 * n, 0.85)
         cases[study.Case("pdc", n)] = of_case(20.0 * n, 0.8)
         cases[study.Case("greedy", n)] = of_case(10.0 * n, 0.9, 800.0)
     for k, images in ((3, 80.0), (5, 130.0), (10, 250.0), (20, 317.0)):
@@ -142,7 +142,7 @@ def test_small_runs_of_the_street_come_back_by_case(tmp_path):
 
 
 def test_the_street_s_claims_follow_its_numbers():
-    found = fake(as_expected())
+    found = fake(as_claimed())
     by_id = {claim.id: claim for claim in street.CLAIMS}
     for name in ("C33", "C34", "C35"):
         outcome = by_id[name].experiment(found)
@@ -150,6 +150,10 @@ def test_the_street_s_claims_follow_its_numbers():
         assert outcome.exhibits
     fewer = found | fake({study.Case("baseline", 120): of_case(1.0)})
     assert not by_id["C34"].experiment(fewer).reproduced
+    narrower = found | fake({study.Case("greedy", 120): of_case(1200.0, 0.84, 800.0)})
+    outcome = by_id["C34"].experiment(narrower)
+    assert not outcome.reproduced
+    assert "GREEDY covers more than BASELINE with 4 of 5 numbers of vehicles" in outcome.why
     louder = found | fake({study.Case("pdc", 40): of_case(800.0, summaries=1030.0)})
     assert not by_id["C35"].experiment(louder).reproduced
     short = found | {study.Case("pdc", 40): found[study.Case("pdc", 40)][:4]}

@@ -8,6 +8,7 @@ import pytest
 from lab.results.markdown import change, listed, pivot, table, text
 from lab.results.pages import README, RESULTS, readme, readme_results, results_page
 from lab.results.record import read_records
+from lab.results.tables import losses
 
 RECORDS = read_records()
 DECIMAL = re.compile(r"\d+\.\d+")
@@ -86,3 +87,21 @@ def test_a_pivot_leaves_what_was_not_run_empty():
         "| ours | 1 | 3 |",
         "| theirs | 2 | – |",
     ]
+
+
+def test_a_loss_is_told_of_the_metric_that_lost():
+    medians = {
+        "icp": {"a": "1.00 (0%)", "b": "5.00 (0%)"},
+        "ceicp-a": {"a": "2.00 (0%)", "b": "4.00 (0%)"},
+        "ceicp-a plane": {"b": "6.00 (0%)"},
+    }
+    assert losses(medians, "icp") == ["a (1.00 against 2.00 cm)"]
+    assert losses(medians, "icp", "ceicp-a plane") == ["b (5.00 against 6.00 cm)"]
+
+
+def test_both_directions_have_a_table_and_their_losses():
+    page = results_page(RECORDS)
+    for direction in ("source to target (q2p)", "target to source (p2q)"):
+        part = page.partition(f"**Matched {direction}**")[2]
+        assert part.lstrip().startswith("| condition | icp |")
+        assert "icp-gated ends nearer to the truth than ceicp-a in: " in part

@@ -1,0 +1,63 @@
+"""The section about filling says what its record says, programs and sizes side by side."""
+
+from lab.results.pages import readme_results
+from lab.results.record import Record
+from lab.results.tables import filling
+
+
+def run(program, group, error):
+    return {
+        "program": program,
+        "group": group,
+        "abs_rel": error,
+        "abs_rel_ci95": [0.5 * error, 2.0 * error],
+        "excess_ci95": [-0.25 * error, 0.5 * error],
+        "close_share": 1.0 - error,
+    }
+
+
+RUNS = [
+    run(program, group, error * factor)
+    for group, error in (
+        ("rooms, hidden", 0.02),
+        ("rooms, disc of 10 px", 0.01),
+        ("rooms, disc of 120 px", 0.1),
+    )
+    for program, factor in (("packetmesh", 2.0), ("flat guess", 1.0), ("nearest", 3.0), ("inpaint-ns", 4.0))
+]
+NUMBERS = {
+    "depth": {
+        "ours_s": 0.25,
+        "peers": {"flat guess": 0.125},
+        "runs": [{"elapsed_s": 0.02, "rounds": 50}, *RUNS],
+    }
+}
+PAGE = filling(NUMBERS)
+
+
+def test_all_hole_pixels_are_the_headline_with_their_interval():
+    assert "| packetmesh | 0.0400 [0.0200, 0.0800] / 96.0 % |" in PAGE
+    assert "| flat guess | 0.0200 [0.0100, 0.0400] / 98.0 % |" in PAGE
+
+
+def test_the_best_is_named_even_if_it_is_not_ours():
+    assert "most pixels within 5 %: rooms, hidden: flat guess and flat guess." in PAGE
+
+
+def test_everybody_else_has_the_difference_to_ours():
+    assert "| flat guess | -0.0050 to +0.0100 |" in PAGE
+    assert PAGE.count("| packetmesh | ") == 3
+
+
+def test_sizes_stand_side_by_side():
+    assert "**Discs hidden: rooms**\n\n| program | 10 px | 120 px |" in PAGE
+    assert "| packetmesh | 0.0200 [0.0100, 0.0400] | 0.2000 [0.1000, 0.4000] |" in PAGE
+
+
+def test_the_readme_has_ours_the_flat_guess_and_the_best_of_the_rest():
+    record = Record("bench_depth", "c", "abc", "2026-01-01", {}, "a machine", NUMBERS)
+    (line,) = readme_results({"bench_depth": record})
+    assert line.endswith(
+        "rooms: ours 0.0400 [0.0200, 0.0800], a flat guess 0.0200 [0.0100, 0.0400], "
+        "nearest 0.0600 [0.0300, 0.1200]."
+    )
