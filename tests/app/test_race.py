@@ -17,6 +17,7 @@ from pipeline.sources import Demo, RigFolder
 
 SPEC = Spec(Demo("box-on-table"))
 SLIGHT = Race(start=Start.towards(3.0, 6.0, seed=0))
+MAPPED = replace(SLIGHT, rivals=(("icp", "point"), ("ceicp-a", "plane")))
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +128,7 @@ def test_a_method_that_finds_no_pair_stays_at_its_start(store):
 
 @pytest.fixture(scope="module")
 def capture(store):
-    return end(capture_job(store, SPEC, SLIGHT))
+    return end(capture_job(store, SPEC, MAPPED))
 
 
 def test_the_capture_range_has_a_cell_for_every_start_and_tells_methods_apart(capture):
@@ -139,7 +140,7 @@ def test_the_capture_range_has_a_cell_for_every_start_and_tells_methods_apart(ca
 
 
 def test_the_capture_range_is_the_same_again_and_from_any_start(capture, tmp_path):
-    again = end(capture_job(Store(str(tmp_path)), SPEC, replace(SLIGHT, start=Start())))
+    again = end(capture_job(Store(str(tmp_path)), SPEC, replace(MAPPED, start=Start())))
     np.testing.assert_array_equal(again.errors_m, capture.errors_m)
 
 

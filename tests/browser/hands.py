@@ -12,7 +12,7 @@ TEXTS = {
     "Scene": "Each camera node delivers",
     "Calibrate": "Photographs of a board of known size",
     "Depth": "points the sensor measured",
-    "Fuse": "move the orange cloud",
+    "Fuse": "Each lane moves the same cloud",
     "Surface": "A ball rolls over the points",
     "Network": "by radio, packet by packet",
     "Export": "Take it along",

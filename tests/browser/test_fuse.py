@@ -46,7 +46,7 @@ def test_two_methods_race_by_default_and_ceicp_arrives(fuse):
 
 def test_a_third_method_gets_a_lane_a_column_and_room(fuse):
     before, picture = numbers(fuse, "End error"), canvas(fuse)
-    unfold(fuse, "More methods, nodes and pairs")
+    unfold(fuse, "Methods, nodes and pairs")
     pick(fuse, "Method ③", "FICP, plane")
     assert len(await_change(fuse, "End error", before)) == 3
     fuse.get_by_text("③ FICP plane").first.wait_for()
@@ -89,7 +89,7 @@ def test_the_player_counts_milliseconds(fuse):
 
 def test_the_histogram_moves_with_the_player(fuse):
     fuse.get_by_role("tab", name="Pairs").click()
-    pick(fuse, "Lane", "② CEICP-A plane")
+    pick(fuse, "Lane", "② CEICP-A point")
     sigma = fuse.get_by_text(re.compile("kernel f, σ = "))
     first = sigma.inner_text()
     fuse.get_by_role("button", name="Step", exact=True).click()
@@ -135,7 +135,7 @@ def test_the_capture_map_is_computed_and_a_cell_starts_a_race(fuse):
 
 
 def test_the_map_can_be_stopped(fuse):
-    unfold(fuse, "More methods, nodes and pairs")
+    unfold(fuse, "Methods, nodes and pairs")
     pick(fuse, "Method ③", "CEICP-A, point")
     fuse.get_by_text("③ CEICP-A point").first.wait_for()
     unfold(fuse, "Capture range")

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.drawing.colors import css
 from app.drawing.curves import Curves
 from app.screens.fuse.draw import MARKS
 from app.screens.fuse.histogram import HistogramChart
+from app.screens.fuse.labels import MOST_LANES
+from app.screens.fuse.methods import color_of
 from app.screens.fuse.player import RaceClock
 from app.screens.fuse.view import RaceView
 from app.ui import Ui
 
 FIRST = f"{MARKS[0]} first"
-LANES = (("#5b6570", ()), ("#009e73", ()), ("#cc6699", (7, 3)), ("#7a4a00", (2, 3)))
-"""Colour and dashes of the first to the fourth method: grey, green, pink and brown."""
 
 
 class RaceCharts:
@@ -25,12 +26,12 @@ class RaceCharts:
         self._rows: tuple[int, ...] = ()
         tabs = gui.add_tab_group()
         with tabs.add_tab("Error"):
-            self._error = Curves(gui, "error, cm", LANES, 0.1)
+            self._error = Curves(gui, "error, cm", MOST_LANES, 0.1)
             self._unknown = gui.add_markdown("The truth of this scene is not known.", visible=False)
         with tabs.add_tab("RMSE"):
-            self._rmse = Curves(gui, "RMSE, cm", LANES, 0.1)
+            self._rmse = Curves(gui, "RMSE, cm", MOST_LANES, 0.1)
         with tabs.add_tab("Entropy"):
-            self._entropy = Curves(gui, "entropy, nat", LANES, 1.0)
+            self._entropy = Curves(gui, "entropy, nat", MOST_LANES, 1.0)
             self._without = gui.add_markdown("None of these methods has an entropy.", visible=False)
         with tabs.add_tab("Pairs"):
             self._lane = gui.add_dropdown("Lane", [FIRST], hint="Method whose pairs are counted.")
@@ -42,12 +43,13 @@ class RaceCharts:
         """Show another race, or the same by another clock."""
         self._view = view
         lanes = view.lanes
+        colors = [css(color_of(lane.rival)) for lane in lanes]
         entropies = [np.array([step.entropy_nat for step in lane.steps]) for lane in lanes]
         errors = [np.array([_cm(step.point_error_m) for step in lane.steps]) for lane in lanes]
         rmses = [np.array([_cm(step.rmse_m) for step in lane.steps]) for lane in lanes]
         ends, label = (0.0, float((clock.length - 1) * clock.unit or 1)), clock.label
         for chart, values in ((self._error, errors), (self._rmse, rmses), (self._entropy, entropies)):
-            chart.load(list(zip(clock.xs, values, strict=True)), ends, label)
+            chart.load(list(zip(clock.xs, values, strict=True)), colors, ends, label)
         self._unknown.visible = not view.has_truth
         self._without.visible = not np.isfinite(np.concatenate(entropies)).any()
         names = tuple(f"{MARKS[index]} {lane.label}" for index, lane in enumerate(lanes))
@@ -85,7 +87,7 @@ def _cm(value_m: float | None) -> float:
 def legend(view: RaceView) -> str:
     """The lanes with the colours of their curves."""
     names = " &emsp; ".join(
-        f"<b style='color:{color}; white-space: nowrap'>{mark} {lane.label}</b>"
-        for mark, (color, _), lane in zip(MARKS, LANES, view.lanes, strict=False)
+        f"<b style='color:{css(color_of(lane.rival))}; white-space: nowrap'>{mark} {lane.label}</b>"
+        for mark, lane in zip(MARKS, view.lanes, strict=False)
     )
     return f"<div style='padding: 0 0.8em 0.5em; font-size: 13px'>{names}</div>"

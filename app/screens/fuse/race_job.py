@@ -6,9 +6,12 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from app.records import sample
+from app.screens.fuse.distances import Distances, shades_of
 from app.screens.fuse.job import true_pose
+from app.screens.fuse.methods import label_of
 from app.screens.fuse.view import PairHistogram, Race, RaceLane, RaceStep, RaceView, Rival, Start
 from app.state import Spec
 from app.store import Store
@@ -22,7 +25,8 @@ from pipeline.registration.degradation import Degradation, degrade
 from pipeline.spec import key
 from pipeline.types import FloatArray, PointCloud, RegistrationStep, Rig
 
-LANE_POINTS = 15_000
+LANE_POINTS = 10_000
+"""Of each of the two clouds of a lane."""
 DRAWN_PAIRS = 250
 BINS = 60
 MOST_BINNED_M = 1.0
@@ -65,17 +69,20 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
         contest = contest_of(rig, nodes, race)
         runs = []
         for index, rival in enumerate(race.rivals):
-            yield Progress(f"race: {label_of(rival)}", index / len(race.rivals))
+            yield Progress(f"race: {label_of(rival)}", 0.9 * index / len(race.rivals))
             runs.append(_run(contest, race, rival, spec.config.node_registration))
         edges_m = _edges_m([run.records for run in runs])
         staying = race.source if race.mode == "inferred" else race.target
+        source = sample(contest.source.points_m, contest.source.colors, LANE_POINTS)
+        distances = Distances(source.points_m, contest.T_true, cKDTree(contest.target.points_m))
+        yield Progress("race: distances", 0.9)
         return RaceView(
-            source=sample(contest.source.points_m, contest.source.colors, LANE_POINTS),
+            source=source,
             target=sample(contest.target.points_m, contest.target.colors, LANE_POINTS),
             T_world_target=rig.frames[staying].T_world_camera,
             center_m=contest.center_m,
             edges_m=edges_m,
-            lanes=tuple(_lane(contest, run, edges_m) for run in runs),
+            lanes=tuple(_lane(contest, run, edges_m, distances) for run in runs),
         )
 
     return (yield from store.remember(("race", *race_key(spec), race), run))
@@ -128,11 +135,6 @@ def config_of(race: Race, rival: Rival, config: RegistrationConfig) -> Registrat
     )
 
 
-def label_of(rival: Rival) -> str:
-    """What to call it."""
-    return f"{rival[0].upper()} {rival[1]}"
-
-
 def _every(points_m: FloatArray, most: int) -> FloatArray:
     """About ``most`` of the points, evenly spaced in their order."""
     return points_m[:: max(1, len(points_m) // most)]
@@ -165,14 +167,15 @@ def _edges_m(runs: Sequence[Sequence[RegistrationStep]]) -> FloatArray:
     return np.linspace(0.0, min(max([0.1, *reaches_m]), MOST_BINNED_M), BINS + 1)
 
 
-def _lane(contest: Contest, run: _Run, edges_m: FloatArray) -> RaceLane:
+def _lane(contest: Contest, run: _Run, edges_m: FloatArray, distances: Distances) -> RaceLane:
     steps, T, time_s = [], run.T_start, 0.0
     for record, done_s in zip(run.records, run.seconds, strict=True):
-        steps.append(_race_step(record, T, time_s, contest, edges_m))
+        steps.append(_race_step(record, T, time_s, contest, edges_m, distances))
         T, time_s = record.T_target_source, float(done_s)
-    steps.append(_end_step(steps[-1] if steps else None, T, time_s, contest))
+    steps.append(_end_step(steps[-1] if steps else None, T, time_s, contest, distances))
     moved_m = geometry.apply(T, _every(contest.source.points_m, HAUSDORFF_POINTS))
     return RaceLane(
+        rival=run.rival,
         label=label_of(run.rival),
         kernel=run.rival[0] in KERNEL_METHODS,
         steps=tuple(steps),
@@ -185,8 +188,14 @@ def _lane(contest: Contest, run: _Run, edges_m: FloatArray) -> RaceLane:
 
 
 def _race_step(
-    record: RegistrationStep, T: FloatArray, time_s: float, contest: Contest, edges_m: FloatArray
+    record: RegistrationStep,
+    T: FloatArray,
+    time_s: float,
+    contest: Contest,
+    edges_m: FloatArray,
+    distances: Distances,
 ) -> RaceStep:
+    distances_m, gap_m = distances.at(T)
     rows = np.unique(np.linspace(0, len(record.pairs) - 1, min(DRAWN_PAIRS, len(record.pairs))).astype(int))
     pairs, weights = record.pairs[rows], record.weights[rows]
     return RaceStep(
@@ -198,12 +207,17 @@ def _race_step(
         rmse_m=record.rmse_m,
         entropy_nat=record.entropy_nat,
         point_error_m=contest.error_m(T),
+        gap_m=gap_m,
+        shades=shades_of(distances_m),
         histogram=_histogram(record, edges_m),
     )
 
 
-def _end_step(last: RaceStep | None, T: FloatArray, time_s: float, contest: Contest) -> RaceStep:
+def _end_step(
+    last: RaceStep | None, T: FloatArray, time_s: float, contest: Contest, distances: Distances
+) -> RaceStep:
     """The pose after the last update, with the numbers of the last matching."""
+    distances_m, gap_m = distances.at(T)
     nothing, unknown = np.empty((0, 3), np.float32), float("nan")
     histogram = PairHistogram(np.zeros(BINS, int), np.full(BINS, np.nan), unknown)
     return RaceStep(
@@ -215,6 +229,8 @@ def _end_step(last: RaceStep | None, T: FloatArray, time_s: float, contest: Cont
         rmse_m=unknown if last is None else last.rmse_m,
         entropy_nat=unknown if last is None else last.entropy_nat,
         point_error_m=contest.error_m(T),
+        gap_m=gap_m,
+        shades=shades_of(distances_m),
         histogram=histogram if last is None else last.histogram,
     )
 
