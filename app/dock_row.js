@@ -40,6 +40,7 @@ window.packetmeshDockRow ??= (() => {
         const used = document.activeElement;
         this.home()?.append(this.row);
         requestAnimationFrame(() => used?.scrollIntoView({block: "center"})); // the panel is lower now
+        this.came?.();
       }
       else {
         this.row.remove();

@@ -11,6 +11,7 @@
       this.row.className = "packetmesh-board";
       this.row.removeAttribute("tabindex");
       this.lanes = [];
+      this.scores = [];
     }
 
     // It lies over the picture.
@@ -31,6 +32,7 @@
       make("span", "", legend, {textContent: scale.ends[1]});
       make("b", "", legend);
       make("span", "", legend, {textContent: scale.target});
+      this.state({lanes: this.scores});
     }
 
     addLane({name, color, about, source}) {
@@ -52,6 +54,7 @@
     }
 
     state({lanes}) {
+      this.scores = lanes;
       this.lanes.forEach((lane, index) => {
         const said = lanes[index];
         if (!said) return;

@@ -15,7 +15,8 @@ from typing import Any
 from app.dock_row import add_hidden
 from app.drawing.colors import DISTANCE_STOPS, MOST_DISTANCE_M, css
 from app.page import running
-from app.screens.fuse.draw import BAND, MARKS
+from app.screens.fuse.draw import BAND
+from app.screens.fuse.labels import MARKS
 from app.screens.fuse.methods import METHODS, METRICS, color_of
 from app.screens.fuse.view import SUCCESS_M, RaceLane, RaceStep, RaceView
 from app.tables import UNKNOWN
@@ -110,7 +111,6 @@ def score(lane: RaceLane, row: int) -> dict[str, str]:
 
 def distance_text(step: RaceStep) -> tuple[str, str]:
     """How far off a step is, and the unit: from the truth (RMS), or else from the nearest points (median)."""
-    distance_m = step.gap_m if step.point_error_m is None else step.point_error_m
-    if distance_m != distance_m:
+    if step.off_m != step.off_m:
         return UNKNOWN, ""
-    return f"{100.0 * distance_m:.{2 if distance_m < 0.01 else 1}f}", "cm"
+    return f"{100.0 * step.off_m:.{2 if step.off_m < 0.01 else 1}f}", "cm"

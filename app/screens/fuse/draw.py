@@ -28,7 +28,6 @@ BAND = (0.26, 0.97)
 """Where in the picture the clouds are, in its height from the top; above is the board."""
 ROOM = 1.08
 """Width of a lane over that of its clouds, and height of the band over theirs."""
-MARKS = "①②③④"
 
 
 class RaceDrawing:

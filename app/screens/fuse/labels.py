@@ -34,3 +34,5 @@ COMPARISONS: dict[str, tuple[Rival, ...]] = {
 """Races that tell apart what the weights do, what the metric does, and both."""
 NOBODY = "none"
 MOST_LANES = 4
+MARKS = "①②③④"
+"""Of the lanes."""

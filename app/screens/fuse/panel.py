@@ -7,6 +7,7 @@ from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any, ClassVar, TypeAlias, get_args
 
+import numpy as np
 import viser
 
 from app.controls import Choice, Controls
@@ -18,8 +19,8 @@ from app.records import DepthView
 from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
-from app.screens.fuse.draw import MARKS, RaceDrawing, gizmo_pose
-from app.screens.fuse.labels import MODES
+from app.screens.fuse.draw import RaceDrawing, gizmo_pose
+from app.screens.fuse.labels import MARKS, MODES
 from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.numbers import places_table, race_table, verdict
 from app.screens.fuse.player import RacePlayer
@@ -30,9 +31,11 @@ from app.ui import Panel
 from pipeline.config import Method
 
 TEXT = """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
-are how far every point is from where it belongs. Press **Play**, then ask what made the difference."""
+are how far every point is from where it belongs. **Play** below (space), then compare what made the
+difference."""
 SINGLE = """This scene has a single node: no other node to find its place beside. What races here is its
 inferred cloud, onto what its sensor measured."""
+RUNNING = "Who comes nearer? At the end of the race its numbers are here."
 RACES = {f"race: {name}": mode for name, mode in MODES.items()}
 RACE_NAMES = {mode: name for name, mode in RACES.items()}
 RESULT, BEFORE = "result", "before registration"
@@ -76,6 +79,8 @@ class FusePanel(Panel):
         self._framed: tuple[float, ...] = ()
         self._fov_rad: float | None = None
         self._here = False
+        self._seen: tuple[int, ...] = ()
+        """The step of each lane that is shown."""
         self._placed: list[viser.PointCloudHandle] = []
         gui.add_markdown(TEXT)
         self._single = gui.add_markdown(SINGLE, visible=False)
@@ -98,6 +103,7 @@ class FusePanel(Panel):
         with gui.add_folder("Methods, nodes and pairs", expand_by_default=False):
             self._setup.add_methods([f"Method {mark}" for mark in MARKS])
             self._setup.add_nodes()
+            self._player.add_axis()
         with gui.add_folder("Start by hand", expand_by_default=False):
             self._dragging = gui.add_checkbox(
                 "Drag",
@@ -108,8 +114,6 @@ class FusePanel(Panel):
             self._setup.add_numbers()
         with gui.add_folder("Make the moving cloud worse", expand_by_default=False):
             self._setup.add_degradations()
-        with gui.add_folder("Axis, speed and loop", expand_by_default=False):
-            self._player.add_options()
         self._capture = CaptureFolder(self.ui, self._map, session.cancel_side_job, self._picked_cell)
         with gui.add_folder("Chain", expand_by_default=False):
             self._controls = Controls(self.ui, ADVANCED, session.spec.config, session.edit)
@@ -132,13 +136,13 @@ class FusePanel(Panel):
     def on_show(self) -> None:
         """Start the race if none has run yet."""
         self._here, self._framed = True, ()
-        self._board.show(self._racing)
+        self._show_parts()
         self._start()
 
     def on_hide(self) -> None:
         """Leave the picture to others, seen as they see it."""
         self._here = False
-        self._board.show(False)
+        self._show_parts()
         self._widen()
 
     # What races.
@@ -226,28 +230,36 @@ class FusePanel(Panel):
         with self.ui.atomic():
             self._drawing = RaceDrawing(self.scene, "/fuse/race", view, self._stage())
             self._gizmo = None
-            self._framed = ()
+            self._framed, self._seen = (), ()
             self._place_gizmo()
             self._board.load(view)
-            self._verdict.content = verdict(view.lanes)
-            self._table.content = race_table(view.lanes)
-            self._player.load_race(view.lanes)
+            self._verdict.content, self._table.content = RUNNING, ""
+            self._player.load(view.lanes)
             self._player.seek_at(self._seek_at)
             self._seek_at = 0
             self._arrange()
+
+    def _show_parts(self) -> None:
+        """Have board and dock there while a race is shown, and only then."""
+        self._board.show(self._racing and self._here)
+        self._player.show(self._racing and self._here)
 
     def _clocked(self) -> None:
         if self._view is not None and self._player.clock is not None:
             self._charts.load(self._view, self._player.clock)
 
-    def _moved(self, at: int) -> None:
+    def _moved(self, now_ns: int) -> None:
         clock = self._player.clock
-        if self._drawing is None or clock is None:
+        if self._drawing is None or clock is None or clock.rows(now_ns) == self._seen:
             return
+        self._seen = clock.rows(now_ns)
         with self.ui.atomic():
-            self._drawing.show(clock.rows(at))
-            self._board.mark(clock.rows(at))
-            self._charts.mark(float(at * clock.unit), clock.rows(at))
+            self._drawing.show(self._seen)
+            self._board.mark(self._seen)
+            self._charts.mark(float(clock.shown(np.array(now_ns))), self._seen)
+            if now_ns >= clock.end_ns and self._view is not None:
+                self._verdict.content = verdict(self._view.lanes)
+                self._table.content = race_table(self._view.lanes)
 
     # The gizmo.
 
@@ -270,7 +282,8 @@ class FusePanel(Panel):
             self._drawing.preview(self._drawn, start)
             self._setup.write_start(start)
         if ended and not self._start():
-            self._moved(self._player.position)
+            self._seen = ()
+            self._moved(self._player.now_ns)
 
     # The capture range.
 
@@ -329,7 +342,7 @@ class FusePanel(Panel):
     def _arrange(self) -> None:
         """Show the race or the nodes in one of their two places."""
         racing = self._racing
-        self._board.show(racing and self._here)
+        self._show_parts()
         for name, visible in (("/fuse/race", racing), ("/fuse/result", not racing)):
             frame = self.scene.get_handle_by_name(name)
             if frame is not None:

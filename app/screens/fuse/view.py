@@ -132,6 +132,11 @@ class RaceStep:
     that is not known: 0 to 255 for none to ``MOST_DISTANCE_M`` and beyond."""
     histogram: PairHistogram
 
+    @property
+    def off_m(self) -> float:
+        """How far off it is: from the truth, or else from the other cloud."""
+        return self.gap_m if self.point_error_m is None else self.point_error_m
+
 
 @dataclass(frozen=True, slots=True)
 class RaceLane:
