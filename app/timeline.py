@@ -245,10 +245,16 @@ class CurvesLane:
     """Curves, each on a scale of its own; beside them what they are at the clock."""
 
     def __init__(
-        self, title: str, curves: Sequence[Curve], height_px: int = 60, veil: float = FAINT_VEIL
+        self,
+        title: str,
+        curves: Sequence[Curve],
+        height_px: int = 60,
+        veil: float = FAINT_VEIL,
+        titled: bool = False,
     ) -> None:
-        """Show curves in so many pixels, veiled so much after the clock."""
+        """Show curves in so many pixels, veiled so much after the clock; ``titled`` writes the title, too."""
         self.title, self.height_px, self.veil, self._curves = title, height_px, veil, tuple(curves)
+        self._titled = titled
         self.legend: Sequence[tuple[str, Color]] = tuple((curve.name, curve.color) for curve in curves)
 
     def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
@@ -263,11 +269,13 @@ class CurvesLane:
 
     def labels(self, now_ns: int) -> Sequence[Label]:
         """Name and value of each curve."""
-        gap_px = self.height_px / (len(self._curves) + 1)
-        return [
-            Label((index + 1) * gap_px, curve.text(now_ns), curve.color)
+        title_px = NAME_PX if self._titled else 0
+        gap_px = (self.height_px - title_px) / (len(self._curves) + 1)
+        curves = [
+            Label(title_px + (index + 1) * gap_px, curve.text(now_ns), curve.color)
             for index, curve in enumerate(self._curves)
         ]
+        return [Label(0.5 * NAME_PX, self.title), *curves] if self._titled else curves
 
     def words(self, start_ns: int, end_ns: int, width_px: int) -> Sequence[Word]:
         """None."""

@@ -52,4 +52,5 @@ def test_the_curves_tell_the_distance_at_the_clock_and_hide_what_is_to_come():
     clock = RaceClock.of([SHORT, LONG], in_ms=False)
     curves = error_lane([SHORT, LONG], clock)
     assert curves.veil == 1.0
-    assert [label.text.split()[-2:] for label in curves.labels(3 * COUNT_NS)] == [["6", "cm"], ["1", "cm"]]
+    said = [label.text for label in curves.labels(3 * COUNT_NS)]
+    assert said == ["distance from the truth", "① 6 cm", "② 1 cm"]

@@ -2,8 +2,23 @@
 (() => {
   if (window.packetmeshBoards?.made) return;
 
+  const RULER_CM = 10;
+  const DOT_CM = 0.35;
   const boards = new Map();
   const {DockRow, make} = window.packetmeshDockRow;
+
+  const bytes = text => Uint8Array.from(atob(text), one => one.charCodeAt(0));
+
+  // As many colours as shades, between stops at equal steps.
+  function palette(stops) {
+    const channels = stops.map(stop => [1, 3, 5].map(at => parseInt(stop.slice(at, at + 2), 16)));
+    return Array.from({length: 256}, (_, shade) => {
+      const at = shade / 255 * (stops.length - 1);
+      const low = Math.min(Math.floor(at), stops.length - 2);
+      const mixed = channels[low].map((one, index) => one + (at - low) * (channels[low + 1][index] - one));
+      return `rgb(${mixed.map(Math.round).join(", ")})`;
+    });
+  }
 
   class Board extends DockRow {
     constructor(name) {
@@ -19,11 +34,13 @@
       return document.querySelector("canvas[data-engine]")?.parentElement.parentElement;
     }
 
-    setup({visible, top, lanes, scale}) {
+    setup({visible, lens, bottom, lanes, scale}) {
       this.wanted = visible;
       this.row.replaceChildren();
       this.row.style.setProperty("--lanes", Math.max(lanes.length, 1));
-      this.row.style.setProperty("--top", `${100 * top}%`);
+      this.row.style.setProperty("--lens", `${100 * (1 - bottom)}%`);
+      this.lens = lens && {...lens, target: bytes(lens.target)};
+      this.colors = palette(scale.stops);
       this.lanes = lanes.map(lane => this.addLane(lane));
       const legend = make("div", "scale", this.row);
       make("span", "", legend, {textContent: scale.text});
@@ -50,7 +67,40 @@
       make("p", "", answer, {textContent: about});
       make("p", "source", answer, {textContent: source});
       ask.addEventListener("click", () => { answer.hidden = !answer.hidden; });
-      return {head, value, unit, note};
+      const glass = this.lens ? make("canvas", "lens", lane) : null;
+      const made = {head, value, unit, note, glass, seen: new Uint8Array()};
+      if (glass) new ResizeObserver(() => this.drawLens(made)).observe(glass);
+      return made;
+    }
+
+    // The corner that the ring marks, cut across: what stays in grey, what moves in the colours of the scale.
+    drawLens({glass, seen}) {
+      const sharp = window.devicePixelRatio;
+      const [width, height] = [glass.clientWidth, glass.clientHeight];
+      Object.assign(glass, {width: width * sharp, height: height * sharp});
+      const pen = glass.getContext("2d");
+      pen.scale(sharp, sharp);
+      const cm = Math.max(width, height) / this.lens.window;
+      const size = Math.max(DOT_CM * cm, 2);
+      const dot = (column, row, color) => {
+        pen.fillStyle = color;
+        const [x, y] = [column, row].map(place => (place / 255 - 0.5) * this.lens.window * cm);
+        pen.fillRect(width / 2 + x - size / 2, height / 2 + y - size / 2, size, size);
+      };
+      const {target} = this.lens;
+      for (let at = 0; at < target.length; at += 2) dot(target[at], target[at + 1], "#78828c");
+      for (let at = 0; at < seen.length; at += 3) dot(seen[at], seen[at + 1], this.colors[seen[at + 2]]);
+      pen.fillStyle = "rgba(255, 255, 255, 0.85)";
+      pen.fillRect(0, height - 44, RULER_CM * cm + 24, 44);
+      pen.fillRect(0, 0, width, 24);
+      pen.fillStyle = "#111";
+      pen.font = "13px system-ui, sans-serif";
+      pen.fillText("the ringed edge, cut across", 10, 17, width - 20);
+      const [left, base, long] = [12, height - 12, RULER_CM * cm];
+      for (const [x, y, wide, high] of [[left, base - 2, long, 4], [left, base - 7, 3, 14], [left + long - 3, base - 7, 3, 14]])
+        pen.fillRect(x, y, wide, high);
+      pen.font = "700 16px system-ui, sans-serif";
+      pen.fillText(`${RULER_CM} cm`, left + 8, base - 8);
     }
 
     state({lanes}) {
@@ -62,6 +112,8 @@
         lane.unit.textContent = said.unit;
         lane.note.textContent = said.note;
         lane.head.dataset.state = said.state;
+        lane.seen = bytes(said.lens);
+        if (lane.glass) this.drawLens(lane);
       });
     }
   }

@@ -6,6 +6,7 @@ of HTML, each of which says all of its part.
 
 from __future__ import annotations
 
+import base64
 import json
 import uuid
 from collections.abc import Sequence
@@ -18,9 +19,10 @@ from app.page import running
 from app.screens.fuse.draw import BAND
 from app.screens.fuse.labels import MARKS
 from app.screens.fuse.methods import METHODS, METRICS, color_of
-from app.screens.fuse.view import SUCCESS_M, RaceLane, RaceStep, RaceView
+from app.screens.fuse.view import SUCCESS_M, LensView, RaceLane, RaceStep, RaceView
 from app.tables import UNKNOWN
 from app.ui import Ui
+from pipeline.types import ByteArray
 
 _SCRIPT, _STYLE = (Path(__file__).with_suffix(kind).read_text(encoding="utf-8") for kind in (".js", ".css"))
 
@@ -53,7 +55,8 @@ class Board:
     def mark(self, rows: Sequence[int]) -> None:
         """Say how far off every lane is at one of its steps."""
         if self._view is not None:
-            said = [score(lane, row) for lane, row in zip(self._view.lanes, rows, strict=True)]
+            seen = list(zip(self._view.lanes, rows, strict=True))
+            said = [{**score(lane, row), "lens": _bytes(lane.steps[row].lens)} for lane, row in seen]
             self._tell(self._state, kind="state", lanes=said)
 
     def _send_setup(self) -> None:
@@ -62,7 +65,8 @@ class Board:
             self._setup,
             kind="setup",
             visible=self._visible and bool(lanes),
-            top=BAND[0],
+            lens=None if self._view is None or self._view.lens is None else _lens(self._view.lens),
+            bottom=BAND[1],
             lanes=[_head(mark, lane) for mark, lane in zip(MARKS, lanes, strict=False)],
             scale=scale(self._view is not None and self._view.has_truth),
         )
@@ -84,6 +88,15 @@ def _head(mark: str, lane: RaceLane) -> dict[str, str]:
     }
 
 
+def _lens(lens: LensView) -> dict[str, Any]:
+    """The magnified corner, without what moves."""
+    return {"window": 100.0 * lens.window_m, "target": _bytes(lens.target)}
+
+
+def _bytes(rows: ByteArray) -> str:
+    return base64.b64encode(rows.tobytes()).decode()
+
+
 def scale(has_truth: bool) -> dict[str, Any]:
     """What the colours of the moving cloud mean."""
     return {
@@ -102,9 +115,9 @@ def score(lane: RaceLane, row: int) -> dict[str, str]:
     if ended and step.point_error_m is not None:
         arrived = step.point_error_m < SUCCESS_M
         state = "arrived" if arrived else "missed"
-        note = f"{'✓ arrived' if arrived else '✗ not there'} after {lane.iterations}"
+        note = f"{'✓ arrived' if arrived else '✗ not there'} after {lane.iterations} iterations"
     elif ended:
-        note = f"stopped after {lane.iterations}"
+        note = f"stopped after {lane.iterations} iterations"
     of = "off" if step.point_error_m is not None else "to the nearest point"
     return {"number": number, "unit": f"{unit} {of}", "note": note, "state": state}
 

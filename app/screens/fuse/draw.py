@@ -14,7 +14,7 @@ from app.drawing.cameras import Stage, turn
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import DISTANCE_STOPS, NEUTRAL, ramp
 from app.drawing.poses import move, place
-from app.screens.fuse.view import RaceStep, RaceView, Start
+from app.screens.fuse.view import LensView, RaceStep, RaceView, Start
 from pipeline.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.types import ByteArray, FloatArray
 
@@ -24,9 +24,11 @@ PALETTE = ramp(np.arange(256.0), 255.0, DISTANCE_STOPS)
 """RGB of every shade of a distance."""
 FOV_RAD = np.radians(25.0)
 """Of the view of a race: from afar all lanes are seen from the same side."""
-BAND = (0.26, 0.97)
-"""Where in the picture the clouds are, in its height from the top; above is the board."""
-ROOM = 1.08
+BAND, WHOLE_BAND = (0.17, 0.57), (0.17, 0.95)
+"""Where in the picture the clouds are, in its height from the top: above the magnified corner, or without."""
+RING, RING_PARTS = (20, 20, 20), 48
+"""Colour of the ring about what is magnified, and its parts."""
+ROOM = 1.14
 """Width of a lane over that of its clouds, and height of the band over theirs."""
 
 
@@ -37,6 +39,7 @@ class RaceDrawing:
         clear(scene, below)
         self._scene, self._below, self._view = scene, below, view
         self._extent = _extent_of(view, stage)
+        self._band = WHOLE_BAND if view.lens is None else BAND
         self._lanes: list[viser.FrameHandle] = []
         self._sources: list[viser.PointCloudHandle] = []
         self._pairs: list[viser.LineSegmentsHandle] = []
@@ -48,6 +51,8 @@ class RaceDrawing:
             self._sources.append(
                 add_cloud(scene, f"{name}/source", moving, first.T_target_source, size_m=POINT_M)
             )
+            if view.lens is not None:
+                self._add_ring(f"{name}/ring", view.lens)
             points, colors = pair_lines(first)
             self._pairs.append(
                 scene.add_line_segments(
@@ -55,16 +60,24 @@ class RaceDrawing:
                 )
             )
 
+    def _add_ring(self, name: str, lens: LensView) -> None:
+        """A circle about what is magnified, facing the viewer."""
+        angles = np.linspace(0.0, 2.0 * np.pi, RING_PARTS + 1)[:, None]
+        around = np.cos(angles) * self._extent.right + np.sin(angles) * self._extent.up
+        ring_m = lens.center_m + 0.5 * lens.window_m * around @ self._view.T_world_target[:3, :3]
+        parts_m = np.stack([ring_m[:-1], ring_m[1:]], axis=1).astype(np.float32)
+        self._scene.add_line_segments(name, parts_m, np.array(RING), thickness=4.0, thickness_units="screen")
+
     def look(self, clients: Iterable[viser.ClientHandle]) -> None:
         """Have all lanes side by side in the picture, each in the middle of its share of the width."""
-        extent, count = self._extent, len(self._lanes)
+        extent, count, (top, bottom) = self._extent, len(self._lanes), self._band
         for client in clients:
             aspect = client.camera.aspect
-            pitch_m = ROOM * max(extent.width_m, aspect * extent.height_m / (count * (BAND[1] - BAND[0])))
+            pitch_m = ROOM * max(extent.width_m, aspect * extent.height_m / (count * (bottom - top)))
             for frame, away in zip(self._lanes, _places(count), strict=True):
                 place(frame, rigid(np.eye(3), away * pitch_m * extent.right) @ self._view.T_world_target)
             height_m = count * pitch_m / aspect
-            at_m = extent.middle_m - (0.5 - 0.5 * (BAND[0] + BAND[1])) * height_m * extent.up
+            at_m = extent.middle_m - (0.5 - 0.5 * (top + bottom)) * height_m * extent.up
             with client.atomic():
                 client.camera.fov = FOV_RAD
                 turn(client, at_m, at_m - 0.5 * height_m / np.tan(0.5 * FOV_RAD) * extent.forward)

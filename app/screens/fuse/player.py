@@ -70,7 +70,9 @@ def error_lane(lanes: Sequence[RaceLane], clock: RaceClock) -> CurvesLane:
     offs_cm = [np.array([100.0 * step.off_m for step in lane.steps]) for lane in lanes]
     most_cm = max(1.0, *(float(np.nanmax(off_cm, initial=0.0)) for off_cm in offs_cm))
     curves = [
-        Curve(f"{mark} {lane.label}", "cm", color_of(lane.rival), steps_ns, off_cm, 0.0, 1.05 * most_cm)
+        Curve(mark, "cm", color_of(lane.rival), steps_ns, off_cm, 0.0, 1.05 * most_cm)
         for mark, lane, steps_ns, off_cm in zip(MARKS, lanes, clock.steps_ns, offs_cm, strict=False)
     ]
-    return CurvesLane("Distance", curves, LANE_PX, veil=1.0)
+    known = lanes[0].steps[0].point_error_m is not None
+    title = "distance from the truth" if known else "distance between the clouds"
+    return CurvesLane(title, curves, LANE_PX, veil=1.0, titled=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,6 +12,7 @@ from scipy.spatial import cKDTree
 from app.records import sample
 from app.screens.fuse.distances import Distances, shades_of
 from app.screens.fuse.job import true_pose
+from app.screens.fuse.lens import Lens, lens_of
 from app.screens.fuse.methods import label_of
 from app.screens.fuse.view import PairHistogram, Race, RaceLane, RaceStep, RaceView, Rival, Start
 from app.state import Spec
@@ -75,14 +77,16 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
         staying = race.source if race.mode == "inferred" else race.target
         source = sample(contest.source.points_m, contest.source.colors, LANE_POINTS)
         distances = Distances(source.points_m, contest.T_true, cKDTree(contest.target.points_m))
-        yield Progress("race: distances", 0.9)
+        yield Progress("race: a corner to magnify", 0.9)
+        lens = lens_of(contest.source.points_m, contest.target.points_m, contest.T_aligned, distances)
         return RaceView(
             source=source,
             target=sample(contest.target.points_m, contest.target.colors, LANE_POINTS),
             T_world_target=rig.frames[staying].T_world_camera,
             center_m=contest.center_m,
             edges_m=edges_m,
-            lanes=tuple(_lane(contest, run, edges_m, distances) for run in runs),
+            lens=None if lens is None else lens.view,
+            lanes=tuple(_lane(contest, run, Watch(edges_m, distances, lens)) for run in runs),
         )
 
     return (yield from store.remember(("race", *race_key(spec), race), run))
@@ -141,6 +145,22 @@ def _every(points_m: FloatArray, most: int) -> FloatArray:
 
 
 @dataclass(frozen=True, slots=True)
+class Watch:
+    """What is looked at in every step."""
+
+    edges_m: FloatArray
+    """(B + 1,) bins of the histogram."""
+    distances: Distances
+    lens: Lens | None
+
+    def seen(self, T_target_source: FloatArray) -> dict[str, Any]:
+        """What a ``RaceStep`` says of where the points are at a pose."""
+        distances_m, gap_m = self.distances.at(T_target_source)
+        lens = np.empty((0, 3), np.uint8) if self.lens is None else self.lens.at(T_target_source)
+        return {"gap_m": gap_m, "shades": shades_of(distances_m), "lens": lens}
+
+
+@dataclass(frozen=True, slots=True)
 class _Run:
     """What a rival did."""
 
@@ -167,12 +187,12 @@ def _edges_m(runs: Sequence[Sequence[RegistrationStep]]) -> FloatArray:
     return np.linspace(0.0, min(max([0.1, *reaches_m]), MOST_BINNED_M), BINS + 1)
 
 
-def _lane(contest: Contest, run: _Run, edges_m: FloatArray, distances: Distances) -> RaceLane:
+def _lane(contest: Contest, run: _Run, watch: Watch) -> RaceLane:
     steps, T, time_s = [], run.T_start, 0.0
     for record, done_s in zip(run.records, run.seconds, strict=True):
-        steps.append(_race_step(record, T, time_s, contest, edges_m, distances))
+        steps.append(_race_step(record, T, time_s, contest, watch))
         T, time_s = record.T_target_source, float(done_s)
-    steps.append(_end_step(steps[-1] if steps else None, T, time_s, contest, distances))
+    steps.append(_end_step(steps[-1] if steps else None, T, time_s, contest, watch))
     moved_m = geometry.apply(T, _every(contest.source.points_m, HAUSDORFF_POINTS))
     return RaceLane(
         rival=run.rival,
@@ -188,14 +208,8 @@ def _lane(contest: Contest, run: _Run, edges_m: FloatArray, distances: Distances
 
 
 def _race_step(
-    record: RegistrationStep,
-    T: FloatArray,
-    time_s: float,
-    contest: Contest,
-    edges_m: FloatArray,
-    distances: Distances,
+    record: RegistrationStep, T: FloatArray, time_s: float, contest: Contest, watch: Watch
 ) -> RaceStep:
-    distances_m, gap_m = distances.at(T)
     rows = np.unique(np.linspace(0, len(record.pairs) - 1, min(DRAWN_PAIRS, len(record.pairs))).astype(int))
     pairs, weights = record.pairs[rows], record.weights[rows]
     return RaceStep(
@@ -207,17 +221,15 @@ def _race_step(
         rmse_m=record.rmse_m,
         entropy_nat=record.entropy_nat,
         point_error_m=contest.error_m(T),
-        gap_m=gap_m,
-        shades=shades_of(distances_m),
-        histogram=_histogram(record, edges_m),
+        histogram=_histogram(record, watch.edges_m),
+        **watch.seen(T),
     )
 
 
 def _end_step(
-    last: RaceStep | None, T: FloatArray, time_s: float, contest: Contest, distances: Distances
+    last: RaceStep | None, T: FloatArray, time_s: float, contest: Contest, watch: Watch
 ) -> RaceStep:
     """The pose after the last update, with the numbers of the last matching."""
-    distances_m, gap_m = distances.at(T)
     nothing, unknown = np.empty((0, 3), np.float32), float("nan")
     histogram = PairHistogram(np.zeros(BINS, int), np.full(BINS, np.nan), unknown)
     return RaceStep(
@@ -229,9 +241,8 @@ def _end_step(
         rmse_m=unknown if last is None else last.rmse_m,
         entropy_nat=unknown if last is None else last.entropy_nat,
         point_error_m=contest.error_m(T),
-        gap_m=gap_m,
-        shades=shades_of(distances_m),
         histogram=histogram if last is None else last.histogram,
+        **watch.seen(T),
     )
 
 

@@ -130,6 +130,8 @@ class RaceStep:
     shades: ByteArray
     """(N,) distance of each drawn point from its true place, or from the nearest point of the target where
     that is not known: 0 to 255 for none to ``MOST_DISTANCE_M`` and beyond."""
+    lens: ByteArray
+    """(M, 3) column, row and shade of the points in the magnified corner, placed as in ``LensView``."""
     histogram: PairHistogram
 
     @property
@@ -158,6 +160,18 @@ class RaceLane:
 
 
 @dataclass(frozen=True, slots=True)
+class LensView:
+    """A corner that is shown magnified."""
+
+    center_m: FloatArray
+    """(3,) target frame."""
+    window_m: float
+    """Width and height of what is seen."""
+    target: ByteArray
+    """(K, 2) column and row of the target's points, 0 to 255 across the window."""
+
+
+@dataclass(frozen=True, slots=True)
 class RaceView:
     """Up to four methods from the same start."""
 
@@ -170,6 +184,8 @@ class RaceView:
     """(3,) centre of the aligned source in the target's frame; the start turns about it."""
     edges_m: FloatArray
     """(B + 1,) bins of all histograms."""
+    lens: LensView | None
+    """None where the clouds share no corner."""
     lanes: tuple[RaceLane, ...]
 
     @property
