@@ -290,8 +290,9 @@
     // Keys mean the dock from the start, unless a hand is on the keyboard elsewhere.
     came() {
       const used = document.activeElement;
-      const typing = used?.matches("input, textarea, select, [role=slider], [contenteditable]");
-      if (!typing && !used?.matches(":focus-visible")) this.row.focus({preventScroll: true});
+      const typing = used?.matches("input, textarea, select, [role=slider], [contenteditable], :focus-visible");
+      const chosen = used?.matches("[aria-haspopup=listbox]:not([data-expanded])"); // from a list that is shut
+      if (!typing || chosen) this.row.focus({preventScroll: true});
     }
   }
 

@@ -92,10 +92,11 @@
       for (let at = 0; at < seen.length; at += 3) dot(seen[at], seen[at + 1], this.colors[seen[at + 2]]);
       pen.fillStyle = "rgba(255, 255, 255, 0.85)";
       pen.fillRect(0, height - 44, RULER_CM * cm + 24, 44);
-      pen.fillRect(0, 0, width, 24);
+      pen.fillRect(0, 0, width, seen.length ? 24 : 48);
       pen.fillStyle = "#111";
       pen.font = "13px system-ui, sans-serif";
       pen.fillText("the ringed edge, cut across", 10, 17, width - 20);
+      if (!seen.length) pen.fillText("the moving cloud is out of sight", 10, 40, width - 20);
       const [left, base, long] = [12, height - 12, RULER_CM * cm];
       for (const [x, y, wide, high] of [[left, base - 2, long, 4], [left, base - 7, 3, 14], [left + long - 3, base - 7, 3, 14]])
         pen.fillRect(x, y, wide, high);

@@ -24,7 +24,7 @@ PALETTE = ramp(np.arange(256.0), 255.0, DISTANCE_STOPS)
 """RGB of every shade of a distance."""
 FOV_RAD = np.radians(25.0)
 """Of the view of a race: from afar all lanes are seen from the same side."""
-BAND, WHOLE_BAND = (0.17, 0.57), (0.17, 0.95)
+BAND, WHOLE_BAND = (0.2, 0.58), (0.2, 0.95)
 """Where in the picture the clouds are, in its height from the top: above the magnified corner, or without."""
 RING, RING_PARTS = (20, 20, 20), 48
 """Colour of the ring about what is magnified, and its parts."""
