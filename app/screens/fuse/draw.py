@@ -28,6 +28,8 @@ BAND, WHOLE_BAND = (0.2, 0.58), (0.2, 0.95)
 """Where in the picture the clouds are, in its height from the top: above the magnified corner, or without."""
 RING, RING_PARTS = (20, 20, 20), 48
 """Colour of the ring about what is magnified, and its parts."""
+ASPECT = 1.5
+"""Of the picture, while nobody looks."""
 ROOM = 1.14
 """Width of a lane over that of its clouds, and height of the band over theirs."""
 
@@ -59,6 +61,7 @@ class RaceDrawing:
                     f"{name}/pairs", points, colors, thickness=2.0, thickness_units="screen"
                 )
             )
+        self._spread(ASPECT)
 
     def _add_ring(self, name: str, lens: LensView) -> None:
         """A circle about what is magnified, facing the viewer."""
@@ -70,17 +73,21 @@ class RaceDrawing:
 
     def look(self, clients: Iterable[viser.ClientHandle]) -> None:
         """Have all lanes side by side in the picture, each in the middle of its share of the width."""
-        extent, count, (top, bottom) = self._extent, len(self._lanes), self._band
+        extent, (top, bottom) = self._extent, self._band
         for client in clients:
-            aspect = client.camera.aspect
-            pitch_m = ROOM * max(extent.width_m, aspect * extent.height_m / (count * (bottom - top)))
-            for frame, away in zip(self._lanes, _places(count), strict=True):
-                place(frame, rigid(np.eye(3), away * pitch_m * extent.right) @ self._view.T_world_target)
-            height_m = count * pitch_m / aspect
+            height_m = len(self._lanes) * self._spread(client.camera.aspect) / client.camera.aspect
             at_m = extent.middle_m - (0.5 - 0.5 * (top + bottom)) * height_m * extent.up
             with client.atomic():
                 client.camera.fov = FOV_RAD
                 turn(client, at_m, at_m - 0.5 * height_m / np.tan(0.5 * FOV_RAD) * extent.forward)
+
+    def _spread(self, aspect: float) -> float:
+        """Place the lanes for a picture so much wider than high; how far they are apart in metres."""
+        extent, count, (top, bottom) = self._extent, len(self._lanes), self._band
+        apart_m = ROOM * max(extent.width_m, aspect * extent.height_m / (count * (bottom - top)))
+        for frame, away in zip(self._lanes, _places(count), strict=True):
+            place(frame, rigid(np.eye(3), away * apart_m * extent.right) @ self._view.T_world_target)
+        return apart_m
 
     def show(self, rows: Sequence[int]) -> None:
         """Move every lane to one of its steps."""

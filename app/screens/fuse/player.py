@@ -74,5 +74,5 @@ def error_lane(lanes: Sequence[RaceLane], clock: RaceClock) -> CurvesLane:
         for mark, lane, steps_ns, off_cm in zip(MARKS, lanes, clock.steps_ns, offs_cm, strict=False)
     ]
     known = lanes[0].steps[0].point_error_m is not None
-    title = "distance from the truth" if known else "distance between the clouds"
+    title = "distance from the truth" if known else "to the nearest point"
     return CurvesLane(title, curves, LANE_PX, veil=1.0, titled=True)

@@ -72,7 +72,7 @@ class RaceSetup:
             "Start",
             [*STARTS, BY_HAND],
             initial_value=SLIGHTLY,
-            hint="How far from aligned the orange cloud starts. Aligned is the truth where it is known, "
+            hint="How far from aligned the moving cloud starts. Aligned is the truth where it is known, "
             "otherwise what the nodes believe.",
         )
         self._ui.when_changed(self._preset, self._picked_preset)
@@ -81,9 +81,9 @@ class RaceSetup:
         """Who moves onto whom, and who asks whom for the nearest point."""
         gui, names = self._ui.gui, ["node_00", "node_01"]
         self._source = gui.add_dropdown(
-            "Move", names, initial_value=names[1], hint="Node whose cloud moves (orange)."
+            "Move", names, initial_value=names[1], hint="Node whose cloud moves (coloured)."
         )
-        self._target = gui.add_dropdown("onto", names, hint="Node whose cloud stays (blue).")
+        self._target = gui.add_dropdown("onto", names, hint="Node whose cloud stays (grey).")
         self._direction = gui.add_dropdown(
             "Pairs", list(DIRECTIONS), hint="Whose points look for their nearest counterpart."
         )
