@@ -36,13 +36,14 @@
         one.addEventListener("pointerdown", () => setTimeout(() => this.row.focus({preventScroll: true})));
         return one;
       };
-      button("|◀", "Event back: to the event before (left arrow)", () => this.say("step", -1));
+      this.back = button("|◀", "Event back: to the event before (left arrow)", () => this.say("step", -1));
       this.play = button("▶", "Play: or pause (space)", () => this.say("toggle"));
-      button("▶|", "Next event: (right arrow)", () => this.say("step", 1));
+      this.next = button("▶|", "Next event: (right arrow)", () => this.say("step", 1));
+      this.loop = button("↻", "Loop: begin again at the end", () => this.say("loop"));
       this.time = make("span", "packetmesh-dock-time", bar);
       make("span", "about", bar, {textContent: "Speed"});
       button("−", "Slower", () => this.say("faster", -1));
-      this.speed = make("span", "speed", bar, {title: "Simulated seconds in a second"});
+      this.speed = make("span", "speed", bar);
       button("+", "Faster", () => this.say("faster", 1));
       make("span", "about", bar, {textContent: "Zoom"});
       button("−", "Zoom out: (− or the wheel)", () => this.zoom(2, this.xOf(this.now)));
@@ -107,23 +108,30 @@
         this.pointer = null;
         this.tip.hidden = true;
       });
-      this.row.addEventListener("keydown", event => {
-        if (event.ctrlKey || event.metaKey || event.altKey) return;
-        if (event.key === " " && event.target !== this.row) return; // a button that has the focus
-        const action = {
-          " ": () => this.say("toggle"),
-          ArrowLeft: () => this.say("step", -1),
-          ArrowRight: () => this.say("step", 1),
-          Home: () => this.say("seek", this.start),
-          End: () => this.say("seek", this.end),
-          "+": () => this.zoomClock(),
-          "-": () => this.zoom(2, this.xOf(this.now)),
-        }[event.key];
-        if (action === undefined) return;
-        event.preventDefault();
-        event.stopPropagation();
-        action();
+      this.row.addEventListener("keydown", event => this.press(event));
+      // After a hand on the picture nothing has the focus; the arrows then turn the view.
+      document.addEventListener("keydown", event => {
+        const idle = event.target === document.body || event.target.matches?.("canvas");
+        if (this.visible && idle && [" ", "Home", "End"].includes(event.key)) this.press(event, true);
       });
+    }
+
+    press(event, idle = false) {
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.key === " " && event.target !== this.row && !idle) return; // a button that has the focus
+      const action = {
+        " ": () => this.say("toggle"),
+        ArrowLeft: () => this.say("step", -1),
+        ArrowRight: () => this.say("step", 1),
+        Home: () => this.say("seek", this.start),
+        End: () => this.say("seek", this.end),
+        "+": () => this.zoomClock(),
+        "-": () => this.zoom(2, this.xOf(this.now)),
+      }[event.key];
+      if (action === undefined) return;
+      event.preventDefault();
+      event.stopPropagation();
+      action();
     }
 
     zoom(factor, x) {
@@ -216,11 +224,16 @@
       this.place();
     }
 
-    setup({visible, ends, window: shown, lanes}) {
+    setup({visible, ends, window: shown, counts, lanes}) {
       this.wanted = visible;
+      this.counts = counts;
+      this.call(this.back, counts ? `One ${counts} back` : "Event back", "(left arrow)");
+      this.call(this.next, `Next ${counts || "event"}`, "(right arrow)");
+      this.speed.title = counts ? `${counts}s a second` : "Simulated seconds in a second";
       [this.start, this.end] = ends;
       this.setLanes(lanes);
       this.window = this.shown = shown;
+      if (this.visible) this.came();
     }
 
     // New pictures take the place of the old ones once they can be drawn at once.
@@ -243,13 +256,18 @@
       this.draw();
     }
 
-    state({now, playing, speed, heard, tip, chosen, labels}) {
+    call(button, name, key) {
+      Object.assign(button, {title: `${name} ${key}`, ariaLabel: name});
+    }
+
+    state({now, playing, loops, speed, heard, tip, chosen, labels}) {
       this.unheard = this.unheard.filter(([number]) => number > (heard[PAGE] ?? 0));
       if (!this.unheard.length) clearTimeout(this.again);
       const moved = this.now !== now;
       Object.assign(this, {playing, tipSaid: tip, chosen});
       if (!this.unheard.some(([, name]) => name === "seek")) this.now = now; // else the hand is ahead
       this.play.textContent = playing ? "❚❚" : "▶";
+      this.loop.ariaPressed = loops;
       this.speed.textContent = speed;
       this.setLabels(labels);
       if (moved && playing) this.follow();
@@ -267,6 +285,14 @@
 
     left() {
       this.tip.hidden = true;
+    }
+
+    // Keys mean the dock from the start, unless a hand is on the keyboard elsewhere.
+    came() {
+      const used = document.activeElement;
+      const typing = used?.matches("input, textarea, select, [role=slider], [contenteditable], :focus-visible");
+      const chosen = used?.matches("[aria-haspopup=listbox]:not([data-expanded])"); // from a list that is shut
+      if (!typing || chosen) this.row.focus({preventScroll: true});
     }
   }
 

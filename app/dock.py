@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from app.dock_row import add_hidden
 from app.page import running
-from app.player import Ticker
+from app.ticker import Ticker
 from app.timeline import Lane
 from app.ui import Ui
 
@@ -38,6 +38,8 @@ WIDTH_PX = (200, 2400)
 """Of a picture, at least and at most."""
 LEAST_SPAN_NS = 1000
 """Of a window."""
+COUNT_NS = 1_000_000_000
+"""One iteration or step on the axis of a timeline that counts them."""
 PAGES = 50
 """As many pages are known apart."""
 
@@ -47,7 +49,7 @@ _SCRIPT = "".join(
 
 
 class Dock:
-    """Shows lanes of a timeline and moves over it; knows no network."""
+    """Shows lanes of a timeline and moves over it; knows neither networks nor races."""
 
     def __init__(
         self,
@@ -70,7 +72,8 @@ class Dock:
         self._start_ns, self._end_ns, self.now_ns = 0, 1, 0
         self._window_ns, self._width_px = (0, 1), 1200
         self._stops_ns: NDArray[np.int64] = np.zeros(0, np.int64)
-        self._playing, self._visible, self._speed = False, False, 1.0
+        self._playing, self._visible, self._loops, self._speed = False, False, False, 1.0
+        self._counts = ""
         self._anchor = (0.0, 0)
         self._heard: dict[str, int] = {}
         self._tip = ""
@@ -98,7 +101,15 @@ class Dock:
         """Simulated seconds in a second."""
         return self._speed
 
-    def load(self, start_ns: int, end_ns: int, stops_ns: NDArray[np.int64], lanes: Sequence[Lane]) -> None:
+    def load(
+        self,
+        start_ns: int,
+        end_ns: int,
+        stops_ns: NDArray[np.int64],
+        lanes: Sequence[Lane],
+        counts: str = "",
+        run_s: float = RUN_S,
+    ) -> None:
         """Take another timeline, at its start and paused.
 
         Args:
@@ -106,12 +117,15 @@ class Dock:
             end_ns: where it ends; later than the start.
             stops_ns: (S,) ascending times at which the step buttons halt.
             lanes: from the top.
+            counts: what the axis counts instead of time, such as "iteration"; each takes ``COUNT_NS``.
+            run_s: how long the whole takes at first, about.
         """
         self.pause()
+        self._counts = counts
         self._start_ns, self._end_ns = start_ns, max(end_ns, start_ns + LEAST_SPAN_NS)
         self._stops_ns, self._lanes = stops_ns, tuple(lanes)
         self._window_ns, self._tip, self._chosen = (self._start_ns, self._end_ns), "", {}
-        self._pace((self._end_ns - self._start_ns) / 1e9 / RUN_S)
+        self._pace((self._end_ns - self._start_ns) / 1e9 / run_s)
         self._send_setup()
         self._draw()
         self.now_ns = start_ns
@@ -171,7 +185,10 @@ class Dock:
             return
         began_s, origin_ns = self._anchor
         t_ns = origin_ns + round((self._clock() - began_s) * self._speed * 1e9)
-        if t_ns >= self._end_ns:
+        if t_ns >= self._end_ns and self._loops:
+            t_ns = self._start_ns + (t_ns - self._start_ns) % (self._end_ns - self._start_ns)
+            self._anchor = (self._clock(), t_ns)
+        elif t_ns >= self._end_ns:
             self._playing = False
             self._ticker.run(False)
         self._go(t_ns)
@@ -214,6 +231,10 @@ class Dock:
         else:
             self.play()
 
+    def _loop(self) -> None:
+        """Begin again at the end, or no longer."""
+        self._loops = not self._loops
+
     def _faster(self, count: int) -> None:
         at = SPEEDS.index(self._speed) + int(count)
         self._pace(SPEEDS[min(max(at, 0), len(SPEEDS) - 1)])
@@ -238,6 +259,7 @@ class Dock:
     def _point(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> None:
         """Say what is under the pointer."""
         there = 0 <= lane < len(self._lanes)
+        there = there and (t_ns <= self.now_ns or self._lanes[lane].veil < 1.0)
         self._tip = self._lanes[lane].tell(round(t_ns), int(y_px), round(tolerance_ns)) if there else ""
 
     def _click(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> None:
@@ -262,6 +284,7 @@ class Dock:
             visible=self._visible and bool(self._lanes),
             ends=(self._start_ns, self._end_ns),
             window=self._window_ns,
+            counts=self._counts,
             lanes=[_looks(lane) for lane in self._lanes],
         )
 
@@ -271,7 +294,8 @@ class Dock:
             kind="state",
             now=self.now_ns,
             playing=self._playing,
-            speed=speed_text(self._speed),
+            loops=self._loops,
+            speed=f"{self._speed:g} a second" if self._counts else speed_text(self._speed),
             heard=self._heard,
             tip=self._tip,
             chosen=self._chosen,
@@ -303,7 +327,7 @@ class Dock:
 def _looks(lane: Lane) -> dict[str, Any]:
     """What the page knows of a lane from the start."""
     legend = list(lane.legend)
-    return {"title": lane.title, "height": lane.height_px, "grows": lane.grows, "legend": legend}
+    return {"title": lane.title, "height": lane.height_px, "veil": lane.veil, "legend": legend}
 
 
 ACTIONS: dict[str, Callable[..., None]] = {
@@ -311,6 +335,7 @@ ACTIONS: dict[str, Callable[..., None]] = {
     "step": Dock.step,
     "seek": lambda dock, t_ns: dock.seek(round(t_ns)),
     "faster": Dock._faster,
+    "loop": Dock._loop,
     "look": Dock._look,
     "point": Dock._point,
     "click": Dock._click,

@@ -27,14 +27,20 @@ window.packetmeshDockRow ??= (() => {
       return document.querySelector(`.packetmesh-dock[data-dock="${this.name}"]`);
     }
 
+    // What it is put into, behind all else there.
+    home() {
+      return root();
+    }
+
     place() {
       const visible = Boolean(this.wanted && this.anchor());
       if (visible === this.visible && (!visible || this.row.isConnected)) return;
       this.visible = visible;
       if (visible) {
         const used = document.activeElement;
-        root()?.append(this.row);
+        this.home()?.append(this.row);
         requestAnimationFrame(() => used?.scrollIntoView({block: "center"})); // the panel is lower now
+        this.came?.();
       }
       else {
         this.row.remove();

@@ -17,7 +17,14 @@ window.packetmeshDockView ??= (() => {
     return `${value.toFixed(digits)} ${name}`;
   }
 
+  const COUNT_NS = 1e9; // of an iteration or step, on an axis that counts them
+
   class DockView extends DockRow {
+    // A place on the axis.
+    text(ns, step = 0, largest = 0) {
+      return this.counts ? `${Math.floor(ns / COUNT_NS + 1e-6)}` : timeText(ns, step, largest);
+    }
+
     width() {
       return Math.max(this.field.clientWidth, 1);
     }
@@ -48,14 +55,14 @@ window.packetmeshDockView ??= (() => {
         const image = part("img", "", this.field);
         const words = part("div", "words", this.field);
         const veil = part("div", "veil", this.field);
-        veil.hidden = !lane.grows;
+        veil.style.opacity = lane.veil;
         const made = {...lane, top, image, words, veil, names: part("div", "", this.names), wordsSaid: []};
         top += lane.height + LANES_GAP_PX;
         return made;
       });
       this.field.style.height = this.names.style.height = `${top + AXIS_PX}px`;
       // Lanes of one kind say the same.
-      const entries = lanes.filter(lane => !lane.grows).flatMap(lane => lane.legend);
+      const entries = lanes.filter(lane => !lane.veil).flatMap(lane => lane.legend);
       const legend = [...new Map(entries.map(entry => [entry.join(), entry])).values()];
       this.legend.replaceChildren(...legend.map(([text, color]) => {
         const word = make("span", "", null, {textContent: text});
@@ -92,8 +99,8 @@ window.packetmeshDockView ??= (() => {
       }
       this.cursor.style.left = `${cursor}px`;
       const step = (this.window[1] - this.window[0]) / width;
-      const now = timeText(this.now, Math.max(10 ** Math.floor(Math.log10(2 * step)), 1), this.end);
-      this.time.textContent = `${now} of ${timeText(this.end)}`;
+      const now = this.text(this.now, Math.max(10 ** Math.floor(Math.log10(2 * step)), 1), this.end);
+      this.time.textContent = `${this.counts} ${now} of ${this.text(this.end)}`.trim();
       this.drawBox(scale);
       this.drawAxis(width);
     }
@@ -124,12 +131,13 @@ window.packetmeshDockView ??= (() => {
       const span = this.window[1] - this.window[0];
       const rough = span / Math.max(width / 110, 1);
       const power = 10 ** Math.floor(Math.log10(rough));
-      const step = [1, 2, 5, 10].map(times => times * power).find(one => one >= rough);
+      const round = [1, 2, 5, 10].map(times => times * power).find(one => one >= rough);
+      const step = this.counts ? Math.max(round, COUNT_NS) : round;
       const ticks = [];
       for (let index = Math.ceil(this.window[0] / step); index * step <= this.window[1]; index++) {
         const x = this.xOf(index * step);
         const tick = make("i", "");
-        const word = make("span", "", null, {textContent: timeText(index * step, step, this.window[1])});
+        const word = make("span", "", null, {textContent: this.text(index * step, step, this.window[1])});
         tick.style.left = word.style.left = `${x}px`;
         const back = x < 24 ? 0 : x > width - 24 ? 100 : 50; // so that the first and the last are whole
         word.style.transform = `translateX(-${back}%)`;

@@ -80,12 +80,14 @@ class Session:
         self._side = LatestWins(pool, self)
         self._quick = LatestWins(pool, object())
         self._wide = False
-        self._shape = 0.0
+        self._shape = self._seen_shape = 0.0
         self._closed = False
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="session")
         self._panels = [panel(self) for panel in panels]
         self._current = self._panels[0]
         self._thread.submit(self._guarded, self._build)
+        if isinstance(target, viser.ClientHandle):
+            target.camera.on_update(lambda _: self._look_at_window())
 
     # What others ask of it, from any thread.
 
@@ -322,6 +324,12 @@ class Session:
         if isinstance(self.target, viser.ViserServer):
             return 1.0
         return round(self.target.camera.aspect, 1)
+
+    def _look_at_window(self) -> None:
+        """Fit the view anew when the picture has another shape, as when the dock comes or goes."""
+        if self._window() != self._seen_shape:
+            self._seen_shape = self._window()
+            self.post(self.frame_view)
 
     def _act(self, action: str) -> None:
         for panel in self._panels:

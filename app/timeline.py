@@ -30,6 +30,8 @@ NAME_PX = 13
 """Height of a row's name."""
 WORD_PX, WORDS = 56.0, 60
 """Least width of a frame with a word in it, and how many are written at most."""
+FAINT_VEIL = 0.82
+"""Over what lies after the clock and may be guessed at."""
 BEFORE = 8
 """Frames before a time among which one that is still on the air is looked for."""
 
@@ -59,8 +61,8 @@ class Lane(Protocol):
 
     title: str
     height_px: int
-    grows: bool
-    """Whether what lies after the clock is not known yet and shown faintly."""
+    veil: float
+    """How much of what lies after the clock is veiled: from 0, not at all, to 1, not to be seen."""
     legend: Sequence[tuple[str, Color]]
     """What its colours mean."""
 
@@ -87,7 +89,7 @@ class FramesLane:
     """One row a node: its frames on the air; lost ones are red when near and a rate when far."""
 
     title = "Frames"
-    grows = False
+    veil = 0.0
     legend: Sequence[tuple[str, Color]] = (
         ("frames on the air", TARGET),
         ("lost; from afar, the share lost", LOSS),
@@ -242,11 +244,17 @@ class Curve:
 class CurvesLane:
     """Curves, each on a scale of its own; beside them what they are at the clock."""
 
-    grows = True
-
-    def __init__(self, title: str, curves: Sequence[Curve], height_px: int = 60) -> None:
-        """Show curves in so many pixels."""
-        self.title, self.height_px, self._curves = title, height_px, tuple(curves)
+    def __init__(
+        self,
+        title: str,
+        curves: Sequence[Curve],
+        height_px: int = 60,
+        veil: float = FAINT_VEIL,
+        titled: bool = False,
+    ) -> None:
+        """Show curves in so many pixels, veiled so much after the clock; ``titled`` writes the title, too."""
+        self.title, self.height_px, self.veil, self._curves = title, height_px, veil, tuple(curves)
+        self._titled = titled
         self.legend: Sequence[tuple[str, Color]] = tuple((curve.name, curve.color) for curve in curves)
 
     def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
@@ -261,11 +269,13 @@ class CurvesLane:
 
     def labels(self, now_ns: int) -> Sequence[Label]:
         """Name and value of each curve."""
-        gap_px = self.height_px / (len(self._curves) + 1)
-        return [
-            Label((index + 1) * gap_px, curve.text(now_ns), curve.color)
+        title_px = NAME_PX if self._titled else 0
+        gap_px = (self.height_px - title_px) / (len(self._curves) + 1)
+        curves = [
+            Label(title_px + (index + 1) * gap_px, curve.text(now_ns), curve.color)
             for index, curve in enumerate(self._curves)
         ]
+        return [Label(0.5 * NAME_PX, self.title), *curves] if self._titled else curves
 
     def words(self, start_ns: int, end_ns: int, width_px: int) -> Sequence[Word]:
         """None."""

@@ -1,4 +1,4 @@
-"""Charts that are drawn many times a second: curves over a common axis, with the player's place marked."""
+"""Charts that are drawn many times a second: curves over a common axis, as far as the player has come."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ def axes(x: str, y: str) -> tuple[uplot.Axis, ...]:
 
 
 class Curves:
-    """One quantity of several things that are told apart by their colours and dashes."""
+    """One quantity of several things that are told apart by their colours."""
 
     def __init__(
         self,
         gui: viser.GuiApi,
         quantity: str,
-        styles: Sequence[tuple[str, tuple[int, ...]]],
+        most: int,
         least: float = 0.0,
         height_px: int = 180,
     ) -> None:
@@ -57,42 +57,41 @@ class Curves:
         Args:
             gui: where to add it.
             quantity: with its unit, of the vertical axis.
-            styles: colour and dashes of each curve that there can be.
+            most: curves that there can be.
             least: the smallest height of the vertical axis.
             height_px: of the whole.
         """
-        self._quantity, self._least, self._most = quantity, least, len(styles)
-        lines = [uplot.Series(label="curve", stroke=color, width=2, dash=dash) for color, dash in styles]
-        dots = [
-            uplot.Series(
-                label="now", stroke=color, width=0, points=uplot.Series_Points(show=True, size=9, fill=color)
-            )
-            for color, _ in styles
-        ]
-        cursor = uplot.Series(label="cursor", stroke=css(NEUTRAL), width=1)
-        self._plot = add_chart(gui, (cursor, *lines, *dots), ("", quantity), height_px)
+        self._quantity, self._least, self._most = quantity, least, most
+        self._plot = add_chart(gui, _series([css(NEUTRAL)] * most), ("", quantity), height_px)
         self._curves: Sequence[tuple[FloatArray, FloatArray]] = ()
         self._top = 1.0
 
     def load(
-        self, curves: Sequence[tuple[FloatArray, FloatArray]], ends: tuple[float, float], label: str
+        self,
+        curves: Sequence[tuple[FloatArray, FloatArray]],
+        colors: Sequence[str],
+        ends: tuple[float, float],
+        label: str,
     ) -> None:
         """Show other curves.
 
         Args:
             curves: (K,) ascending abscissae and (K,) values of each, NaN where there is none.
+            colors: of the curves.
             ends: of the horizontal axis.
             label: of the horizontal axis.
         """
         self._curves = curves
         highest = max((float(np.nanmax(values, initial=0.0)) for _, values in curves), default=0.0)
         self._top = max(highest, self._least) or 1.0
+        missing = self._most - len(colors)
+        self._plot.series = (uplot.Series(label="x"), *_series([*colors, *[css(NEUTRAL)] * missing]))
         self._plot.scales = scales(ends, self._top)
         self._plot.axes = axes(label, self._quantity)
         self.mark(ends[0])
 
     def mark(self, now: float, rows: Sequence[int] = ()) -> None:
-        """Draw the player's place as a line, and a dot on each curve at its value in ``rows``."""
+        """Draw the player's place as a line, and each curve up to its value in ``rows`` with a dot there."""
         # The line is two points above each other, so its place stands twice among the abscissae.
         own = np.concatenate([[now], *(at for at, _ in self._curves)])
         x = np.sort(np.append(np.unique(own), now))
@@ -100,10 +99,23 @@ class Curves:
         first = int(np.searchsorted(x, now))
         cursor[first : first + 2] = 0.0, HEADROOM * self._top
         empty = np.full(len(x), np.nan)
-        lines = [polyline(x, at, values) for at, values in self._curves]
+        known = zip(self._curves, rows, strict=False)
+        lines = [polyline(x, at[: row + 1], values[: row + 1]) for (at, values), row in known]
         dots = [_dot(x, at[row], values[row]) for (at, values), row in zip(self._curves, rows, strict=False)]
         padded = [[*some, *[empty] * (self._most - len(some))] for some in (lines, dots)]
         self._plot.data = (x, cursor, *padded[0], *padded[1])
+
+
+def _series(colors: Sequence[str]) -> tuple[uplot.Series, ...]:
+    """The player's place, a line for each curve, and a dot for each."""
+    lines = [uplot.Series(label="curve", stroke=color, width=2) for color in colors]
+    dots = [
+        uplot.Series(
+            label="now", stroke=color, width=0, points=uplot.Series_Points(show=True, size=9, fill=color)
+        )
+        for color in colors
+    ]
+    return (uplot.Series(label="cursor", stroke=css(NEUTRAL), width=1), *lines, *dots)
 
 
 def polyline(x: FloatArray, at: FloatArray, values: FloatArray) -> FloatArray:

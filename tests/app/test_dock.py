@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from app.dock import Dock, speed_text, time_text
+from app.dock import COUNT_NS, Dock, speed_text, time_text
 from app.levels import levels_of
 from app.timeline import Curve, CurvesLane, FramesLane
 from tests.app.fakes import ui_of
@@ -155,6 +155,42 @@ def test_new_lanes_leave_clock_and_window_as_they_are(hand):
     assert hand.dock.now_ns == 3_000_000_000
     assert "&quot;window&quot;:[2000000000,4000000000]" in hand.told("setup")
     assert "warmth 21" in hand.told("state")
+
+
+def test_it_begins_again_at_the_end_while_it_loops(hand):
+    hand.say(["loop"])
+    hand.dock.seek(END_NS - 500_000_000)
+    hand.dock.play()
+    speed = hand.dock.speed
+    hand.later(1.5 / speed)
+    assert hand.dock.playing
+    assert hand.dock.now_ns == pytest.approx(START_NS + 1_000_000_000, abs=2)
+    hand.later(1.0 / speed)
+    assert hand.dock.now_ns == pytest.approx(START_NS + 2_000_000_000, abs=2)
+    hand.say(["loop"])
+    hand.later(20.0 / speed)
+    assert (hand.dock.now_ns, hand.dock.playing) == (END_NS, False)
+
+
+def test_it_counts_steps_at_a_pace_that_is_asked_for(hand):
+    hand.dock.load(0, 50 * COUNT_NS, COUNT_NS * np.arange(51), [hand.lane], "iteration", 10.0)
+    assert hand.dock.speed == 5.0
+    assert "&quot;counts&quot;:&quot;iteration&quot;" in hand.told("setup")
+    assert "5 a second" in hand.told("state")
+    hand.dock.play()
+    hand.later(2.0)
+    assert hand.dock.now_ns == 10 * COUNT_NS
+
+
+@pytest.mark.parametrize(("veil", "told"), [(0.8, True), (1.0, False)])
+def test_pointing_ahead_tells_nothing_of_what_is_not_to_be_seen_yet(hand, veil, told):
+    t_ns = np.array([0, 5_000_000_000])
+    curve = Curve("warmth", "°C", (0, 0, 0), t_ns, np.array([20.0, 31.0]), 0, 40)
+    hand.dock.load(0, END_NS, STOPS_NS, [CurvesLane("Weather", [curve], veil=veil)])
+    hand.say(["point", 0, 6_000_000_000, 5, 0])
+    assert ("warmth 31" in hand.told("state")) == told
+    hand.say(["seek", 7_000_000_000], ["point", 0, 6_000_000_000, 5, 0])
+    assert "&quot;tip&quot;:&quot;warmth 31" in hand.told("state")
 
 
 def test_hiding_it_stops_the_clock(hand):

@@ -27,8 +27,12 @@ EDGES_M = np.linspace(0.0, 0.3, 31)
 
 def lane(label, error_m, reason="converged", sigma_m=float("nan"), kernel=False):
     shown = PairHistogram(np.ones(30, int), np.ones(30), sigma_m)
-    step = RaceStep(np.eye(4), NOTHING, NOTHING, np.empty(0), 0.0, 0.01, 5.0, error_m, shown)
-    return RaceLane(label, kernel, (step,), reason, 3, 0.2, 0.01, 500.0)
+    shades = np.zeros(0, np.uint8)
+    lens = np.zeros((0, 3), np.uint8)
+    step = RaceStep(
+        np.eye(4), NOTHING, NOTHING, np.empty(0), 0.0, 0.01, 5.0, error_m, 0.03, shades, lens, shown
+    )
+    return RaceLane(("icp", "point"), label, kernel, (step,), reason, 3, 0.2, 0.01, 500.0)
 
 
 @pytest.mark.parametrize(

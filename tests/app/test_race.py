@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.drawing.colors import MOST_DISTANCE_M
 from app.screens.fuse.capture_job import capture_job
 from app.screens.fuse.race_job import contest_of, race_job
 from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, Race, Start
@@ -17,6 +18,7 @@ from pipeline.sources import Demo, RigFolder
 
 SPEC = Spec(Demo("box-on-table"))
 SLIGHT = Race(start=Start.towards(3.0, 6.0, seed=0))
+MAPPED = replace(SLIGHT, rivals=(("icp", "point"), ("ceicp-a", "plane")))
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +49,31 @@ def test_the_annealed_plane_version_arrives_and_plain_icp_does_not(view):
     errors_m = {lane.label: lane.steps[-1].point_error_m for lane in view.lanes}
     assert errors_m["CEICP-A plane"] < 0.005
     assert errors_m["ICP point"] > 0.05
+
+
+def test_the_magnified_corner_shows_who_arrived(view):
+    icp, ceicp = (view.lanes[index].steps[-1].lens[:, 2] for index in (0, 2))
+    assert len(ceicp) > 100
+    assert ceicp.max() < 30
+    assert len(icp) == 0 or icp.min() > 60
+
+
+def test_the_colours_are_those_of_the_error(view):
+    for lane in view.lanes:
+        for step in (lane.steps[0], lane.steps[-1]):
+            shown_m = step.shades / 255.0 * MOST_DISTANCE_M
+            capped_m = min(step.point_error_m, MOST_DISTANCE_M)
+            assert np.sqrt(np.mean(shown_m**2)) == pytest.approx(capped_m, rel=0.35, abs=0.0005)
+
+
+def test_without_truth_the_number_is_the_distance_between_the_clouds(tmp_path, rig):
+    save_rig(tmp_path / "rig", replace(rig, truth=None))
+    spec = replace(SPEC, source=RigFolder(str(tmp_path / "rig")))
+    view = end(race_job(Store(str(tmp_path)), spec, replace(SLIGHT, rivals=(("ceicp-a", "plane"),))))
+    first, last = view.lanes[0].steps[0], view.lanes[0].steps[-1]
+    assert first.point_error_m is None
+    assert 0.0 < last.off_m < first.off_m
+    assert last.shades.mean() < first.shades.mean()
 
 
 def test_time_runs_forward_from_zero_and_ends_with_the_lane(view):
@@ -127,7 +154,7 @@ def test_a_method_that_finds_no_pair_stays_at_its_start(store):
 
 @pytest.fixture(scope="module")
 def capture(store):
-    return end(capture_job(store, SPEC, SLIGHT))
+    return end(capture_job(store, SPEC, MAPPED))
 
 
 def test_the_capture_range_has_a_cell_for_every_start_and_tells_methods_apart(capture):
@@ -139,7 +166,7 @@ def test_the_capture_range_has_a_cell_for_every_start_and_tells_methods_apart(ca
 
 
 def test_the_capture_range_is_the_same_again_and_from_any_start(capture, tmp_path):
-    again = end(capture_job(Store(str(tmp_path)), SPEC, replace(SLIGHT, start=Start())))
+    again = end(capture_job(Store(str(tmp_path)), SPEC, replace(MAPPED, start=Start())))
     np.testing.assert_array_equal(again.errors_m, capture.errors_m)
 
 

@@ -1,40 +1,56 @@
-"""Which step every lane shows, by iteration and by time."""
+"""Which step every lane shows, by iteration and by time, and the curves below."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from app.screens.fuse.player import MOST_TICKS, RaceClock
+from app.dock import COUNT_NS
+from app.screens.fuse.clock import RaceClock
+from app.screens.fuse.player import error_lane
+from tests.app.test_fuse_numbers import lane
+
+MS = 1_000_000
 
 
-def clock(*xs, unit=1, in_ms=False):
-    return RaceClock(tuple(np.array(x, dtype=float) for x in xs), unit, in_ms)
+def racer(errors_m, times_s):
+    """A lane with an error and a time for each of its steps."""
+    bare = lane("ICP point", None)
+    steps = tuple(
+        replace(bare.steps[0], point_error_m=error_m, time_s=time_s)
+        for error_m, time_s in zip(errors_m, times_s, strict=True)
+    )
+    return replace(bare, steps=steps)
+
+
+SHORT = racer([0.08, 0.07, 0.06], [0.0, 0.012, 0.014])
+LONG = racer([0.08, 0.04, 0.02, 0.01, 0.002], [0.0, 0.005, 0.010, 0.020, 0.033])
 
 
 def test_by_iteration_a_lane_that_ended_stays_at_its_end():
-    race = clock([0, 1, 2], [0, 1, 2, 3, 4])
-    assert race.length == 5
-    assert [race.rows(place) for place in range(5)] == [(0, 0), (1, 1), (2, 2), (2, 3), (2, 4)]
+    clock = RaceClock.of([SHORT, LONG], in_ms=False)
+    assert clock.end_ns == 4 * COUNT_NS
+    assert [clock.rows(place * COUNT_NS) for place in range(5)] == [(0, 0), (1, 1), (2, 2), (2, 3), (2, 4)]
+    assert clock.rows(2 * COUNT_NS - 1) == (1, 1)
 
 
 def test_by_time_a_lane_shows_what_it_has_reached():
-    race = clock([0.0, 12.0, 14.0], [0.0, 5.0, 33.0], unit=10, in_ms=True)
-    assert race.length == 5
-    assert [race.rows(place) for place in range(5)] == [(0, 0), (0, 1), (2, 1), (2, 1), (2, 2)]
+    clock = RaceClock.of([SHORT, LONG], in_ms=True)
+    assert [clock.rows(ms * MS) for ms in (0, 11, 13, 14, 33)] == [(0, 0), (0, 2), (1, 2), (2, 2), (2, 4)]
+    assert clock.stops_ns.tolist() == [ms * MS for ms in (0, 5, 10, 12, 14, 20, 33)]
 
 
-@pytest.mark.parametrize("longest_s", [0.004, 0.15, 0.7, 12.0])
-def test_the_slider_over_time_has_a_bearable_number_of_places(longest_s):
-    class Step:
-        def __init__(self, time_s):
-            self.time_s = time_s
-
-    class Lane:
-        steps = (Step(0.0), Step(longest_s))
-
-    race = RaceClock.of([Lane()], in_ms=True)
-    assert 2 <= race.length <= MOST_TICKS + 1
-    assert race.rows(race.length - 1) == (1,)
+@pytest.mark.parametrize(("in_ms", "unit_ns"), [(False, COUNT_NS), (True, MS)])
+def test_a_place_in_a_lesson_counts_iterations_or_milliseconds(in_ms, unit_ns):
+    clock = RaceClock.of([SHORT, LONG], in_ms)
+    assert clock.at(3) == 3 * unit_ns
+    assert clock.at(None) == clock.end_ns
+    np.testing.assert_allclose(clock.shown(np.array([2 * unit_ns])), 2.0)
 
 
-def test_a_lane_without_steps_to_take_has_one_place():
-    assert clock([0]).length == 1
+def test_the_curves_tell_the_distance_at_the_clock_and_hide_what_is_to_come():
+    clock = RaceClock.of([SHORT, LONG], in_ms=False)
+    curves = error_lane([SHORT, LONG], clock)
+    assert curves.veil == 1.0
+    said = [label.text for label in curves.labels(3 * COUNT_NS)]
+    assert said == ["distance from the truth", "① 6 cm", "② 1 cm"]

@@ -7,9 +7,10 @@ import time
 import numpy as np
 import pytest
 
+from app.dock import COUNT_NS
 from app.screens.surface.draw_rolling import RollingDrawing, pieces
 from app.screens.surface.labels import AFTER, BEFORE
-from app.screens.surface.rolling import CLOSE_UP, WHOLE, RollingFolder, status_line
+from app.screens.surface.rolling import CLOSE_UP, WHOLE, RollingFolder, front_lane, status_line
 from app.screens.surface.walk_job import PATCH_POINTS, PLACES, walk_job, walk_over
 from app.screens.surface.walk_view import WalkRequest
 from app.state import Spec
@@ -205,28 +206,39 @@ def test_requests_are_what_is_chosen_and_change_while_somebody_watches(room, clo
 
 
 def test_the_player_steps_scrubs_and_plays(room, close_up):
-    gui = room.gui
-    assert not gui.find("Player").seen
+    gui, dock = room.gui, room.folder._dock
+    room.folder.visit(True)
     room.folder.load(close_up)
-    gui.press("Player", "Pause")
-    gui.set("Step", 0)
-    assert gui.find("Player").seen
-    assert gui.find("Step").max == close_up.steps
-    gui.press("Player", "Step")
-    gui.press("Player", "Step")
-    assert gui.find("Step").value == 2
-    gui.press("Player", "Step back")
-    assert gui.find("Step").value == 1
-    gui.set("Step", 200)
+    assert dock.playing
+    dock.pause()
+    dock.seek(0)
+    dock.step(1)
+    dock.step(1)
+    assert dock.now_ns == 2 * COUNT_NS
+    dock.step(-1)
+    assert dock.now_ns == COUNT_NS
+    assert status_line(close_up, 1) in gui.text()
+    dock.seek(200 * COUNT_NS)
     assert status_line(close_up, 200) in gui.text()
-    gui.set("Speed (1/s)", 60.0)
-    gui.press("Player", "Play")
-    time.sleep(0.5)
-    gui.press("Player", "Pause")
-    played = gui.find("Step").value
-    assert played > 205
-    time.sleep(0.2)
-    assert gui.find("Step").value == played
+    dock.seek(10**15)
+    assert status_line(close_up, close_up.steps) in gui.text()
+    dock.play()
+    time.sleep(0.3)
+    dock.pause()
+    assert 0 < dock.now_ns < 5 * COUNT_NS
+
+
+def test_a_walk_that_comes_while_another_screen_is_shown_does_not_play(room, close_up):
+    room.folder.visit(True)
+    room.folder.visit(False)
+    room.folder.load(close_up)
+    assert not room.folder._dock.playing
+
+
+def test_the_curve_of_the_front_ends_with_the_walk(close_up):
+    said = [label.text for label in front_lane(close_up).labels(close_up.steps * COUNT_NS)]
+    assert f"triangles {close_up.count(close_up.steps):.3g}" in said[0]
+    assert said[1].strip() == "front edges 0"
 
 
 def test_a_close_up_has_a_focus_and_the_whole_has_none(room, close_up, whole):

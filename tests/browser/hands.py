@@ -12,7 +12,7 @@ TEXTS = {
     "Scene": "Each camera node delivers",
     "Calibrate": "Photographs of a board of known size",
     "Depth": "points the sensor measured",
-    "Fuse": "move the orange cloud",
+    "Fuse": "Each lane moves the same cloud",
     "Surface": "A ball rolls over the points",
     "Network": "by radio, packet by packet",
     "Export": "Take it along",
@@ -46,12 +46,13 @@ def canvas(page, still=2):
 
 
 def differing(one, other):
-    """Share of the cells in which two pictures differ visibly."""
+    """Share of the cells in which two pictures differ visibly, as far down as both reach."""
+    pictures = [cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) for png in (one, other)]
+    height, width = np.min([picture.shape[:2] for picture in pictures], axis=0)
     cells = []
-    for png in (one, other):
-        picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
-        size = (picture.shape[1] // CELL_PX, picture.shape[0] // CELL_PX)
-        cells.append(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+    for picture in pictures:
+        size = (width // CELL_PX, height // CELL_PX)
+        cells.append(cv2.resize(picture[:height, :width], size, interpolation=cv2.INTER_AREA))
     return float(np.mean(cv2.absdiff(*cells).max(axis=2) > LEVELS))
 
 

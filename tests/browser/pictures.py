@@ -1,13 +1,14 @@
-"""Make docs/surface.jpg and docs/kinect.jpg again: ``python tests/browser/pictures.py [surface] [kinect]``.
+"""Make pictures of docs/ again: ``python tests/browser/pictures.py [fuse] [surface] [kinect]``.
 
-``surface`` opens the app in Chromium; ``kinect`` reconstructs the two real frames of ``--frames``, a folder
-with ``kinect_desk`` and ``kinect_basket``.
+``fuse`` and ``surface`` open the app in Chromium; ``kinect`` reconstructs the two real frames of
+``--frames``, a folder with ``kinect_desk`` and ``kinect_basket``.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +17,7 @@ import numpy as np
 from conftest import ARGUMENTS, chromium_path
 from hands import canvas, go
 from PIL import Image
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
 import packetmesh as pm
 from app.drawing.colors import INFERRED, TARGET
@@ -33,15 +34,31 @@ QUALITY = 88
 FRAMES = ("kinect_desk", "kinect_basket")
 
 
+def fuse(frames: Path) -> Image.Image:
+    """The end of the race in the living room."""
+
+    def to_the_end(page: Page) -> None:
+        page.locator(".packetmesh-board .number").first.wait_for()
+        page.locator(".packetmesh-dock-row").press("End")
+        page.locator(".packetmesh-board [data-state=arrived]").wait_for()
+
+    return _screen("Fuse", to_the_end)
+
+
 def surface(frames: Path) -> Image.Image:
     """The Surface screen with the living room."""
+    return _screen("Surface", lambda page: None)
+
+
+def _screen(step: str, prepare: Callable[[Page], None]) -> Image.Image:
     app = build_server("living-room", port=0)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium_path(), args=ARGUMENTS)
         page = browser.new_page(viewport=WINDOW_PX)
         page.goto(app.url)
-        go(page, "Surface")
+        go(page, step)
         page.get_by_text("Up to date").wait_for(timeout=120_000)
+        prepare(page)
         for close in page.locator(".mantine-Notification-closeButton").all():
             close.click()
         canvas(page)
@@ -81,11 +98,11 @@ def _panel(title: str, rgb: np.ndarray) -> np.ndarray:
     return panel
 
 
-PICTURES = {"surface": surface, "kinect": kinect}
+PICTURES = {"fuse": fuse, "surface": surface, "kinect": kinect}
 
 
 def main() -> None:
-    """Make the named pictures, or both."""
+    """Make the named pictures, or all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", default=list(PICTURES), help=" or ".join(PICTURES))
     data = Path(os.environ.get("PACKETMESH_SHARED_DATA", DATA))

@@ -7,8 +7,10 @@ import re
 import cv2
 import numpy as np
 import pytest
+from playwright.sync_api import expect
 
 from tests.browser.hands import canvas, changed_from, go, pick, slider, unfold
+from tests.browser.hands import press as press_button
 
 
 @pytest.fixture
@@ -17,14 +19,33 @@ def fuse(tab):
     tab.reload()
     tab.get_by_text("Up to date").wait_for()
     go(tab, "Fuse")
-    tab.get_by_role("row", name="End error").wait_for()
+    tab.locator(".packetmesh-board .number").first.wait_for()
     return tab
 
 
+def press(page, *keys):
+    """Press keys in the dock, which take effect one after the other."""
+    page.locator(".packetmesh-dock-row").focus()
+    for key in keys:
+        page.keyboard.press(key)
+
+
+def board(page):
+    """The number over each lane, in cm."""
+    return [float(text) for text in page.locator(".packetmesh-board .number b").all_inner_texts()]
+
+
 def numbers(page, row):
-    """The numbers in a row of the result table, one for each lane."""
-    text = page.get_by_role("row", name=row).inner_text()
-    return [float(value) for value in re.findall(r"\d+(?:\.\d+)?", text)]
+    """The numbers in a row of the result table, one for each lane, which is there at the end of a race."""
+    rows = page.get_by_role("row", name=row)
+    for _ in range(150):
+        press(page, "End")
+        page.wait_for_timeout(200)
+        if rows.count():
+            return [
+                float(value) for value in re.findall(r"\d+(?:\.\d+)?", rows.inner_text().replace(",", ""))
+            ]
+    raise AssertionError("the race has no end")
 
 
 def await_change(page, row, before):
@@ -37,6 +58,81 @@ def await_change(page, row, before):
     raise AssertionError(f"{row} stayed {before}")
 
 
+def clock(page):
+    """What the dock's clock shows."""
+    return page.locator(".packetmesh-dock-time").inner_text()
+
+
+def test_the_race_is_driven_by_keys_alone_and_tells_who_wins(fuse):
+    """From the click on its step on, no mouse: the dock has the keys by itself."""
+    start_cm = board(fuse)
+    assert len(start_cm) == 2
+    assert start_cm[0] == start_cm[1]
+    assert re.fullmatch(r"iteration 0 of \d+", clock(fuse))
+    assert not fuse.get_by_role("row", name="End error").count()
+    fuse.keyboard.press("ArrowRight")
+    expect(fuse.locator(".packetmesh-dock-time")).to_have_text(re.compile("^iteration 1 of"))
+    fuse.keyboard.press("Space")
+    expect(fuse.locator(".packetmesh-dock-time")).to_have_text(re.compile("^iteration ([4-9]|..) of"))
+    fuse.keyboard.press("Space")
+    assert start_cm[1] > board(fuse)[1] > 0.5
+    fuse.keyboard.press("End")
+    heads = fuse.locator(".packetmesh-board .head")
+    expect(heads.nth(1)).to_have_attribute("data-state", "arrived")
+    expect(heads.nth(0)).to_have_attribute("data-state", "missed")
+    icp_cm, ceicp_cm = board(fuse)
+    assert ceicp_cm < 2.0 < icp_cm
+    np.testing.assert_allclose(numbers(fuse, "End error"), board(fuse), atol=0.05)
+    fuse.keyboard.press("ArrowLeft")
+    expect(heads.nth(1)).to_have_attribute("data-state", "running")
+    fuse.keyboard.press("Home")
+    expect(fuse.locator(".packetmesh-dock-time")).to_have_text(re.compile("^iteration 0 of"))
+    assert board(fuse) == start_cm
+
+
+def test_no_curve_runs_ahead_of_the_race(fuse):
+    press(fuse, "Home", *["ArrowRight"] * 5)
+    expect(fuse.locator(".packetmesh-dock-time")).to_have_text(re.compile("^iteration 5 of"))
+    field = fuse.locator(".packetmesh-dock-field")
+    box = field.bounding_box()
+    shot = cv2.imdecode(np.frombuffer(field.screenshot(), np.uint8), cv2.IMREAD_COLOR).astype(int)
+    curves = np.ptp(shot[4:90], axis=2) > 40
+    cursor = fuse.locator(".packetmesh-dock-cursor").bounding_box()
+    x = round(cursor["x"] + cursor["width"] / 2 - box["x"])
+    assert curves[:, : x - 3].any()
+    assert not curves[:, x + 3 :].any()
+
+
+def test_the_second_click_shows_what_the_metric_alone_does(fuse):
+    before = numbers(fuse, "End error")
+    press_button(fuse, "Point or plane")
+    await_change(fuse, "End error", before)
+    names = fuse.locator(".packetmesh-board .title span")
+    assert names.all_inner_texts() == ["① ICP point", "② ICP plane"]
+
+
+def test_a_question_mark_says_what_a_method_does_and_where_it_is_from(fuse):
+    answer = fuse.locator(".packetmesh-board .answer").nth(1)
+    expect(answer).to_be_hidden()
+    fuse.get_by_role("button", name="What ② CEICP-A point does").click()
+    expect(answer).to_contain_text("−p log p")
+    expect(answer).to_contain_text("Source: the thesis")
+    fuse.get_by_role("button", name="What ② CEICP-A point does").click()
+    expect(answer).to_be_hidden()
+
+
+def test_board_and_dock_go_with_the_race(fuse):
+    for there in (fuse.locator(".packetmesh-board"), fuse.locator(".packetmesh-dock-row")):
+        expect(there).to_have_count(1)
+    pick(fuse, "Show", "result")
+    for gone in (fuse.locator(".packetmesh-board"), fuse.locator(".packetmesh-dock-row")):
+        expect(gone).to_have_count(0)
+    pick(fuse, "Show", "race: node on node")
+    expect(fuse.locator(".packetmesh-board")).to_have_count(1)
+    go(fuse, "Scene")
+    expect(fuse.locator(".packetmesh-board")).to_have_count(0)
+
+
 def test_two_methods_race_by_default_and_ceicp_arrives(fuse):
     icp_cm, ceicp_cm = numbers(fuse, "End error")
     assert ceicp_cm < 2.0 < icp_cm
@@ -46,9 +142,10 @@ def test_two_methods_race_by_default_and_ceicp_arrives(fuse):
 
 def test_a_third_method_gets_a_lane_a_column_and_room(fuse):
     before, picture = numbers(fuse, "End error"), canvas(fuse)
-    unfold(fuse, "More methods, nodes and pairs")
+    unfold(fuse, "Methods, nodes and pairs")
     pick(fuse, "Method ③", "FICP, plane")
     assert len(await_change(fuse, "End error", before)) == 3
+    assert len(board(fuse)) == 3
     fuse.get_by_text("③ FICP plane").first.wait_for()
     assert changed_from(fuse, picture)
 
@@ -76,24 +173,22 @@ def test_noise_changes_the_end_and_not_the_start(fuse):
 
 
 def test_the_player_counts_milliseconds(fuse):
-    unfold(fuse, "Axis, speed and loop")
+    unfold(fuse, "Methods, nodes and pairs")
     pick(fuse, "Axis", "milliseconds")
-    fuse.get_by_text("Time (ms)").wait_for()
-    handle = slider(fuse, "Time (ms)")
-    assert int(handle.get_attribute("aria-valuemax")) >= max(numbers(fuse, "Time")) - 1
+    expect(fuse.locator(".packetmesh-dock-time")).to_have_text(re.compile("^0[.0-9]* m?s of"))
+    press(fuse, "Home")
     picture = canvas(fuse)
-    handle.focus()
-    handle.press("End")
+    longest_ms = max(numbers(fuse, "Time"))
+    value, unit = clock(fuse).split(" of ")[1].split()
+    assert float(value) * {"ms": 1.0, "s": 1000.0}[unit] == pytest.approx(longest_ms, abs=6.0)
     assert changed_from(fuse, picture)
 
 
 def test_the_histogram_moves_with_the_player(fuse):
-    fuse.get_by_role("tab", name="Pairs").click()
-    pick(fuse, "Lane", "② CEICP-A plane")
+    pick(fuse, "Lane", "② CEICP-A point")
     sigma = fuse.get_by_text(re.compile("kernel f, σ = "))
     first = sigma.inner_text()
-    fuse.get_by_role("button", name="Step", exact=True).click()
-    fuse.get_by_role("button", name="Step", exact=True).click()
+    press(fuse, "ArrowRight", "ArrowRight")
     fuse.wait_for_function(
         "old => ![...document.querySelectorAll('div')].some(d => d.innerText === old)", arg=first
     )
@@ -113,7 +208,7 @@ def test_the_lesson_walks_ten_stops_and_sets_the_controls(fuse):
     assert starts == {"aligned", "slightly off (3°, 6 cm)", "far off (20°, 40 cm)"}
     assert lanes == {2, 3, 4}
     assert fuse.get_by_label("Show", exact=True).first.input_value() == "race: inferred on sensor"
-    fuse.get_by_text("Time (ms)").wait_for()
+    assert re.search("of .* m?s$", clock(fuse))
     fuse.get_by_role("button", name="Back", exact=True).click()
     fuse.get_by_text("(9 of 10)").wait_for()
 
@@ -135,7 +230,7 @@ def test_the_capture_map_is_computed_and_a_cell_starts_a_race(fuse):
 
 
 def test_the_map_can_be_stopped(fuse):
-    unfold(fuse, "More methods, nodes and pairs")
+    unfold(fuse, "Methods, nodes and pairs")
     pick(fuse, "Method ③", "CEICP-A, point")
     fuse.get_by_text("③ CEICP-A point").first.wait_for()
     unfold(fuse, "Capture range")
@@ -150,13 +245,17 @@ def test_inferred_on_sensor_is_another_race(fuse):
     before = numbers(fuse, "Start error")
     pick(fuse, "Show", "race: inferred on sensor")
     await_change(fuse, "Start error", before)
-    picture = canvas(fuse)
+    assert len(board(fuse)) == 2
     pick(fuse, "Show", "result")
-    assert changed_from(fuse, picture)
+    expect(fuse.locator(".packetmesh-board")).to_have_count(0)
+    result = canvas(fuse)
+    pick(fuse, "Show", "before registration")
+    assert changed_from(fuse, result)
 
 
 def test_dragging_the_arrows_moves_the_start_and_races_from_there(fuse):
     error_cm = numbers(fuse, "Start error")
+    press(fuse, "Home")
     assert len(red_pixels(canvas(fuse))) < 5
     unfold(fuse, "Start by hand")
     fuse.get_by_label("Drag", exact=True).first.check()
@@ -164,8 +263,10 @@ def test_dragging_the_arrows_moves_the_start_and_races_from_there(fuse):
     y, x = arrow[np.argmin(np.sum((arrow - np.median(arrow, axis=0)) ** 2, axis=1))]
     x, y = int(x), int(y)
     fuse.mouse.move(x, y)
+    fuse.wait_for_timeout(500)  # until it is seen what the hand is on
     fuse.mouse.down()
     fuse.mouse.move(x + 20, y + 30, steps=6)
+    fuse.wait_for_timeout(500)
     fuse.mouse.up()
     assert await_change(fuse, "Start error", error_cm)
     assert fuse.get_by_label("Start", exact=True).first.input_value() == "by hand"

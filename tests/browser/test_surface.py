@@ -150,13 +150,14 @@ def test_the_ball_rolls_steps_back_and_leaves(surface):
     press(surface, "Roll")
     line = surface.get_by_text(re.compile(r"Step \d+ of \d+"))
     surface.get_by_text(re.compile(r"Step ([3-9]|\d\d+) of")).wait_for()
-    press(surface, "Pause")
-    press(surface, "Step")
+    press(surface, "Play")
+    surface.wait_for_timeout(500)
+    press(surface, "Next step")
     surface.wait_for_timeout(1500)
     step = int(re.search(r"Step (\d+)", line.inner_text())[1])
     assert step >= 3
     assert differing(canvas(surface), meshed) > ALIKE
-    press(surface, "Step back")
+    press(surface, "One step back")
     surface.get_by_text(re.compile(rf"Step {step - 1} of")).wait_for()
     press(surface, "Close")
     expect(line).to_have_count(0)

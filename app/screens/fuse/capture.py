@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 
-from app.screens.fuse.draw import MARKS
+from app.screens.fuse.labels import MARKS
 from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, SUCCESS_M, CaptureView
 from app.tables import number
 from app.ui import Ui

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.screens.fuse.race_job import Contest, config_of, contest_of, label_of, race_key
+from app.screens.fuse.methods import label_of
+from app.screens.fuse.race_job import Contest, config_of, contest_of, race_key
 from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, CaptureView, Race, Start
 from app.state import Spec
 from app.store import Store

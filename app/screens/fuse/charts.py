@@ -1,54 +1,51 @@
-"""The race in charts: distance from truth, RMSE and entropy over the race, and the pairs by distance."""
+"""The race in charts: the pairs by distance, and RMSE and entropy as far as the race has come."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from app.drawing.colors import css
 from app.drawing.curves import Curves
-from app.screens.fuse.draw import MARKS
+from app.screens.fuse.clock import RaceClock
 from app.screens.fuse.histogram import HistogramChart
-from app.screens.fuse.player import RaceClock
+from app.screens.fuse.labels import MARKS, MOST_LANES
+from app.screens.fuse.methods import color_of
 from app.screens.fuse.view import RaceView
 from app.ui import Ui
 
 FIRST = f"{MARKS[0]} first"
-LANES = (("#5b6570", ()), ("#009e73", ()), ("#cc6699", (7, 3)), ("#7a4a00", (2, 3)))
-"""Colour and dashes of the first to the fourth method: grey, green, pink and brown."""
 
 
 class RaceCharts:
-    """Four charts in tabs, all with the player's place marked."""
+    """Three charts in tabs, all with the player's place marked."""
 
     def __init__(self, ui: Ui) -> None:
         gui = ui.gui
         self._view: RaceView | None = None
         self._rows: tuple[int, ...] = ()
         tabs = gui.add_tab_group()
-        with tabs.add_tab("Error"):
-            self._error = Curves(gui, "error, cm", LANES, 0.1)
-            self._unknown = gui.add_markdown("The truth of this scene is not known.", visible=False)
-        with tabs.add_tab("RMSE"):
-            self._rmse = Curves(gui, "RMSE, cm", LANES, 0.1)
-        with tabs.add_tab("Entropy"):
-            self._entropy = Curves(gui, "entropy, nat", LANES, 1.0)
-            self._without = gui.add_markdown("None of these methods has an entropy.", visible=False)
         with tabs.add_tab("Pairs"):
             self._lane = gui.add_dropdown("Lane", [FIRST], hint="Method whose pairs are counted.")
             ui.when_changed(self._lane, self._show_pairs)
             self._pairs = HistogramChart(gui)
+        with tabs.add_tab("RMSE"):
+            self._rmse = Curves(gui, "RMSE, cm", MOST_LANES, 0.1)
+        with tabs.add_tab("Entropy"):
+            self._entropy = Curves(gui, "entropy, nat", MOST_LANES, 1.0)
+            self._without = gui.add_markdown("None of these methods has an entropy.", visible=False)
         self._legend = gui.add_html("")
 
     def load(self, view: RaceView, clock: RaceClock) -> None:
         """Show another race, or the same by another clock."""
         self._view = view
         lanes = view.lanes
+        colors = [css(color_of(lane.rival)) for lane in lanes]
         entropies = [np.array([step.entropy_nat for step in lane.steps]) for lane in lanes]
-        errors = [np.array([_cm(step.point_error_m) for step in lane.steps]) for lane in lanes]
-        rmses = [np.array([_cm(step.rmse_m) for step in lane.steps]) for lane in lanes]
-        ends, label = (0.0, float((clock.length - 1) * clock.unit or 1)), clock.label
-        for chart, values in ((self._error, errors), (self._rmse, rmses), (self._entropy, entropies)):
-            chart.load(list(zip(clock.xs, values, strict=True)), ends, label)
-        self._unknown.visible = not view.has_truth
+        rmses = [np.array([100.0 * step.rmse_m for step in lane.steps]) for lane in lanes]
+        at = [clock.shown(steps_ns) for steps_ns in clock.steps_ns]
+        ends = (0.0, max(float(x[-1]) for x in at) or 1.0)
+        for chart, values in ((self._rmse, rmses), (self._entropy, entropies)):
+            chart.load(list(zip(at, values, strict=True)), colors, ends, clock.label)
         self._without.visible = not np.isfinite(np.concatenate(entropies)).any()
         names = tuple(f"{MARKS[index]} {lane.label}" for index, lane in enumerate(lanes))
         if names != tuple(self._lane.options):
@@ -65,7 +62,7 @@ class RaceCharts:
     def mark(self, now: float, rows: tuple[int, ...]) -> None:
         """Follow the player: the place on the axis, and the step of each lane."""
         self._rows = rows
-        for curves in (self._error, self._rmse, self._entropy):
+        for curves in (self._rmse, self._entropy):
             curves.mark(now, rows)
         self._show_pairs()
 
@@ -78,14 +75,10 @@ class RaceCharts:
             self._pairs.show(self._view.lanes[index], self._rows[index], self._view.edges_m)
 
 
-def _cm(value_m: float | None) -> float:
-    return float("nan") if value_m is None else 100.0 * value_m
-
-
 def legend(view: RaceView) -> str:
     """The lanes with the colours of their curves."""
     names = " &emsp; ".join(
-        f"<b style='color:{color}; white-space: nowrap'>{mark} {lane.label}</b>"
-        for mark, (color, _), lane in zip(MARKS, LANES, view.lanes, strict=False)
+        f"<b style='color:{css(color_of(lane.rival))}; white-space: nowrap'>{mark} {lane.label}</b>"
+        for mark, lane in zip(MARKS, view.lanes, strict=False)
     )
     return f"<div style='padding: 0 0.8em 0.5em; font-size: 13px'>{names}</div>"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,55 +12,89 @@ from viser import transforms
 
 from app.drawing.cameras import Stage, turn
 from app.drawing.clouds import add_cloud, clear
-from app.drawing.colors import SOURCE, TARGET
+from app.drawing.colors import DISTANCE_STOPS, NEUTRAL, ramp
 from app.drawing.poses import move, place
-from app.screens.fuse.view import RaceStep, RaceView, Start
+from app.screens.fuse.view import LensView, RaceStep, RaceView, Start
 from pipeline.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.types import ByteArray, FloatArray
 
 FAINT, STRONG = np.array([235.0, 235.0, 235.0]), np.array([20.0, 20.0, 20.0])
-POINT_M = 0.009
-GAP = 1.05
-"""Distance of two lanes in widths, or heights, of the scene."""
-AWAY = 2.3
-"""How far the viewer of two rows of lanes stands, in distances for one lane."""
-MARKS = "①②③④"
+POINT_M = 0.011
+PALETTE = ramp(np.arange(256.0), 255.0, DISTANCE_STOPS)
+"""RGB of every shade of a distance."""
+FOV_RAD = np.radians(25.0)
+"""Of the view of a race: from afar all lanes are seen from the same side."""
+BAND, WHOLE_BAND = (0.2, 0.58), (0.2, 0.95)
+"""Where in the picture the clouds are, in its height from the top: above the magnified corner, or without."""
+RING, RING_PARTS = (20, 20, 20), 48
+"""Colour of the ring about what is magnified, and its parts."""
+ASPECT = 1.5
+"""Of the picture, while nobody looks."""
+ROOM = 1.14
+"""Width of a lane over that of its clouds, and height of the band over theirs."""
 
 
 class RaceDrawing:
-    """The lanes of one race below a scene node: up to two in a row, and a second row below."""
+    """The lanes of one race below a scene node, beside each other."""
 
     def __init__(self, scene: viser.SceneApi, below: str, view: RaceView, stage: Stage) -> None:
         clear(scene, below)
         self._scene, self._below, self._view = scene, below, view
+        self._extent = _extent_of(view, stage)
+        self._band = WHOLE_BAND if view.lens is None else BAND
+        self._lanes: list[viser.FrameHandle] = []
         self._sources: list[viser.PointCloudHandle] = []
         self._pairs: list[viser.LineSegmentsHandle] = []
-        for index, (lane, offset_m) in enumerate(zip(view.lanes, _offsets_m(view, stage), strict=True)):
+        for index, lane in enumerate(view.lanes):
             name, first = f"{below}/lane{index}", lane.steps[0]
-            frame = scene.add_frame(name, show_axes=False)
-            place(frame, rigid(np.eye(3), offset_m) @ view.T_world_target)
-            add_cloud(scene, f"{name}/target", view.target, np.eye(4), TARGET, POINT_M)
+            self._lanes.append(scene.add_frame(name, show_axes=False))
+            add_cloud(scene, f"{name}/target", view.target, np.eye(4), NEUTRAL, POINT_M)
+            moving = replace(view.source, colors=PALETTE[first.shades])
             self._sources.append(
-                add_cloud(scene, f"{name}/source", view.source, first.T_target_source, SOURCE, POINT_M)
+                add_cloud(scene, f"{name}/source", moving, first.T_target_source, size_m=POINT_M)
             )
+            if view.lens is not None:
+                self._add_ring(f"{name}/ring", view.lens)
             points, colors = pair_lines(first)
             self._pairs.append(
                 scene.add_line_segments(
-                    f"{name}/pairs", points, colors, thickness=3.0, thickness_units="screen"
+                    f"{name}/pairs", points, colors, thickness=2.0, thickness_units="screen"
                 )
             )
-            scene.add_label(
-                f"{below}/label{index}",
-                f"{MARKS[index]} {lane.label}",
-                position=stage.top_m + offset_m,
-                anchor="bottom-center",
-            )
+        self._spread(ASPECT)
+
+    def _add_ring(self, name: str, lens: LensView) -> None:
+        """A circle about what is magnified, facing the viewer."""
+        angles = np.linspace(0.0, 2.0 * np.pi, RING_PARTS + 1)[:, None]
+        around = np.cos(angles) * self._extent.right + np.sin(angles) * self._extent.up
+        ring_m = lens.center_m + 0.5 * lens.window_m * around @ self._view.T_world_target[:3, :3]
+        parts_m = np.stack([ring_m[:-1], ring_m[1:]], axis=1).astype(np.float32)
+        self._scene.add_line_segments(name, parts_m, np.array(RING), thickness=4.0, thickness_units="screen")
+
+    def look(self, clients: Iterable[viser.ClientHandle]) -> None:
+        """Have all lanes side by side in the picture, each in the middle of its share of the width."""
+        extent, (top, bottom) = self._extent, self._band
+        for client in clients:
+            height_m = len(self._lanes) * self._spread(client.camera.aspect) / client.camera.aspect
+            at_m = extent.middle_m - (0.5 - 0.5 * (top + bottom)) * height_m * extent.up
+            with client.atomic():
+                client.camera.fov = FOV_RAD
+                turn(client, at_m, at_m - 0.5 * height_m / np.tan(0.5 * FOV_RAD) * extent.forward)
+
+    def _spread(self, aspect: float) -> float:
+        """Place the lanes for a picture so much wider than high; how far they are apart in metres."""
+        extent, count, (top, bottom) = self._extent, len(self._lanes), self._band
+        apart_m = ROOM * max(extent.width_m, aspect * extent.height_m / (count * (bottom - top)))
+        for frame, away in zip(self._lanes, _places(count), strict=True):
+            place(frame, rigid(np.eye(3), away * apart_m * extent.right) @ self._view.T_world_target)
+        return apart_m
 
     def show(self, rows: Sequence[int]) -> None:
         """Move every lane to one of its steps."""
         for lane, row, source, pairs in zip(self._view.lanes, rows, self._sources, self._pairs, strict=True):
             step = lane.steps[row]
             move(source, step.T_target_source)
+            source.colors = PALETTE[step.shades]
             points, colors = pair_lines(step)
             pairs.visible = bool(len(points))
             if len(points):
@@ -100,25 +135,35 @@ def start_of(pose: FloatArray, center_m: FloatArray) -> Start:
     return Start(tuple(turn_deg), tuple((100.0 * (pose[:3, 3] - center_m)).round(2).tolist()))
 
 
-def look_at_rows(clients: Iterable[viser.ClientHandle], stage: Stage) -> None:
-    """Step back until both rows of lanes are in the picture."""
-    for client in clients:
-        turn(client, stage.middle_m, stage.middle_m + AWAY * (stage.viewpoint_m - stage.middle_m))
+@dataclass(frozen=True, slots=True)
+class _Extent:
+    """What the clouds of a lane take up, as they are seen."""
+
+    right: FloatArray
+    """(3,) unit vectors along the picture and into it."""
+    up: FloatArray
+    forward: FloatArray
+    middle_m: FloatArray
+    """(3,)."""
+    width_m: float
+    height_m: float
 
 
-def _offsets_m(view: RaceView, stage: Stage) -> list[FloatArray]:
-    """Where each lane stands: side by side, the third and fourth below, all about the stage's middle."""
-    count = len(view.lanes)
-    height_m = apply(view.T_world_target, view.target.points_m.astype(float))[:, 2]
-    low_m, high_m = np.percentile(height_m, [2, 98])
-    right_m = stage.right * stage.width_m * GAP
-    down_m = np.array([0.0, 0.0, -1.5 * (high_m - low_m) * GAP])
-    rows = [min(count, 2), max(0, count - 2)]
-    return [
-        right_m * (column - (rows[row] - 1) / 2) + down_m * (row - (0.5 if rows[1] else 0.0))
-        for row in range(2)
-        for column in range(rows[row])
-    ]
+def _extent_of(view: RaceView, stage: Stage) -> _Extent:
+    forward = stage.middle_m - stage.viewpoint_m
+    forward = forward / np.linalg.norm(forward)
+    axes = np.stack([stage.right, np.cross(stage.right, forward), forward])
+    start = apply(view.lanes[0].steps[0].T_target_source, view.source.points_m.astype(float))
+    points_m = np.concatenate([view.target.points_m.astype(float), start])
+    low_m, high_m = np.percentile(apply(view.T_world_target, points_m) @ axes.T, [0.5, 99.5], axis=0)
+    width_m, height_m, _ = (high_m - low_m).tolist()
+    middle_m = 0.5 * (low_m + high_m) @ axes
+    return _Extent(axes[0], axes[1], axes[2], middle_m, width_m, height_m)
+
+
+def _places(count: int) -> FloatArray:
+    """(count,) places of lanes about the middle, in their distance from each other."""
+    return np.arange(count) - 0.5 * (count - 1)
 
 
 def pair_lines(step: RaceStep) -> tuple[FloatArray, ByteArray]:

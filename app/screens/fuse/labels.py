@@ -26,5 +26,13 @@ RIVALS: dict[str, Rival] = {
     for metric in get_args(Metric)
 }
 RIVAL_NAMES = {rival: name for name, rival in RIVALS.items()}
+COMPARISONS: dict[str, tuple[Rival, ...]] = {
+    "ICP or CEICP": (("icp", "point"), ("ceicp-a", "point")),
+    "Point or plane": (("icp", "point"), ("icp", "plane")),
+    "All four": (("icp", "point"), ("ceicp-a", "point"), ("icp", "plane"), ("ceicp-a", "plane")),
+}
+"""Races that tell apart what the weights do, what the metric does, and both."""
 NOBODY = "none"
 MOST_LANES = 4
+MARKS = "①②③④"
+"""Of the lanes."""

@@ -7,7 +7,7 @@ from html import escape
 
 import numpy as np
 
-from app.screens.fuse.draw import MARKS
+from app.screens.fuse.labels import MARKS
 from app.screens.fuse.view import SUCCESS_M, FuseView, RaceLane, RegistrationRow
 from app.tables import Row, number, table
 

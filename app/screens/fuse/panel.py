@@ -7,6 +7,7 @@ from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any, ClassVar, TypeAlias, get_args
 
+import numpy as np
 import viser
 
 from app.controls import Choice, Controls
@@ -15,10 +16,11 @@ from app.drawing.clouds import add_cloud, clear
 from app.drawing.poses import move, place
 from app.lesson import LessonFolder, read_lesson
 from app.records import DepthView
+from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
-from app.screens.fuse.draw import RaceDrawing, gizmo_pose, look_at_rows
-from app.screens.fuse.labels import MODES
+from app.screens.fuse.draw import RaceDrawing, gizmo_pose
+from app.screens.fuse.labels import MARKS, MODES
 from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.numbers import places_table, race_table, verdict
 from app.screens.fuse.player import RacePlayer
@@ -28,11 +30,12 @@ from app.state import Spec, Step
 from app.ui import Panel
 from pipeline.config import Method
 
-TEXT = """**What you see.** Methods move the orange cloud onto the blue one, all from the same start. Lines
-join the points each method pairs; the darker, the more weight. Press **Play**, or drag the iteration. Choose
-*result* to see all nodes in place. Go on with **Surface**."""
+TEXT = """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
+are how far every point is from where it belongs. **Play** below (space), then compare what made the
+difference."""
 SINGLE = """This scene has a single node: no other node to find its place beside. What races here is its
 inferred cloud, onto what its sensor measured."""
+RUNNING = "Who comes nearer? At the end of the race its numbers are here."
 RACES = {f"race: {name}": mode for name, mode in MODES.items()}
 RACE_NAMES = {mode: name for name, mode in RACES.items()}
 RESULT, BEFORE = "result", "before registration"
@@ -73,7 +76,11 @@ class FusePanel(Panel):
         self._drawn: Start = Start()
         self._gizmo: Any = None
         self._seek_at: int | None = 0
-        self._lanes = 0
+        self._framed: tuple[float, ...] = ()
+        self._fov_rad: float | None = None
+        self._here = False
+        self._seen: tuple[int, ...] = ()
+        """The step of each lane that is shown."""
         self._placed: list[viser.PointCloudHandle] = []
         gui.add_markdown(TEXT)
         self._single = gui.add_markdown(SINGLE, visible=False)
@@ -81,9 +88,10 @@ class FusePanel(Panel):
         self._shown = gui.add_dropdown("Show", [*RACES, RESULT, BEFORE], hint="What the 3-D view shows.")
         self.ui.when_changed(self._shown, self._picked_shown)
         self._setup = RaceSetup(self.ui, self._start)
-        self._setup.add_methods(("Method ①", "Method ②"))
+        self._setup.add_comparisons()
         self._setup.add_preset()
         self._player = RacePlayer(self.ui, self._moved, self._clocked)
+        self._board = Board(self.ui)
         self._charts = RaceCharts(self.ui)
         self._verdict = gui.add_markdown("")
         self._table = gui.add_html("")
@@ -92,9 +100,10 @@ class FusePanel(Panel):
 
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session
-        with gui.add_folder("More methods, nodes and pairs", expand_by_default=False):
-            self._setup.add_methods(("Method ③", "Method ④"))
+        with gui.add_folder("Methods, nodes and pairs", expand_by_default=False):
+            self._setup.add_methods([f"Method {mark}" for mark in MARKS])
             self._setup.add_nodes()
+            self._player.add_axis()
         with gui.add_folder("Start by hand", expand_by_default=False):
             self._dragging = gui.add_checkbox(
                 "Drag",
@@ -105,16 +114,9 @@ class FusePanel(Panel):
             self._setup.add_numbers()
         with gui.add_folder("Make the moving cloud worse", expand_by_default=False):
             self._setup.add_degradations()
-        with gui.add_folder("Axis, speed and loop", expand_by_default=False):
-            self._player.add_options()
         self._capture = CaptureFolder(self.ui, self._map, session.cancel_side_job, self._picked_cell)
         with gui.add_folder("Chain", expand_by_default=False):
             self._controls = Controls(self.ui, ADVANCED, session.spec.config, session.edit)
-
-    @property
-    def wide(self) -> bool:
-        """Whether lanes stand beside each other."""
-        return self._view is not None and len(self._view.lanes) > 1 and self._shown.value in RACES
 
     def on_spec(self, spec: Spec) -> None:
         """Show the settings that are wanted."""
@@ -133,8 +135,15 @@ class FusePanel(Panel):
 
     def on_show(self) -> None:
         """Start the race if none has run yet."""
-        self._lanes = 0
+        self._here, self._framed = True, ()
+        self._show_parts()
         self._start()
+
+    def on_hide(self) -> None:
+        """Leave the picture to others, seen as they see it."""
+        self._here = False
+        self._show_parts()
+        self._widen()
 
     # What races.
 
@@ -149,6 +158,11 @@ class FusePanel(Panel):
             self._setup.choose_nodes(names)
             if self._shown.value in RACES:
                 self._setup.choose_mode(RACES[self._shown.value])
+
+    @property
+    def _racing(self) -> bool:
+        """Whether a race is shown."""
+        return self._shown.value in RACES and self._view is not None
 
     def _picked_shown(self) -> None:
         if self._shown.value in RACES:
@@ -196,9 +210,9 @@ class FusePanel(Panel):
     def _forget(self) -> None:
         """Take the race of another scene away."""
         self._raced = self._arrived = self._view = self._drawing = self._gizmo = None
-        self._lanes = 0
         with self.ui.atomic():
             clear(self.scene, "/fuse/race")
+            self._board.load(None)
             self._verdict.content = self._table.content = self._rows.content = ""
             self._capture.forget()
 
@@ -216,25 +230,36 @@ class FusePanel(Panel):
         with self.ui.atomic():
             self._drawing = RaceDrawing(self.scene, "/fuse/race", view, self._stage())
             self._gizmo = None
+            self._framed, self._seen = (), ()
             self._place_gizmo()
-            self._verdict.content = verdict(view.lanes)
-            self._table.content = race_table(view.lanes)
-            self._player.load_race(view.lanes)
+            self._board.load(view)
+            self._verdict.content, self._table.content = RUNNING, ""
+            self._player.load(view.lanes)
             self._player.seek_at(self._seek_at)
             self._seek_at = 0
             self._arrange()
+
+    def _show_parts(self) -> None:
+        """Have board and dock there while a race is shown, and only then."""
+        self._board.show(self._racing and self._here)
+        self._player.show(self._racing and self._here)
 
     def _clocked(self) -> None:
         if self._view is not None and self._player.clock is not None:
             self._charts.load(self._view, self._player.clock)
 
-    def _moved(self, at: int) -> None:
+    def _moved(self, now_ns: int) -> None:
         clock = self._player.clock
-        if self._drawing is None or clock is None:
+        if self._drawing is None or clock is None or clock.rows(now_ns) == self._seen:
             return
+        self._seen = clock.rows(now_ns)
         with self.ui.atomic():
-            self._drawing.show(clock.rows(at))
-            self._charts.mark(float(at * clock.unit), clock.rows(at))
+            self._drawing.show(self._seen)
+            self._board.mark(self._seen)
+            self._charts.mark(float(clock.shown(np.array(now_ns))), self._seen)
+            if now_ns >= clock.end_ns and self._view is not None:
+                self._verdict.content = verdict(self._view.lanes)
+                self._table.content = race_table(self._view.lanes)
 
     # The gizmo.
 
@@ -257,7 +282,8 @@ class FusePanel(Panel):
             self._drawing.preview(self._drawn, start)
             self._setup.write_start(start)
         if ended and not self._start():
-            self._moved(self._player.position)
+            self._seen = ()
+            self._moved(self._player.now_ns)
 
     # The capture range.
 
@@ -281,12 +307,25 @@ class FusePanel(Panel):
         return stage_of(self.session.results.view("scene").nodes)
 
     def look(self) -> bool:
-        """Have more than two lanes in the picture; the session sees to one or two."""
-        lanes = len(self._view.lanes) if self._view is not None and self._shown.value in RACES else 1
-        if lanes > 2 and self._lanes <= 2:
-            look_at_rows(self.session.clients(), self._stage())
-        self._lanes = lanes
-        return lanes > 2
+        """Have all lanes in the picture, once for each shape of the window; the session sees to the rest."""
+        if self._drawing is None or not self._racing:
+            self._widen()
+            return False
+        clients = list(self.session.clients())
+        shape = tuple(round(client.camera.aspect, 2) for client in clients)
+        if shape != self._framed and clients:
+            if self._fov_rad is None:
+                self._fov_rad = clients[0].camera.fov
+            self._framed = shape
+            self._drawing.look(clients)
+        return True
+
+    def _widen(self) -> None:
+        """Give the view back the angle that a race narrows."""
+        if self._fov_rad is not None:
+            for client in self.session.clients():
+                client.camera.fov = self._fov_rad
+            self._fov_rad, self._framed = None, ()
 
     def _draw_result(self, view: FuseView) -> None:
         depth: DepthView | None = self.session.results.view("depth")
@@ -302,7 +341,8 @@ class FusePanel(Panel):
 
     def _arrange(self) -> None:
         """Show the race or the nodes in one of their two places."""
-        racing = self._shown.value in RACES and self._view is not None
+        racing = self._racing
+        self._show_parts()
         for name, visible in (("/fuse/race", racing), ("/fuse/result", not racing)):
             frame = self.scene.get_handle_by_name(name)
             if frame is not None:

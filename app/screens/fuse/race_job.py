@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from app.records import sample
+from app.screens.fuse.distances import Distances, shades_of
 from app.screens.fuse.job import true_pose
+from app.screens.fuse.lens import Lens, lens_of
+from app.screens.fuse.methods import label_of
 from app.screens.fuse.view import PairHistogram, Race, RaceLane, RaceStep, RaceView, Rival, Start
 from app.state import Spec
 from app.store import Store
@@ -22,7 +27,8 @@ from pipeline.registration.degradation import Degradation, degrade
 from pipeline.spec import key
 from pipeline.types import FloatArray, PointCloud, RegistrationStep, Rig
 
-LANE_POINTS = 15_000
+LANE_POINTS = 10_000
+"""Of each of the two clouds of a lane."""
 DRAWN_PAIRS = 250
 BINS = 60
 MOST_BINNED_M = 1.0
@@ -65,17 +71,22 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
         contest = contest_of(rig, nodes, race)
         runs = []
         for index, rival in enumerate(race.rivals):
-            yield Progress(f"race: {label_of(rival)}", index / len(race.rivals))
+            yield Progress(f"race: {label_of(rival)}", 0.9 * index / len(race.rivals))
             runs.append(_run(contest, race, rival, spec.config.node_registration))
         edges_m = _edges_m([run.records for run in runs])
         staying = race.source if race.mode == "inferred" else race.target
+        source = sample(contest.source.points_m, contest.source.colors, LANE_POINTS)
+        distances = Distances(source.points_m, contest.T_true, cKDTree(contest.target.points_m))
+        yield Progress("race: a corner to magnify", 0.9)
+        lens = lens_of(contest.source.points_m, contest.target.points_m, contest.T_aligned, distances)
         return RaceView(
-            source=sample(contest.source.points_m, contest.source.colors, LANE_POINTS),
+            source=source,
             target=sample(contest.target.points_m, contest.target.colors, LANE_POINTS),
             T_world_target=rig.frames[staying].T_world_camera,
             center_m=contest.center_m,
             edges_m=edges_m,
-            lanes=tuple(_lane(contest, run, edges_m) for run in runs),
+            lens=None if lens is None else lens.view,
+            lanes=tuple(_lane(contest, run, Watch(edges_m, distances, lens)) for run in runs),
         )
 
     return (yield from store.remember(("race", *race_key(spec), race), run))
@@ -128,14 +139,25 @@ def config_of(race: Race, rival: Rival, config: RegistrationConfig) -> Registrat
     )
 
 
-def label_of(rival: Rival) -> str:
-    """What to call it."""
-    return f"{rival[0].upper()} {rival[1]}"
-
-
 def _every(points_m: FloatArray, most: int) -> FloatArray:
     """About ``most`` of the points, evenly spaced in their order."""
     return points_m[:: max(1, len(points_m) // most)]
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """What is looked at in every step."""
+
+    edges_m: FloatArray
+    """(B + 1,) bins of the histogram."""
+    distances: Distances
+    lens: Lens | None
+
+    def seen(self, T_target_source: FloatArray) -> dict[str, Any]:
+        """What a ``RaceStep`` says of where the points are at a pose."""
+        distances_m, gap_m = self.distances.at(T_target_source)
+        lens = np.empty((0, 3), np.uint8) if self.lens is None else self.lens.at(T_target_source)
+        return {"gap_m": gap_m, "shades": shades_of(distances_m), "lens": lens}
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,14 +187,15 @@ def _edges_m(runs: Sequence[Sequence[RegistrationStep]]) -> FloatArray:
     return np.linspace(0.0, min(max([0.1, *reaches_m]), MOST_BINNED_M), BINS + 1)
 
 
-def _lane(contest: Contest, run: _Run, edges_m: FloatArray) -> RaceLane:
+def _lane(contest: Contest, run: _Run, watch: Watch) -> RaceLane:
     steps, T, time_s = [], run.T_start, 0.0
     for record, done_s in zip(run.records, run.seconds, strict=True):
-        steps.append(_race_step(record, T, time_s, contest, edges_m))
+        steps.append(_race_step(record, T, time_s, contest, watch))
         T, time_s = record.T_target_source, float(done_s)
-    steps.append(_end_step(steps[-1] if steps else None, T, time_s, contest))
+    steps.append(_end_step(steps[-1] if steps else None, T, time_s, contest, watch))
     moved_m = geometry.apply(T, _every(contest.source.points_m, HAUSDORFF_POINTS))
     return RaceLane(
+        rival=run.rival,
         label=label_of(run.rival),
         kernel=run.rival[0] in KERNEL_METHODS,
         steps=tuple(steps),
@@ -185,7 +208,7 @@ def _lane(contest: Contest, run: _Run, edges_m: FloatArray) -> RaceLane:
 
 
 def _race_step(
-    record: RegistrationStep, T: FloatArray, time_s: float, contest: Contest, edges_m: FloatArray
+    record: RegistrationStep, T: FloatArray, time_s: float, contest: Contest, watch: Watch
 ) -> RaceStep:
     rows = np.unique(np.linspace(0, len(record.pairs) - 1, min(DRAWN_PAIRS, len(record.pairs))).astype(int))
     pairs, weights = record.pairs[rows], record.weights[rows]
@@ -198,11 +221,14 @@ def _race_step(
         rmse_m=record.rmse_m,
         entropy_nat=record.entropy_nat,
         point_error_m=contest.error_m(T),
-        histogram=_histogram(record, edges_m),
+        histogram=_histogram(record, watch.edges_m),
+        **watch.seen(T),
     )
 
 
-def _end_step(last: RaceStep | None, T: FloatArray, time_s: float, contest: Contest) -> RaceStep:
+def _end_step(
+    last: RaceStep | None, T: FloatArray, time_s: float, contest: Contest, watch: Watch
+) -> RaceStep:
     """The pose after the last update, with the numbers of the last matching."""
     nothing, unknown = np.empty((0, 3), np.float32), float("nan")
     histogram = PairHistogram(np.zeros(BINS, int), np.full(BINS, np.nan), unknown)
@@ -216,6 +242,7 @@ def _end_step(last: RaceStep | None, T: FloatArray, time_s: float, contest: Cont
         entropy_nat=unknown if last is None else last.entropy_nat,
         point_error_m=contest.error_m(T),
         histogram=histogram if last is None else last.histogram,
+        **watch.seen(T),
     )
 
 

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import viser
 
-from app.screens.fuse.labels import BY_HAND, DIRECTIONS, MOST_LANES, NOBODY, RIVAL_NAMES, RIVALS, STARTS
-from app.screens.fuse.view import Race, RaceMode, Start
+from app.screens.fuse.labels import (
+    BY_HAND,
+    COMPARISONS,
+    DIRECTIONS,
+    MOST_LANES,
+    NOBODY,
+    RIVAL_NAMES,
+    RIVALS,
+    STARTS,
+)
+from app.screens.fuse.view import Race, RaceMode, Rival, Start
 from app.ui import Ui
 
 SLIGHTLY = list(STARTS)[1]
@@ -32,6 +42,17 @@ class RaceSetup:
         self._race = Race(start=Start.towards(*STARTS[SLIGHTLY], seed=0))
         self._slots: list[viser.GuiDropdownHandle[str]] = []
 
+    def add_comparisons(self) -> None:
+        """Buttons for the races that are worth a question."""
+        actions = {
+            name: functools.partial(self._picked_rivals, rivals) for name, rivals in COMPARISONS.items()
+        }
+        self._ui.buttons(
+            "Compare",
+            actions,
+            "Other weights with the same metric; another metric with the same weights; or all of them.",
+        )
+
     def add_methods(self, labels: Sequence[str]) -> None:
         """The next drop-downs of methods; all but the first may stay empty."""
         for label in labels:
@@ -51,7 +72,7 @@ class RaceSetup:
             "Start",
             [*STARTS, BY_HAND],
             initial_value=SLIGHTLY,
-            hint="How far from aligned the orange cloud starts. Aligned is the truth where it is known, "
+            hint="How far from aligned the moving cloud starts. Aligned is the truth where it is known, "
             "otherwise what the nodes believe.",
         )
         self._ui.when_changed(self._preset, self._picked_preset)
@@ -60,9 +81,9 @@ class RaceSetup:
         """Who moves onto whom, and who asks whom for the nearest point."""
         gui, names = self._ui.gui, ["node_00", "node_01"]
         self._source = gui.add_dropdown(
-            "Move", names, initial_value=names[1], hint="Node whose cloud moves (orange)."
+            "Move", names, initial_value=names[1], hint="Node whose cloud moves (coloured)."
         )
-        self._target = gui.add_dropdown("onto", names, hint="Node whose cloud stays (blue).")
+        self._target = gui.add_dropdown("onto", names, hint="Node whose cloud stays (grey).")
         self._direction = gui.add_dropdown(
             "Pairs", list(DIRECTIONS), hint="Whose points look for their nearest counterpart."
         )
@@ -153,6 +174,10 @@ class RaceSetup:
 
     def _picked(self) -> None:
         self._race = self._read(self._race)
+        self._on_change()
+
+    def _picked_rivals(self, rivals: tuple[Rival, ...]) -> None:
+        self.write(replace(self._race, rivals=rivals))
         self._on_change()
 
     def _picked_preset(self) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.records import Sample
 from pipeline.config import Direction, Method, Metric
-from pipeline.types import FloatArray, IntArray
+from pipeline.types import ByteArray, FloatArray, IntArray
 
 RaceMode = Literal["nodes", "inferred"]
 """nodes: one node's sensor cloud onto another's; inferred: a node's inferred cloud onto its sensor cloud."""
@@ -80,7 +80,8 @@ class Race:
     """Index of the node that moves, or whose inferred cloud moves."""
     target: int = 0
     """Index of the node that stays; a node's inferred cloud moves onto its own sensor cloud."""
-    rivals: tuple[Rival, ...] = (("icp", "point"), ("ceicp-a", "plane"))
+    rivals: tuple[Rival, ...] = (("icp", "point"), ("ceicp-a", "point"))
+    """By default two that differ in their weights only, not in their metric."""
     direction: Direction = "q2p"
     start: Start = Start()
     noise_m: float = 0.0
@@ -124,13 +125,26 @@ class RaceStep:
     """NaN for methods without one."""
     point_error_m: float | None
     """Against the truth, at the same pose."""
+    gap_m: float
+    """Median distance of the drawn points from the nearest of the target; NaN where the truth is known."""
+    shades: ByteArray
+    """(N,) distance of each drawn point from its true place, or from the nearest point of the target where
+    that is not known: 0 to 255 for none to ``MOST_DISTANCE_M`` and beyond."""
+    lens: ByteArray
+    """(M, 3) column, row and shade of the points in the magnified corner, placed as in ``LensView``."""
     histogram: PairHistogram
+
+    @property
+    def off_m(self) -> float:
+        """How far off it is: from the truth, or else from the other cloud."""
+        return self.gap_m if self.point_error_m is None else self.point_error_m
 
 
 @dataclass(frozen=True, slots=True)
 class RaceLane:
     """One method's way from the start pose to its end."""
 
+    rival: Rival
     label: str
     kernel: bool
     """Whether its weights come from the Gaussian kernel f of the pair distance."""
@@ -146,6 +160,18 @@ class RaceLane:
 
 
 @dataclass(frozen=True, slots=True)
+class LensView:
+    """A corner that is shown magnified."""
+
+    center_m: FloatArray
+    """(3,) target frame."""
+    window_m: float
+    """Width and height of what is seen."""
+    target: ByteArray
+    """(K, 2) column and row of the target's points, 0 to 255 across the window."""
+
+
+@dataclass(frozen=True, slots=True)
 class RaceView:
     """Up to four methods from the same start."""
 
@@ -158,6 +184,8 @@ class RaceView:
     """(3,) centre of the aligned source in the target's frame; the start turns about it."""
     edges_m: FloatArray
     """(B + 1,) bins of all histograms."""
+    lens: LensView | None
+    """None where the clouds share no corner."""
     lanes: tuple[RaceLane, ...]
 
     @property

@@ -105,6 +105,14 @@ class SurfacePanel(Panel):
             self._controls = Controls(self.ui, ADVANCED, session.spec.config, session.edit)
             self._look_quickly = QuickLook(session, self._painted, self._drawn, self._rested)
 
+    def on_show(self) -> None:
+        """Have the walk's dock there again."""
+        self._rolling.visit(True)
+
+    def on_hide(self) -> None:
+        """Leave the lower edge to others."""
+        self._rolling.visit(False)
+
     @property
     def wide(self) -> bool:
         """Whether both surfaces are shown."""
@@ -351,11 +359,15 @@ class SurfacePanel(Panel):
             return
         self._rolling.load(view)
         self._arrange()
-        if self._rolling.focus is not None:
+        self.session.frame_view(anew=True)
+
+    def look(self) -> bool:
+        """Have the patch of a close-up in the picture; the session sees to the rest."""
+        focus = self._rolling.focus
+        if focus is not None:
             for client in self.session.clients():
-                turn(client, *self._rolling.focus)
-        else:
-            self.session.frame_view(anew=True)
+                turn(client, *focus)
+        return focus is not None
 
     def _take_look(self, look: SurfaceLook) -> None:
         """Set the controls as a stop of the lesson says; what needs the surface waits for it."""

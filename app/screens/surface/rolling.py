@@ -1,15 +1,19 @@
-"""The folder in which the rolling ball is watched: what rolls where, and the player."""
+"""The folder in which the rolling ball is watched, and its dock."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
+from app.dock import COUNT_NS, Dock
 from app.drawing.clouds import clear
-from app.player import Player, Ruler
+from app.drawing.colors import DELIVERED, LOSS, NEUTRAL
 from app.screens.surface.draw_rolling import RollingDrawing
 from app.screens.surface.labels import AFTER, BEFORE
 from app.screens.surface.view import Which
 from app.screens.surface.walk_view import Happening, WalkRequest, WalkView
+from app.timeline import Curve, CurvesLane
 from app.ui import Ui
 from pipeline.types import FloatArray
 
@@ -26,11 +30,12 @@ HAPPENED: dict[Happening, str] = {
     "glue": "closed with a point of the front",
     "end": "no edge is left to turn about",
 }
-FRAME_S = 0.05
-SPEEDS = {True: 2.0, False: 8.0}
+SPEEDS = {True: 2.0, False: 10.0}
 """Steps a second at first, of a close-up and of the whole."""
 FASTEST_ARC = 6.0
 """With more steps a second the ball jumps from rest to rest."""
+SAMPLES = 200
+"""Steps, at most, at which the edges of the front are counted for its curve."""
 AWAY = 1.8
 """How far to stand from a close-up, over its reach."""
 
@@ -44,21 +49,12 @@ class RollingFolder:
         self._view: WalkView | None = None
         self._drawing: RollingDrawing | None = None
         self._drawn = 0
-        self._waiting = False
+        self._waiting = self._here = False
         with ui.gui.add_folder("Watch the ball roll", expand_by_default=False):
             ui.gui.add_markdown(TEXT)
             self._add_choices(ui)
-            self._player = Player(
-                ui, self._moved, Ruler("Step"), "Drag to any step of the walk.", period_s=FRAME_S
-            )
-            self._player.add_speed(
-                (0.5, 60.0, 0.5),
-                SPEEDS[True],
-                f"Steps a second; up to {FASTEST_ARC:.0f} the ball of a close-up is seen turning.",
-            )
-            self._player.add_loop()
             self._status = ui.gui.add_markdown("")
-        self._player.show(False)
+        self._dock = Dock(ui, self._moved, lambda lane, item: None)
 
     def _add_choices(self, ui: Ui) -> None:
         self._way = ui.gui.add_dropdown(
@@ -100,21 +96,28 @@ class RollingFolder:
             self._way.value = CLOSE_UP if view.request.close_up else WHOLE
             self._cloud.value = next(name for name, which in CLOUDS.items() if which == view.request.which)
             self._drawing = RollingDrawing(self._ui.scene, f"{BELOW}/walk{self._drawn}", view)
-            self._player.load(view.steps * view.places + 1, ruler=Ruler("Step", every=view.places))
-            self._player.set_speed(SPEEDS[view.request.close_up])
-            self._player.show(True)
-        self._player.play()
+            run_s = view.steps / SPEEDS[view.request.close_up]
+            stops_ns = COUNT_NS * np.arange(view.steps + 1)
+            self._dock.load(0, COUNT_NS * view.steps, stops_ns, [front_lane(view)], "step", run_s)
+            self._dock.show(self._here)
+        if self._here:
+            self._dock.play()
 
     def forget(self) -> None:
         """Take the walk away; its cloud or radii are no longer those of the screen."""
         self._waiting = False
-        self._player.load(0)
+        self._dock.pause()
         with self._ui.atomic():
             if self._drawing is not None:
                 clear(self._ui.scene, BELOW)
             self._view = self._drawing = None
             self._status.content = ""
-            self._player.show(False)
+            self._dock.show(False)
+
+    def visit(self, here: bool) -> None:
+        """The screen is shown, or others are."""
+        self._here = here
+        self._dock.show(here and self.showing)
 
     def _close(self) -> None:
         self._on_request(None)
@@ -130,18 +133,34 @@ class RollingFolder:
         self._status.content = WAITING
         self._on_request(WalkRequest(CLOUDS[self._cloud.value], self._way.value == CLOSE_UP))
 
-    def _moved(self, position: int) -> None:
+    def _moved(self, now_ns: int) -> None:
         if self._view is None or self._drawing is None:
             return
-        done, place = divmod(position, self._view.places)
-        self._drawing.show(done, 0 if self._player.speed > FASTEST_ARC else place)
+        done, place = divmod(now_ns * self._view.places // COUNT_NS, self._view.places)
+        self._drawing.show(done, 0 if self._dock.speed > FASTEST_ARC else place)
         line = status_line(self._view, done)
         if line != self._status.content:
             self._status.content = line
 
 
+def front_lane(view: WalkView) -> CurvesLane:
+    """Triangles and open edges after each step, each on a scale of its own."""
+    steps = np.unique(np.linspace(0, view.steps, min(view.steps, SAMPLES) + 1).astype(int))
+    open_edges = [view.open_edges(int(done)) for done in steps]
+    counts = {
+        ("triangles", NEUTRAL): np.array([view.count(int(done)) for done in steps], float),
+        ("front edges", DELIVERED): np.array([len(front) for front, _ in open_edges], float),
+        ("rim edges", LOSS): np.array([len(dead) for _, dead in open_edges], float),
+    }
+    curves = [
+        Curve(name, "", color, COUNT_NS * steps, values, 0.0, max(1.0, 1.05 * float(values.max())))
+        for (name, color), values in counts.items()
+    ]
+    return CurvesLane("Front", curves, veil=1.0)
+
+
 def status_line(view: WalkView, done: int) -> str:
-    """The line under the player after ``done`` steps."""
+    """What has happened after ``done`` steps."""
     front, dead = view.open_edges(done)
     ball = int(view.step_radius[max(done - 1, 0)])
     radius = f"ball {1000.0 * view.radii_m[ball]:.1f} mm"

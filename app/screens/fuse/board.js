@@ -1,0 +1,133 @@
+// The board over a race: names, large numbers and the scale of colours. Its other side is board.py.
+(() => {
+  if (window.packetmeshBoards?.made) return;
+
+  const RULER_CM = 10;
+  const DOT_CM = 0.35;
+  const boards = new Map();
+  const {DockRow, make} = window.packetmeshDockRow;
+
+  const bytes = text => Uint8Array.from(atob(text), one => one.charCodeAt(0));
+
+  // As many colours as shades, between stops at equal steps.
+  function palette(stops) {
+    const channels = stops.map(stop => [1, 3, 5].map(at => parseInt(stop.slice(at, at + 2), 16)));
+    return Array.from({length: 256}, (_, shade) => {
+      const at = shade / 255 * (stops.length - 1);
+      const low = Math.min(Math.floor(at), stops.length - 2);
+      const mixed = channels[low].map((one, index) => one + (at - low) * (channels[low + 1][index] - one));
+      return `rgb(${mixed.map(Math.round).join(", ")})`;
+    });
+  }
+
+  class Board extends DockRow {
+    constructor(name) {
+      super(name, "Race");
+      this.row.className = "packetmesh-board";
+      this.row.removeAttribute("tabindex");
+      this.lanes = [];
+      this.scores = [];
+    }
+
+    // It lies over the picture.
+    home() {
+      return document.querySelector("canvas[data-engine]")?.parentElement.parentElement;
+    }
+
+    setup({visible, lens, bottom, lanes, scale}) {
+      this.wanted = visible;
+      this.row.replaceChildren();
+      this.row.style.setProperty("--lanes", Math.max(lanes.length, 1));
+      this.row.style.setProperty("--lens", `${100 * (1 - bottom)}%`);
+      this.lens = lens && {...lens, target: bytes(lens.target)};
+      this.colors = palette(scale.stops);
+      this.lanes = lanes.map(lane => this.addLane(lane));
+      const legend = make("div", "scale", this.row);
+      make("span", "", legend, {textContent: scale.text});
+      make("span", "", legend, {textContent: scale.ends[0]});
+      make("i", "", legend).style.background = `linear-gradient(to right, ${scale.stops.join(", ")})`;
+      make("span", "", legend, {textContent: scale.ends[1]});
+      make("b", "", legend);
+      make("span", "", legend, {textContent: scale.target});
+      this.state({lanes: this.scores});
+    }
+
+    addLane({name, color, about, source}) {
+      const lane = make("div", "lane", this.row);
+      lane.style.setProperty("--color", color);
+      const head = make("div", "head", lane);
+      const title = make("div", "title", head);
+      make("span", "", title, {textContent: name});
+      const ask = make("button", "", title, {textContent: "?", type: "button", ariaLabel: `What ${name} does`});
+      const number = make("div", "number", head);
+      const value = make("b", "", number);
+      const unit = make("span", "", number);
+      const note = make("div", "note", head);
+      const answer = make("div", "answer", head, {hidden: true});
+      make("p", "", answer, {textContent: about});
+      make("p", "source", answer, {textContent: source});
+      ask.addEventListener("click", () => { answer.hidden = !answer.hidden; });
+      const glass = this.lens ? make("canvas", "lens", lane) : null;
+      const made = {head, value, unit, note, glass, seen: new Uint8Array()};
+      if (glass) new ResizeObserver(() => this.drawLens(made)).observe(glass);
+      return made;
+    }
+
+    // The corner that the ring marks, cut across: what stays in grey, what moves in the colours of the scale.
+    drawLens({glass, seen}) {
+      const sharp = window.devicePixelRatio;
+      const [width, height] = [glass.clientWidth, glass.clientHeight];
+      Object.assign(glass, {width: width * sharp, height: height * sharp});
+      const pen = glass.getContext("2d");
+      pen.scale(sharp, sharp);
+      const cm = Math.max(width, height) / this.lens.window;
+      const size = Math.max(DOT_CM * cm, 2);
+      const dot = (column, row, color) => {
+        pen.fillStyle = color;
+        const [x, y] = [column, row].map(place => (place / 255 - 0.5) * this.lens.window * cm);
+        pen.fillRect(width / 2 + x - size / 2, height / 2 + y - size / 2, size, size);
+      };
+      const {target} = this.lens;
+      for (let at = 0; at < target.length; at += 2) dot(target[at], target[at + 1], "#78828c");
+      for (let at = 0; at < seen.length; at += 3) dot(seen[at], seen[at + 1], this.colors[seen[at + 2]]);
+      pen.fillStyle = "rgba(255, 255, 255, 0.85)";
+      pen.fillRect(0, height - 44, RULER_CM * cm + 24, 44);
+      pen.fillRect(0, 0, width, seen.length ? 24 : 48);
+      pen.fillStyle = "#111";
+      pen.font = "13px system-ui, sans-serif";
+      pen.fillText("the ringed edge, cut across", 10, 17, width - 20);
+      if (!seen.length) pen.fillText("the moving cloud is out of sight", 10, 40, width - 20);
+      const [left, base, long] = [12, height - 12, RULER_CM * cm];
+      for (const [x, y, wide, high] of [[left, base - 2, long, 4], [left, base - 7, 3, 14], [left + long - 3, base - 7, 3, 14]])
+        pen.fillRect(x, y, wide, high);
+      pen.font = "700 16px system-ui, sans-serif";
+      pen.fillText(`${RULER_CM} cm`, left + 8, base - 8);
+    }
+
+    state({lanes}) {
+      this.scores = lanes;
+      this.lanes.forEach((lane, index) => {
+        const said = lanes[index];
+        if (!said) return;
+        lane.value.textContent = said.number;
+        lane.unit.textContent = said.unit;
+        lane.note.textContent = said.note;
+        lane.head.dataset.state = said.state;
+        lane.seen = bytes(said.lens);
+        if (lane.glass) this.drawLens(lane);
+      });
+    }
+  }
+
+  const waiting = window.packetmeshBoards ?? [];
+  window.packetmeshBoards = {
+    made: true,
+    push(message) {
+      if (!boards.has(message.dock)) boards.set(message.dock, new Board(message.dock));
+      const board = boards.get(message.dock);
+      board[message.kind](message);
+      board.place();
+    },
+  };
+  waiting.forEach(message => window.packetmeshBoards.push(message));
+})();

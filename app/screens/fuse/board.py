@@ -1,0 +1,129 @@
+"""The board over the lanes of a race: which method, how far off it is now, and what the colours mean.
+
+The page's side is ``board.js``, its looks are ``board.css``. What the page is to know is in two hidden pieces
+of HTML, each of which says all of its part.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import uuid
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from app.dock_row import add_hidden
+from app.drawing.colors import DISTANCE_STOPS, MOST_DISTANCE_M, css
+from app.page import running
+from app.screens.fuse.draw import BAND
+from app.screens.fuse.labels import MARKS
+from app.screens.fuse.methods import METHODS, METRICS, color_of
+from app.screens.fuse.view import SUCCESS_M, LensView, RaceLane, RaceStep, RaceView
+from app.tables import UNKNOWN
+from app.ui import Ui
+from pipeline.types import ByteArray
+
+_SCRIPT, _STYLE = (Path(__file__).with_suffix(kind).read_text(encoding="utf-8") for kind in (".js", ".css"))
+
+
+class Board:
+    """Stands over the picture while a race is shown."""
+
+    def __init__(self, ui: Ui) -> None:
+        """Add it, empty and hidden."""
+        self._name = uuid.uuid4().hex
+        self._view: RaceView | None = None
+        self._visible = False
+        with add_hidden(ui, self._name, _SCRIPT):
+            ui.gui.add_html(f"<style>{_STYLE}</style>")
+            self._setup, self._state = ui.gui.add_html(""), ui.gui.add_html("")
+
+    def load(self, view: RaceView | None) -> None:
+        """Stand over another race, at its start; None is no race."""
+        self._view = view
+        self._send_setup()
+        if view is not None:
+            self.mark([0] * len(view.lanes))
+
+    def show(self, visible: bool) -> None:
+        """Show or hide it."""
+        if visible != self._visible:
+            self._visible = visible
+            self._send_setup()
+
+    def mark(self, rows: Sequence[int]) -> None:
+        """Say how far off every lane is at one of its steps."""
+        if self._view is not None:
+            seen = list(zip(self._view.lanes, rows, strict=True))
+            said = [{**score(lane, row), "lens": _bytes(lane.steps[row].lens)} for lane, row in seen]
+            self._tell(self._state, kind="state", lanes=said)
+
+    def _send_setup(self) -> None:
+        lanes = () if self._view is None else self._view.lanes
+        self._tell(
+            self._setup,
+            kind="setup",
+            visible=self._visible and bool(lanes),
+            lens=None if self._view is None or self._view.lens is None else _lens(self._view.lens),
+            bottom=BAND[1],
+            lanes=[_head(mark, lane) for mark, lane in zip(MARKS, lanes, strict=False)],
+            scale=scale(self._view is not None and self._view.has_truth),
+        )
+
+    def _tell(self, handle: Any, **what: Any) -> None:
+        message = json.dumps({"dock": self._name, **what}, separators=(",", ":"))
+        handle.content = running(f"(window.packetmeshBoards ??= []).push({message})")
+
+
+def _head(mark: str, lane: RaceLane) -> dict[str, str]:
+    """What stands over a lane all the time."""
+    method, metric = lane.rival
+    about = METHODS[method]
+    return {
+        "name": f"{mark} {lane.label}",
+        "color": css(color_of(lane.rival)),
+        "about": f"{about.text} {METRICS[metric]}",
+        "source": f"Source: {about.source}.",
+    }
+
+
+def _lens(lens: LensView) -> dict[str, Any]:
+    """The magnified corner, without what moves."""
+    return {"window": 100.0 * lens.window_m, "target": _bytes(lens.target)}
+
+
+def _bytes(rows: ByteArray) -> str:
+    return base64.b64encode(rows.tobytes()).decode()
+
+
+def scale(has_truth: bool) -> dict[str, Any]:
+    """What the colours of the moving cloud mean."""
+    return {
+        "text": "Distance from its true place" if has_truth else "Distance to the nearest point",
+        "stops": [css(stop) for stop in DISTANCE_STOPS],
+        "ends": ("0", f"{100.0 * MOST_DISTANCE_M:.0f} cm and more"),
+        "target": "the cloud that stays",
+    }
+
+
+def score(lane: RaceLane, row: int) -> dict[str, str]:
+    """The number over a lane at one of its steps, and how it stands."""
+    step, ended = lane.steps[row], row == len(lane.steps) - 1
+    number, unit = distance_text(step)
+    state, note = "running", f"iteration {row} of {lane.iterations}"
+    if ended and step.point_error_m is not None:
+        arrived = step.point_error_m < SUCCESS_M
+        state = "arrived" if arrived else "missed"
+        note = f"{'✓ arrived' if arrived else '✗ not there'} after {lane.iterations} iterations"
+    elif ended:
+        note = f"stopped after {lane.iterations} iterations"
+    of = "off" if step.point_error_m is not None else "to the nearest point"
+    return {"number": number, "unit": f"{unit} {of}", "note": note, "state": state}
+
+
+def distance_text(step: RaceStep) -> tuple[str, str]:
+    """How far off a step is, and the unit: from the truth (RMS), or else from the nearest points (median)."""
+    if step.off_m != step.off_m:
+        return UNKNOWN, ""
+    return f"{100.0 * step.off_m:.{2 if step.off_m < 0.01 else 1}f}", "cm"

@@ -1,0 +1,120 @@
+"""The magnified corner of a race: an edge of two surfaces that both clouds show, cut and seen along it.
+
+Seen so, a surface is a line, and a cloud that is ten centimetres off is a second line ten centimetres away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from app.screens.fuse.distances import Distances, shades_of
+from app.screens.fuse.view import LensView
+from pipeline.geometry import apply
+from pipeline.registration.neighbourhood import pca_normals
+from pipeline.types import BoolArray, ByteArray, FloatArray
+
+WINDOW_M = 0.3
+"""Width and height of what is seen."""
+SLAB_M = 0.1
+"""Half the length of edge that is seen."""
+AROUND_M = 0.15
+"""Surfaces so near a point tell whether it is on an edge."""
+LEAST_SHARE = 0.12
+"""Share of the second direction among the normals about an edge."""
+CLEAR = 0.75
+"""Edges whose second direction has such a part of the greatest share are as good as the clearest."""
+LEAST_POINTS = 60
+CLOUD_POINTS, CANDIDATES, DRAWN = 30_000, 800, 900
+
+
+@dataclass(frozen=True, slots=True)
+class Lens:
+    """Where to look, and what of the moving cloud belongs there."""
+
+    view: LensView
+    axes: FloatArray
+    """(3, 3) rows: to the right, up and towards the viewer, target frame."""
+    distances: Distances
+    """Of the source's points that belong here or nearby."""
+
+    def at(self, T_target_source: FloatArray) -> ByteArray:
+        """(M, 3) column, row and shade of the points in sight at a pose."""
+        pixels, inside = _pixels(
+            apply(T_target_source, self.distances.points_m), self.view.center_m, self.axes
+        )
+        shades = shades_of(self.distances.at(T_target_source)[0])
+        return np.column_stack([pixels, shades])[inside].astype(np.uint8)
+
+
+def lens_of(
+    source_m: FloatArray, target_m: FloatArray, T_aligned: FloatArray, distances: Distances
+) -> Lens | None:
+    """Of the edges that both clouds show clearly the farthest out, where a wrong turn shows most, if any.
+
+    Args:
+        source_m: (N, 3) the moving cloud in its own frame.
+        target_m: (M, 3) the cloud that stays, in the frame of its camera.
+        T_aligned: (4, 4) where the one belongs on the other.
+        distances: of the drawn points, from whose truth or partners the colours come.
+    """
+    aligned_m = apply(T_aligned, source_m)
+    found = _edge(_thinned(aligned_m), _thinned(target_m))
+    if found is None:
+        return None
+    center_m, axes = found
+    near = np.abs((aligned_m - center_m) @ axes.T) <= (0.75 * WINDOW_M, 0.75 * WINDOW_M, SLAB_M)
+    here = np.abs((target_m - center_m) @ axes[2]) <= SLAB_M
+    pixels, inside = _pixels(target_m[here], center_m, axes)
+    view = LensView(center_m, WINDOW_M, _some(pixels[inside]).astype(np.uint8))
+    points_m = _some(source_m[near.all(axis=1)])
+    return Lens(view, axes, Distances(points_m, distances.T_true, distances.tree))
+
+
+def _edge(aligned_m: FloatArray, target_m: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """(3,) place and (3, 3) axes of the edge where the normals of both clouds have two directions."""
+    if min(len(aligned_m), len(target_m)) < LEAST_POINTS:
+        return None
+    clouds = [(cKDTree(points_m), pca_normals(points_m)) for points_m in (target_m, aligned_m)]
+    candidates_m = target_m[:: max(1, len(target_m) // CANDIDATES)]
+    shares = np.array([min(_two_directions(one, *cloud) for cloud in clouds) for one in candidates_m])
+    if shares.max() < LEAST_SHARE:
+        return None
+    clear_m = candidates_m[shares >= max(LEAST_SHARE, CLEAR * shares.max())]
+    center_m = clear_m[np.argmax(np.linalg.norm(clear_m - target_m.mean(axis=0), axis=1))]
+    tree, normals = clouds[0]
+    near = normals[tree.query_ball_point(center_m, AROUND_M)]
+    along, facing = np.linalg.eigh(near.T @ near)[1][:, 0], near.mean(axis=0)
+    along = along if along @ center_m < 0.0 else -along  # towards the camera, which is at the origin
+    up = -(facing - facing @ along * along)
+    up /= np.linalg.norm(up)
+    return center_m, np.stack([np.cross(up, along), up, along])
+
+
+def _two_directions(center_m: FloatArray, tree: cKDTree, normals: FloatArray) -> float:
+    """From 0 to 0.5 how much the normals about a place have a second direction, and no third."""
+    rows = tree.query_ball_point(center_m, AROUND_M)
+    if len(rows) < LEAST_POINTS:
+        return 0.0
+    third, second, _ = np.linalg.eigvalsh(normals[rows].T @ normals[rows] / len(rows))
+    return float(second - 2.0 * third)
+
+
+def _pixels(points_m: FloatArray, center_m: FloatArray, axes: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """(N, 2) column and row from 0 to 255 across the window, and (N,) whether they are in it."""
+    across = ((points_m - center_m) @ axes[:2].T) / WINDOW_M
+    pixels = np.rint(255.0 * (0.5 + across * (1.0, -1.0)))
+    return pixels, np.all((pixels >= 0) & (pixels <= 255), axis=1)
+
+
+def _thinned(points_m: FloatArray) -> FloatArray:
+    return points_m[:: max(1, len(points_m) // CLOUD_POINTS)].astype(float)
+
+
+def _some(rows: FloatArray) -> FloatArray:
+    """At most ``DRAWN`` of them, evenly drawn."""
+    if len(rows) <= DRAWN:
+        return rows
+    return rows[np.sort(np.random.default_rng(0).choice(len(rows), DRAWN, replace=False))]

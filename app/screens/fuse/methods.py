@@ -1,0 +1,130 @@
+"""The methods that race: the colour of each, what it does in two sentences, and where it comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.screens.fuse.view import Rival
+
+Color = tuple[int, int, int]
+
+PLANE_SHADE = 0.55
+"""Strength of a method's colour where it minimises distances to planes: the same hue, darker."""
+METRICS = {
+    "point": "It minimises the distance to the paired point.",
+    "plane": "It minimises the distance to the plane at the paired point, so surfaces may slide along "
+    "themselves (Chen, Medioni 1992).",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What a race says of a method."""
+
+    color: Color
+    text: str
+    """Two sentences."""
+    source: str
+
+
+_THESIS = "the thesis, eqs. 3.10-3.17"
+METHODS: dict[str, About] = {
+    "icp": About(
+        (120, 132, 144),
+        "Every point is paired with its nearest counterpart, and every pair counts the same. Pairs of points "
+        "that have no counterpart pull the cloud aside.",
+        "Besl, McKay, TPAMI 1992",
+    ),
+    "trimmed-icp": About(
+        (170, 68, 153),
+        "Only a fixed share of the closest pairs counts, all of them the same. The share has to be known "
+        "beforehand.",
+        "Chetverikov, Svirko, Stepanov, Krsek, ICPR 2002",
+    ),
+    "picp": About(
+        (82, 60, 168),
+        "From few points to many, it keeps the closest of all pairs that share a point. Pairs far above the "
+        "usual distance are left out.",
+        "Zinsser, Schmidt, Niemann, ICIP 2003",
+    ),
+    "ricp": About(
+        (150, 92, 20),
+        "Motions of small random sets of pairs compete, and the one with the least median residual wins. The "
+        "pairs that agree with it count the same, the others not at all.",
+        "Trucco, Fusiello, Roberto, Pattern Recognition Letters 1999",
+    ),
+    "mricp": About(
+        (184, 134, 11),
+        "Plain ICP on few points of both clouds, then on ever more. That is quick, and less easily caught by "
+        "small detail.",
+        "Jost, Hügli, 3DIM 2003",
+    ),
+    "ficp": About(
+        (204, 85, 110),
+        "It chooses the share of the closest pairs anew at every matching, by a residual that rewards "
+        "keeping many. Those count the same, the others not at all.",
+        "Phillips, Liu, Tomasi, 3DIM 2007",
+    ),
+    "hicp": About(
+        (210, 105, 50),
+        "Nearest means near in place and in hue. Of these pairs the closest share counts.",
+        "Men, Gebre, Pochiraju, ICRA 2011",
+    ),
+    "ceicp-literal": About(
+        (136, 34, 85),
+        "Pairs weigh −f log f, with f a Gaussian density fitted to their distances, as the thesis prints it. "
+        "A density has a unit, so the weights depend on whether one measures in millimetres or metres.",
+        _THESIS,
+    ),
+    "ceicp-n": About(
+        (42, 160, 160),
+        "Pairs within a gate weigh −p log p, with p falling with their distance and adding up to one. The "
+        "scale is estimated from the pairs at every iteration.",
+        f"{_THESIS}, made free of units (SPEC 4.4)",
+    ),
+    "ceicp-a": About(
+        (0, 140, 90),
+        "Pairs weigh −p log p, with p falling with their distance. The scale shrinks at every iteration, so "
+        "far pairs soon cease to count.",
+        f"{_THESIS}, made free of units; the shrinking scale is ours (SPEC 4.4)",
+    ),
+    "ceicp-r": About(
+        (128, 138, 40),
+        "Pairs weigh −p log p, on a scale that follows the median of their distances. It never grows again.",
+        f"{_THESIS}, made free of units; the robust scale is ours (SPEC 4.4)",
+    ),
+    "ceicp-ml": About(
+        (50, 145, 195),
+        "Each point of the cloud that stays shares itself out among its five nearest counterparts. That "
+        "minimises the cross-entropy of the two clouds itself.",
+        "Granger, Pennec, ECCV 2002; Myronenko, Song, TPAMI 2010",
+    ),
+    "kernel-correlation": About(
+        (150, 110, 205),
+        "Every point pulls on its ten nearest counterparts, the nearer the stronger. The scale shrinks at "
+        "every iteration.",
+        "Tsin, Kanade, ECCV 2004",
+    ),
+    "fast-robust-icp": About(
+        (35, 85, 195),
+        "Pairs weigh less and less with their distance, on a scale that halves whenever the cloud has come "
+        "to rest. Steps are extrapolated; of all published methods it is the nearest to CEICP-A.",
+        "Zhang, Yao, Deng, TPAMI 2021",
+    ),
+}
+"""By the method's name in the settings."""
+
+
+def color_of(rival: Rival) -> Color:
+    """The colour of a method with a metric, the same in every race."""
+    method, metric = rival
+    shade = PLANE_SHADE if metric == "plane" else 1.0
+    red, green, blue = np.rint(np.multiply(METHODS[method].color, shade)).astype(int).tolist()
+    return (red, green, blue)
+
+
+def label_of(rival: Rival) -> str:
+    """What to call it."""
+    return f"{rival[0].upper()} {rival[1]}"

@@ -1,0 +1,84 @@
+"""What stands over the lanes of a race, and the colours of its points."""
+
+import re
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from app.drawing.colors import MOST_DISTANCE_M
+from app.screens.fuse.board import scale, score
+from app.screens.fuse.distances import REACH_M, Distances, shades_of
+from app.screens.fuse.labels import COMPARISONS, RIVALS
+from app.screens.fuse.methods import METHODS, color_of
+from app.screens.fuse.view import SUCCESS_M, Race
+from pipeline import config
+from pipeline.geometry import rigid, rotation_exp
+from tests.app.test_fuse_numbers import lane
+
+
+def test_every_method_says_what_it_does_in_two_sentences_and_where_it_is_from():
+    assert METHODS.keys() == config.METHODS.keys()
+    for name, about in METHODS.items():
+        assert len(re.findall(r"\.(?= |$)", about.text)) == 2, name
+        assert re.search(r"\d{4}|thesis", about.source), name
+
+
+def test_every_method_and_metric_has_a_colour_of_its_own():
+    colors = np.array([color_of(rival) for rival in RIVALS.values()], float)
+    assert min(np.abs(one - other).max() for one, other in combinations(colors, 2)) >= 12
+
+
+def test_the_default_race_differs_in_the_weights_only_and_the_next_in_the_metric_only():
+    weights, metric, everything = COMPARISONS.values()
+    assert Race().rivals == weights
+    assert len({method for method, _ in weights}) == len({kind for _, kind in metric}) == 2
+    assert len({kind for _, kind in weights}) == len({method for method, _ in metric}) == 1
+    assert {*weights, *metric} < {*everything}
+
+
+@pytest.mark.parametrize(
+    ("error_m", "number", "state"),
+    [(0.104, "10.4", "missed"), (0.0012, "0.12", "arrived"), (SUCCESS_M, "2.0", "missed")],
+)
+def test_the_number_over_a_lane_is_its_distance_from_the_truth(error_m, number, state):
+    said = score(lane("ICP point", error_m), 0)
+    assert (said["number"], said["unit"], said["state"]) == (number, "cm off", state)
+
+
+def test_without_truth_it_is_the_distance_to_the_other_cloud_and_nobody_arrives():
+    said = score(lane("ICP point", None), 0)
+    assert (said["number"], said["unit"]) == ("3.0", "cm to the nearest point")
+    assert said["state"] == "running"
+    assert scale(False)["text"] != scale(True)["text"]
+
+
+def cloud():
+    return np.random.default_rng(0).uniform(-1.0, 1.0, (500, 3))
+
+
+def test_points_are_as_far_off_as_the_motion_carries_them():
+    points_m = cloud()
+    T_true = rigid(rotation_exp(np.array([0.1, 0.2, -0.3])), np.array([1.0, 0.0, 0.5]))
+    distances = Distances(points_m, T_true, cKDTree(points_m))
+    moved_m, gap_m = distances.at(rigid(np.eye(3), np.array([0.0, 0.03, 0.04])) @ T_true)
+    np.testing.assert_allclose(moved_m, 0.05)
+    assert np.isnan(gap_m)
+    assert distances.at(T_true)[0].max() == 0.0
+
+
+def test_without_truth_points_are_as_far_off_as_their_partners():
+    points_m = cloud()
+    distances = Distances(points_m, None, cKDTree(points_m))
+    near_m, gap_m = distances.at(rigid(np.eye(3), np.array([0.0, 0.001, 0.0])))
+    np.testing.assert_allclose(near_m, 0.001)
+    assert gap_m == pytest.approx(0.001)
+    far_m, gap_m = distances.at(rigid(np.eye(3), np.array([0.0, 9.0, 0.0])))
+    assert (far_m == REACH_M).all()
+    assert gap_m == REACH_M
+
+
+def test_the_scale_of_the_colours_is_fixed():
+    distances_m = MOST_DISTANCE_M * np.array([0.0, 0.5, 1.0, 7.0])
+    assert shades_of(distances_m).tolist() == [0, 128, 255, 255]
