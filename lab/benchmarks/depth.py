@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import statistics
 import time
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
 from lab.benchmarks.benchmark import Benchmark
-from lab.benchmarks.filling import OURS, fillings
+from lab.benchmarks.filling import OURS, Filling, fillings
 from packetmesh.memory import peak_memory_bytes
 from pipeline.depth import DepthNetwork
 from pipeline.io.demos import load_demo
@@ -48,7 +49,21 @@ def benchmark() -> Benchmark:
     seconds = {name: run.elapsed_s for name, run in chosen.items()}
     errors_m = {name: run.median_error_m for name, run in chosen.items()}
     runs = (asdict(speed), *(asdict(run) for run in groups))
-    return Benchmark(seconds.pop(OURS), seconds, peak_memory_bytes(), errors_m=errors_m, runs=runs)
+    return Benchmark(
+        seconds.pop(OURS),
+        seconds,
+        peak_memory_bytes(),
+        errors_m=errors_m,
+        runs=runs,
+        notes=tuple(error_lines(groups)),
+    )
+
+
+def error_lines(runs: Sequence[Filling]) -> Iterator[str]:
+    """A line for every group of holes: the relative error of everyone over all of its pixels, least first."""
+    for group in dict.fromkeys(run.group for run in runs):
+        ranked = sorted((run for run in runs if run.group == group), key=lambda run: run.abs_rel)
+        yield f"{group}: {', '.join(f'{run.program} {run.abs_rel:.4f}' for run in ranked)}"
 
 
 def network_speed(network: DepthNetwork, rgb: ByteArray, rounds: int = ROUNDS) -> NetworkSpeed:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lab.benchmarks import CASES, Benchmark
-from lab.benchmarks.depth import network_speed
+from lab.benchmarks.depth import error_lines, network_speed
 from lab.benchmarks.filling import (
     FLAT,
     HIDDEN_SHARE,
@@ -90,6 +90,12 @@ def test_an_interval_resamples_places_not_pixels():
     low, high = mean_ci95(values, np.arange(200))
     assert 0.4 < low < 0.5 < high < 0.6
     assert mean_ci95(np.array([0.0, 1.0, 1.0, 1.0]), np.zeros(4, int)) == (0.75, 0.75)
+
+
+def test_a_line_ranks_everyone_over_all_pixels():
+    everyone = {"far": constant(2.4), "exact": constant(2.0)}
+    runs = compare_fillings(iter([case(group="g"), case(group="h")]), everyone)
+    assert list(error_lines(runs)) == [f"{group}: exact 0.0000, far 0.2000" for group in "gh"]
 
 
 def test_an_excess_is_of_the_same_pixels():
