@@ -15,13 +15,13 @@ from lab.claims.claim import bootstrap_ci95
 from lab.claims.depth.scenes import HELD_OUT, REAL, Site, demo_scenes, held_out_scenes, real_frames
 from lab.training.evaluate import Example
 from pipeline.config import DepthConfig
-from pipeline.depth import DepthNetwork, align_depth
+from pipeline.depth import DepthNetwork, align_depth, complete
 from pipeline.depth.confidence import judge
 from pipeline.depth.fillers import PEERS, nearest
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, IntArray
 
 OURS = "packetmesh"
-FLAT, PIXELS = "flat guess", "pixel baseline"
+NETWORK, FLAT, PIXELS = "colour network", "flat guess", "pixel baseline"
 HIDDEN_SHARE = 0.15
 ROOMS, VIEWS = 5, 3
 """Rooms of each held-out scene, and views of each room."""
@@ -134,13 +134,14 @@ def without(hole: BoolArray, place: str, group: str, rgb: ByteArray, depth: Dept
     return HoleCase(place, group, rgb, left, hole, depth.z_m)
 
 
-def chain_filling(infer: Callable[[ByteArray], DepthMap]) -> Filler:
-    """Inferred, aligned and trusted depth, as the chain makes it of what ``infer`` makes of the colours."""
+def chain_filling(infer: Callable[[ByteArray], DepthMap], completes: bool) -> Filler:
+    """Depth as the chain fills it with what ``infer`` makes of the colours, with or without completion."""
     config = DepthConfig()
 
     def fill(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
         aligned = align_depth(infer(rgb), sensor, config.alignment)
-        return judge(aligned, sensor, rgb, config.reach, config.least_confidence).depth
+        completed = complete(sensor, rgb) if completes else None
+        return judge(aligned, sensor, rgb, config.reach, config.least_confidence, completed).depth
 
     return fill
 
@@ -158,8 +159,9 @@ def pixel_filling(network: DepthNetwork) -> Filler:
 def programs(network: DepthNetwork) -> dict[str, Filler]:
     """Everyone who is compared; another is one line more."""
     return {
-        OURS: chain_filling(network.infer),
-        FLAT: chain_filling(flat),
+        OURS: chain_filling(network.infer, completes=True),
+        NETWORK: chain_filling(network.infer, completes=False),
+        FLAT: chain_filling(flat, completes=False),
         PIXELS: pixel_filling(network),
         **PEERS,
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from lab.benchmarks.filling import FLAT, OURS, PIXELS
+from lab.benchmarks.filling import FLAT, NETWORK, OURS, PIXELS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
 from lab.results import tables
@@ -39,7 +39,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
 }
 """Heading and body by record, in the order of the page; a section without its record is left out."""
 
-NETWORK_FILLERS = (OURS, FLAT, PIXELS)
+NETWORK_FILLERS = (OURS, NETWORK, FLAT, PIXELS)
 """What fills by the network, or by its alignment."""
 
 INTRODUCTION = """# Results
@@ -152,12 +152,17 @@ def _filling(runs: list[Row]) -> str:
         errors = {run["program"]: run for run in runs if run.get("group") == group}
         peers = [run for name, run in errors.items() if name not in NETWORK_FILLERS]
         best = min(peers, key=lambda run: run["abs_rel"])
-        shown = (("ours", errors[OURS]), ("a flat guess", errors[FLAT]), (best["program"], best))
+        shown = (
+            ("completion", errors[OURS]),
+            (NETWORK, errors[NETWORK]),
+            ("a flat guess", errors[FLAT]),
+            (best["program"], best),
+        )
         cells = ", ".join(f"{name} {tables.error(run)}" for name, run in shown)
         parts.append(f"{group.removesuffix(', hidden')}: {cells}")
     return (
-        "**What fills holes, and how much of it the network does.** Relative error over all hidden pixels by "
-        "the network, by one depth everywhere through the same alignment, and by the best of the rest: "
+        "**What fills holes.** Relative error over all hidden pixels by completion, by the colour network "
+        "alone, by one depth everywhere through the same alignment, and by the best of the rest: "
         f"{'; '.join(parts)}."
     )
 

@@ -19,7 +19,7 @@ from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 COMPLETED_FROM = 0.0125
 """Distance from a rim at which completed and aligned depth weigh the same, in shares of the diagonal; of 0,
 5, 10, 20 and 40 px at 640 x 480 the best on validation rooms."""
-COMPLETED_ODDS = (1.4, -1.9, 0.0, -0.3, -0.5)
+COMPLETED_ODDS = (-1.22, -1.25, 0.34, 0.08, -0.76)
 """The same odds of completed depth: constant, and per feature of ``features_of_completion``.
 ``python -m lab.training fit_confidence`` fits them on validation rooms."""
 TYPICAL_LOG_SCALE = -2.7

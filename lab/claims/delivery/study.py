@@ -15,11 +15,12 @@ from lab.claims.delivery.statistics import slope_terms
 from lab.claims.delivery.trials import LossTask, Values, colorless_trial, loss_trial
 from lab.trials import iterate_trials
 from packetmesh.progress import Progress
+from pipeline.depth.completion import SHIPPED_COMPLETION
 from pipeline.depth.inference import SHIPPED_MODEL
 from pipeline.io.demos import SCENES
 from pipeline.types import FloatArray
 
-DATA = (SHIPPED_MODEL, SCENES)
+DATA = (SHIPPED_MODEL, SHIPPED_COMPLETION, SCENES)
 """What every trial depends on beside the code."""
 
 

@@ -16,7 +16,8 @@ from lab.claims.exhibits import Chart, Curve, Table, plain_curve
 from lab.trials import iterate_trials
 from packetmesh.progress import Progress
 from pipeline.config import DepthConfig
-from pipeline.depth import DepthNetwork, align_depth, judge
+from pipeline.depth import DepthNetwork, align_depth, complete, judge
+from pipeline.depth.completion import SHIPPED_COMPLETION
 from pipeline.depth.inference import SHIPPED_MODEL
 from pipeline.io.demos import SCENES
 from pipeline.types import BoolArray, FloatArray
@@ -107,7 +108,8 @@ def confidence_trial(site: Site) -> list[dict[str, Any]]:
     found = []
     for case in hidden_cases(site):
         aligned = align_depth(network.infer(case.rgb), case.sensor, config.alignment)
-        judged = judge(aligned, case.sensor, case.rgb, float("inf"), 0.0)
+        completed = complete(case.sensor, case.rgb)
+        judged = judge(aligned, case.sensor, case.rgb, float("inf"), 0.0, completed)
         answered = case.hole & judged.depth.valid
         truth_m = case.truth_m[answered]
         right = np.abs(judged.depth.z_m[answered] - truth_m) <= CLOSE * truth_m
@@ -120,7 +122,7 @@ def all_confidences(
     folder: Path, scheduler: str | None
 ) -> Generator[Progress, None, tuple[Reliability, ...]]:
     """Every group of images that this machine has."""
-    data = (SHIPPED_MODEL, SCENES, *real_folders())
+    data = (SHIPPED_MODEL, SHIPPED_COMPLETION, SCENES, *real_folders())
     trials = yield from iterate_trials(
         "D10, confidence", confidence_trial, sites(), folder, scheduler, data=data
     )

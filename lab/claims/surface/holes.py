@@ -17,6 +17,7 @@ from lab.claims.surface.figures import thesis_figures
 from lab.trials import iterate_trials
 from packetmesh.progress import Progress
 from pipeline.config import PRESETS
+from pipeline.depth.completion import SHIPPED_COMPLETION
 from pipeline.depth.inference import SHIPPED_MODEL
 from pipeline.io.demos import CALIBRATED_SCENES, SCENES, load_demo
 from pipeline.surface import hit_depth
@@ -93,7 +94,7 @@ def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Meas
     """Every node of the demo scenes as a rig of its own."""
     nodes = [(scene, index) for scene in CALIBRATED_SCENES for index in range(len(load_demo(scene).frames))]
     found = yield from iterate_trials(
-        "C22, holes", node_trial, nodes, folder, scheduler, data=(SHIPPED_MODEL, SCENES)
+        "C22, holes", node_trial, nodes, folder, scheduler, data=(SHIPPED_MODEL, SHIPPED_COMPLETION, SCENES)
     )
     measured: Measured = {}
     for entry in chain(*found):

@@ -11,7 +11,6 @@ from scipy.special import expit
 
 from lab.training.dataset import FIRST_SEED
 from lab.training.evaluate import Example, held_out_rooms
-from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork, align_depth, complete
 from pipeline.depth.alignment import INLIER_SHARE_OF_DEPTH
 from pipeline.depth.confidence import distance_to_measured, features_of_completion, joined, meet_rims
@@ -66,7 +65,6 @@ def judged_view(
     completed = complete(sensor, example.rgb)
     filled = joined(rims, completed, measured, distance)
     holes = hidden if hidden.any() else ~measured & np.isfinite(example.truth_m)
-    holes &= distance <= DepthConfig().reach
     chosen = rng.permutation(np.flatnonzero(holes))[:PIXELS]
     features = features_of_completion(rims, completed, distance).reshape(4, -1).T
     ratio = filled.z_m.ravel()[chosen] / example.truth_m.ravel()[chosen]

@@ -23,7 +23,13 @@ RUNS = [
         ("rooms, disc of 10 px", 0.01),
         ("rooms, disc of 120 px", 0.1),
     )
-    for program, factor in (("packetmesh", 2.0), ("flat guess", 1.0), ("nearest", 3.0), ("inpaint-ns", 4.0))
+    for program, factor in (
+        ("packetmesh", 2.0),
+        ("colour network", 2.5),
+        ("flat guess", 1.0),
+        ("nearest", 3.0),
+        ("inpaint-ns", 4.0),
+    )
 ]
 NUMBERS = {
     "depth": {

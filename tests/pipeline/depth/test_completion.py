@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.depth import align_depth, complete, judge
-from pipeline.depth.completion import confidence_of, enlarged
+from pipeline.depth import CompletedDepth, align_depth, complete, judge
+from pipeline.depth.completion import enlarged
+from pipeline.depth.confidence import COMPLETED_FROM, distance_to_measured, odds_of_completion
 from pipeline.depth.slopes import (
     CHANNELS_IN,
     CHANNELS_OUT,
@@ -128,8 +129,7 @@ def test_what_is_measured_stays_and_what_is_not_becomes_dense(shape):
     completed = complete(sensor, rgb)
     np.testing.assert_array_equal(completed.depth.z_m[~disc], z_m[~disc])
     assert np.isfinite(completed.depth.z_m).all()
-    assert (completed.confidence[~disc] == 1.0).all()
-    assert ((completed.confidence[disc] > 0.0) & (completed.confidence[disc] < 1.0)).all()
+    assert np.isfinite(completed.log_scale).all()
 
 
 @pytest.mark.parametrize("radius_px", [10, 20, 40, 75])
@@ -139,7 +139,7 @@ def test_a_wall_goes_on_behind_its_hole(radius_px):
     completed = complete(sensor, np.full((480, 640, 3), 128, np.uint8))
     error = np.abs(completed.depth.z_m / z_m - 1.0)[disc]
     assert error.mean() < 0.012
-    assert completed.confidence[disc].mean() > 0.8
+    assert completed.log_scale[disc].mean() < np.log(0.05)
 
 
 def test_completion_does_not_care_in_what_unit_depth_is():
@@ -150,14 +150,19 @@ def test_completion_does_not_care_in_what_unit_depth_is():
     np.testing.assert_allclose(far.depth.z_m[disc], 3.0 * near.depth.z_m[disc], rtol=2e-3)
 
 
-def test_confidence_falls_with_doubt_distance_and_disagreement(relief):
-    unknown = np.zeros(SHAPE, bool)
-    unknown[20:100, 20:120] = True
-    grid, calm = grid_of(relief, unknown), np.full(SHAPE, -3.0)
-    sure = confidence_of(grid, calm, np.zeros(SHAPE))
-    assert sure[21, 60] > sure[60, 60]
-    assert (confidence_of(grid, calm + 1.0, np.zeros(SHAPE)) < sure).all()
-    assert (confidence_of(grid, calm, np.full(SHAPE, 0.1)) < sure).all()
+def test_confidence_falls_with_doubt_and_with_dissent():
+    shape = (48, 64)
+    distance = np.full(shape, 0.05, np.float32)
+    completed = CompletedDepth(DepthMap(np.full(shape, 2.0, np.float32)), np.full(shape, -3.0, np.float32))
+    agreed = odds_of_completion(completed.depth, completed, distance)
+    doubted = odds_of_completion(
+        completed.depth, CompletedDepth(completed.depth, completed.log_scale + 1.0), distance
+    )
+    dissented = odds_of_completion(DepthMap(np.full(shape, 2.3, np.float32)), completed, distance)
+    unaligned = odds_of_completion(DepthMap(np.full(shape, np.nan, np.float32)), completed, distance)
+    assert (doubted < agreed).all()
+    assert (dissented < agreed).all()
+    np.testing.assert_array_equal(unaligned, agreed)
 
 
 def test_a_plane_of_the_grid_keeps_its_places_at_full_size():
@@ -167,18 +172,22 @@ def test_a_plane_of_the_grid_keeps_its_places_at_full_size():
     np.testing.assert_allclose(whole[100, 2:636], (np.arange(2, 636) - 1.5) / 4.0, atol=1e-3)
 
 
-def test_a_judged_frame_takes_the_completion_in_its_holes_only():
+def test_a_judged_frame_is_the_aligned_depth_at_rims_and_the_completion_within():
     z_m = a_wall()
-    sensor, disc = with_disc(z_m, 40)
+    sensor, disc = with_disc(z_m, 60)
     rgb = np.full((480, 640, 3), 128, np.uint8)
     aligned = align_depth(DepthMap(2.0 * z_m), sensor)
-    completed = complete(sensor, rgb)
+    completed = CompletedDepth(DepthMap(1.2 * z_m), np.full(z_m.shape, -4.0, np.float32))
     judged = judge(aligned, sensor, rgb, 0.1, 0.0, completed)
-    kept = disc & judged.depth.valid
-    assert kept.sum() > 0.9 * disc.sum()
-    np.testing.assert_array_equal(judged.depth.z_m[kept], completed.depth.z_m[kept])
-    np.testing.assert_array_equal(judged.confidence[disc], completed.confidence[disc])
     np.testing.assert_array_equal(judged.depth.z_m[~disc], aligned.depth.z_m[~disc])
+    ratio = judged.depth.z_m / z_m
+    distance = distance_to_measured(sensor.valid)
+    assert np.nanmedian(ratio[disc & (distance < 0.003)]) < 1.02
+    assert np.nanmedian(ratio[disc & (distance > 0.06)]) > 1.18
+    half = disc & (np.abs(distance - COMPLETED_FROM) < 0.0007)
+    assert np.nanmedian(ratio[half]) == pytest.approx(np.sqrt(1.2), abs=0.02)
+    nothing = judge(aligned, sensor, rgb, 0.1, 0.0)
+    assert np.nanmedian(nothing.depth.z_m[disc] / z_m[disc]) < 1.02
 
 
 def test_nothing_measured_or_another_size_is_one_sentence():
