@@ -115,9 +115,9 @@ def score(lane: RaceLane, row: int) -> dict[str, str]:
     if ended and step.point_error_m is not None:
         arrived = step.point_error_m < SUCCESS_M
         state = "arrived" if arrived else "missed"
-        note = f"{'✓ arrived' if arrived else '✗ not there'} after {lane.iterations} iterations"
+        note = f"{'✓ arrived' if arrived else '✗ missed'} · {lane.iterations} iterations"
     elif ended:
-        note = f"stopped after {lane.iterations} iterations"
+        note = f"stopped · {lane.iterations} iterations"
     of = "off" if step.point_error_m is not None else "to the nearest point"
     return {"number": number, "unit": f"{unit} {of}", "note": note, "state": state}
 

@@ -30,7 +30,7 @@ RING, RING_PARTS = (20, 20, 20), 48
 """Colour of the ring about what is magnified, and its parts."""
 ASPECT = 1.5
 """Of the picture, while nobody looks."""
-ROOM = 1.14
+ROOM = 1.2
 """Width of a lane over that of its clouds, and height of the band over theirs."""
 
 
