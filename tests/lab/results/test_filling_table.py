@@ -64,6 +64,7 @@ def test_the_readme_has_ours_the_flat_guess_and_the_best_of_the_rest():
     record = Record("bench_depth", "c", "abc", "2026-01-01", {}, "a machine", NUMBERS)
     (line,) = readme_results({"bench_depth": record})
     assert line.endswith(
-        "rooms: completion 0.0400 [0.0200, 0.0800], colour network 0.0500 [0.0250, 0.1000], a flat guess 0.0200 [0.0100, 0.0400], "
+        "rooms: completion 0.0400 [0.0200, 0.0800], colour network 0.0500 [0.0250, 0.1000], "
+        "a flat guess 0.0200 [0.0100, 0.0400], "
         "nearest 0.0600 [0.0300, 0.1200]."
     )
