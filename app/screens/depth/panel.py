@@ -23,11 +23,10 @@ from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelVi
 from app.state import Spec, Step
 from app.ui import Panel
 
-TEXT = """**What you see.** Blue: points the sensor measured. Violet: points a neural network inferred
-from the colour image alone, made metric by comparing it with the sensor where both know a depth. Red:
-points the outlier filter rejects. Fusion takes violet points only where the
-sensor measured nothing.
-Go on with **Fuse**."""
+TEXT = """**What you see.** Blue: points the sensor measured. Violet: points that are inferred: from the
+colour image, made metric where the sensor knows a depth too; in its holes from colours and measured depth
+together. Red: points the outlier filter rejects. Fusion takes violet points only where the sensor measured
+nothing. Go on with **Fuse**."""
 CONFIDENCE_TEXT = (
     "Inferred depth that flies, lies too far from anything measured or is hardly believed is left out."
 )
