@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, atomic_path, read_bytes
+from pipeline.io.raw_images import SIGNATURES, raw_values
 from pipeline.types import AnyPath, ByteArray, DepthMap
 
 COMMON_DEPTH_SCALES = (1.0, 100.0, 256.0, 1000.0, 5000.0, 10000.0)
@@ -31,28 +32,35 @@ _PNM_HEADER = re.compile(rb"P[56]" + (_PNM_SPACE + rb"(\d{1,9})") * 3 + rb"\s")
 
 
 def read_color(path: AnyPath) -> ByteArray:
-    """(H, W, 3) RGB of a PNG, JPEG, PGM or PPM file; grey images get three equal channels.
+    """(H, W, 3) RGB of a PNG, JPEG, PGM, PPM, TIFF or NPY file; grey images get three equal channels.
 
     Raises:
         InputError: missing, truncated, too large, or none of these.
     """
+    raw = _raw(path, "colour image")
+    if raw is not None:
+        return _rgb_of(path, raw)
     bgr = _decode(path, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION, "colour image")
     return np.ascontiguousarray(bgr[..., ::-1])
 
 
 def read_depth(path: AnyPath, depth_scale: float = 1000.0) -> DepthMap:
-    """Metric depth of a 16-bit PNG, whose values 0 and 65535 mean unknown.
+    """Metric depth of a PNG, PGM, TIFF, PFM or NPY image; 0 and, in 16 bits, 65535 mean unknown.
 
     Args:
-        path: the PNG file.
-        depth_scale: image units per metre; 1000 when the image holds millimetres.
+        path: the file.
+        depth_scale: image units per metre; 1000 when the image holds millimetres. Floating-point numbers
+            are metres, whatever it is.
 
     Raises:
-        InputError: missing, truncated, too large, not 16-bit grey, without any depth, or with a
+        InputError: missing, truncated, too large, not one channel of depth, without any depth, or with a
             median depth that no room has at this scale.
     """
     if not (np.isfinite(depth_scale) and depth_scale > 0):
         raise InputError(f"The depth scale for {path} is {depth_scale}; try 1000 for an image in millimetres")
+    raw = _raw(path, "depth image")
+    if raw is not None and raw.dtype.kind == "f":
+        return _metres_of(path, raw)
     units = read_depth_units(path)
     known = units > 0
     _check_scale(path, float(np.median(units[known])), depth_scale)
@@ -62,12 +70,13 @@ def read_depth(path: AnyPath, depth_scale: float = 1000.0) -> DepthMap:
 
 
 def read_depth_units(path: AnyPath) -> NDArray[np.uint16]:
-    """(H, W) values of a 16-bit PNG, 0 where the depth is unknown; 65535 becomes 0, too.
+    """(H, W) values of a 16-bit image, 0 where the depth is unknown; 65535 becomes 0, too.
 
     Raises:
         InputError: missing, truncated, too large, not 16-bit grey, or without any depth.
     """
-    units = _decode(path, cv2.IMREAD_UNCHANGED, "depth image")
+    raw = _raw(path, "depth image")
+    units = _decode(path, cv2.IMREAD_UNCHANGED, "depth image") if raw is None else raw.copy()
     if units.dtype != np.uint16 or units.ndim != 2:
         channels = 1 if units.ndim == 2 else units.shape[2]
         raise InputError(
@@ -106,10 +115,46 @@ def write_depth_mm(path: AnyPath, depth: DepthMap) -> None:
         sibling.write_bytes(cv2.imencode(".png", depth_mm.astype(np.uint16))[1].tobytes())
 
 
+def _raw(path: AnyPath, what: str) -> np.ndarray | None:
+    """The numbers of a file that holds them plainly; None for one that is to be decoded."""
+    data = read_bytes(path, MAX_IMAGE_BYTES, what)
+    return raw_values(path, data, what) if data.startswith(SIGNATURES) else None
+
+
+def _rgb_of(path: AnyPath, values: np.ndarray) -> ByteArray:
+    """(H, W, 3) bytes of an image with one, three or four channels."""
+    if values.ndim == 2:
+        values = np.stack([values] * 3, axis=-1)
+    if values.dtype != np.uint8 or values.shape[2] not in (3, 4):
+        raise InputError(
+            f"The colour image {path} is {values.dtype} of shape {values.shape}; try 8 bits in three channels"
+        )
+    return np.ascontiguousarray(values[..., :3])
+
+
+def _metres_of(path: AnyPath, values: np.ndarray) -> DepthMap:
+    """Depth in floating point."""
+    if values.ndim != 2:
+        raise InputError(f"The depth image {path} has {values.shape[2]} channels where one is needed")
+    known = np.isfinite(values) & (values > 0)
+    if not known.any():
+        raise InputError(f"The depth image {path} has no depth anywhere; try another exposure of the scene")
+    median_m = float(np.median(values[known]))
+    if not PLAUSIBLE_MEDIAN_M[0] <= median_m <= PLAUSIBLE_MEDIAN_M[1]:
+        raise InputError(
+            f"The depth image {path} has a median depth of {median_m:.3g}; floating-point depth is in "
+            "metres, so try to divide it by 1000 if it is millimetres"
+        )
+    return DepthMap(np.where(known, values, np.nan).astype(np.float32))
+
+
 def _decode(path: AnyPath, flags: int, what: str) -> np.ndarray:
     data = read_bytes(path, MAX_IMAGE_BYTES, what)
     if not data.startswith((_PNG_SIGNATURE, _JPEG_SIGNATURE, *_PNM_SIGNATURES)):
-        raise InputError(f"The {what} {path} is neither a PNG nor a JPEG file; try to convert it to PNG")
+        raise InputError(
+            f"The {what} {path} is neither a PNG nor a JPEG file, nor PGM, PPM, TIFF or NPY; try to convert "
+            "it to PNG"
+        )
     complete = _is_whole(data)
     width_px, height_px = _size_px(data)
     if complete and width_px * height_px > MAX_IMAGE_PIXELS:

@@ -26,6 +26,7 @@ from pipeline.io.truth import read_truth, write_truth
 from pipeline.types import AnyPath, CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
 MAX_NODES = 6
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".tif", ".tiff", ".npy", ".pfm")
 
 
 def load_frame(
@@ -205,6 +206,12 @@ def _node_folders(directory: Path) -> list[Path]:
 
 def _load_node(folder: Path, over: NodeFiles, depth_scale: float) -> RgbdFrame:
     files: NodeFiles = {"intrinsics": folder / "intrinsics.json", **node_files(folder), **over}
-    return load_frame(
-        folder / "color.png", folder / "depth.png", depth_scale=depth_scale, name=folder.name, **files
-    )
+    color, depth = (_image_in(folder, stem) for stem in ("color", "depth"))
+    return load_frame(color, depth, depth_scale=depth_scale, name=folder.name, **files)
+
+
+def _image_in(folder: Path, stem: str) -> Path:
+    """The PNG, or where there is none the only image of that name with another suffix."""
+    usual = folder / f"{stem}.png"
+    others = [file for file in sorted(folder.glob(f"{stem}.*")) if file.suffix.lower() in IMAGE_SUFFIXES]
+    return others[0] if len(others) == 1 and not usual.exists() else usual

@@ -1,0 +1,128 @@
+"""Images as TIFF, PFM and NumPy files: other programs' come back, bad ones get a sentence."""
+
+import io
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from packetmesh.errors import InputError
+from pipeline.io.images import read_color, read_depth
+from pipeline.io.rigs import load_rig
+
+RNG = np.random.default_rng(2)
+MM = RNG.integers(500, 6000, (12, 17), dtype=np.uint16)
+MM[3:5, 4:9] = 0
+METRES = np.where(MM > 0, MM / 1000.0, np.nan).astype(np.float32)
+RGB = RNG.integers(0, 256, (12, 17, 3), dtype=np.uint8)
+
+
+def npy(values):
+    stream = io.BytesIO()
+    np.save(stream, values, allow_pickle=True)
+    return stream.getvalue()
+
+
+def tiff(values):
+    stream = io.BytesIO()
+    Image.fromarray(values).save(stream, format="TIFF")
+    return stream.getvalue()
+
+
+def opencv(values, suffix):
+    return cv2.imencode(suffix, values)[1].tobytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("mm.npy", npy(MM)),
+        ("mm.tif", opencv(MM, ".tiff")),
+        ("pillow.tif", tiff(MM)),
+        ("metres.npy", npy(METRES)),
+        ("doubles.npy", npy(METRES.astype(float))),
+        ("metres.tiff", opencv(METRES, ".tiff")),
+        ("metres.pfm", opencv(METRES, ".pfm")),
+        ("big.pfm", b"Pf\n17 12\n1.0\n" + METRES[::-1].astype(">f4").tobytes()),
+        ("zeros.npy", npy(np.nan_to_num(METRES))),
+    ],
+)
+def test_depth_comes_back(tmp_path, name, data):
+    (tmp_path / name).write_bytes(data)
+    np.testing.assert_allclose(read_depth(tmp_path / name).z_m, METRES, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "expected"),
+    [
+        ("rgb.npy", npy(RGB), RGB),
+        ("rgb.tif", opencv(RGB[..., ::-1], ".tiff"), RGB),
+        ("pillow.tif", tiff(RGB), RGB),
+        ("grey.tif", tiff(RGB[..., 0]), np.stack([RGB[..., 0]] * 3, axis=-1)),
+        ("alpha.npy", npy(np.dstack([RGB, RGB[..., 0]])), RGB),
+    ],
+)
+def test_colours_come_back(tmp_path, name, data, expected):
+    (tmp_path / name).write_bytes(data)
+    np.testing.assert_array_equal(read_color(tmp_path / name), expected)
+
+
+def test_units_heed_the_scale_and_metres_do_not(tmp_path):
+    (tmp_path / "a.npy").write_bytes(npy(MM))
+    (tmp_path / "b.npy").write_bytes(npy(METRES))
+    np.testing.assert_allclose(read_depth(tmp_path / "a.npy", 5000.0).z_m, METRES / 5.0, rtol=1e-6)
+    np.testing.assert_array_equal(read_depth(tmp_path / "b.npy", 5000.0).z_m, METRES)
+
+
+def test_a_rig_takes_the_only_image_of_a_name(tmp_path):
+    node = tmp_path / "rig" / "node_00"
+    node.mkdir(parents=True)
+    (node / "color.ppm").write_bytes(opencv(RGB[..., ::-1], ".ppm"))
+    (node / "depth.npy").write_bytes(npy(METRES))
+    (node / "intrinsics.json").write_text('{"width":17,"height":12,"fx":20,"fy":20,"cx":8,"cy":6}')
+    (frame,) = load_rig(tmp_path / "rig").frames
+    np.testing.assert_array_equal(frame.rgb, RGB)
+    np.testing.assert_array_equal(frame.depth.z_m, METRES)
+    (node / "color.tif").write_bytes(tiff(RGB))
+    with pytest.raises(InputError, match=r"color\.png does not exist"):  # which of the two is meant
+        load_rig(tmp_path / "rig")
+
+
+def header_only(shape):
+    stream = io.BytesIO()
+    np.lib.format.write_array_header_1_0(stream, {"descr": "<f4", "fortran_order": False, "shape": shape})
+    return stream.getvalue()
+
+
+BAD = {
+    "cut.npy": (npy(METRES)[:-9], "truncated"),
+    "cut.tif": (tiff(MM)[:200], "truncated"),
+    "cut.pfm": (opencv(METRES, ".pfm")[:-9], "truncated"),
+    "bomb.npy": (header_only((200_000, 200_000)), "200000 x 200000 pixels"),
+    "bomb.pfm": (b"Pf\n200000 200000\n-1.0\n", "200000 x 200000 pixels"),
+    "pickle.npy": (npy(np.array([{}], object)), "truncated or damaged"),
+    "text.npy": (npy(np.array([["a"]])), "no image"),
+    "line.npy": (npy(METRES[0]), "truncated or damaged"),
+    "three.npy": (npy(np.dstack([METRES] * 3)), "3 channels"),
+    "bytes.npy": (npy(RGB[..., 0]), "one of 16 is needed"),
+    "millimetres.npy": (npy(1000.0 * METRES), "divide it by 1000"),
+    "nothing.npy": (npy(np.zeros((4, 4))), "no depth anywhere"),
+    "words.pfm": (b"Pf\nwide high\n-1.0\n", "truncated or damaged"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_image_gets_its_sentence(tmp_path, name):
+    data, says = BAD[name]
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(InputError, match=says) as caught:
+        read_depth(tmp_path / name)
+    assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_colours_of_sixteen_bits_are_refused(tmp_path):
+    (tmp_path / "deep.npy").write_bytes(npy(RGB.astype(np.uint16)))
+    with pytest.raises(InputError, match="try 8 bits"):
+        read_color(tmp_path / "deep.npy")
