@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
 from pipeline.geometry import rigid
+from pipeline.importing.rvl import decode_rvl
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
 _COLORS = {"rgb8": (3, [0, 1, 2]), "bgr8": (3, [2, 1, 0]), "rgba8": (4, [0, 1, 2]), "bgra8": (4, [2, 1, 0])}
@@ -22,7 +23,7 @@ _DEPTHS: dict[str, np.dtype[Any]] = {
 }
 _COMPRESSED_DEPTH = "compressedDepth"
 _CONFIG_BYTES = 12
-"""Before the PNG of a compressed depth image: its format and two numbers by which 32FC1 is quantised."""
+"""Before the PNG or RVL of compressed depth: its format and two numbers by which 32FC1 is quantised."""
 
 
 def is_depth(message: Any) -> bool:
@@ -102,19 +103,27 @@ def transform_in(message: Any) -> FloatArray:
 
 def _compressed_depth(message: Any, topic: str) -> tuple[FloatArray, float]:
     data = np.asarray(message.data)
-    values = None
-    if "rvl" not in message.format.lower():
-        values = cv2.imdecode(data[_CONFIG_BYTES:], cv2.IMREAD_UNCHANGED)
+    rvl = "rvl" in message.format.lower()
+    values = _rvl(data.tobytes()) if rvl else cv2.imdecode(data[_CONFIG_BYTES:], cv2.IMREAD_UNCHANGED)
     if values is None or values.ndim != 2:
         raise InputError(
-            f"A depth image of {topic} has the format '{message.format}' and is no PNG; try to record the "
-            "topic without compression"
+            f"A depth image of {topic} is damaged, or of another format than its '{message.format}'; try to "
+            "record the topic without compression"
         )
     if not message.format.startswith("32FC1"):
         return values.astype(np.float64), 1000.0
     _, a, b = struct.unpack_from("<iff", data.tobytes())
     known = values > 0
     return np.where(known, a / np.where(known, values - b, 1.0), 0.0), 1.0
+
+
+def _rvl(data: bytes) -> np.ndarray | None:
+    """Depth after the configuration, width and height; None if it is damaged."""
+    try:
+        width_px, height_px = struct.unpack_from("<II", data, _CONFIG_BYTES)
+        return decode_rvl(data[_CONFIG_BYTES + 8 :], width_px, height_px)
+    except (struct.error, ValueError):
+        return None
 
 
 def _rows(message: Any, type_: np.dtype, channels: int, topic: str) -> np.ndarray:
