@@ -11,7 +11,7 @@ import numpy as np
 from packetmesh.errors import InputError
 from pipeline.depth.extension import extrapolated
 from pipeline.depth.sessions import modified_ns, open_session
-from pipeline.depth.slopes import GRID_WIDTH_PX, coarse, network_input, solved
+from pipeline.depth.slopes import cell_px, coarse, network_input, solved
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 SHIPPED_COMPLETION = Path(__file__).resolve().parents[2] / "assets" / "depth" / "completion.onnx"
@@ -65,13 +65,12 @@ def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION)
 
 
 def enlarged(plane: FloatArray, shape: tuple[int, int]) -> FloatArray:
-    """(H, W) a plane of the grid at full size, its cells' middles in place; the last cells go on."""
+    """(H, W) a plane of the grid at full size, its cells' middles in place."""
     rows, columns = shape
-    step = max(1, round(columns / GRID_WIDTH_PX))
+    step = cell_px(columns)
     height, width = plane.shape
     whole = cv2.resize(plane, (width * step, height * step), interpolation=cv2.INTER_LINEAR)
-    beyond = max(0, rows - height * step), max(0, columns - width * step)
-    return cv2.copyMakeBorder(whole, 0, beyond[0], 0, beyond[1], cv2.BORDER_REPLICATE)
+    return np.asarray(whole[:rows, :columns], np.float32)
 
 
 def meeting(log_z: FloatArray, sensor: DepthMap, rgb: ByteArray) -> FloatArray:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.sparse import coo_matrix, diags
+from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import cg
 
 from pipeline.types import BoolArray, ByteArray, FloatArray
@@ -47,22 +47,31 @@ class Grid:
 
 
 def coarse(z_m: FloatArray, known: BoolArray, rgb: ByteArray) -> Grid:
-    """Colours averaged over cells of the grid; of each cell's measured depths the middle-most in place."""
+    """Colours averaged over cells of the grid; of each cell's measured depths the middle-most in place.
+
+    What the last cells lack of an image that is no whole number of them is unknown.
+    """
     rows, columns = known.shape
-    step = max(1, round(columns / GRID_WIDTH_PX))
-    height, width = rows // step, columns // step
-    cut = np.s_[: height * step, : width * step]
-    small = cv2.resize(np.ascontiguousarray(rgb[cut]), (width, height), interpolation=cv2.INTER_AREA)
+    step = cell_px(columns)
+    missing = -rows % step, -columns % step
+    margin = (0, missing[0]), (0, missing[1])
+    z_m, known = np.pad(z_m, margin), np.pad(known, margin)
+    rgb = np.asarray(cv2.copyMakeBorder(rgb, 0, missing[0], 0, missing[1], cv2.BORDER_REPLICATE), np.uint8)
+    height, width = known.shape[0] // step, known.shape[1] // step
+    small = np.asarray(cv2.resize(rgb, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
     offsets = np.array([(y, x) for y in range(step) for x in range(step)]) - 0.5 * (step - 1)
-    order = np.argsort((offsets**2).sum(axis=1), kind="stable")
     log_z, found = np.zeros((height, width), np.float32), np.zeros((height, width), bool)
-    for place in order:
+    for place in np.argsort((offsets**2).sum(axis=1), kind="stable"):
         y, x = divmod(int(place), step)
-        there = known[cut][y::step, x::step]
-        take = there & ~found
-        log_z[take] = np.log(z_m[cut][y::step, x::step][take])
-        found |= there
+        take = known[y::step, x::step] & ~found
+        log_z[take] = np.log(z_m[y::step, x::step][take])
+        found |= take
     return Grid(log_z, found, small)
+
+
+def cell_px(width_px: int) -> int:
+    """Side of a cell in an image of this width."""
+    return max(1, round(width_px / GRID_WIDTH_PX))
 
 
 def network_input(grid: Grid) -> tuple[FloatArray, FloatArray]:
@@ -109,8 +118,7 @@ def measured_slopes(grid: Grid) -> tuple[FloatArray, FloatArray]:
         for part in (first, second):
             total[part] += step * counts
             weight[part] += counts
-        blur = (cv2.GaussianBlur(plane, (0, 0), SLOPE_SIGMA) for plane in (total, weight))
-        total, weight = blur
+        total, weight = (cv2.GaussianBlur(plane, (0, 0), SLOPE_SIGMA) for plane in (total, weight))
         slopes.append(total / (weight + 1e-3))
     return slopes[0], slopes[1]
 
@@ -129,37 +137,41 @@ def solved(grid: Grid, start: FloatArray, output: FloatArray) -> FloatArray:
     Returns:
         (H, W) logarithmic depth.
     """
-    rows, columns = grid.known.shape
-    output = output[:, :rows, :columns].astype(np.float64)
-    unknown = np.flatnonzero(~grid.known)
-    if not len(unknown):
+    if grid.known.all():
         return grid.log_z
-    place = np.full(grid.known.size, -1)
-    place[unknown] = np.arange(len(unknown))
-    known_z = grid.log_z.ravel().astype(np.float64)
-    stiffness = _stiffness(output[1]).ravel()[unknown]
-    guess = (start + output[0]).ravel()[unknown]
-    diagonal, force = stiffness.copy(), stiffness * guess
-    matrix = coo_matrix((len(unknown), len(unknown)))
-    number = np.arange(grid.known.size).reshape(rows, columns)
-    for link, (near, far) in enumerate(_ends(rows, columns)):
-        a, b = number[near].ravel(), number[far].ravel()
-        k = _stiffness(output[3 + 2 * link])[near].ravel()
-        pull = k * output[2 + 2 * link][near].ravel()
-        i, j = place[a], place[b]
-        both, first, second = (i >= 0) & (j >= 0), (i >= 0) & (j < 0), (i < 0) & (j >= 0)
-        for here, sign, free in ((i, -1.0, i >= 0), (j, 1.0, j >= 0)):
-            diagonal += np.bincount(here[free], k[free], len(unknown))
-            force += np.bincount(here[free], sign * pull[free], len(unknown))
-        force += np.bincount(i[first], (k * known_z[b])[first], len(unknown))
-        force += np.bincount(j[second], (k * known_z[a])[second], len(unknown))
-        matrix += coo_matrix((-k[both], (i[both], j[both])), matrix.shape)
-    system = (matrix + matrix.T + diags(diagonal)).tocsr()
-    jacobi = diags(1.0 / diagonal)
+    rows, columns = grid.known.shape
+    said = output[:, :rows, :columns].astype(np.float64)
+    guess = (start + said[0])[~grid.known]
+    system, force = _balance(grid, guess, said)
+    jacobi = diags(1.0 / system.diagonal())
     filled, _ = cg(system, force, guess, rtol=TOLERANCE, maxiter=STEPS, M=jacobi)
-    log_z = known_z.copy()
-    log_z[unknown] = filled
-    return log_z.reshape(rows, columns).astype(np.float32)
+    log_z = grid.log_z.copy()
+    log_z[~grid.known] = filled
+    return log_z
+
+
+def _balance(grid: Grid, guess: FloatArray, said: FloatArray) -> tuple[csr_matrix, FloatArray]:
+    """The linear system (N, N) and its right side (N,) in the unknown pixels' depth."""
+    rows, columns = grid.known.shape
+    count = len(guess)
+    place = np.full(grid.known.shape, -1)
+    place[~grid.known] = np.arange(count)
+    diagonal = _stiffness(said[1])[~grid.known]
+    force = diagonal * guess
+    links: csr_matrix = csr_matrix((count, count))
+    for number, (near, far) in enumerate(_ends(rows, columns)):
+        i, j = place[near].ravel(), place[far].ravel()
+        k = _stiffness(said[3 + 2 * number])[near].ravel()
+        pull = k * said[2 + 2 * number][near].ravel()
+        for here, there, sign, beyond in ((i, j, -1.0, far), (j, i, 1.0, near)):
+            free = here >= 0
+            diagonal += np.bincount(here[free], k[free], count)
+            force += np.bincount(here[free], sign * pull[free], count)
+            held = free & (there < 0)
+            force += np.bincount(here[held], (k * grid.log_z[beyond].ravel())[held], count)
+        both = (i >= 0) & (j >= 0)
+        links += csr_matrix((-k[both], (i[both], j[both])), (count, count))
+    return (links + links.T + diags(diagonal)).tocsr(), force
 
 
 def _stiffness(log_scale: FloatArray) -> FloatArray:

@@ -107,6 +107,16 @@ def test_the_grid_takes_the_middle_most_measured_pixel_of_a_cell_and_averages_co
     np.testing.assert_array_equal(grid.rgb[0, 0], [100, 100, 100])
 
 
+def test_a_pixel_of_the_last_broken_cell_counts():
+    z_m, known = np.full((481, 641), 2.0, np.float32), np.zeros((481, 641), bool)
+    known[480, 640] = True
+    grid = coarse(z_m, known, np.zeros((481, 641, 3), np.uint8))
+    assert grid.known.shape == (121, 161)
+    assert np.argwhere(grid.known).tolist() == [[120, 160]]
+    alone = complete(DepthMap(np.where(known, z_m, np.nan)), np.zeros((481, 641, 3), np.uint8))
+    assert np.isfinite(alone.depth.z_m).all()
+
+
 def test_the_network_sees_a_padded_grid_and_only_what_was_measured(relief):
     unknown = np.zeros(SHAPE, bool)
     unknown[30:60, 30:60] = True
@@ -166,7 +176,7 @@ def test_confidence_falls_with_doubt_and_with_dissent():
 
 
 def test_a_plane_of_the_grid_keeps_its_places_at_full_size():
-    x = np.indices((120, 160), dtype=np.float32)[1]
+    x = np.indices((121, 161), dtype=np.float32)[1]
     whole = enlarged(x, (483, 641))  # four pixels a cell, some over
     assert whole.shape == (483, 641)
     np.testing.assert_allclose(whole[100, 2:636], (np.arange(2, 636) - 1.5) / 4.0, atol=1e-3)
