@@ -162,13 +162,13 @@ def test_a_cloud_without_a_surface_is_one_sentence(capsys, tmp_path, case):
         (["missing.ply"], 1, "missing.ply does not exist"),
         (["cut.ply"], 1, "of its 1500 points"),
         (["noise.pcd"], 1, "noise.pcd"),
-        (["ball.las"], 1, "of a kind that is not read"),
+        (["ball.dxf"], 1, "of a kind that is not read"),
     ],
 )
 def test_what_cannot_be_is_one_sentence_and_writes_nothing(capsys, tmp_path, ball, argv, code, says):
     (ball.parent / "cut.ply").write_bytes(ball.read_bytes()[:5000])
     (ball.parent / "noise.pcd").write_bytes(np.random.default_rng(0).bytes(3000))
-    (ball.parent / "ball.las").write_bytes(ball.read_bytes())
+    (ball.parent / "ball.dxf").write_bytes(ball.read_bytes())
     got = run(capsys, ball.parent / argv[0], "--out", tmp_path / "out" / "mesh.ply", *argv[1:])
     commands.check_one_sentence(got, code, says)
     assert not (tmp_path / "out").exists()

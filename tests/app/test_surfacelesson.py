@@ -170,7 +170,7 @@ def test_r_F_uses_nine_points_in_ten_and_leaves_much_open_and_the_thesis_closes_
     look, _ = stop_named("A ball of r_F")
     least = room.roll(look, room.fused)
     assert 0.07 < unused(least, room.fused) < 0.12
-    assert 0.34 < missed(least) < 0.39
+    assert 0.38 < missed(least) < 0.43
     look, text = stop_named("The thesis's radii")
     thesis = room.roll(look, room.fused)
     largest_m = room.r_F_m + room.sigma_D_m
@@ -206,7 +206,7 @@ def test_one_ball_after_the_other_leaves_fewer_points_than_the_largest_alone(roo
     assert abs(missed(alone) - missed(four_balls)) < 0.01
     assert unused(alone, room.fused) > 2.0 * unused(four_balls, room.fused)
     assert about(text, r"Drag the radius to (\d+) mm", (10.0 * largest_m,))
-    assert about(text, r"As few rays miss, (\d+) %", (missed(alone),))
+    assert about(text, r"as few rays miss, (\d+) %", (missed(alone),))
     shares = (unused(alone, room.fused), unused(four_balls, room.fused))
     assert about(text, r"leaves (\d+) % of the points unused; the four together leave (\d+) %", shares)
 
@@ -248,17 +248,17 @@ def test_no_ball_closes_before_fusion_what_the_sensor_did_not_see(room, four_bal
     assert about(text, r"even the best radius leaves (\d+) %", (best,))
 
 
-def test_what_is_guessed_is_a_fifth_and_a_quarter_of_it_is_off(room, four_balls):
+def test_what_is_guessed_is_a_fifth_and_an_eighth_of_it_is_off(room, four_balls):
     text = stop_named("Measured or guessed?")[1]
     guessed = four_balls.source == PointSource.INFERRED
     a, b, c = four_balls.vertices_m[four_balls.triangles].swapaxes(0, 1)
     area_m2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     share = area_m2[guessed[four_balls.triangles].any(axis=1)].sum() / area_m2.sum()
-    assert 0.2 < guessed.mean() < 0.25
-    assert 0.25 < share < 0.33
+    assert 0.17 < guessed.mean() < 0.21
+    assert 0.22 < share < 0.26
     near = distances_to_truth_m(four_balls.vertices_m, room.rig.truth, room.cameras) <= 0.05
     assert near[~guessed].mean() > 0.997
-    assert 0.72 < near[guessed].mean() < 0.79
+    assert 0.84 < near[guessed].mean() < 0.92
     before, after = (
         room.truth(surface)["f_score_5cm"] for surface in (room.roll(SurfaceLook(), room.sensor), four_balls)
     )

@@ -11,6 +11,7 @@ from lab.benchmarks.depth import error_lines, network_speed
 from lab.benchmarks.filling import (
     FLAT,
     HIDDEN_SHARE,
+    NETWORK,
     OURS,
     PIXELS,
     RADII_PX,
@@ -146,10 +147,10 @@ def test_ours_and_every_peer_fill_a_demo_frame():
     median = constant(np.nanmedian(frame.depth.z_m))
     everyone = {**programs(DepthNetwork()), "median": median}
     runs = {run.program: run for run in compare_fillings(iter([hidden]), everyone)}
-    assert set(runs) == {OURS, FLAT, PIXELS, *PEERS, "median"}
+    assert set(runs) == {OURS, NETWORK, FLAT, PIXELS, *PEERS, "median"}
     assert all(runs[name].filled_share == 1.0 for name in PEERS)
     assert runs[OURS].filled_share > 0.9
-    assert all(runs[name].abs_rel < 0.3 * runs["median"].abs_rel for name in (OURS, FLAT, *PEERS))
+    assert all(runs[name].abs_rel < 0.3 * runs["median"].abs_rel for name in (OURS, NETWORK, FLAT, *PEERS))
     assert runs[OURS].abs_rel < min(0.9 * runs["nearest"].abs_rel, runs[PIXELS].abs_rel)
 
 
