@@ -14,8 +14,8 @@ from packetmesh.errors import InputError
 from pipeline.config import ModelKind, NetworkPreset
 
 if TYPE_CHECKING:
-    from pipeline.depth import DepthNetwork
-    from pipeline.types import DepthMap
+    from pipeline.depth import AlignmentResult, DepthNetwork
+    from pipeline.types import ByteArray, DepthMap
 
 FARTHEST_M = 65.534
 """What 16 bits of millimetres hold; 65535 means unknown."""
@@ -32,6 +32,7 @@ def infer_depth(
     normalisation: Literal["imagenet", "unit", "bytes"] | None = None,
     channels: Literal["RGB", "BGR"] | None = None,
     sensor: Path | None = None,
+    fill: bool = False,
     depth_scale: float = 1000.0,
     json: bool = False,
 ) -> None:
@@ -48,6 +49,7 @@ def infer_depth(
         normalisation: ImageNet's mean and deviation, or values from 0 to 1 (unit) or to 255 (bytes).
         channels: Order of its channels.
         sensor: The sensor's depth image of the one photograph, to make inferred depth metric.
+        fill: Keep what the sensor measured and fill its holes only, as `reconstruct` does; with --sensor.
         depth_scale: Depth units per metre in that image.
         json: Print what was done as one JSON object.
     """
@@ -55,6 +57,8 @@ def infer_depth(
         wrong_use("infer-depth needs at least one photograph")
     if sensor is not None and len(photos) > 1:
         wrong_use("--sensor belongs to one photograph; give one at a time")
+    if fill and sensor is None:
+        wrong_use("--fill needs the depth image whose holes are filled: --sensor DEPTH")
     from packetmesh.files import writable_folder
     from pipeline.depth import DepthNetwork, Overrides
 
@@ -69,7 +73,7 @@ def infer_depth(
     report = {"model": str(network.model_path), "kind": network.convention.kind, "provider": network.provider}
     say(f"{report['model']} ({report['kind']}) runs on {report['provider']}")
     inferred = {}
-    for photo, record in _inferred(photos, network, out, sensor, depth_scale):
+    for photo, record in _inferred(photos, network, out, sensor, depth_scale, fill):
         say(_line(photo, record))
         inferred[str(photo)] = record
     if json:
@@ -77,9 +81,15 @@ def infer_depth(
 
 
 def _inferred(
-    photos: tuple[Path, ...], network: DepthNetwork, out: Path, sensor: Path | None, depth_scale: float
+    photos: tuple[Path, ...],
+    network: DepthNetwork,
+    out: Path,
+    sensor: Path | None,
+    depth_scale: float,
+    fill: bool,
 ) -> Iterator[tuple[Path, dict[str, Any]]]:
     """Each photograph with what was made of it."""
+    from pipeline.depth import align_depth
     from pipeline.io.images import read_color, read_depth
 
     for photo in photos:
@@ -93,21 +103,41 @@ def _inferred(
             "inference_ms": 1000.0 * (time.perf_counter() - started),
         }
         if measured is not None:
-            depth, record["alignment"] = _aligned(depth, measured, network)
+            aligned = align_depth(depth, measured, disparity=network.convention.kind == "inverse")
+            depth, record["alignment"] = aligned.depth, _alignment(aligned)
+            if fill:
+                depth, record["filled"] = _filled(aligned, measured, rgb, network)
         yield photo, record | _written(depth, network.convention.kind, out, photo.stem)
 
 
-def _aligned(depth: DepthMap, sensor: DepthMap, network: DepthNetwork) -> tuple[DepthMap, dict[str, Any]]:
-    """Depth in the sensor's metres (SPEC 3.5); disparity needs a line of its own."""
-    from pipeline.depth import align_depth
-
-    result = align_depth(depth, sensor, disparity=network.convention.kind == "inverse")
-    return result.depth, {
+def _alignment(result: AlignmentResult) -> dict[str, Any]:
+    """How depth was brought to the sensor's metres (SPEC 3.5); disparity has a line of its own."""
+    return {
         "mode": result.mode,
         "coefficients": result.coefficients,
         "residual_rms_m": result.residual_rms_m,
         "inliers": result.inliers,
     }
+
+
+def _filled(
+    aligned: AlignmentResult, measured: DepthMap, rgb: ByteArray, network: DepthNetwork
+) -> tuple[DepthMap, dict[str, Any]]:
+    """Measured depth with its holes filled: by completion, or by a network of one's own (SPEC 3.6)."""
+    import numpy as np
+
+    from pipeline.config import DepthConfig
+    from pipeline.depth import complete, judge
+    from pipeline.depth.inference import SHIPPED_MODEL
+    from pipeline.types import DepthMap
+
+    model = None if network.model_path == SHIPPED_MODEL else str(network.model_path)
+    completed = complete(measured, rgb) if DepthConfig(model=model).completes else None
+    judged = judge(aligned, measured, rgb, float("inf"), 0.0, completed)
+    depth = DepthMap(np.where(measured.valid, measured.z_m, judged.depth.z_m).astype(np.float32))
+    holes = ~measured.valid & depth.valid
+    confidence = float(judged.confidence[holes].mean()) if holes.any() else None
+    return depth, {"share": float(holes.mean()), "mean_confidence": confidence}
 
 
 def _written(depth: DepthMap, kind: ModelKind, out: Path, stem: str) -> dict[str, Any]:
@@ -159,4 +189,6 @@ def _line(photo: Path, record: dict[str, Any]) -> str:
     aligned = record.get("alignment")
     if aligned is not None:
         values += f", {aligned['mode']} residual {1000.0 * aligned['residual_rms_m']:.0f} mm"
+    if "filled" in record:
+        values += f", {record['filled']['share']:.1%} of the pixels filled in"
     return f"{photo}: {size}, {record['inference_ms']:.0f} ms, depth {values}; see {record['depth']}"

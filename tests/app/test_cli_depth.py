@@ -8,7 +8,7 @@ import pytest
 
 from app.drawing.colors import HOLE
 from pipeline.depth import DepthNetwork
-from pipeline.io.images import read_color
+from pipeline.io.images import read_color, read_depth
 from tests.app import commands
 from tests.paths import ASSETS
 
@@ -101,6 +101,20 @@ def test_a_sensor_makes_the_depth_metric(capsys, tmp_path, kind):
     np.testing.assert_allclose(values(record["depth"]), 1000.0 * truth_m, atol=4.0)
 
 
+def test_a_sensors_holes_are_filled_and_what_it_measured_stays(capsys, tmp_path):
+    words = (PAIR / "color.png", "--out", tmp_path, "--sensor", PAIR / "depth.png", "--fill", "--json")
+    code, out, err = run(capsys, *words)
+    assert code == 0
+    (record,) = json.loads(out)["photos"].values()
+    filled, sensor = read_depth(record["depth"]), read_depth(PAIR / "depth.png")
+    measured = sensor.valid
+    np.testing.assert_array_equal(filled.z_m[measured], sensor.z_m[measured])
+    assert filled.valid.mean() > 0.98
+    assert record["filled"]["share"] == pytest.approx((filled.valid & ~measured).mean())
+    assert 0.3 < record["filled"]["mean_confidence"] < 1.0
+    assert "of the pixels filled in" in err
+
+
 @pytest.mark.parametrize(
     "name", ["grey.png", "alpha.png", "grey_alpha.png", "grey16.png", "palette.png", "cmyk.jpg"]
 )
@@ -155,6 +169,7 @@ def test_what_cannot_be_done_is_one_sentence_and_leaves_nothing_behind(capsys, t
     cases = [
         ([], 2, "photograph"),
         ([good, good, "--sensor", good], 2, "--sensor"),
+        ([good, "--fill"], 2, "--fill needs the depth image"),
         ([good, same_name], 1, "photo"),
         ([good, "--model", tmp_path / "cut.onnx"], 1, "cut.onnx"),
         ([good, "--model", tmp_path / "none.onnx"], 1, "none.onnx"),
