@@ -13,7 +13,7 @@ from app.lesson import LessonFolder, read_lesson
 from app.records import SceneView
 from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.holes import HolesFolder
-from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN
+from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN, TEXT
 from app.screens.surface.legend import legend_html
 from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook, surface_of
 from app.screens.surface.numbers import WAIT, note_html, quality_table, quick_line
@@ -37,9 +37,6 @@ from app.state import Spec, Step
 from app.ui import Panel
 from pipeline.types import FloatArray
 
-TEXT = """**What you see.** A ball rolls over the points and leaves a triangle wherever it rests on three.
-Too small, and it falls through between the points; too large, and it skips detail. Red lines are the rims
-of holes. Drag the radius, and compare before and after fusion. Go on with **Export**."""
 NAMES = {rule: name for name, rule in RULES.items()}
 
 
@@ -97,8 +94,7 @@ class SurfacePanel(Panel):
 
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session
-        stop = session.cancel_side_job
-        self._advice = AdviceFolder(self.ui, self._sweep, stop, self._take_radius)
+        self._advice = AdviceFolder(self.ui, self._sweep, session.cancel_side_job, self._take_radius)
         self._holes = HolesFolder(self.ui, self._explain, self._fill)
         self._rolling = RollingFolder(self.ui, self._watch)
         with gui.add_folder("Advanced", expand_by_default=False):
