@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from packetmesh.errors import InputError
-from packetmesh.files import MAX_TEXT_BYTES, read_bytes
+from packetmesh.files import MAX_TEXT_BYTES, read_bytes, read_text
 from pipeline.geometry import inverse
-from pipeline.importing.cameras import PRIMESENSE, camera_in_matrix, camera_of, numbers_in
+from pipeline.importing.cameras import PRIMESENSE, camera_of
 from pipeline.importing.sequence import Candidate, Sequence, posed
 from pipeline.io.images import read_color, read_depth_units
+from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.poses import read_pose, rigid_or_none
 from pipeline.types import CameraIntrinsics, FloatArray
 
@@ -59,13 +60,13 @@ def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
     first, beside = candidates[0], folder / "intrinsic"
     height_px, width_px = read_color(first.color).shape[:2]
     if intrinsics is None:
-        camera = camera_in_matrix(beside / "intrinsic_color.txt", width_px, height_px)
+        camera = read_intrinsics(beside / "intrinsic_color.txt", (width_px, height_px))
     else:
         camera, _ = camera_of(folder, first.color, intrinsics, None, "")
     depth_height_px, depth_width_px = read_depth_units(first.depth).shape
     if (depth_height_px, depth_width_px) == (height_px, width_px):
         return Sequence(candidates, camera, notes=notes)
-    depth_camera = camera_in_matrix(beside / "intrinsic_depth.txt", depth_width_px, depth_height_px)
+    depth_camera = read_intrinsics(beside / "intrinsic_depth.txt", (depth_width_px, depth_height_px))
     T_body_color, T_body_depth = (_matrix_or_identity(beside / f"extrinsic_{of}.txt") for of in FRAMES)
     T_color_depth = inverse(T_body_color) @ T_body_depth
     return Sequence(candidates, camera, depth_camera=depth_camera, T_color_depth=T_color_depth, notes=notes)
@@ -164,7 +165,10 @@ def _pose_or_none(path: Path) -> FloatArray | None:
 def _matrix_or_identity(path: Path) -> FloatArray:
     if not path.is_file():
         return np.eye(4)
-    values = numbers_in(path, "extrinsics file")
+    try:
+        values = np.array(read_text(path, "extrinsics file").split(), dtype=np.float64)
+    except ValueError:
+        raise InputError(f"The extrinsics file {path} holds other things than numbers; check it") from None
     T = rigid_or_none(values.reshape(4, 4)) if values.size == 16 else None
     if T is None:
         raise InputError(f"The extrinsics file {path} is no rigid 4 x 4 transform; check the file")

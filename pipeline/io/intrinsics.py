@@ -12,7 +12,7 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, read_text
 from pipeline.io.camera_files import camera_in, is_fisheye
-from pipeline.types import AnyPath, CameraIntrinsics
+from pipeline.types import AnyPath, CameraIntrinsics, FloatArray
 
 _BROWN_CONRADY = {"", "plumb_bob", "rational_polynomial"}
 """Distortion models whose first five coefficients are k1, k2, p1, p2, k3."""
@@ -20,18 +20,25 @@ _YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTI
 _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?(?![\w.])")
 
 
-def read_intrinsics(path: AnyPath) -> CameraIntrinsics:
+def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> CameraIntrinsics:
     """Intrinsics from JSON, YAML or text.
 
     Three styles: ``width height fx fy cx cy [distortion]``; Open3D's ``intrinsic_matrix``, which is
     column-major; ROS's camera_info (``K``, ``D``) or OpenCV's and ROS's calibration file
     (``camera_matrix``, ``distortion_coefficients``). And those of COLMAP, Kalibr and MATLAB
-    (``pipeline.io.camera_files``).
+    (``pipeline.io.camera_files``). Or a bare matrix, 3 x 3 or 4 x 4 numbers, of images whose size is known.
+
+    Args:
+        path: the file.
+        size_px: width and height of the images, for a bare matrix.
 
     Raises:
         InputError: unreadable, of no known style, or with impossible values.
     """
     text = read_text(path, "intrinsics file")
+    numbers = _bare_numbers(text)
+    if numbers is not None and numbers.size in (9, 16):
+        return _in_matrix(path, numbers, size_px)
     if is_fisheye(text):
         raise InputError(
             f"The intrinsics file {path} has the distortion model equidistant, that of a fisheye lens; try a "
@@ -48,6 +55,31 @@ def read_intrinsics(path: AnyPath) -> CameraIntrinsics:
         )
     _check(path, camera, str(values.get("distortion_model", "")))
     return replace(camera, distortion=camera.distortion[:5])
+
+
+def _bare_numbers(text: str) -> FloatArray | None:
+    """(N,) numbers of a text that holds nothing else, separated by blanks or commas."""
+    try:
+        return np.array(text.replace(",", " ").split(), dtype=np.float64)
+    except ValueError:
+        return None
+
+
+def _in_matrix(path: AnyPath, numbers: FloatArray, size_px: tuple[int, int] | None) -> CameraIntrinsics:
+    """The camera of a 3 x 3 or 4 x 4 matrix in rows."""
+    side = 3 if numbers.size == 9 else 4
+    matrix = numbers.reshape(side, side)[:3, :3]
+    if not (np.isfinite(matrix).all() and matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[2, 2] == 1):
+        raise InputError(
+            f"The intrinsics file {path} holds no camera matrix; try fx 0 cx, 0 fy cy, 0 0 1 in pixels"
+        )
+    if size_px is None:
+        raise InputError(
+            f"The intrinsics file {path} is a bare matrix and does not say for which size; try JSON with "
+            "width, height, fx, fy, cx and cy"
+        )
+    fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    return CameraIntrinsics.pinhole(fx, fy, cx, cy, *size_px)
 
 
 def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics) -> None:

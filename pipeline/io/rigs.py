@@ -46,7 +46,7 @@ def load_frame(
     Args:
         color: (H, W) image.
         depth: (H, W) 16-bit image, 0 where the depth is unknown; of another size if it is not registered.
-        intrinsics: JSON with fx, fy, cx and cy, Open3D JSON or ROS camera_info, pixels.
+        intrinsics: JSON with fx, fy, cx and cy, Open3D JSON, ROS camera_info or a bare matrix, pixels.
         depth_scale: depth units in a metre.
         name: what the node is called.
         pose: 4 x 4 T_world_camera, metres.
@@ -64,8 +64,8 @@ def load_frame(
     >>> frame.rgb.shape[:2] == frame.depth.z_m.shape
     True
     """
-    camera = read_intrinsics(intrinsics)
     rgb = read_color(color)
+    camera = read_intrinsics(intrinsics, rgb.shape[1::-1])
     sensed, noise = read_depth(depth, depth_scale), None
     if depth_correction is not None:
         correction = read_depth_correction(depth_correction)
@@ -95,7 +95,7 @@ def _registered(
             f"The depth image {depth} comes with {given} but without {missing}; give both if it is not "
             "registered to the colour image, none if it is"
         )
-    depth_camera = read_intrinsics(depth_intrinsics)
+    depth_camera = read_intrinsics(depth_intrinsics, sensed.z_m.shape[::-1])
     shape = (depth_camera.height_px, depth_camera.width_px)
     _check_size("intrinsics file", depth_intrinsics, shape, "depth image", depth, sensed.z_m.shape)
     seen = register_depth(sensed, depth_camera, color_camera, read_extrinsics(extrinsics))
@@ -205,7 +205,10 @@ def _node_folders(directory: Path) -> list[Path]:
 
 
 def _load_node(folder: Path, over: NodeFiles, depth_scale: float) -> RgbdFrame:
-    files: NodeFiles = {"intrinsics": folder / "intrinsics.json", **node_files(folder), **over}
+    intrinsics = folder / "intrinsics.json"
+    if not intrinsics.exists() and intrinsics.with_suffix(".txt").exists():
+        intrinsics = intrinsics.with_suffix(".txt")
+    files: NodeFiles = {"intrinsics": intrinsics, **node_files(folder), **over}
     color, depth = (_image_in(folder, stem) for stem in ("color", "depth"))
     return load_frame(color, depth, depth_scale=depth_scale, name=folder.name, **files)
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.types import CameraIntrinsics
 
@@ -110,3 +111,27 @@ def test_what_is_written_is_read_to_the_last_bit(tmp_path):
 def test_four_coefficients_leave_k3_zero(tmp_path):
     (tmp_path / "camera.json").write_text(json.dumps(FLAT | {"distortion": [0.1, -0.2, 0, 0]}))
     np.testing.assert_array_equal(read_intrinsics(tmp_path / "camera.json").distortion, [0.1, -0.2, 0, 0, 0])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "500 0 319.5\n0 510 239.5\n0 0 1\n",
+        "500,0,319.5,0,510,239.5,0,0,1",
+        "500 0 319.5 0\n0 510 239.5 0\n0 0 1 0\n0 0 0 1",
+    ],
+)
+def test_a_bare_matrix_is_of_the_images_it_comes_with(tmp_path, text):
+    (tmp_path / "K.txt").write_text(text)
+    camera = read_intrinsics(tmp_path / "K.txt", (640, 480))
+    assert (camera.fx_px, camera.fy_px, camera.width_px, camera.height_px) == (500.0, 510.0, 640, 480)
+    assert camera.matrix[:2, 2].tolist() == [319.5, 239.5]
+    with pytest.raises(InputError, match="does not say for which size"):
+        read_intrinsics(tmp_path / "K.txt")
+
+
+@pytest.mark.parametrize("text", ["0 0 0\n0 0 0\n0 0 1", "500 0 320 0 500 240 0 0 2", "nan 0 1 0 1 1 0 0 1"])
+def test_nine_numbers_that_are_no_camera_are_refused(tmp_path, text):
+    (tmp_path / "K.txt").write_text(text)
+    with pytest.raises(InputError, match="no camera matrix"):
+        read_intrinsics(tmp_path / "K.txt", (640, 480))
