@@ -42,12 +42,18 @@ def term(name: str, hint: str) -> str:
     return f'<span style="{_NAME}" title="{html.escape(hint, quote=True)}">{html.escape(name)}</span>'
 
 
-def table(rows: Sequence[Row], columns: Sequence[Head] = ()) -> str:
-    """HTML of rows of numbers; ``columns`` head the values when there are several."""
+def table(
+    rows: Sequence[Row], columns: Sequence[Head] = (), colors: Sequence[tuple[int, int, int]] = ()
+) -> str:
+    """HTML of rows of numbers; ``columns`` head the values when there are several, in ``colors`` if given."""
     lines = []
     if columns:
         names = [html.escape(one) if isinstance(one, str) else term(*one) for one in columns]
-        heads = "".join(f'<th style="{_CELL} text-align: right">{name}</th>' for name in names)
+        inks = [f" color: {css(color)};" for color in colors] or [""] * len(names)
+        heads = "".join(
+            f'<th style="{_CELL} text-align: right;{ink}">{name}</th>'
+            for name, ink in zip(names, inks, strict=True)
+        )
         lines.append(f"<tr><th></th>{heads}</tr>")
     for name, hint, *values in rows:
         text = term(name, hint)

@@ -5,9 +5,11 @@ import re
 import numpy as np
 import pytest
 
+from app.drawing.colors import css
 from app.screens.fuse.capture import capture_html, capture_sentence, cell_name
 from app.screens.fuse.draw import gizmo_pose, start_of
 from app.screens.fuse.histogram import kernel, weights
+from app.screens.fuse.methods import color_of
 from app.screens.fuse.numbers import places_table, race_table, verdict
 from app.screens.fuse.view import (
     CAPTURE_SHIFTS_M,
@@ -69,6 +71,8 @@ def test_the_table_has_a_column_for_each_lane_and_explains_every_row():
     assert re.findall("[①②③④]", html) == list("①②③④")
     assert html.count("title=") == 8
     assert html.count(">lost<") == 4
+    for mark in "①②③④":  # in the colour of its method, as everywhere
+        assert re.search(rf"color: {css(color_of(lane('0', 0.0).rival))};\">{mark}<", html)
 
 
 def test_the_kernel_is_a_gaussian_of_the_distance_and_icp_has_none():

@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from app.screens.fuse.labels import MARKS
+from app.screens.fuse.methods import color_of
 from app.screens.fuse.view import SUCCESS_M, FuseView, RaceLane, RegistrationRow
 from app.tables import Row, number, table
 
@@ -94,7 +95,7 @@ def race_table(lanes: tuple[RaceLane, ...]) -> str:
             lambda x: number(x.elapsed_s, 0, "ms", 1000),
         ),
     ]
-    return table(rows, MARKS[: len(lanes)])
+    return table(rows, MARKS[: len(lanes)], [color_of(lane.rival) for lane in lanes])
 
 
 def _stopped(reason: str) -> str:
