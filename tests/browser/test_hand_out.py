@@ -80,11 +80,11 @@ def test_stepping_shows_more_of_the_wall_and_larger_numbers(page):
 
 
 def test_playing_moves_the_clock_until_it_is_paused(page):
-    page.get_by_label("Speed").select_option(label="2×")
+    page.get_by_label("Speed").select_option(label="1×")
     page.keyboard.press(" ")
     page.locator("#play", has_text="Pause").wait_for()
-    shown(page, 0)
-    page.locator("html[data-moment='1']").wait_for()
+    # On a busy machine one picture may pass over a whole moment, so "reached" is asked, not "is".
+    page.wait_for_function("() => Number(document.documentElement.dataset.moment) >= 1")
     page.keyboard.press(" ")
     page.locator("#play", has_text="Play").wait_for()
     stopped = number(page, "Network time")
