@@ -19,7 +19,7 @@ def import_rig(
     intrinsics: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Make a rig of a few frames of a recording: TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood, Open3D, ROS.
+    """Make a rig of frames of a recording: TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood, Open3D, COLMAP, ROS.
 
     Args:
         path: The recording's folder, unpacked; or a bag of ROS 1 or 2 (.bag, .db3, .mcap or its folder).

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence as Values
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from packetmesh.errors import InputError
+from pipeline.importing.colmap import read_depth_map
 from pipeline.importing.sequence import Sequence
 from pipeline.io.images import FARTHEST_M, likely_depth_scale, read_depth_units
 from pipeline.types import DepthMap
@@ -35,10 +37,16 @@ def depth_in(path: Path, sequence: Sequence) -> ReadDepth:
     Raises:
         InputError: it cannot be read, or holds nothing within 65 m.
     """
-    units, notes = read_depth_units(path), list[str]()
-    scale = sequence.units_per_metre
+    scale, notes = sequence.units_per_metre, list[str]()
+    if path.suffix == ".bin":
+        return _metres(path, read_depth_map(path), scale, notes)
+    units = read_depth_units(path)
     if sequence.rotated_bits and has_rotated_bits(units):
         units, scale, notes = unrotated(units), 1000.0, ["The bits of the depth were turned back by three"]
+    return _metres(path, units, scale, notes)
+
+
+def _metres(path: Path, units: NDArray[Any], scale: float, notes: list[str]) -> ReadDepth:
     z_m = (units / scale).astype(np.float32)
     z_m[(units == 0) | (z_m > FARTHEST_M)] = np.nan
     if not np.isfinite(z_m).any():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -97,7 +97,7 @@ def iterate_import(
     yield Progress("files", 0.0)
     sequence = kind.read(folder, None if intrinsics is None else Path(intrinsics))
     if depth_scale is not None:
-        sequence = replace(sequence, units_per_metre=depth_scale, rotated_bits=False)
+        sequence = sequence.with_scale(depth_scale)
     yield Progress("choice of frames", 0.2)
     middle = depth_in(sequence.candidates[len(sequence.candidates) // 2].depth, sequence)
     chosen = choose(sequence, frames, middle.median_m)

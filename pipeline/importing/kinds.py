@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from packetmesh.errors import InputError
-from pipeline.importing import numbered, tum
+from pipeline.importing import colmap, numbered, tum
 from pipeline.importing.sequence import Sequence
 
 
@@ -33,6 +33,12 @@ KINDS = (
         numbered.read_seven_scenes,
     ),
     Kind("ScanNet", "color/, depth/, pose/ and intrinsic/", numbered.is_scannet, numbered.read_scannet),
+    Kind(
+        "COLMAP",
+        "sparse/{cameras,images,points3D}.txt with images/ and stereo/depth_maps/ or depth/",
+        colmap.is_colmap,
+        colmap.read_colmap,
+    ),
     Kind("SUN RGB-D", "image/, depth_bfx/ and intrinsics.txt", numbered.is_sunrgbd, numbered.read_sunrgbd),
     Kind(
         "Redwood or Open3D",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pipeline.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
 
@@ -17,6 +18,11 @@ class Candidate:
     T_world_camera: FloatArray | None = None
     """(4, 4) of the colour camera, metres."""
     time_s: float | None = None
+
+    def enlarged(self, factor: float) -> Candidate:
+        """With its pose's lengths times ``factor``."""
+        T = self.T_world_camera
+        return self if T is None else replace(self, T_world_camera=rigid(T[:3, :3], factor * T[:3, 3]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +40,18 @@ class Sequence:
     """Of depth images that are not registered to the colour images."""
     T_color_depth: FloatArray | None = None
     """(4, 4) where that camera stands, metres."""
+    poses_in_depth_units: bool = False
+    """Whether the poses are known in the unit of the depth images only, as those of COLMAP."""
     notes: tuple[str, ...] = ()
     """What was assumed, one sentence each."""
+
+    def with_scale(self, units_per_metre: float) -> Sequence:
+        """With depth images of so many units in a metre."""
+        candidates = self.candidates
+        if self.poses_in_depth_units:
+            factor = self.units_per_metre / units_per_metre
+            candidates = tuple(candidate.enlarged(factor) for candidate in candidates)
+        return replace(self, candidates=candidates, units_per_metre=units_per_metre, rotated_bits=False)
 
 
 def posed(candidates: list[Candidate], what: str) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:

@@ -90,11 +90,50 @@ def write_redwood(folder: Path, rig: Rig) -> None:
     _write_camera(folder / "camera_intrinsic.json")
 
 
+def write_colmap(folder: Path, rig: Rig, metres_a_unit: float = 1.0, sensor: bool = False) -> None:
+    """A text model with dense depth maps, or with a sensor's images and points that were measured in them.
+
+    The model's unit is so many metres long; COLMAP's pixels begin at their corners.
+    """
+    rng = np.random.default_rng(3)
+    images, points = ["# a comment"], ["# a comment"]
+    for index, frame in enumerate(rig.frames):
+        name = f"room/view_{index}.png"
+        write_color(folder / "images" / name, frame.rgb)
+        T_camera_world = np.linalg.inv(frame.T_world_camera)
+        x, y, z, w = Rotation.from_matrix(T_camera_world[:3, :3]).as_quat()
+        place = T_camera_world[:3, 3] / metres_a_unit
+        pose = [index + 1, w, x, y, z, *place, 1, name]
+        features = []
+        if sensor:
+            _write_units(folder / "depth" / name, frame, 1000.0)
+            for v, u in rng.integers(0, (30, 40), (20, 2)):
+                z_m = np.nan_to_num(frame.depth.z_m[v, u], nan=2.0) * rng.choice([1.0, 1.0, 1.0, 1.6])
+                ray = np.linalg.solve(CAMERA.matrix, [u, v, 1.0])
+                world = frame.T_world_camera @ [*(z_m * ray), 1.0]
+                points.append(
+                    f"{len(points)} {' '.join(map(repr, (world[:3] / metres_a_unit).tolist()))} 0 0 0 0.5 1 0"
+                )
+                features += [f"{u + 0.5} {v + 0.5} {len(points) - 1}", "3.5 4.5 -1"]
+        else:
+            file = folder / "stereo" / "depth_maps" / f"{name}.geometric.bin"
+            file.parent.mkdir(parents=True, exist_ok=True)
+            values = np.nan_to_num(frame.depth.z_m / metres_a_unit).astype("<f4")
+            file.write_bytes(b"40&30&1&" + values.tobytes())
+        images += [" ".join(map(str, pose)), " ".join(features)]
+    model = folder / "sparse"
+    model.mkdir(parents=True)
+    (model / "cameras.txt").write_text("# a comment\n1 PINHOLE 40 30 30 30.5 20 15\n")
+    (model / "images.txt").write_text("\n".join(images) + "\n")
+    (model / "points3D.txt").write_text("\n".join(points) + "\n")
+
+
 LAYOUTS: dict[str, Callable[[Path, Rig], None]] = {
     "TUM": write_tum,
     "7-Scenes": write_seven_scenes,
     "ScanNet": write_scannet,
     "Redwood or Open3D": write_redwood,
+    "COLMAP": write_colmap,
 }
 
 

@@ -1,0 +1,267 @@
+"""COLMAP's text models: where photographs were taken from, with dense or measured depth.
+
+Schönberger and Frahm, "Structure-from-Motion Revisited", CVPR 2016; https://colmap.github.io/format.html.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from packetmesh.errors import InputError
+from packetmesh.files import MAX_GEOMETRY_BYTES, MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes
+from pipeline.geometry import inverse, rigid, scaled
+from pipeline.importing.cameras import camera_of
+from pipeline.importing.sequence import Candidate, Sequence
+from pipeline.io.images import read_depth_units
+from pipeline.types import CameraIntrinsics, FloatArray
+
+MILLIMETRES = 1000.0
+CENTRE_PX = 0.5
+"""Where COLMAP puts the middle of the first pixel; here it is 0 (SPEC 1.1)."""
+LEAST_POINTS = 20
+"""Points with measured depth that tell how long a unit of the model is."""
+_PARAMETERS = {
+    "SIMPLE_PINHOLE": ("fx", "cx", "cy"),
+    "PINHOLE": ("fx", "fy", "cx", "cy"),
+    "SIMPLE_RADIAL": ("fx", "cx", "cy", "k1"),
+    "RADIAL": ("fx", "cx", "cy", "k1", "k2"),
+    "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
+}
+_DISTORTION = ("k1", "k2", "p1", "p2", "k3")
+_MODEL_FOLDERS = (".", "sparse", "sparse/0")
+_IMAGE_FOLDERS = ("images", "image", "color", "rgb", ".")
+_DEPTH_FOLDERS = ("depth", "depths", "depth_images")
+
+
+@dataclass(frozen=True, slots=True)
+class _Image:
+    """One line of images.txt and the one after it."""
+
+    camera: int
+    name: str
+    T_camera_model: FloatArray
+    """(4, 4), in the model's unit."""
+    points: str
+    """X, Y and POINT3D_ID of each feature."""
+
+
+def is_colmap(folder: Path) -> bool:
+    """Whether it has cameras.txt and images.txt, itself or in sparse/."""
+    return _model_folder(folder, ".txt") is not None or _model_folder(folder, ".bin") is not None
+
+
+def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
+    """The registered images that have depth, of the camera that took the most of them.
+
+    Depth comes from ``stereo/depth_maps``, in the model's own unit, or from images of a depth sensor in
+    ``depth/`` with the names of the photographs, which then say how long a unit of the model is.
+
+    Raises:
+        InputError: a binary or damaged model, a camera model without our distortion, or no depth.
+    """
+    model = _model_folder(folder, ".txt")
+    if model is None:
+        raise InputError(
+            f"The model in {folder} is binary; try colmap model_converter --output_type TXT beside it"
+        )
+    cameras, images = _cameras(model / "cameras.txt"), list(_images(model / "images.txt"))
+    found = [
+        (image, color, depth)
+        for image in images
+        if (color := _beside(folder, _IMAGE_FOLDERS, image.name)) and (depth := _depth(folder, image.name))
+    ]
+    if not found:
+        raise InputError(
+            f"{folder} has no image of images.txt with its depth; try colmap patch_match_stereo, which "
+            "writes stereo/depth_maps, or put the sensor's PNG images of the same names in depth/"
+        )
+    most, _ = Counter(image.camera for image, _, _ in found).most_common(1)[0]
+    ours = sorted((one for one in found if one[0].camera == most), key=lambda one: one[0].name)
+    if most not in cameras:
+        raise InputError(f"{model / 'cameras.txt'} has no camera {most}, which images.txt names; check both")
+    camera, notes = cameras[most], list[str]()
+    if intrinsics is not None:
+        camera, _ = camera_of(folder, ours[0][1], intrinsics, None, "")
+    if len(ours) < len(images):
+        notes.append(f"{len(images) - len(ours)} of {len(images)} images have no depth or another camera")
+    dense = ours[0][2].suffix == ".bin"
+    if dense:
+        units, metres = 1.0, 1.0
+        notes.append(
+            "COLMAP knows no metres: its unit is taken as one; --depth-scale says how many units a metre has"
+        )
+    else:
+        units = MILLIMETRES
+        metres = _metres_a_unit(model / "points3D.txt", [(image, depth) for image, _, depth in ours], units)
+        notes.append(f"A unit of the model is {metres:.4g} m by the depth that was measured at its points")
+    candidates = []
+    for image, color, depth in ours:
+        T_model_camera = inverse(image.T_camera_model)
+        T_model_camera[:3, 3] *= metres
+        candidates.append(Candidate(color, depth, T_model_camera))
+    depth_camera = _depth_camera(camera, ours[0][2])
+    return Sequence(
+        tuple(candidates),
+        camera,
+        units,
+        depth_camera=depth_camera,
+        T_color_depth=None if depth_camera is None else np.eye(4),
+        poses_in_depth_units=True,
+        notes=tuple(notes),
+    )
+
+
+def read_depth_map(path: Path) -> FloatArray:
+    """(H, W) depth of ``stereo/depth_maps``, in the model's unit; 0 where it is unknown.
+
+    Raises:
+        InputError: it is damaged, too large, of more than one channel or without any depth.
+    """
+    data = read_bytes(path, MAX_IMAGE_BYTES, "depth map")
+    words = data[:64].split(b"&", 3)
+    sizes = [int(word) for word in words[:3] if word.isdigit()]
+    if len(words) < 4 or len(sizes) < 3 or sizes[2] != 1 or not 0 < sizes[0] * sizes[1] <= MAX_IMAGE_PIXELS:
+        raise InputError(f"{path} is no depth map of COLMAP, such as 640&480&1& and numbers; check the file")
+    width_px, height_px, start = sizes[0], sizes[1], sum(len(word) + 1 for word in words[:3])
+    if len(data) - start != 4 * width_px * height_px:
+        raise InputError(f"The depth map {path} is truncated or damaged; try to copy it again")
+    values = np.frombuffer(data, "<f4", offset=start).reshape(height_px, width_px)
+    known = np.isfinite(values) & (values > 0.0)
+    if not known.any():
+        raise InputError(f"The depth map {path} has no depth anywhere; try another image")
+    return np.where(known, values, 0.0)
+
+
+def _metres_a_unit(file: Path, frames: list[tuple[_Image, Path]], units_per_metre: float) -> float:
+    """The median ratio of the depth that a sensor measured at the model's points to their depth in it."""
+    points = _points(file)
+    ratios = [np.empty(0)]
+    for image, depth in frames[:: -(-len(frames) // 20)]:
+        features = _numbers(image.points.split(), 3, file.with_name("images.txt"))
+        seen = [(x, y, points[int(which)]) for x, y, which in features if int(which) in points]
+        if not seen:
+            continue
+        places = np.array([point for _, _, point in seen])
+        z = (places @ image.T_camera_model[:3, :3].T + image.T_camera_model[:3, 3])[:, 2]
+        units = read_depth_units(depth)
+        height_px, width_px = units.shape
+        pixels = np.array([(y, x) for x, y, _ in seen]).astype(int)  # COLMAP's pixel 0 is from 0 to 1
+        inside = ((pixels >= 0) & (pixels < (height_px, width_px))).all(axis=1) & (z > 0)
+        measured = units[tuple(pixels[inside].T)] / units_per_metre
+        ratios.append((measured / z[inside])[measured > 0])
+    known = np.concatenate(ratios)
+    if len(known) < LEAST_POINTS:
+        raise InputError(
+            f"Only {len(known)} points of {file} have measured depth, too few to tell how long a unit of the "
+            "model is; try a model of more images"
+        )
+    return float(np.median(known))
+
+
+def _depth_camera(camera: CameraIntrinsics, depth: Path) -> CameraIntrinsics | None:
+    """The camera of depth that is smaller than its photograph; None where both have the same size."""
+    shape = read_depth_map(depth).shape if depth.suffix == ".bin" else read_depth_units(depth).shape
+    if shape == (camera.height_px, camera.width_px):
+        return None
+    smaller = scaled(camera, shape[1] / camera.width_px)
+    if (smaller.height_px, smaller.width_px) != shape:
+        raise InputError(
+            f"The depth image {depth} has {shape[1]} x {shape[0]} pixels, which is not the shape of its "
+            f"photograph, {camera.width_px} x {camera.height_px}; try depth of the same view"
+        )
+    return smaller
+
+
+def _cameras(file: Path) -> dict[int, CameraIntrinsics]:
+    """Those whose model we have, by their numbers."""
+    cameras, others = {}, set()
+    for line in _lines(file):
+        words = line.split()
+        names = _PARAMETERS.get(words[1] if len(words) > 1 else "")
+        if names is None:
+            others.update(words[1:2])
+            continue
+        (row,) = _numbers([words[0], *words[2:]], 3 + len(names), file)
+        given = dict(zip(names, row[3:], strict=True))
+        fx, fy = given["fx"], given.get("fy", given["fx"])
+        pinhole = CameraIntrinsics.pinhole(
+            fx, fy, given["cx"] - CENTRE_PX, given["cy"] - CENTRE_PX, int(row[1]), int(row[2])
+        )
+        distortion = np.array([given.get(name, 0.0) for name in _DISTORTION])
+        cameras[int(row[0])] = CameraIntrinsics(pinhole.matrix, distortion, int(row[1]), int(row[2]))
+    if not cameras:
+        raise InputError(
+            f"{file} has no camera that is read ({', '.join(sorted(others)) or 'none at all'}); try colmap "
+            "image_undistorter, whose cameras are PINHOLE"
+        )
+    return cameras
+
+
+def _images(file: Path) -> Iterator[_Image]:
+    """Every other line is of an image; the one after it may be empty."""
+    lines = [line for line in _text(file).splitlines() if not line.startswith("#")]
+    for line, points in zip(lines[::2], [*lines[1::2], ""], strict=False):
+        words = line.split(maxsplit=9)
+        if len(words) < 10:
+            raise InputError(f"{file} has the line '{line[:80]}' where an image is expected; check the file")
+        (row,) = _numbers(words[:9], 9, file)
+        quaternion = row[1:5]
+        if np.linalg.norm(quaternion) < 0.5:
+            raise InputError(f"{file} has no rotation for {words[9]}; check the file")
+        rotation = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
+        yield _Image(int(row[8]), words[9].strip(), rigid(rotation, row[5:8]), points)
+
+
+def _points(file: Path) -> dict[int, FloatArray]:
+    """(3,) places in the model's unit by the numbers of the points."""
+    rows = [line.split(maxsplit=4)[:4] for line in _lines(file)]
+    values = _numbers([word for row in rows for word in row], 4, file)
+    return {int(row[0]): row[1:] for row in values}
+
+
+def _lines(file: Path) -> Iterator[str]:
+    return (line for line in _text(file).splitlines() if line.strip() and not line.startswith("#"))
+
+
+def _text(file: Path) -> str:
+    return read_bytes(file, MAX_GEOMETRY_BYTES, "part of a COLMAP model").decode("utf-8", "replace")
+
+
+def _numbers(words: list[str], columns: int, file: Path) -> FloatArray:
+    """(N, columns) of so many words."""
+    try:
+        values = np.array(words, dtype=np.float64).reshape(-1, columns)
+    except ValueError:
+        raise InputError(
+            f"{file} has words or too few numbers where numbers belong; check the file"
+        ) from None
+    if not np.isfinite(values).all():
+        raise InputError(f"{file} has numbers that are not finite; check the file")
+    return values
+
+
+def _model_folder(folder: Path, suffix: str) -> Path | None:
+    names = [f"{name}{suffix}" for name in ("cameras", "images")]
+    places = (folder / place for place in _MODEL_FOLDERS)
+    return next((place for place in places if all((place / name).is_file() for name in names)), None)
+
+
+def _beside(folder: Path, places: tuple[str, ...], name: str) -> Path | None:
+    """A file of that name in one of the places; none outside the folder."""
+    if ".." in Path(name).parts or Path(name).is_absolute():
+        raise InputError(f"images.txt in {folder} names {name}, which is outside; check the file")
+    return next((path for place in places if (path := folder / place / name).is_file()), None)
+
+
+def _depth(folder: Path, name: str) -> Path | None:
+    dense = (f"{name}.{kind}.bin" for kind in ("geometric", "photometric"))
+    maps = (_beside(folder, ("stereo/depth_maps",), file) for file in dense)
+    return next((path for path in maps if path), None) or _beside(
+        folder, _DEPTH_FOLDERS, str(Path(name).with_suffix(".png"))
+    )
