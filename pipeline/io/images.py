@@ -45,7 +45,7 @@ def read_color(path: AnyPath) -> ByteArray:
 
 
 def read_depth(path: AnyPath, depth_scale: float = 1000.0) -> DepthMap:
-    """Metric depth of a PNG, PGM, TIFF, PFM or NPY image; 0 and, in 16 bits, 65535 mean unknown.
+    """Metric depth of a PNG, PGM, TIFF, PFM, OpenEXR or NPY image; 0 and, in 16 bits, 65535 mean unknown.
 
     Args:
         path: the file.

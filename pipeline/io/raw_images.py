@@ -1,4 +1,4 @@
-"""Images as plain numbers: NumPy arrays, PFM and TIFF files."""
+"""Images as plain numbers: NumPy arrays, PFM, TIFF and, with the extra ``exr``, OpenEXR files."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from pipeline.types import AnyPath
 
 _NPY = b"\x93NUMPY"
 _TIFF = (b"II*\x00", b"MM\x00*")
+_EXR = b"\x76\x2f\x31\x01"
+_EXR_DEPTH = ("Z", "Y", "V")
+"""Names under which programs write one channel, in the order in which they are looked for."""
 _PFM = re.compile(rb"(P[Ff])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]{1,30})\s")
-SIGNATURES = (_NPY, *_TIFF, b"Pf", b"PF")
+SIGNATURES = (_NPY, *_TIFF, b"Pf", b"PF", _EXR)
 
 
 def raw_values(path: AnyPath, data: bytes, what: str) -> np.ndarray:
@@ -27,11 +30,16 @@ def raw_values(path: AnyPath, data: bytes, what: str) -> np.ndarray:
         what: for the errors, such as "depth image".
 
     Raises:
-        InputError: truncated, damaged, too large, or no image.
+        InputError: truncated, damaged, too large, no image, or OpenEXR without the extra.
     """
-    read = _numpy if data.startswith(_NPY) else _tiff if data.startswith(_TIFF) else _pfm
+    readers = {_NPY: _numpy, **dict.fromkeys(_TIFF, _tiff), _EXR: _exr}
+    read = next((reader for signature, reader in readers.items() if data.startswith(signature)), _pfm)
     try:
         values = read(data)
+    except ImportError:
+        raise InputError(
+            f"Reading the {what} {path} needs OpenEXR; try pip install 'packetmesh[exr]', or TIFF"
+        ) from None
     except _TooLarge as error:
         raise InputError(
             f"The {what} {path} has {error} pixels, more than the {MAX_IMAGE_PIXELS / 1e6:g} million that "
@@ -68,6 +76,21 @@ def _tiff(data: bytes) -> np.ndarray:
     with Image.open(io.BytesIO(data), formats=["TIFF"]) as image:
         _check(image.height, image.width)
         return np.asarray(image)
+
+
+def _exr(data: bytes) -> np.ndarray:
+    """The one channel of a depth image, or red, green and blue."""
+    import OpenEXR
+
+    corners = OpenEXR.File(io.BytesIO(data), header_only=True).header()["dataWindow"]
+    width_px, height_px = (int(last - first) + 1 for first, last in zip(*corners, strict=True))
+    _check(height_px, width_px)
+    with OpenEXR.File(io.BytesIO(data), separate_channels=True) as file:
+        channels = {name: channel.pixels for name, channel in file.channels().items()}
+    if {"R", "G", "B"} <= channels.keys():
+        return np.stack([channels[name] for name in "RGB"], axis=-1)
+    (only,) = list(channels) if len(channels) == 1 else [name for name in _EXR_DEPTH if name in channels][:1]
+    return channels[only].astype(np.float32)
 
 
 def _pfm(data: bytes) -> np.ndarray:

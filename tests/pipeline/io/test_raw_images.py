@@ -4,6 +4,7 @@ import io
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
@@ -30,6 +31,16 @@ def tiff(values):
     return stream.getvalue()
 
 
+def exr(**channels):
+    """Of OpenEXR's own writer."""
+    stream = io.BytesIO()
+    with OpenEXR.File(
+        {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}, channels
+    ) as file:
+        file.write(stream)
+    return stream.getvalue()
+
+
 def opencv(values, suffix):
     return cv2.imencode(suffix, values)[1].tobytes()
 
@@ -45,6 +56,8 @@ def opencv(values, suffix):
         ("metres.tiff", opencv(METRES, ".tiff")),
         ("metres.pfm", opencv(METRES, ".pfm")),
         ("big.pfm", b"Pf\n17 12\n1.0\n" + METRES[::-1].astype(">f4").tobytes()),
+        ("z.exr", exr(Z=METRES)),
+        ("y_and_alpha.exr", exr(Y=METRES, A=np.ones_like(METRES))),
         ("zeros.npy", npy(np.nan_to_num(METRES))),
     ],
 )
@@ -99,6 +112,9 @@ BAD = {
     "cut.npy": (npy(METRES)[:-9], "truncated"),
     "cut.tif": (tiff(MM)[:200], "truncated"),
     "cut.pfm": (opencv(METRES, ".pfm")[:-9], "truncated"),
+    "cut.exr": (exr(Z=METRES)[:-90], "truncated or damaged"),
+    "nameless.exr": (exr(a=METRES, b=METRES), "truncated or damaged"),
+    "colours.exr": (exr(R=METRES, G=METRES, B=METRES), "3 channels"),
     "bomb.npy": (header_only((200_000, 200_000)), "200000 x 200000 pixels"),
     "bomb.pfm": (b"Pf\n200000 200000\n-1.0\n", "200000 x 200000 pixels"),
     "pickle.npy": (npy(np.array([{}], object)), "truncated or damaged"),
