@@ -26,7 +26,7 @@ from pipeline.io.truth import read_truth, write_truth
 from pipeline.types import AnyPath, CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
 MAX_NODES = 6
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".tif", ".tiff", ".npy", ".pfm")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".tif", ".tiff", ".npy", ".pfm", ".exr")
 
 
 def load_frame(

@@ -97,7 +97,7 @@ def test_the_command_is_shown(page):
 
 
 def test_a_wrong_upload_is_a_sentence_and_the_session_goes_on(page):
-    page.get_by_text("Use your own RGB-D pair").click()
+    page.get_by_text("Use your own images").click()
     files = page.locator("input[type=file]")
     for index, (name, content) in enumerate(
         [("color.png", b"not a picture"), ("depth.png", b"nor this"), ("k.json", b"{}")]

@@ -7,24 +7,23 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-import viser
 
 from app.drawing.cameras import add_camera
 from app.drawing.clouds import add_cloud, clear
 from app.records import SceneView
+from app.screens.scene.own import OwnFolder
+from app.screens.scene.recording import ReadRecording
 from app.state import Spec, Step
 from app.tables import number, table
-from app.ui import Panel, keep_upload
-from packetmesh.errors import InputError
+from app.ui import Panel
 from pipeline.config import PRESETS
 from pipeline.io.demos import DEMO_SCENES
-from pipeline.sources import Demo, ImagePair
+from pipeline.sources import Demo, ImagePair, RigFolder
 
 TEXT = """**What you see.** Each camera node delivers a colour image and a depth image. The points are
 the depth pixels put where they belong in space; the gaps are what the sensor could not measure.
 Go on with **Depth**."""
 DEMOS = {name: scene.title for name, scene in DEMO_SCENES.items()}
-UPLOAD_LIMIT_BYTES = 32 << 20
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 
 
@@ -58,34 +57,10 @@ class ScenePanel(Panel):
         self.ui.when_changed(self._preset, self._picked_preset)
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images are shown below.")
         self.ui.when_changed(self._node, self._show_node)
-        self._build_upload()
+        self._own = OwnFolder(self.ui, self.session.folder, self._use_pair, self._read_recording)
         self._color = gui.add_image(EMPTY, label="Colour image")
         self._depth = gui.add_image(EMPTY, label="Sensor depth", format="png")
         self._numbers = gui.add_html("")
-
-    def _build_upload(self) -> None:
-        gui = self.gui
-        self._files: dict[str, Path] = {}
-        with gui.add_folder("Use your own RGB-D pair", expand_by_default=False):
-            for kind, label, mime in (
-                ("color", "Colour image …", "image/png,image/jpeg"),
-                ("depth", "Depth PNG, 16 bit …", "image/png"),
-                ("intrinsics", "Intrinsics JSON or YAML …", ".json,.yaml,.yml"),
-            ):
-                button = gui.add_upload_button(label, icon=viser.Icon.UPLOAD, mime_type=mime)
-                button.on_upload(lambda event, kind=kind: self._uploaded(kind, event))
-            self._scale = gui.add_number(
-                "Units per m",
-                1000.0,
-                min=1.0,
-                max=100_000.0,
-                step=1.0,
-                hint="Depth image units in one metre: 1000 for millimetres.",
-            )
-            self._have = gui.add_markdown("Add all three files, then press the button.")
-            gui.add_button("Reconstruct this pair", icon=viser.Icon.PLAYER_PLAY).on_click(
-                lambda _: self.ui.post(self._use_files)
-            )
 
     def on_spec(self, spec: Spec) -> None:
         """Show the preset and the scene that are wanted."""
@@ -154,25 +129,22 @@ class ScenePanel(Panel):
     def _picked_preset(self) -> None:
         self.session.want(self.session.spec.with_preset(self._preset.value))
 
-    def _uploaded(self, kind: str, event: viser.GuiEvent) -> None:
-        self.ui.post(self._keep_file, kind, event.target.value)
-
-    def _keep_file(self, kind: str, file: viser.UploadedFile) -> None:
-        instead = "use packetmesh reconstruct for larger files"
-        self._files[kind] = keep_upload(file, self.session.folder, kind, UPLOAD_LIMIT_BYTES, instead)
-        missing = [name for name in ("color", "depth", "intrinsics") if name not in self._files]
-        self._have.content = (
-            f"Still needed: {', '.join(missing)}." if missing else "All there: press the button."
-        )
-
-    def _use_files(self) -> None:
-        if len(self._files) < 3:
-            raise InputError("A pair needs a colour image, a depth image and intrinsics; add all three.")
-        files = {kind: str(path) for kind, path in self._files.items()}
-        source = ImagePair(**files, depth_scale=float(self._scale.value))
+    def _use_pair(self, source: ImagePair) -> None:
         self.session.want(dataclasses.replace(self.session.spec, source=source))
+
+    def _read_recording(self, path: Path, name: str) -> None:
+        self.session.side_job("scene.recording_job:recording_job", path, name, on_end=self._use_recording)
+
+    def _use_recording(self, read: ReadRecording | None) -> None:
+        if read is None:
+            self._own.tell(("Nothing could be used.",))
+            return
+        self._own.tell(read.notes)
+        self.session.want(dataclasses.replace(self.session.spec, source=read.source))
 
 
 def _title(spec: Spec) -> str:
-    """What to call the scene: a demo by its title."""
+    """What to call the scene: a demo by its title, a rig by its folder's name."""
+    if isinstance(spec.source, RigFolder):
+        return Path(spec.source.path).name
     return DEMOS.get(spec.source.title, spec.source.title)

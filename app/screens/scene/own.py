@@ -1,0 +1,98 @@
+"""The folder for a person's own images: a pair of them, or a recording."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import viser
+
+from app.ui import Ui, keep_upload
+from packetmesh.errors import InputError
+from pipeline.sources import ImagePair
+
+PAIR_LIMIT_BYTES = 64 << 20
+RECORDING_LIMIT_BYTES = 256 << 20
+IMAGES = "image/*,.pgm,.ppm,.tif,.tiff,.npy,.pfm,.exr"
+FILES = {
+    "color": ("Colour image …", IMAGES),
+    "depth": ("Depth image …", IMAGES),
+    "intrinsics": ("Intrinsics …", ".json,.yaml,.yml,.txt"),
+}
+RECORDINGS = ".zip,.bag,.mcap,.db3,application/zip"
+PAIR_TEXT = """**A pair**: colour, depth (16 bits, or metres in floating point) and the camera's
+intrinsics (JSON, YAML or a 3 × 3 matrix)."""
+RECORDING_TEXT = """**A recording**: a bag of ROS, or a ZIP of a rig (node_00, node_01 …) or of a folder of
+TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood, Open3D or COLMAP. Up to three frames of it become nodes."""
+INSTEAD = "use packetmesh import and reconstruct for larger files"
+
+
+class OwnFolder:
+    """Upload buttons, how long a unit of depth is, and a button that reconstructs the pair."""
+
+    def __init__(
+        self,
+        ui: Ui,
+        below: Path,
+        on_pair: Callable[[ImagePair], None],
+        on_recording: Callable[[Path, str], None],
+    ) -> None:
+        """Add the folder.
+
+        Args:
+            ui: where to add it.
+            below: folder of the session.
+            on_pair: called with a pair that is to be reconstructed.
+            on_recording: called with the file of a recording and a name for its rig.
+        """
+        self._ui, self._below = ui, below
+        self._on_pair, self._on_recording = on_pair, on_recording
+        self._files: dict[str, Path] = {}
+        gui = ui.gui
+        with gui.add_folder("Use your own images", expand_by_default=False):
+            gui.add_markdown(PAIR_TEXT)
+            for kind, (label, mime) in FILES.items():
+                self._add_button(label, mime, self._keep_file, kind)
+            self._scale = gui.add_number(
+                "Units per m",
+                1000.0,
+                min=1.0,
+                max=100_000.0,
+                step=1.0,
+                hint="Depth units in one metre: 1000 for millimetres; floating-point images have metres.",
+            )
+            self._have = gui.add_markdown("Add all three files, then press the button.")
+            gui.add_button("Reconstruct this pair", icon=viser.Icon.PLAYER_PLAY).on_click(
+                lambda _: ui.post(self._use_files)
+            )
+            gui.add_markdown(RECORDING_TEXT)
+            self._add_button("Recording …", RECORDINGS, self._keep_recording)
+            self._notes = gui.add_markdown("")
+
+    def tell(self, notes: tuple[str, ...]) -> None:
+        """Show what was found in a recording, or that nothing was."""
+        self._notes.content = "\n".join(f"- {note}" for note in notes)
+
+    def _add_button(self, label: str, mime: str, action: Callable[..., None], *arguments: str) -> None:
+        button = self._ui.gui.add_upload_button(label, icon=viser.Icon.UPLOAD, mime_type=mime)
+        button.on_upload(lambda event: self._ui.post(action, *arguments, event.target.value))
+
+    def _keep_file(self, kind: str, file: viser.UploadedFile) -> None:
+        self._files[kind] = keep_upload(file, self._below, kind, PAIR_LIMIT_BYTES, INSTEAD)
+        missing = [name for name in FILES if name not in self._files]
+        self._have.content = (
+            f"Still needed: {', '.join(missing)}." if missing else "All there: press the button."
+        )
+
+    def _use_files(self) -> None:
+        if len(self._files) < len(FILES):
+            raise InputError("A pair needs a colour image, a depth image and intrinsics; add all three.")
+        files = {kind: str(path) for kind, path in self._files.items()}
+        self._on_pair(ImagePair(**files, depth_scale=float(self._scale.value)))
+
+    def _keep_recording(self, file: viser.UploadedFile) -> None:
+        path = keep_upload(file, self._below, "recording", RECORDING_LIMIT_BYTES, INSTEAD)
+        self.tell(("Reading the recording …",))
+        stem = re.sub(r"[^A-Za-z0-9._-]+", "-", Path(file.name).stem).strip(".-")[:40]
+        self._on_recording(path, f"{stem or 'rig'}-{path.stem[-3:]}")

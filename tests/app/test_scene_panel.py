@@ -1,0 +1,105 @@
+"""A person's own images on the Scene screen, with real jobs and no browser."""
+
+import io
+import zipfile
+
+import cv2
+import numpy as np
+import pytest
+
+from app.screens.scene import own, recording_job
+from app.screens.scene.panel import ScenePanel
+from packetmesh.errors import InputError
+from pipeline.io.rigs import save_rig
+from pipeline.sources import Demo
+from tests.app.fakes import Bench, ui_of
+from tests.pipeline.importing.recordings import orbit, write_colmap, write_tum
+
+FOLDER = "Use your own images"
+
+
+@pytest.fixture
+def session(store, server, tmp_path):
+    (tmp_path / "uploads").mkdir()
+    return Bench(ScenePanel, ui_of(server.scene), store, tmp_path / "uploads", steps=("scene",))
+
+
+def zipped(folder):
+    """The bytes of a ZIP with all files of a folder, below its own name."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for path in folder.rglob("*"):
+            archive.write(path, path.relative_to(folder.parent))
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("write", [write_tum, write_colmap])
+def test_a_recording_in_a_zip_becomes_a_rig(session, tmp_path, write):
+    written = orbit(5)
+    write(tmp_path / "desk", written)
+    session.gui.upload("Recording …", "my desk.zip", zipped(tmp_path / "desk"))
+    nodes = session.results.view("scene").nodes
+    assert len(nodes) == 3
+    assert session.gui.find("Scene").value.startswith("my-desk-")
+    assert session.gui.find("Node").options == ("node_00", "node_01", "node_02")
+    assert "3 of 5 frames became nodes" in session.gui.text(FOLDER)
+    assert "units in a metre" in session.gui.text(FOLDER)
+    pictures = [frame.rgb for frame in written.frames]
+    assert all(any(np.array_equal(node.color.rgb, rgb) for rgb in pictures) for node in nodes)
+
+
+def test_a_rig_in_a_zip_is_taken_as_it_is_and_may_come_twice(session, tmp_path):
+    save_rig(tmp_path / "rig", orbit(2))
+    for _ in range(2):
+        session.gui.upload("Recording …", "rig.zip", zipped(tmp_path / "rig"))
+        assert len(session.results.view("scene").nodes) == 2
+    assert len(list(session.folder.glob("rig-*"))) == 2
+    assert sorted(path.suffix for path in session.folder.iterdir()) == ["", "", ".zip", ".zip"]
+
+
+def test_a_pair_may_be_metres_in_floating_point_with_a_bare_matrix(session, tmp_path):
+    (frame,) = orbit(1).frames
+    for label, name, content in (
+        ("Colour image …", "color.ppm", cv2.imencode(".ppm", frame.rgb[..., ::-1])[1].tobytes()),
+        ("Depth image …", "depth.pfm", cv2.imencode(".pfm", frame.depth.z_m)[1].tobytes()),
+        ("Intrinsics …", "k.txt", b"30 0 19.5\n0 30.5 14.5\n0 0 1\n"),
+    ):
+        session.gui.upload(label, name, content)
+    session.gui.press("Reconstruct this pair")
+    (node,) = session.results.view("scene").nodes
+    np.testing.assert_array_equal(node.color.rgb, frame.rgb)
+    assert node.coverage == pytest.approx(frame.depth.coverage)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("a.zip", b"nonsense", "cannot be read as a ZIP"),
+        ("a.bag", b"nonsense", "bag"),
+        ("a.txt", b"nonsense", "no bag"),
+        ("a.zip", zipfile.ZipFile, "of no known kind"),
+    ],
+)
+def test_what_is_no_recording_gets_a_sentence_and_the_scene_stays(session, name, content, sentence):
+    if not isinstance(content, bytes):
+        stream = io.BytesIO()
+        with content(stream, "w") as archive:
+            archive.writestr("../../outside.txt", "text")
+        content = stream.getvalue()
+    session.gui.upload("Recording …", name, content)
+    assert sentence in session.notices.pop()
+    assert isinstance(session.spec.source, Demo)
+    assert "Nothing could be used" in session.gui.text(FOLDER)
+    assert [path.name for path in session.folder.iterdir()] == [f"recording_000{name[1:]}"]
+    assert not (session.folder.parent / "outside.txt").exists()
+
+
+def test_too_much_is_refused_before_it_is_unpacked_or_kept(session, tmp_path, monkeypatch):
+    save_rig(tmp_path / "rig", orbit(1))
+    monkeypatch.setattr(recording_job, "UNPACKED_LIMIT_BYTES", 100)
+    session.gui.upload("Recording …", "rig.zip", zipped(tmp_path / "rig"))
+    assert "packetmesh import" in session.notices.pop()
+    monkeypatch.setattr(own, "RECORDING_LIMIT_BYTES", 100)
+    with pytest.raises(InputError, match="takes up to 0 MB"):
+        session.gui.upload("Recording …", "rig.zip", zipped(tmp_path / "rig"))
+    assert len(list(session.folder.iterdir())) == 1
