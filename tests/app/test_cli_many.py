@@ -74,6 +74,24 @@ def test_the_same_again_goes_on_and_other_settings_begin_anew(capsys, rigs, tmp_
     assert [row["state"] for row in json.loads(printed)] == ["done", "done", "failed"]
 
 
+def test_a_cluster_of_two_workers_gives_the_same_surfaces(capsys, rigs, tmp_path, monkeypatch):
+    """The workers stand in folders of their own; paths hold for all of them."""
+    distributed = pytest.importorskip("distributed", reason="needs the package distributed")
+    shutil.copytree(rigs, tmp_path / "rigs")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        monkeypatch.chdir(tmp_path)
+        words = ["reconstruct", "--rigs", "rigs", "--depth-scale", "1000", *QUICK, "--json"]
+        code, spread, _ = run(capsys, *words, "--out", "spread", "--scheduler", cluster.scheduler_address)
+    assert code == 1
+    _, local, _ = run(capsys, *words, "--out", "local")
+    rows = json.loads(spread)
+    assert [row["state"] for row in rows] == ["done", "done", "failed"]
+    for row, own in zip(rows, json.loads(local), strict=True):
+        assert row | {"elapsed_s": 0.0} == own | {"elapsed_s": 0.0}
+
+
 def test_what_is_taken_for_a_rig(rigs, tmp_path):
     assert [path.name for path in rigs_in(rigs)] == ["a-rig", "b-recording", "c-empty"]
     with pytest.raises(InputError, match="is no folder"):
