@@ -18,7 +18,7 @@ from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 COMPLETED_FROM = 0.0125
 """Distance from a rim at which completed and aligned depth weigh the same, in shares of the diagonal; of 0,
-5, 10, 20 and 40 px at 640 x 480 the best on validation rooms."""
+5, 10, 20 and 40 px at 640 x 480 the best on validation rooms (``fit_confidence`` prints the errors)."""
 COMPLETED_ODDS = (-1.22, -1.25, 0.34, 0.08, -0.76)
 """The same odds of completed depth: constant, and per feature of ``features_of_completion``.
 ``python -m lab.training fit_confidence`` fits them on validation rooms."""
@@ -40,13 +40,9 @@ FLYING_MEASURED = 0.02
 """Logarithmic depths: the step in the window, the least one within 3 x 3 pixels, and how near to a measured
 depth a pixel continues that surface; between them the share of the step off either side. On hidden depth
 seven of ten pixels that this removes are more than 5 % wrong, of the others one in twelve."""
-LOG_ODDS = -2.8
-ODDS_OF_DISTANCE = -0.97
-ODDS_OF_RESIDUAL = -13.2
-"""Log odds of being within 5 % of the truth: constant, per log of the distance in shares of the diagonal,
-and per local residual; logistic regression on hidden sensor depth and on the sensor's own holes in rendered
-frames together. Those are harder, for they are where things are dark, shiny or out of sight: this gives 83 %
-there where 73 % are within 5 %, and 84 % on hidden depth where 93 % are."""
+ALIGNED_ODDS = (-2.8, -0.97, -13.2)
+"""Log odds of aligned depth being within 5 % of the truth: constant, and per feature of
+``features_of_alignment``. ``python -m lab.training fit_confidence`` fits them on validation rooms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,18 +124,41 @@ def confidence_of(alignment: AlignmentResult, sensor: DepthMap, distance: FloatA
     """
     z_m, p_m = alignment.depth.z_m, sensor.z_m
     known = positive(z_m) & positive(p_m)
-    residual = np.log(np.where(known, p_m, 1.0) / np.where(known, z_m, 1.0))
-    residual = np.clip(residual, -LOCAL_CLIP, LOCAL_CLIP).astype(np.float32)
-    rough = np.abs(residual - masked_blur(residual, known)) * known
-    agrees = known & (np.abs(np.expm1(-residual)) < INLIER_SHARE_OF_DEPTH)
-    odds = ODDS_OF_DISTANCE * np.log(np.maximum(distance, 1e-6)) + LOG_ODDS
-    odds += ODDS_OF_RESIDUAL * masked_blur(rough.astype(np.float32), known)
+    agrees = known & (np.abs(np.expm1(-_log_residual(alignment, sensor))) < INLIER_SHARE_OF_DEPTH)
+    odds = _odds(ALIGNED_ODDS, features_of_alignment(alignment, sensor, distance))
     inferred = 1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0)))
     return np.where(known, np.clip(masked_blur(agrees.astype(np.float32), known), 0.0, 1.0), inferred)
 
 
+def features_of_alignment(alignment: AlignmentResult, sensor: DepthMap, distance: FloatArray) -> FloatArray:
+    """(2, H, W) what tells whether aligned depth is right.
+
+    Log of the distance in shares of the diagonal, and what a smooth correction leaves of the residual nearby.
+    """
+    residual, known = _log_residual(alignment, sensor), positive(alignment.depth.z_m) & positive(sensor.z_m)
+    rough = np.abs(residual - masked_blur(residual, known)) * known
+    return np.stack([np.log(np.maximum(distance, 1e-6)), masked_blur(rough.astype(np.float32), known)])
+
+
+def _log_residual(alignment: AlignmentResult, sensor: DepthMap) -> FloatArray:
+    """(H, W) float32, clipped; 0 where one of both is unknown."""
+    z_m, p_m = alignment.depth.z_m, sensor.z_m
+    known = positive(z_m) & positive(p_m)
+    residual = np.log(np.where(known, p_m, 1.0) / np.where(known, z_m, 1.0))
+    return np.clip(residual, -LOCAL_CLIP, LOCAL_CLIP).astype(np.float32)
+
+
+def _odds(coefficients: tuple[float, ...], features: FloatArray) -> FloatArray:
+    constant, *weights = coefficients
+    return constant + np.tensordot(np.array(weights), features, 1)
+
+
 def joined(
-    aligned: DepthMap, completed: CompletedDepth, measured: BoolArray, distance: FloatArray
+    aligned: DepthMap,
+    completed: CompletedDepth,
+    measured: BoolArray,
+    distance: FloatArray,
+    completed_from: float = COMPLETED_FROM,
 ) -> DepthMap:
     """Aligned depth at measured pixels and beside them, completed depth inside the holes.
 
@@ -147,7 +166,7 @@ def joined(
     d^2 / (d^2 + d0^2) at the distance d from measured depth, and both are averaged as logarithms.
     """
     usable = positive(aligned.z_m)
-    share = distance**2 / (distance**2 + COMPLETED_FROM**2)
+    share = distance**2 / (distance**2 + completed_from**2)
     share = np.where(usable, share, 1.0)
     log_aligned = np.log(np.where(usable, aligned.z_m, 1.0))
     both_m = np.exp((1.0 - share) * log_aligned + share * np.log(completed.depth.z_m))
@@ -156,9 +175,7 @@ def joined(
 
 def odds_of_completion(aligned: DepthMap, completed: CompletedDepth, distance: FloatArray) -> FloatArray:
     """(H, W) log odds of completed depth."""
-    constant, *weights = COMPLETED_ODDS
-    features = features_of_completion(aligned, completed, distance)
-    return constant + np.tensordot(np.array(weights), features, 1)
+    return _odds(COMPLETED_ODDS, features_of_completion(aligned, completed, distance))
 
 
 def features_of_completion(aligned: DepthMap, completed: CompletedDepth, distance: FloatArray) -> FloatArray:
