@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 import viser
 
 from app import jobs
+from app.address import Address, Place
 from app.drawing.cameras import look, stage_of
 from app.drawing.colors import BRAND, DELIVERED
 from app.page import add_script
@@ -22,7 +23,6 @@ from app.pool import ComputePool, LatestWins, Outcome
 from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
 from app.stepper import Stepper
 from app.store import Store
-from app.tables import command_html
 from app.ui import Panel, Ui
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress
@@ -275,6 +275,10 @@ class Session:
             "back to the settings of the start; Copy as command shows the command that computes the same.",
         )
         actions.on_click(lambda event: self.post(self._act, event.target.value))
+        self._address: Address | None = None
+        if isinstance(self.target, viser.ClientHandle):  # one that many share is nobody's to move
+            start = Place(self._start, self._current.title)
+            self._address = Address(self.ui, start, tuple(titles), self._go_to)
         self._folders: dict[str, viser.GuiFolderHandle] = {}
         for panel in self._panels:
             self.scene.add_frame(panel.drawn_below, show_axes=False, visible=False)
@@ -282,6 +286,15 @@ class Session:
             with self._folders[panel.title]:
                 panel.build()
         self.show(self._current.title)
+
+    def _go_to(self, place: Place) -> None:
+        """Show what an address asks for; what it does not name of the spec stays."""
+        spec = place.spec
+        self.want(
+            replace(self.spec, source=spec.source, preset=spec.preset, config=spec.config, shown=spec.shown)
+        )
+        if place.screen != self._current.title:
+            self.show(place.screen)
 
     def show(self, title: str) -> None:
         """Make a step the current one."""
@@ -342,13 +355,7 @@ class Session:
         elif action == "Reset":
             self.want(self._start)
         else:
-            self._show_command()
-
-    def _show_command(self) -> None:
-        with self.gui.add_modal("The same from the command line") as modal:
-            self.gui.add_markdown("This computes and writes what the app shows now:")
-            self.gui.add_html(command_html(self._current.command))
-            self.gui.add_button("Close").on_click(lambda _: modal.close())
+            self.ui.show_command(self._current.command)
 
     def _show_status(self) -> None:
         """Bring the stepper and the status line up to date."""
@@ -359,6 +366,8 @@ class Session:
             if panel.step is not None
         }
         self._stepper.show(self._current.title, statuses)
+        if self._address is not None:
+            self._address.show(Place(self.spec, self._current.title))
         failures = [self.results.failure(step, self.spec) for step in STEPS]
         failure = next((sentence for sentence in failures if sentence), None)
         if running:

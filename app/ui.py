@@ -14,6 +14,7 @@ import viser
 
 from app.debounce import Debounce
 from app.state import Spec, Step
+from app.tables import command_html
 from packetmesh.errors import InputError
 from pipeline.types import FloatArray
 
@@ -55,6 +56,13 @@ class Ui:
         group = self.gui.add_button_group(label, tuple(actions), hint=hint, visible=visible)
         group.on_click(lambda event: self.post(actions[event.target.value]))
         return group
+
+    def show_command(self, command: str) -> None:
+        """Show a command in a window of its own."""
+        with self.gui.add_modal("The same from the command line") as modal:
+            self.gui.add_markdown("This computes and writes what the app shows now:")
+            self.gui.add_html(command_html(command))
+            self.gui.add_button("Close").on_click(lambda _: modal.close())
 
     def when_clicked(self, below: str, action: Callable[[FloatArray, FloatArray], object]) -> None:
         """Answer a click while the node ``below`` is shown: ``action`` gets its ray, origin and direction."""

@@ -1,0 +1,41 @@
+// The address of the page: what stands in it is what the app shows, and the other way round. It is in the
+// query, beside what viser puts there, for viser cannot connect from an address with a # in it.
+window.packetmeshAddress ??= (() => {
+  const KEYS = ["scene", "preset", "set", "surface", "screen"];
+  let name = null; // of the session's hidden field
+  let said = 0;
+
+  function split() {
+    const own = new URLSearchParams(), others = new URLSearchParams();
+    for (const [key, value] of new URLSearchParams(location.search))
+      (KEYS.includes(key) ? own : others).append(key, value);
+    return [own.toString(), others.toString()];
+  }
+
+  // To the server: what the address asks for. A number tells two that are alike apart.
+  function say() {
+    const anchor = document.querySelector(`.packetmesh-dock[data-dock="${name}"]`);
+    const input = anchor?.parentElement.nextElementSibling?.querySelector("input");
+    if (!input) return void setTimeout(say, 100);
+    const text = `${++said} ${split()[0]}`;
+    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(input, text);
+    input.dispatchEvent(new Event("input", {bubbles: true}));
+  }
+
+  window.addEventListener("popstate", say); // Back and forward
+
+  return {
+    // A session has begun: by a new page, a reload, or after the server was away.
+    begin(session) {
+      name = session;
+      say();
+    },
+
+    // What is shown now; a place of its own among those that Back knows, or a change to the one before.
+    show(text, place) {
+      const [own, others] = split();
+      const query = others ? `${others}&${text}` : text;
+      if (own !== text) history[place ? "pushState" : "replaceState"](null, "", `${location.pathname}?${query}`);
+    },
+  };
+})();
