@@ -18,6 +18,7 @@ from pipeline.placement import NodeRegistration, NodeVerdict
 from pipeline.reconstruct import Reconstruction
 from pipeline.registration.agreement import Agreement
 from pipeline.spec import Spec
+from pipeline.stages import dressed
 from pipeline.types import PointCloud, PointSource, SurfaceResult
 
 
@@ -44,10 +45,11 @@ def write_run_folder(reconstruction: Reconstruction, metrics: dict[str, Any], fo
         "surface_after.ply": reconstruction.after,
         "surface.glb": reconstruction.after,
     }
+    texture = dressed(reconstruction.rig, reconstruction.placement, reconstruction.after)
     for name, mesh in meshes.items():
         if len(mesh.triangles):
             files.append(folder / name)
-            write_mesh(files[-1], mesh)
+            write_mesh(files[-1], mesh, texture if name.endswith(".glb") else None)
     return files
 
 

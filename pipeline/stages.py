@@ -43,12 +43,14 @@ from pipeline.surface import (
     Yardstick,
     compare_with_truth,
     measured,
+    photographed,
     radii,
     roll_or_nothing,
     yardstick_of,
 )
 from pipeline.surface.baselines import alpha_surface, poisson_surface
-from pipeline.types import DepthMap, PointCloud, Rig, SurfaceResult
+from pipeline.texture import Texture
+from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult
 
 Result = TypeVar("Result")
 Steps = Generator[Progress, None, Result]
@@ -272,6 +274,12 @@ def cameras_of(rig: Rig, placement: Placement) -> list[Camera]:
         Camera(frame.intrinsics, pose)
         for frame, pose in placement.placed(list(zip(rig.frames, placement.T_world_camera, strict=True)))
     ]
+
+
+def dressed(rig: Rig, placement: Placement, surface: Surface) -> Texture:
+    """The photographs of the registered cameras on a surface."""
+    pictures = [(frame.rgb, frame.rgb_known) for frame in placement.placed(rig.frames)]
+    return photographed(surface, cameras_of(rig, placement), pictures)
 
 
 def _sensed(rig: Rig, placement: Placement) -> list[DepthMap]:

@@ -16,6 +16,7 @@ from pipeline.types import ByteArray, FloatArray, IntArray
 
 _TYPES = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
 _LINES, _TRIANGLES = 1, 4
+_CLAMP = 33071
 _UNLIT = "KHR_materials_unlit"
 
 
@@ -33,6 +34,31 @@ def mesh_glb(vertices_m: FloatArray, triangles: IntArray, colors: ByteArray) -> 
     )
 
 
+def textured_glb(
+    vertices_m: FloatArray, triangles: IntArray, colors: ByteArray, uv: FloatArray, picture: bytes
+) -> bytes:
+    """A mesh that wears a picture, darkened or tinted by its vertex colours; empty if it has no triangle.
+
+    Args:
+        vertices_m: (V, 3).
+        triangles: (F, 3), seen from their front.
+        colors: (V, 3) sRGB that the picture is multiplied with.
+        uv: (V, 2) in shares of the picture from its upper left corner.
+        picture: a JPEG file.
+    """
+    if not len(triangles):
+        return b""
+    rgba = np.full((len(colors), 4), 65535, dtype="<u2")
+    rgba[:, :3] = _LINEAR[colors]
+    return _glb(
+        _TRIANGLES,
+        {"POSITION": vertices_m.astype("<f4"), "COLOR_0": rgba, "TEXCOORD_0": uv.astype("<f4")},
+        (1.0, 1.0, 1.0),
+        triangles.astype("<u2" if len(vertices_m) < 65535 else "<u4").reshape(-1),
+        picture,
+    )
+
+
 def lines_glb(segments_m: FloatArray, color: tuple[int, int, int]) -> bytes:
     """(E, 2, 3) segments, one pixel wide, in an sRGB colour; empty if there is none."""
     if not len(segments_m):
@@ -46,10 +72,12 @@ def _glb(
     attributes: dict[str, np.ndarray],
     linear_rgb: tuple[float, float, float],
     indices: np.ndarray | None = None,
+    picture: bytes = b"",
 ) -> bytes:
-    """One primitive of one material."""
+    """One primitive of one material, which may wear a JPEG file."""
     arrays = list(attributes.values()) + ([] if indices is None else [indices])
-    blocks = [array.tobytes() + bytes(-array.nbytes % 4) for array in arrays]
+    parts = [array.tobytes() for array in arrays] + ([picture] if picture else [])
+    blocks = [part + bytes(-len(part) % 4) for part in parts]
     starts = np.cumsum([0, *map(len, blocks)]).tolist()
     primitive: dict[str, Any] = {
         "attributes": {name: row for row, name in enumerate(attributes)},
@@ -58,7 +86,7 @@ def _glb(
     }
     if indices is not None:
         primitive["indices"] = len(attributes)
-    head = {
+    head: dict[str, Any] = {
         "asset": {"version": "2.0"},
         "extensionsUsed": [_UNLIT],
         "scene": 0,
@@ -70,11 +98,16 @@ def _glb(
         ],
         "accessors": [_accessor(row, array) for row, array in enumerate(arrays)],
         "bufferViews": [
-            {"buffer": 0, "byteOffset": start, "byteLength": array.nbytes}
-            for start, array in zip(starts, arrays, strict=False)
+            {"buffer": 0, "byteOffset": start, "byteLength": len(part)}
+            for start, part in zip(starts, parts, strict=False)
         ],
         "buffers": [{"byteLength": starts[-1]}],
     }
+    if picture:
+        head["images"] = [{"bufferView": len(arrays), "mimeType": "image/jpeg"}]
+        head["samplers"] = [{"wrapS": _CLAMP, "wrapT": _CLAMP}]
+        head["textures"] = [{"source": 0, "sampler": 0}]
+        head["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
     text = json.dumps(head).encode()
     text += b" " * (-len(text) % 4)
     body = struct.pack("<I4s", len(text), b"JSON") + text

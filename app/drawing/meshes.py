@@ -5,18 +5,26 @@ from __future__ import annotations
 import numpy as np
 
 from app.drawing.colors import LOSS, NEUTRAL
-from app.drawing.glb import lines_glb, mesh_glb
+from app.drawing.glb import lines_glb, mesh_glb, textured_glb
 from app.records import MeshView
-from pipeline.types import ByteArray, FloatArray, Surface, SurfaceResult
+from pipeline.io.images import jpeg_of
+from pipeline.texture import Texture
+from pipeline.types import ByteArray, FloatArray, PointSource, Surface, SurfaceResult
 
 DARKEST = {True: 0.75, False: 0.45}
 """How dark a surface gets that turns from the light: the camera's own colours have shadows already."""
 
+VIOLET = (0.72, 0.5, 1.0)
+"""What a photograph is multiplied with where the surface was inferred."""
 
-def mesh_view(surface: SurfaceResult, truth: dict[str, float] | None) -> MeshView:
-    """A surface with the rims of its holes, ready to be sent."""
+
+def mesh_view(
+    surface: SurfaceResult, truth: dict[str, float] | None, texture: Texture | None = None
+) -> MeshView:
+    """A surface with the rims of its holes, ready to be sent; in photographs if there is a texture."""
+    glb = surface_glb(surface, surface.colors, photographed=True)
     return MeshView(
-        glb=surface_glb(surface, surface.colors, photographed=True),
+        glb=glb if texture is None else photographed_glb(surface, texture),
         quality=surface.quality,
         rims_glb=lines_glb(rim_segments_m(surface), LOSS),
         vertices=len(surface.vertices_m),
@@ -35,6 +43,33 @@ def surface_glb(surface: Surface, colors: ByteArray | None, photographed: bool) 
     """
     if not len(surface.triangles):
         return b""
+    return mesh_glb(surface.vertices_m, surface.triangles, _lit(surface, colors, photographed))
+
+
+def photographed_glb(surface: Surface, texture: Texture, tinted: bool = False) -> bytes:
+    """The mesh in its cameras' photographs and, where none sees it, in the colours of its points.
+
+    Args:
+        surface: as it was dressed.
+        texture: its photographs.
+        tinted: whether what was inferred is violet.
+    """
+    if not len(surface.triangles):
+        return b""
+    corners = texture.corners(surface.triangles)
+    lit = _lit(surface, surface.colors, photographed=True)[corners.vertices]
+    colors = np.where(corners.seen[:, None], 255, lit)
+    if tinted and surface.source is not None:
+        guessed = surface.source[corners.vertices] == PointSource.INFERRED
+        colors[guessed] = colors[guessed] * VIOLET
+    places_m = surface.vertices_m[corners.vertices]
+    return textured_glb(
+        places_m, corners.triangles, colors.astype(np.uint8), corners.uv, jpeg_of(texture.image)
+    )
+
+
+def _lit(surface: Surface, colors: ByteArray | None, photographed: bool) -> ByteArray:
+    """(V, 3) colours with light on them."""
     if colors is None:
         colors, photographed = np.tile(np.array(NEUTRAL, np.uint8), (len(surface.vertices_m), 1)), False
     normals = vertex_normals(surface)
@@ -43,7 +78,7 @@ def surface_glb(surface: Surface, colors: ByteArray | None, photographed: bool) 
     light /= max(float(np.linalg.norm(light)), 1e-9)
     darkest = DARKEST[photographed]
     shade = darkest + (1.0 - darkest) * np.clip(0.5 + 0.5 * (normals @ light), 0.0, 1.0)
-    return mesh_glb(surface.vertices_m, surface.triangles, (colors * shade[:, None]).astype(np.uint8))
+    return (colors * shade[:, None]).astype(np.uint8)
 
 
 def vertex_normals(surface: Surface) -> FloatArray:

@@ -99,6 +99,11 @@ def write_color(path: AnyPath, rgb: ByteArray) -> None:
         sibling.write_bytes(cv2.imencode(sibling.suffix, rgb[..., ::-1])[1].tobytes())
 
 
+def jpeg_of(rgb: ByteArray, quality: int = 88) -> bytes:
+    """(H, W, 3) RGB as a JPEG file."""
+    return cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+
+
 def write_depth_mm(path: AnyPath, depth: DepthMap) -> None:
     """Write a 16-bit PNG in millimetres, 0 where the depth is unknown.
 

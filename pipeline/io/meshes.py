@@ -7,23 +7,29 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from PIL import Image
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
 from pipeline.geometry import rigid
+from pipeline.io.images import jpeg_of
+from pipeline.texture import Texture
 from pipeline.types import AnyPath, Surface
 
 MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")
+SRGB_GAMMA = 2.2
+"""About that of sRGB; glTF has vertex colours in linear light."""
 T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.zeros(3))
 """glTF has y up and the world frame z; the file's root node carries this rotation."""
 
 
-def write_mesh(path: AnyPath, surface: Surface) -> None:
+def write_mesh(path: AnyPath, surface: Surface, texture: Texture | None = None) -> None:
     """Write the triangles of a surface, with its colours, in the format of the suffix.
 
     Args:
         path: ends in .ply (binary), .glb, .obj or .stl (binary, which has no place for colours).
         surface: in metres, Z up; a .glb file is turned to Y up, as glTF wants it.
+        texture: its photographs, which only a .glb file has a place for.
 
     Raises:
         InputError: another suffix, no triangle, or a folder that cannot be written.
@@ -37,7 +43,11 @@ def write_mesh(path: AnyPath, surface: Surface) -> None:
     suffix = mesh_suffix(path)
     if not len(surface.triangles):
         raise InputError(f"There is no triangle to write into {path}; try a larger ball radius")
-    mesh = trimesh.Trimesh(surface.vertices_m, surface.triangles, vertex_colors=surface.colors, process=False)
+    if texture is not None and suffix == ".glb":
+        mesh = _dressed(surface, texture)
+    else:
+        corners = surface.vertices_m, surface.triangles
+        mesh = trimesh.Trimesh(*corners, vertex_colors=surface.colors, process=False)
     with atomic_path(path) as sibling:
         if suffix == ".glb":
             scene = trimesh.Scene()
@@ -45,6 +55,24 @@ def write_mesh(path: AnyPath, surface: Surface) -> None:
             scene.export(str(sibling))
         else:
             mesh.export(str(sibling))
+
+
+def _dressed(surface: Surface, texture: Texture) -> trimesh.Trimesh:
+    """In photographs and, where there is none, in the colours of the points, which glTF multiplies."""
+    corners = texture.corners(surface.triangles)
+    colors = np.full((len(corners.vertices), 4), 255, np.uint8)
+    if surface.colors is not None:
+        own = surface.colors[corners.vertices[~corners.seen]] / 255.0
+        colors[~corners.seen, :3] = np.rint(255.0 * own**SRGB_GAMMA)
+    picture = Image.open(io.BytesIO(jpeg_of(texture.image)))
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorTexture=picture, metallicFactor=0.0, roughnessFactor=1.0
+    )
+    uv = corners.uv * (1.0, -1.0) + (0.0, 1.0)  # trimesh counts from the lower edge
+    visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    visual.vertex_attributes["color"] = colors
+    vertices_m = surface.vertices_m[corners.vertices]
+    return trimesh.Trimesh(vertices_m, corners.triangles, visual=visual, process=False)
 
 
 def read_mesh(path: AnyPath) -> Surface:

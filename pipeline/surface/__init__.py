@@ -7,6 +7,7 @@ from pipeline.surface.normals import estimate_normals
 from pipeline.surface.quality import measure_quality, measured
 from pipeline.surface.radii import nearest_distances_m, radii, spacing
 from pipeline.surface.smooth import smooth
+from pipeline.surface.texture import photographed
 from pipeline.surface.truth import Yardstick, compare_with_truth, distances_to_truth_m, yardstick_of
 from pipeline.surface.voxel import in_cubes_of, voxel_average, voxel_for_count
 
@@ -22,6 +23,7 @@ __all__ = [
     "measure_quality",
     "measured",
     "nearest_distances_m",
+    "photographed",
     "radii",
     "reconstruct_surface",
     "roll_ball",

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.drawing.meshes import surface_glb
+from app.drawing.meshes import photographed_glb
 from app.records import Shown
 from app.reports.reconstruction import write_reconstruction_report
 from app.state import Spec
@@ -26,6 +26,8 @@ from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.run_folder import clouds_of, config_of, metrics_of, write_run_folder
+from pipeline.stages import dressed
+from pipeline.texture import Texture
 from pipeline.types import SurfaceResult
 
 CLOUD_FILES = ("sensor.ply", "inferred.ply", "fused.ply")
@@ -52,12 +54,12 @@ def export_job(store: Store, spec: Spec, name: str, shown: Shown = "after") -> G
             clouds = yield from store.stage(spec, "clouds")
             write_cloud(path, clouds_of(clouds)[name])
         elif name.startswith("surface."):
-            surface = yield from store.stage(spec, shown)
-            write_mesh(path, surface)
+            surface, rig, placement = yield from store.stages(spec, shown, "rig", "placement")
+            write_mesh(path, surface, dressed(rig, placement, surface) if path.suffix == ".glb" else None)
         elif name == "scene.html":
-            surface = yield from store.stage(spec, shown)
+            surface, rig, placement = yield from store.stages(spec, shown, "rig", "placement")
             yield Progress("writing the page", 0.8)
-            path.write_text(_page(surface), encoding="utf-8")
+            path.write_text(_page(surface, dressed(rig, placement, surface)), encoding="utf-8")
         else:
             result = yield from iterate_reconstruction(spec, store)
             metrics = metrics_of(result)
@@ -79,7 +81,7 @@ def _archive(result: Reconstruction, metrics: dict[str, Any], path: Path) -> Non
             archive.write(file, f"run/{file.name}")
 
 
-def _page(surface: SurfaceResult) -> str:
+def _page(surface: SurfaceResult, texture: Texture) -> str:
     """A self-contained page with a surface, drawn by a server that nobody visits."""
     if not len(surface.triangles):
         raise InputError("The surface has no triangle to show; try a larger ball radius")
@@ -91,7 +93,7 @@ def _page(surface: SurfaceResult) -> str:
             extent_m = float(np.ptp(surface.vertices_m, axis=0).max())
             server.initial_camera.position = middle_m + extent_m * np.array([-0.4, -0.9, 0.6])
             server.initial_camera.look_at = middle_m
-            server.scene.add_glb("/surface", surface_glb(surface, surface.colors, photographed=True))
+            server.scene.add_glb("/surface", photographed_glb(surface, texture))
             return server.scene.as_html()
         finally:
             server.stop()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Generator
 from dataclasses import replace
 
@@ -15,7 +16,7 @@ from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.merging import FusedCloud
-from pipeline.stages import compute
+from pipeline.stages import compute, dressed
 from pipeline.surface import nearest_distances_m
 
 HISTOGRAM_BINS = 60
@@ -26,14 +27,22 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
     clouds = yield from store.stage(spec, "fused")
     rolled = yield from compute(spec, "after", store)
     after = rolled.value
-    view = SurfaceView(spacing_of(clouds), after.radii_m, mesh_view(after, None), None, rolled.elapsed_s)
+    rig, placement = yield from store.stages(spec, "rig", "placement")
+    in_photographs = functools.partial(dressed, rig, placement)
+    view_after = mesh_view(after, None, in_photographs(after))
+    view = SurfaceView(spacing_of(clouds), after.radii_m, view_after, None, rolled.elapsed_s)
     yield view
     before = yield from store.stage(spec, "before")
-    view = replace(view, before=mesh_view(before, None))
+    view_before = mesh_view(before, None, in_photographs(before))
+    view = replace(view, before=view_before)
     yield view
     truth_before, truth_after = yield from store.stage(spec, "truth")
     if truth_before or truth_after:
-        view = replace(view, before=mesh_view(before, truth_before), after=mesh_view(after, truth_after))
+        view = replace(
+            view,
+            before=replace(view_before, truth=truth_before),
+            after=replace(view_after, truth=truth_after),
+        )
         yield view
     yield Progress("looking for holes", 0.9)
     return replace(

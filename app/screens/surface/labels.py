@@ -15,7 +15,9 @@ BASELINES: dict[str, BaselineName] = {POISSON: "poisson", ALPHA: "alpha"}
 SHOWN: dict[str, Shown] = {AFTER: "after", BEFORE: "before", BOTH: "after", **BASELINES}
 """Which surface is drawn, and so exported; of two side by side the one after fusion."""
 COLORINGS: dict[str, Coloring] = {
-    "the camera's colours": "color",
+    "photographs": "photo",
+    "photographs, inferred in violet": "violet",
+    "the points' colours": "color",
     "source: sensor or inferred": "source",
     "distance to the truth": "distance",
     "normal": "normal",

@@ -11,10 +11,12 @@ _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1
 
 
 def legend_html(coloring: Coloring, has_truth: bool) -> str:
-    """Empty for the camera's own colours."""
-    if coloring == "color":
+    """Empty for the cameras' own colours."""
+    if coloring in ("photo", "color"):
         return ""
-    if coloring == "source":
+    if coloring == "violet":
+        text = f"{_box(INFERRED)}inferred by the network; all else was measured by a sensor"
+    elif coloring == "source":
         text = f"{_box(TARGET)}measured by a sensor &emsp; {_box(INFERRED)}inferred by the network"
     elif coloring == "normal":
         text = "Red, green and blue are the x, y and z of the normal; floors are light blue (z up)."

@@ -29,7 +29,7 @@ class SurfaceLook:
     rule: RadiusRule = _DEFAULT.radius_rule
     radius_in_r_F: float | None = None
     """The ball radius over r_F of the fused cloud, so that it suits every scene; only with rule manual."""
-    coloring: Coloring = "color"
+    coloring: Coloring = "photo"
     rims: bool = True
     """Whether the rims of the holes are drawn."""
     smoothing_passes: int = _DEFAULT.smoothing_passes

@@ -9,15 +9,19 @@ import numpy as np
 
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET, ramp
 from app.drawing.glb import lines_glb
-from app.drawing.meshes import rim_segments_m, surface_glb
+from app.drawing.meshes import photographed_glb, rim_segments_m, surface_glb
 from app.screens.surface.view import Coloring, PaintedMesh, PaintedView, PaintRequest, Which
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
+from pipeline.placement import Placement
 from pipeline.spec import key
-from pipeline.stages import cameras_of, run
+from pipeline.stages import cameras_of, dressed, run
 from pipeline.surface import Camera, distances_to_truth_m, roll_or_nothing, voxel_average, voxel_for_count
 from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
+
+PHOTOGRAPHED: tuple[Coloring, ...] = ("photo", "violet", "color")
+"""What has a camera's light and shadow in it."""
 
 
 def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Progress, None, PaintedView]:
@@ -33,10 +37,9 @@ def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Prog
         started = time.perf_counter()
         surfaces = {name: roll_or_nothing(thin[name], (request.radius_m,)) for name in request.which}
         roll_s = time.perf_counter() - started
-    cameras = cameras_of(rig, placement)
     return PaintedView(
         request,
-        {name: _painted(surface, request, rig, cameras) for name, surface in surfaces.items()},
+        {name: _painted(surface, request, rig, placement) for name, surface in surfaces.items()},
         len(thin[request.which[0]]),
         len(whole[request.which[0]]),
         roll_s,
@@ -63,18 +66,22 @@ def _thinned(
     return (yield from store.remember(("quick", most_points, key(spec, "clouds")), thin))
 
 
-def _painted(surface: Surface, request: PaintRequest, rig: Rig, cameras: list[Camera]) -> PaintedMesh:
-    """The rims come when the radius rests: lines are costly to draw in software."""
-    colors = vertex_colors(surface, request.coloring, rig, cameras)
-    glb = surface_glb(surface, colors, photographed=request.coloring == "color")
-    rims_glb = b"" if request.radius_m is not None else lines_glb(rim_segments_m(surface), LOSS)
+def _painted(surface: Surface, request: PaintRequest, rig: Rig, placement: Placement) -> PaintedMesh:
+    """The rims come when the radius rests, and so do photographs: both are costly to draw in software."""
+    quick, coloring = request.radius_m is not None, request.coloring
+    if coloring in ("photo", "violet") and not quick:
+        glb = photographed_glb(surface, dressed(rig, placement, surface), tinted=coloring == "violet")
+    else:
+        colors = vertex_colors(surface, coloring, rig, cameras_of(rig, placement))
+        glb = surface_glb(surface, colors, photographed=coloring in PHOTOGRAPHED)
+    rims_glb = b"" if quick else lines_glb(rim_segments_m(surface), LOSS)
     return PaintedMesh(glb, rims_glb, len(surface.vertices_m), len(surface.triangles))
 
 
 def vertex_colors(surface: Surface, coloring: Coloring, rig: Rig, cameras: list[Camera]) -> ByteArray | None:
     """(V, 3) RGB; grey where it is not known what the colour would say."""
     count = len(surface.vertices_m)
-    if not count or coloring == "color":
+    if not count or coloring in PHOTOGRAPHED:
         return surface.colors
     if coloring == "source" and surface.source is not None:
         palette = np.array([TARGET, INFERRED], dtype=np.uint8)

@@ -178,7 +178,7 @@ class SurfacePanel(Panel):
     def _take(self, view: SurfaceView) -> None:
         """Show a view of the chain."""
         with self.ui.atomic():
-            if COLORINGS[self._coloring.value] == "color":
+            if COLORINGS[self._coloring.value] == "photo":
                 self._stage.draw("after", view.after)
                 if view.before is not None:
                     self._stage.draw("before", view.before)
@@ -208,7 +208,7 @@ class SurfacePanel(Panel):
     def _repaint(self) -> None:
         """Have the surfaces of the settings in the colours chosen."""
         coloring = COLORINGS[self._coloring.value]
-        if coloring != "color" and self.session.results.view("fuse") is not None:
+        if coloring != "photo" and self.session.results.view("fuse") is not None:
             session = self.session
             request = PaintRequest(("after", "before"), coloring)
             session.quick_job("surface.paint_job:paint_job", request, on_end=self._painted)

@@ -10,7 +10,7 @@ from app.records import MeshView
 from pipeline.findings import Explanation, RayParts, Suggestion, SweepPoint
 from pipeline.types import FloatArray, IntArray
 
-Coloring = Literal["color", "source", "distance", "normal"]
+Coloring = Literal["photo", "violet", "color", "source", "distance", "normal"]
 """What the colours of a surface mean."""
 
 Which = Literal["after", "before"]
