@@ -71,7 +71,10 @@ def test_all_that_can_be_shown_has_a_short_name(tmp_path):
         ("radii = 0 r_F", "above 0 and at most 20 r_F"),
         ("radii = 30 r_F", "above 0 and at most 20 r_F"),
         ("radii = 20 mm", "such as '1.5 r_F'"),
-        ("colours = truth", "try one of the camera's colours, source, distance to the truth, normal"),
+        (
+            "colours = truth",
+            "try one of photographs, inferred in violet, the points' colours, source, distance to the truth,",
+        ),
         ("rims = red", "try one of on, off"),
         ("smoothing = 6", "try a whole number from 0 to 5"),
         ("smoothing = -1", "try a whole number from 0 to 5"),

@@ -16,7 +16,7 @@ SHOWN: dict[str, Shown] = {AFTER: "after", BEFORE: "before", BOTH: "after", **BA
 """Which surface is drawn, and so exported; of two side by side the one after fusion."""
 COLORINGS: dict[str, Coloring] = {
     "photographs": "photo",
-    "photographs, inferred in violet": "violet",
+    "inferred in violet (on photographs)": "violet",
     "the points' colours": "color",
     "source: sensor or inferred": "source",
     "distance to the truth": "distance",
