@@ -19,11 +19,11 @@ from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 COMPLETED_FROM = 0.0125
 """Distance from a rim at which completed and aligned depth weigh the same, in shares of the diagonal; of 0,
 5, 10, 20 and 40 px at 640 x 480 the best on validation rooms (``fit_confidence`` prints the errors)."""
-COMPLETED_ODDS = (-1.22, -1.25, 0.34, 0.08, -0.76)
+COMPLETED_ODDS = (-1.17, -1.27, 0.33, 0.10, -0.78)
 """The same odds of completed depth: constant, and per feature of ``features_of_completion``.
 ``python -m lab.training fit_confidence`` fits them on validation rooms."""
 TYPICAL_LOG_SCALE = -2.7
-LEAST_DISSENT = 0.005
+LEAST_DIFFERENCE = 0.005
 RELIEF_APART = 0.02
 """Separation at which the network's relief is compared with the sensor's, in shares of the diagonal."""
 RELIEF_STEP = 0.15
@@ -40,7 +40,7 @@ FLYING_MEASURED = 0.02
 """Logarithmic depths: the step in the window, the least one within 3 x 3 pixels, and how near to a measured
 depth a pixel continues that surface; between them the share of the step off either side. On hidden depth
 seven of ten pixels that this removes are more than 5 % wrong, of the others one in twelve."""
-ALIGNED_ODDS = (-2.8, -0.97, -13.2)
+ALIGNED_ODDS = (-7.64, -0.76, -1.70)
 """Log odds of aligned depth being within 5 % of the truth: constant, and per feature of
 ``features_of_alignment``. ``python -m lab.training fit_confidence`` fits them on validation rooms."""
 
@@ -133,11 +133,13 @@ def confidence_of(alignment: AlignmentResult, sensor: DepthMap, distance: FloatA
 def features_of_alignment(alignment: AlignmentResult, sensor: DepthMap, distance: FloatArray) -> FloatArray:
     """(2, H, W) what tells whether aligned depth is right.
 
-    Log of the distance in shares of the diagonal, and what a smooth correction leaves of the residual nearby.
+    Logs of the distance in shares of the diagonal and of what a smooth correction leaves of the residual
+    nearby.
     """
     residual, known = _log_residual(alignment, sensor), positive(alignment.depth.z_m) & positive(sensor.z_m)
     rough = np.abs(residual - masked_blur(residual, known)) * known
-    return np.stack([np.log(np.maximum(distance, 1e-6)), masked_blur(rough.astype(np.float32), known)])
+    nearby = masked_blur(rough.astype(np.float32), known)
+    return np.stack([np.log(np.maximum(distance, 1e-3)), np.log(np.maximum(nearby, 0.0) + LEAST_DIFFERENCE)])
 
 
 def _log_residual(alignment: AlignmentResult, sensor: DepthMap) -> FloatArray:
@@ -186,7 +188,7 @@ def features_of_completion(aligned: DepthMap, completed: CompletedDepth, distanc
     """
     scale = completed.log_scale - TYPICAL_LOG_SCALE
     ratio = np.where(positive(aligned.z_m), aligned.z_m, completed.depth.z_m) / completed.depth.z_m
-    dissent = np.log(np.abs(np.log(ratio)) + LEAST_DISSENT)
+    dissent = np.log(np.abs(np.log(ratio)) + LEAST_DIFFERENCE)
     return np.stack([scale, scale**2, np.log(np.maximum(distance, 1e-3)), dissent])
 
 

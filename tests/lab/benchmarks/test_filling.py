@@ -232,7 +232,7 @@ def test_a_network_s_speed_has_its_time_its_size_and_its_cost(tmp_path, monkeypa
 def test_the_shipped_network_is_small_and_says_what_its_8_bits_cost():
     speed = network_speed(DepthNetwork(), load_demo("box-on-table").frames[0].rgb, rounds=1)
     assert speed.file_bytes <= 40e6
-    assert abs(speed.quantisation_cost) < 0.01 < speed.abs_rel < 0.2
+    assert abs(speed.quantisation_cost) < 0.01 < speed.abs_rel < 0.25
 
 
 def test_the_benchmark_is_registered_and_its_record_is_plain():

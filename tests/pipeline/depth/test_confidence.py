@@ -138,7 +138,7 @@ def test_confidence_falls_inwards_and_with_the_residual():
 def test_less_is_kept_the_more_confidence_is_asked_for():
     sensor = with_hole(floor_m())
     alignment = align_depth(DepthMap(floor_m().astype(np.float32)), sensor)
-    kept = [judge(alignment, sensor, grey(), 1.0, least).depth.valid for least in (0.0, 0.7, 0.9, 1.0)]
+    kept = [judge(alignment, sensor, grey(), 1.0, least).depth.valid for least in (0.0, 0.98, 0.99, 1.0)]
     assert kept[0].all()
     assert all((more | less == more).all() and (more != less).any() for more, less in pairwise(kept))
 
