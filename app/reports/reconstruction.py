@@ -10,9 +10,11 @@ from typing import Any
 
 from app.drawing.pictures import depth_picture, depth_range_m
 from app.reports.html import picture, pictures, table, write_page
+from pipeline.rays import Camera
 from pipeline.reconstruct import Reconstruction
-from pipeline.stages import cameras_of
-from pipeline.surface.pictures import mesh_picture
+from pipeline.stages import cameras_of, dressed
+from pipeline.surface.pictures import beside, mesh_picture
+from pipeline.types import ByteArray, Surface
 
 QUALITY_ROWS = (
     ("no_hit_ray_share", "camera rays that miss the surface (%)", 100.0),
@@ -94,9 +96,17 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
     radii = ", ".join(f"{1000 * radius:.1f}" for radius in before["radii_m"])
     yield (
         f'<p class="note">Ball radii {radii} mm on both. Magenta: a ray that hits nothing. '
-        f"Seen from each node's camera.</p>"
+        f"First in photographs, from beside the first camera; then from each node's camera.</p>"
     )
     frames, placed = result.placement.placed(result.rig.frames), cameras_of(result.rig, result.placement)
+    view = beside(placed[0], result.after)
+    yield pictures(
+        (
+            picture(_in_photographs(result, surface, view), f"{when} fusion, in the nodes' photographs")
+            for when, surface in (("before", result.before), ("after", result.after))
+        ),
+        columns=2,
+    )
     for frame, camera in zip(frames, placed, strict=True):
         surfaces = (("before", result.before), ("after", result.after))
         figures = (
@@ -113,6 +123,10 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
         for key, label, scale in QUALITY_ROWS
     )
     yield table(("", "before", "after"), rows)
+
+
+def _in_photographs(result: Reconstruction, surface: Surface, camera: Camera) -> ByteArray:
+    return mesh_picture(surface, camera, texture=dressed(result.rig, result.placement, surface))
 
 
 def _truth(metrics: dict[str, Any]) -> Iterator[str]:

@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from pipeline.geometry import pixel_rays
+from pipeline.geometry import pixel_rays, rigid
 from pipeline.rays import Camera, camera_hits, triangle_scene
+from pipeline.texture import Texture
 from pipeline.types import ByteArray, Surface
 
 MISSED = (255, 0, 255)
 """Magenta: a ray that hits nothing."""
 
 
-def mesh_picture(surface: Surface, camera: Camera, colored: bool = True) -> ByteArray:
+def beside(camera: Camera, surface: Surface, angle_deg: float = 20.0) -> Camera:
+    """A camera that has gone around the middle of what it sees, upright in the world."""
+    if not len(surface.vertices_m):
+        return camera
+    middle_m = np.median(surface.vertices_m, axis=0)
+    turn = Rotation.from_rotvec([0.0, 0.0, np.deg2rad(angle_deg)]).as_matrix()
+    T_around = rigid(turn, middle_m - turn @ middle_m)
+    return Camera(camera.intrinsics, T_around @ camera.T_world_camera)
+
+
+def mesh_picture(
+    surface: Surface, camera: Camera, colored: bool = True, texture: Texture | None = None
+) -> ByteArray:
     """(H, W, 3) picture of a mesh from a camera; rays that hit nothing show ``MISSED``.
 
     Args:
         surface: what is seen.
         camera: from where.
         colored: use the vertex colours; without, a grey surface whose shading shows its shape.
+        texture: photographs that the surface wears in place of its colours, unshaded.
     """
     hits = camera_hits(triangle_scene(surface.vertices_m, surface.triangles), camera)
     hit = np.isfinite(hits["t_hit"].numpy())
@@ -34,7 +49,16 @@ def mesh_picture(surface: Surface, camera: Camera, colored: bool = True) -> Byte
         light = 0.6 + 0.4 * light
     else:
         albedo = np.full((len(triangle), 3), 225.0)
+    shaded = np.clip(albedo * light, 0, 255).astype(np.uint8)
+    if texture is not None:
+        whose = texture.camera[hits["primitive_ids"].numpy()[hit].astype(np.int64)]
+        worn = whose >= 0
+        corner = texture.uv[whose[worn, None], triangle[worn]]
+        place = (1 - u - v)[worn] * corner[:, 0] + u[worn] * corner[:, 1] + v[worn] * corner[:, 2]
+        height_px, width_px = texture.image.shape[:2]
+        column, row = np.clip(place * (width_px, height_px) - 0.5, 0, (width_px - 1, height_px - 1)).T
+        shaded[worn] = texture.image[np.rint(row).astype(int), np.rint(column).astype(int)]
     rgb = np.empty((*hit.shape, 3), np.uint8)
     rgb[:] = MISSED
-    rgb[hit] = np.clip(albedo * light, 0, 255).astype(np.uint8)
+    rgb[hit] = shaded
     return rgb
