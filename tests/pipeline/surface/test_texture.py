@@ -10,6 +10,7 @@ from pipeline.geometry import apply, inverse, look_at, project
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.rays import Camera
 from pipeline.surface import photographed
+from pipeline.surface.pictures import MISSED, beside, mesh_picture
 from pipeline.types import CameraIntrinsics, Surface
 
 LENS = CameraIntrinsics.pinhole(200.0, 200.0, 159.5, 119.5, 320, 240)
@@ -142,6 +143,16 @@ def test_large_photographs_are_made_smaller_and_stay_right():
 def test_a_mesh_without_triangles_has_nothing_to_wear():
     empty = Surface(np.empty((0, 3)), np.empty((0, 3), np.int32))
     assert photographed(empty, [LEFT], [(photograph(LEFT), None)]).camera.shape == (0,)
+
+
+def test_a_picture_from_beside_shows_the_wall_in_its_colours():
+    texture = photographed(WALL, [LEFT], [(photograph(LEFT), None)])
+    view = beside(LEFT, WALL)
+    assert np.linalg.norm(view.T_world_camera[:3, 3] - LEFT.T_world_camera[:3, 3]) > 0.5
+    seen = mesh_picture(WALL, view, texture=texture)
+    hit = (seen != MISSED).any(axis=-1)
+    assert 0.1 < hit.mean() < 0.9
+    np.testing.assert_allclose(seen[hit], photograph(view)[hit], atol=6.0)
 
 
 def test_a_glb_file_wears_it(tmp_path):
