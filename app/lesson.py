@@ -37,6 +37,12 @@ CHOICES = 3
 """Of every question; they are the keys 1, 2 and 3."""
 GUESS = f"Take a guess: 1, 2 or 3. Or press **{SKIP}**."
 FIRST = "**Guess before you go on: 1, 2 or 3.** A wrong guess costs nothing. Or press **Skip**."
+KEYS = (
+    "<span><b>→</b> or <b>space</b> next, <b>←</b> back, <b>1 2 3</b> guess, <b>S</b> skip. "
+    "Click the dock, and the keys are the dock's.</span>"
+    "<span>The keys are the dock's now; <b>Esc</b> gives them back to the lesson.</span>"
+)
+"""What the page says of the keys: while they are the lesson's, and while they are the dock's."""
 PARTS = ("ask", "choices", "reveal")
 Value = TypeVar("Value")
 Look = TypeVar("Look", bound="DataclassInstance")
@@ -206,6 +212,10 @@ class LessonFolder(Generic[Look]):
                 hint="Shows what to look at and sets the controls below; change them as you like.",
             )
             ui.when_changed(self._stop, self._picked)
+            self._large = ui.gui.add_checkbox(
+                "Large", ui.shared, hint="Shows the text large over the picture, for a room to read."
+            )
+            ui.when_changed(self._large, self._point_out)
             self._text = ui.gui.add_markdown(BEGIN)
             guesses = {str(index + 1): partial(self._take, index) for index in range(CHOICES)}
             self._guess = ui.buttons(
@@ -219,8 +229,8 @@ class LessonFolder(Generic[Look]):
                 {"Back": lambda: self._go(-1), "Next": lambda: self._go(1)},
                 "To the stop before or after.",
             )
-            self._unfolding = ui.gui.add_html("")
-        self._unfolded = 0
+            self._mark = ui.gui.add_html("")
+        self._marked = 0
 
     def _go(self, count: int) -> None:
         index = self._index() + count
@@ -243,18 +253,26 @@ class LessonFolder(Generic[Look]):
         if index < 0:
             self._guesses.clear()
             self._text.content, self._guess.visible = BEGIN, False
-            self._unfold(())
+            self._point_out()
             return
         stop = self._lesson.stops[index]
         self._write(GUESS)
         self._on_stop(stop.look)
-        self._unfold(stop.opens)
+        self._point_out()
 
-    def _unfold(self, titles: tuple[str, ...]) -> None:
-        """Have the page do what a hand would."""
-        self._unfolded += 1
-        script = f"window.packetmesh?.unfold({json.dumps(titles)})"
-        self._unfolding.content = running(script, self._unfolded) if titles else ""
+    def _point_out(self) -> None:
+        """Have the page give the keys to the stop, unfold what it speaks of and show it large or not."""
+        index = self._index()
+        self._marked += 1
+        if index < 0:
+            self._mark.content = ""
+            return
+        opens = json.dumps(self._lesson.stops[index].opens)
+        script = f"window.packetmesh?.unfold({opens}); window.packetmeshLesson?.at(this)"
+        large = "data-large" if self._large.value else ""
+        self._mark.content = (
+            f"<div class='packetmesh-lesson' {large}>{KEYS}{running(script, self._marked)}</div>"
+        )
 
     def _take(self, guess: int) -> None:
         """Answer a guess; the first one counts."""
