@@ -10,6 +10,7 @@
   const PRESSED_BY_SPACE = "button, input";
   const EDGE_PX = 16; // between the card and the picture's edges
   const WIDTH = 0.55; // of the picture, at most
+  const FOLDERS_MS = 600; // until the folders of a stop are open
 
   const card = Object.assign(document.createElement("div"), {className: "packetmesh-lesson-card"});
   let mark = null; // of the lesson whose stop was shown last
@@ -50,6 +51,7 @@
   // The text stands in the control panel, before the buttons; what is large is a copy.
   function show() {
     waiting = false;
+    if (!mark?.isConnected) frame([]);
     const canvas = document.querySelector("canvas[data-engine]");
     const text = mark?.isConnected && "large" in mark.dataset && canvas ? written() : null;
     if (!text) return card.remove();
@@ -70,6 +72,16 @@
     return null;
   }
 
+  // The folders that the stop speaks of are framed, and in view where the text stands elsewhere.
+  function frame(titles) {
+    document.querySelectorAll(".packetmesh-here").forEach(one => one.classList.remove("packetmesh-here"));
+    const heads = [...document.querySelectorAll("svg[class*=tabler-icon-chevron-]")].map(arrow => arrow.parentElement);
+    for (const head of heads.filter(one => titles.includes(one.textContent.trim()) && one.offsetParent !== null)) {
+      head.parentElement.classList.add("packetmesh-here");
+      if (card.isConnected) head.parentElement.scrollIntoView({block: "center"});
+    }
+  }
+
   new MutationObserver(records => {
     if (waiting || !mark || records.every(record => card.contains(record.target))) return;
     waiting = true;
@@ -79,11 +91,12 @@
 
   window.packetmeshLesson = {
     // A stop is shown whose mark holds this image: the keys are its own, also after its list was used.
-    at(image) {
+    at(image, titles) {
       mark = image.closest(".packetmesh-lesson");
       give(false);
       if (document.activeElement?.matches("input")) document.activeElement.blur();
       show();
+      setTimeout(frame, FOLDERS_MS, titles);
     },
   };
 })();

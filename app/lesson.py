@@ -267,8 +267,8 @@ class LessonFolder(Generic[Look]):
         if index < 0:
             self._mark.content = ""
             return
-        opens = json.dumps(self._lesson.stops[index].opens)
-        script = f"window.packetmesh?.unfold({opens}); window.packetmeshLesson?.at(this)"
+        titles = json.dumps(self._lesson.stops[index].opens)
+        script = f"window.packetmesh?.unfold({titles}); window.packetmeshLesson?.at(this, {titles})"
         large = "data-large" if self._large.value else ""
         self._mark.content = (
             f"<div class='packetmesh-lesson' {large}>{KEYS}{running(script, self._marked)}</div>"

@@ -76,6 +76,10 @@ def test_large_text_lies_over_the_picture_and_follows(page):
     expect(card).to_contain_text("(1 of 10)")
     page.keyboard.press("3")
     expect(card).to_contain_text(RIGHT)
+    ball = page.locator(".packetmesh-here")
+    expect(ball).to_have_count(1)
+    expect(ball).to_contain_text("Watch the ball roll")
+    expect(ball).to_be_in_viewport()
     assert float(card.evaluate("one => parseFloat(getComputedStyle(one).fontSize)")) >= 17.0
     inner, outer = card.bounding_box(), page.locator("canvas").first.bounding_box()
     assert inner["x"] + inner["width"] < outer["x"] + outer["width"]
