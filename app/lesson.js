@@ -55,13 +55,16 @@
     const canvas = document.querySelector("canvas[data-engine]");
     const text = mark?.isConnected && "large" in mark.dataset && canvas ? written() : null;
     if (!text) return card.remove();
-    if (card.innerHTML !== text.innerHTML) card.innerHTML = text.innerHTML;
+    const changed = card.innerHTML !== text.innerHTML;
+    const answered = changed && card.firstElementChild?.textContent === text.firstElementChild?.textContent;
+    if (changed) card.innerHTML = text.innerHTML;
     const {left, top, width, height} = canvas.getBoundingClientRect();
     Object.assign(card.style, {
       left: `${left + EDGE_PX}px`, top: `${top + EDGE_PX}px`, maxWidth: `${WIDTH * width}px`,
       maxHeight: `${height - 2 * EDGE_PX}px`,
     });
     if (!card.isConnected) document.body.append(card);
+    if (changed) card.scrollTop = answered ? card.scrollHeight : 0; // the answer stands last
   }
 
   function written() {

@@ -306,7 +306,7 @@ def told(question: Question, guess: int | None, waiting: str) -> list[str]:
     if guess != SKIPPED:
         reason = question.choices[guess].reason
         marks[guess] = "✗ " if reason else "✓ "
-        answer = f"**Not quite, and many think so.** {reason} " if reason else "**Yes.** "
+        answer = f"**Not quite, and many think so.** {reason} " if reason else "**Right.** "
     listed = zip(marks, question.choices, strict=True)
     choices = (f"{i}. {mark}{choice.text}" for i, (mark, choice) in enumerate(listed, 1))
     return [*choices, answer + question.reveal]

@@ -189,7 +189,7 @@ def test_next_waits_for_a_guess_or_a_skip(tmp_path):
     assert "green." not in gui.text()
     assert not guess.seen
     gui.press("Your guess", "2")
-    assert "**Yes.**" not in gui.text()
+    assert "**Right.**" not in gui.text()
     gui.press("Go", "Next")
     assert "The sea." in gui.text()
     assert not guess.seen
