@@ -2,7 +2,14 @@
 
 A lesson is a ``# title`` and sections. A section is a ``## title``, lines ``set: name = value``, lines
 ``open: folder`` and its text. What a section does not set is at its default, so that every stop can be shown
-by itself; the folders that it speaks of are unfolded.
+by itself; the folders that it speaks of are unfolded. Behind the text a section asks::
+
+    ask: What does it cost?
+    choices:
+    - [ ] Nothing. | Why somebody may think so, and why it is not so.
+    - [x] Time.
+    - [ ] Energy. | The reason here, too.
+    reveal: What there is to know, which is shown when a person has guessed.
 """
 
 from __future__ import annotations
@@ -11,6 +18,7 @@ import json
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
@@ -24,12 +32,44 @@ if TYPE_CHECKING:
 LESSONS = Path(__file__).resolve().parents[1] / "assets" / "lessons"
 NUMBER = r"(\d+(?:\.\d+)?)"
 OFF, BEGIN = "not now", "Choose a stop, or press **Next**."
-ANSWER, THINK = "*Answer:*", "*Answer:* think first, then press **Answer**."
+SKIP, SKIPPED = "Skip", -1
+CHOICES = 3
+"""Of every question; they are the keys 1, 2 and 3."""
+GUESS = f"Take a guess: 1, 2 or 3. Or press **{SKIP}**."
+FIRST = "**Guess before you go on: 1, 2 or 3.** A wrong guess costs nothing. Or press **Skip**."
+KEYS = (
+    "<span><b>→</b> or <b>space</b> next, <b>←</b> back, <b>1 2 3</b> guess, <b>S</b> skip. "
+    "Click the dock, and the keys are the dock's.</span>"
+    "<span>The keys are the dock's now; <b>Esc</b> gives them back to the lesson.</span>"
+)
+"""What the page says of the keys: while they are the lesson's, and while they are the dock's."""
+PARTS = ("ask", "choices", "reveal")
 Value = TypeVar("Value")
 Look = TypeVar("Look", bound="DataclassInstance")
 """What a screen is to show: a frozen record of all that a stop may set."""
 Setting: TypeAlias = Callable[[Look, str], Look]
 """Changes a look as the text behind ``set: name =`` says; a ValueError says what to try instead."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of the answers that can be guessed."""
+
+    text: str
+    """Markdown."""
+    reason: str = ""
+    """Why it is wrong; empty for the one that is right."""
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What a stop asks before it tells."""
+
+    text: str
+    """Markdown."""
+    choices: tuple[Choice, ...]
+    reveal: str
+    """Markdown, shown after a guess."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +82,7 @@ class Stop(Generic[Look]):
     look: Look
     opens: tuple[str, ...] = ()
     """Titles of the folders that it speaks of."""
+    question: Question | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +102,8 @@ def read_lesson(path: Path, settings: Mapping[str, Setting[Look]], default: Look
         default: what is shown where a section sets nothing.
 
     Raises:
-        InputError: the file cannot be read, has no title or no section, or sets what it cannot.
+        InputError: the file cannot be read, has no title or no section, sets what it cannot, or asks without
+            choices or an answer.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -79,10 +121,11 @@ def read_lesson(path: Path, settings: Mapping[str, Setting[Look]], default: Look
 
 def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: Look) -> Stop[Look]:
     title, *lines = section.splitlines()
-    text = "\n".join(line for line in lines if not line.startswith(("set:", "open:"))).strip()
+    told = "\n".join(line for line in lines if not line.startswith(("set:", "open:")))
+    text, *parts = re.split(rf"^({'|'.join(PARTS)}):", told, flags=re.MULTILINE)
     opens = tuple(line[5:].strip() for line in lines if line.startswith("open:"))
     where = f"The lesson {file}, section '{title.strip()}',"
-    if not text:
+    if not text.strip():
         raise InputError(f"{where} has no text.")
     for line in lines:
         if line.startswith("set:"):
@@ -93,7 +136,30 @@ def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: 
                 raise InputError(f"{where} cannot set {name} = {value}: {error}.") from None
     if "" in opens:
         raise InputError(f"{where} opens nothing; name a folder behind 'open:'.")
-    return Stop(title.strip(), text, look, opens)
+    return Stop(title.strip(), text.strip(), look, opens, _question(parts, where) if parts else None)
+
+
+def _question(parts: list[str], where: str) -> Question:
+    """What the parts, each after its name, ask."""
+    asked, choices, reveal = (
+        (part.strip() for part in parts[1::2]) if tuple(parts[::2]) == PARTS else ("",) * 3
+    )
+    if not (asked and choices and reveal):
+        raise InputError(
+            f"{where} must ask with 'ask:', 'choices:' and 'reveal:', in this order, each with text."
+        )
+    _, *items = re.split(r"^- \[([ x])\] ", choices, flags=re.MULTILINE)
+    marks, texts = items[::2], [" ".join(item.split()) for item in items[1::2]]
+    if len(texts) != CHOICES or marks.count("x") != 1:
+        raise InputError(
+            f"{where} needs {CHOICES} choices: '- [x] choice' once, else '- [ ] choice | why it is wrong'."
+        )
+    found = tuple(Choice(*(part.strip() for part in text.partition(" | ")[::2])) for text in texts)
+    for mark, one in zip(marks, found, strict=True):
+        if (mark == "x") == bool(one.reason):
+            fault = "is right but has a reason why not" if one.reason else "has no reason why it is wrong"
+            raise InputError(f"{where} choice '{one.text}' {fault}; a reason stands behind ' | '.")
+    return Question(asked, found, reveal)
 
 
 def sets(key: str, read: Callable[[str], Any]) -> Callable[[Look, str], Look]:
@@ -138,6 +204,7 @@ class LessonFolder(Generic[Look]):
         """Add the folder; ``on_stop`` is called with what the stop shows."""
         self._lesson, self._on_stop = lesson, on_stop
         self._names = [f"{i}. {stop.title}" for i, stop in enumerate(lesson.stops, 1)]
+        self._guesses: dict[int, int] = {}
         with ui.gui.add_folder(f"Lesson: {lesson.title}", expand_by_default=False):
             self._stop = ui.gui.add_dropdown(
                 "Stop",
@@ -145,48 +212,101 @@ class LessonFolder(Generic[Look]):
                 hint="Shows what to look at and sets the controls below; change them as you like.",
             )
             ui.when_changed(self._stop, self._picked)
-            keys = {"Back": lambda: self._go(-1), "Next": lambda: self._go(1)}
-            hint = "To the stop before or after."
-            if any(ANSWER in stop.text for stop in lesson.stops):
-                keys["Answer"] = self._answer
-                hint = "To the stop before or after, or to the answer of this one."
-            ui.buttons("Go", keys, hint)
+            self._large = ui.gui.add_checkbox(
+                "Large", ui.shared, hint="Shows the text large over the picture, for a room to read."
+            )
+            ui.when_changed(self._large, self._point_out)
             self._text = ui.gui.add_markdown(BEGIN)
-            self._unfolding = ui.gui.add_html("")
-        self._unfolded = 0
+            guesses = {str(index + 1): partial(self._take, index) for index in range(CHOICES)}
+            self._guess = ui.buttons(
+                "Your guess",
+                {**guesses, SKIP: partial(self._take, SKIPPED)},
+                "Which answer do you expect? You are told why it is right or not.",
+                visible=False,
+            )
+            ui.buttons(
+                "Go",
+                {"Back": lambda: self._go(-1), "Next": lambda: self._go(1)},
+                "To the stop before or after.",
+            )
+            self._mark = ui.gui.add_html("")
+        self._marked = 0
 
     def _go(self, count: int) -> None:
         index = self._index() + count
-        if 0 <= index < len(self._names):
+        if count > 0 and self._waits():
+            self._write(FIRST)
+        elif 0 <= index < len(self._names):
             self._stop.value = self._names[index]
             self._picked()
 
     def _index(self) -> int:
         return -1 if self._stop.value == OFF else self._names.index(self._stop.value)
 
+    def _waits(self) -> bool:
+        """Whether the stop has asked and nobody has guessed."""
+        index = self._index()
+        return index >= 0 and self._lesson.stops[index].question is not None and index not in self._guesses
+
     def _picked(self) -> None:
         index = self._index()
         if index < 0:
-            self._text.content = BEGIN
-            self._unfold(())
+            self._guesses.clear()
+            self._text.content, self._guess.visible = BEGIN, False
+            self._point_out()
             return
         stop = self._lesson.stops[index]
-        asked, answer, _ = stop.text.partition(ANSWER)
-        self._write(asked + THINK if answer else asked)
+        self._write(GUESS)
         self._on_stop(stop.look)
-        self._unfold(stop.opens)
+        self._point_out()
 
-    def _unfold(self, titles: tuple[str, ...]) -> None:
-        """Have the page do what a hand would."""
-        self._unfolded += 1
-        script = f"window.packetmesh?.unfold({json.dumps(titles)})"
-        self._unfolding.content = running(script, self._unfolded) if titles else ""
-
-    def _answer(self) -> None:
-        if self._index() >= 0:
-            self._write(self._lesson.stops[self._index()].text)
-
-    def _write(self, text: str) -> None:
+    def _point_out(self) -> None:
+        """Have the page give the keys to the stop, unfold what it speaks of and show it large or not."""
         index = self._index()
-        title = self._lesson.stops[index].title
-        self._text.content = f"**{title}** ({index + 1} of {len(self._names)})\n\n{text}"
+        self._marked += 1
+        if index < 0:
+            self._mark.content = ""
+            return
+        titles = json.dumps(self._lesson.stops[index].opens)
+        script = f"window.packetmesh?.unfold({titles}); window.packetmeshLesson?.at(this, {titles})"
+        large = "data-large" if self._large.value else ""
+        self._mark.content = (
+            f"<div class='packetmesh-lesson' {large}>{KEYS}{running(script, self._marked)}</div>"
+        )
+
+    def _take(self, guess: int) -> None:
+        """Answer a guess; the first one counts."""
+        if self._waits():
+            self._guesses[self._index()] = guess
+            self._write(GUESS)
+
+    def _write(self, waiting: str) -> None:
+        """Show the stop; ``waiting`` stands where the answer will be."""
+        index = self._index()
+        stop = self._lesson.stops[index]
+        lines = [f"**{stop.title}** ({index + 1} of {len(self._names)})", stop.text]
+        if stop.question is not None:
+            lines += [f"**{stop.question.text}**", *told(stop.question, self._guesses.get(index), waiting)]
+        self._text.content = "\n\n".join(lines)
+        self._guess.visible = self._waits()
+
+
+def told(question: Question, guess: int | None, waiting: str) -> list[str]:
+    """Paragraphs of markdown: the choices, and the answer to a guess, or ``waiting`` before there is one.
+
+    Args:
+        question: what is asked.
+        guess: index of a choice, ``SKIPPED``, or None while nobody has guessed.
+        waiting: what to say until then.
+    """
+    if guess is None:
+        return [*(f"{i}. {choice.text}" for i, choice in enumerate(question.choices, 1)), waiting]
+    marks = ["" if choice.reason else "✓ " for choice in question.choices]
+    answer = ""
+    if guess != SKIPPED:
+        reason = question.choices[guess].reason
+        marks[guess] = "✗ " if reason else "✓ "
+        answer = f"**Not quite, and many think so.** {reason} " if reason else "**Right.** "
+    listed = zip(marks, question.choices, strict=True)
+    choices = (f"{i}. {mark}{choice.text}" for i, (mark, choice) in enumerate(listed, 1))
+    return [*choices, answer + question.reveal]

@@ -1,4 +1,4 @@
-"""What the app adds to viser's page: a script and a style sheet of its own, ``page.js`` and ``page.css``."""
+"""What the app adds to viser's page: scripts and style sheets of its own, ``page`` and ``lesson``."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from pathlib import Path
 
 import viser
 
-_SCRIPT, _STYLE = (Path(__file__).with_suffix(kind).read_text(encoding="utf-8") for kind in (".js", ".css"))
+_SCRIPT, _STYLE = (
+    "".join(Path(__file__).with_name(name + kind).read_text(encoding="utf-8") for name in ("page", "lesson"))
+    for kind in (".js", ".css")
+)
 
 
 def add_script(gui: viser.GuiApi) -> None:
-    """Have the page run the script, before it is first called, and take the style sheet."""
+    """Have the page run the scripts, before they are first called, and take the style sheets."""
     gui.add_html(f"<style>{_STYLE}</style>{running(_SCRIPT)}")
 
 

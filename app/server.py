@@ -16,6 +16,7 @@ import viser
 
 from app.drawing.colors import BRAND
 from app.jobs import warm_up
+from app.landing import add_scene_buttons, landing_first
 from app.origin import only_own_page
 from app.pool import ComputePool
 from app.screens.calibrate.panel import CalibratePanel
@@ -86,7 +87,8 @@ def build_server(
     spec = start_spec(scene, config or PipelineConfig())
     folder = Path(tempfile.mkdtemp(prefix="packetmesh-"))
     pool = ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
-    with contextlib.redirect_stdout(io.StringIO()), only_own_page():
+    landing = contextlib.nullcontext() if lecture else landing_first()
+    with contextlib.redirect_stdout(io.StringIO()), landing, only_own_page():
         server = viser.ViserServer(host=host, port=port, label="PacketMesh", verbose=False)
     app = AppServer(server, pool, folder)
     if port and server.get_port() != port:
@@ -96,7 +98,9 @@ def build_server(
     store, shared = Store(str(folder)), SharedViews()
 
     def begin(target: Target, number: int) -> None:
-        app.sessions[number] = Session(target, pool, store, shared, spec, PANELS)
+        session = app.sessions[number] = Session(target, pool, store, shared, spec, PANELS)
+        if not lecture:
+            session.post(add_scene_buttons, session)
 
     if lecture:
         begin(server, -1)

@@ -65,7 +65,8 @@ class Session:
     ) -> None:
         self.target = target
         self.gui, self.scene = target.gui, target.scene
-        self.ui = Ui(target.gui, target.scene, self.post, target.atomic, target.flush)
+        shared_ui = isinstance(target, viser.ViserServer)
+        self.ui = Ui(target.gui, target.scene, self.post, target.atomic, target.flush, shared=shared_ui)
         self.store = store
         self._shared = shared
         self.spec = spec

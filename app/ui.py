@@ -38,6 +38,8 @@ class Ui:
     """Sends it now."""
     closers: list[Callable[[], None]] = field(default_factory=list)
     """What ends the timers and threads of the screens."""
+    shared: bool = False
+    """Whether all browsers see the same, as in a lecture."""
 
     def when_changed(self, handle: Input, action: Callable[[], object]) -> Input:
         """The handle, whose changes by a person, not by the program, cause ``action``."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from app.lesson import ANSWER, BEGIN, OFF, LessonFolder, read_lesson
+from app.lesson import BEGIN, FIRST, OFF, SKIP, SKIPPED, LessonFolder, read_lesson, told
 from app.screens.calibrate import lesson as calibrate
 from app.screens.depth import lesson as depth
 from app.screens.fuse import lesson as fuse
@@ -16,6 +16,21 @@ from app.screens.network import lesson as network
 from app.screens.surface import lesson as surface
 from packetmesh.errors import InputError
 from tests.app.fakes import ui_of
+
+ASKED = """# A
+## One
+The sky.
+ask: Which colour
+is it?
+choices:
+- [ ] Red. | green.
+- [x] Blue.
+- [ ] Grey. | Only when
+  clouded.
+reveal: Air scatters blue.
+## Two
+The sea.
+"""
 
 
 def lesson(tmp_path, text):
@@ -40,16 +55,22 @@ def test_the_stops_of_the_lesson_that_ships_have_different_titles_and_text():
         (surface.SHIPPED, surface.SETTINGS, surface.SurfaceLook()),
         (network.CROSSING, network.SETTINGS, network.NetworkLook()),
         (network.LOST_PACKET, network.SETTINGS, network.NetworkLook()),
+        (SHIPPED, SETTINGS, RaceLook()),
     ],
     ids=lambda value: getattr(value, "stem", ""),
 )
-def test_the_stops_of_lessons_that_ask_differ_and_answer(path, settings, look):
+def test_every_stop_that_ships_differs_and_asks_what_cannot_be_guessed_by_its_place(path, settings, look):
     shipped = read_lesson(path, settings, look)
-    assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) > 1
+    assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) >= 5
     assert len({stop.look for stop in shipped.stops}) == len(shipped.stops)
+    rights = []
     for stop in shipped.stops:
-        assert stop.text.count("*Question:*") == stop.text.count("*Answer:*") == 1
+        assert stop.question is not None
         assert "set:" not in stop.text
+        assert "Answer" not in stop.text + stop.question.reveal
+        rights += [i for i, choice in enumerate(stop.question.choices) if not choice.reason]
+    assert len(rights) == len(shipped.stops)
+    assert set(rights) == {0, 1, 2}
 
 
 def test_a_stop_sets_what_it_names_and_leaves_the_rest_at_the_default(tmp_path):
@@ -126,6 +147,14 @@ def test_a_start_in_numbers_and_the_end(tmp_path):
         ("# A\n## One\nset: start = near\nx", "try one of aligned, slightly off, far off or such as"),
         ("# A\n## One\nset: position = -1\nx", "try start, end or the number"),
         ("# A\n## One\nset: mode\nx", "cannot set mode = : try one of node on node"),
+        ("# A\n## One\nask: Why?\nchoices:\n- [x] So.\nreveal: So.", "has no text"),
+        ("# A\n## One\nx\nask: Why?", "must ask with 'ask:', 'choices:' and 'reveal:'"),
+        ("# A\n## One\nx\nreveal: So.", "must ask with"),
+        ("# A\n## One\nx\nask:\nchoices:\n- [x] a\nreveal: So.", "must ask with"),
+        ("# A\n## One\nx\nask: Why?\nchoices:\n- [x] a\n- [ ] b | c\nreveal: So.", "needs 3 choices"),
+        (ASKED.replace("[x]", "[ ]"), "needs 3 choices: '- \\[x\\] choice' once"),
+        (ASKED.replace(" | green.", ""), "'Red.' has no reason why it is wrong"),
+        (ASKED.replace("Blue.", "Blue. | no."), "'Blue.' is right but has a reason why not"),
     ],
 )
 def test_a_bad_lesson_is_one_sentence(tmp_path, text, sentence):
@@ -134,10 +163,55 @@ def test_a_bad_lesson_is_one_sentence(tmp_path, text, sentence):
     assert "\n" not in str(error.value)
 
 
-def test_a_lesson_that_asks_nothing_has_no_answers():
-    ui = ui_of()
-    LessonFolder(ui, read_lesson(SHIPPED, SETTINGS, RaceLook()), lambda look: None)
-    assert ui.gui.find("Go").options == ("Back", "Next")
+def test_a_question_has_choices_with_reasons_and_an_answer(tmp_path):
+    one, two = lesson(tmp_path, ASKED).stops
+    assert (one.text, two.text, two.question) == ("The sky.", "The sea.", None)
+    assert one.question.text == "Which colour\nis it?"
+    assert [choice.text for choice in one.question.choices] == ["Red.", "Blue.", "Grey."]
+    assert [choice.reason for choice in one.question.choices] == ["green.", "", "Only when clouded."]
+    assert one.question.reveal == "Air scatters blue."
+
+
+def test_next_waits_for_a_guess_or_a_skip(tmp_path):
+    ui, shown = ui_of(), []
+    LessonFolder(ui, lesson(tmp_path, ASKED), shown.append)
+    gui, guess = ui.gui, ui.gui.find("Your guess")
+    assert not guess.seen
+    gui.press("Go", "Next")
+    assert guess.seen
+    assert "Air scatters" not in gui.text()
+    gui.press("Go", "Next")
+    assert FIRST in gui.text()
+    assert (len(shown), "One" in gui.text()) == (1, True)
+    gui.press("Your guess", "3")
+    assert "Only when clouded." in gui.text()
+    assert "Air scatters blue." in gui.text()
+    assert "green." not in gui.text()
+    assert not guess.seen
+    gui.press("Your guess", "2")
+    assert "**Right.**" not in gui.text()
+    gui.press("Go", "Next")
+    assert "The sea." in gui.text()
+    assert not guess.seen
+    gui.press("Go", "Back")
+    assert "Only when clouded." in gui.text()
+    gui.set("Stop", OFF)
+    gui.press("Go", "Next")
+    assert "Air scatters" not in gui.text()
+    gui.press("Your guess", SKIP)
+    assert "Air scatters blue." in gui.text()
+
+
+def test_a_guess_is_answered_with_the_reason_and_the_right_choice_is_marked(tmp_path):
+    question = lesson(tmp_path, ASKED).stops[0].question
+    wrong, right, skipped, waiting = (told(question, guess, "Guess!") for guess in (0, 1, SKIPPED, None))
+    assert wrong[:2] == ["1. ✗ Red.", "2. ✓ Blue."]
+    assert right[:3] == skipped[:3] == ["1. Red.", "2. ✓ Blue.", "3. Grey."]
+    assert "green." in wrong[-1]
+    assert right[-1].endswith(skipped[-1])
+    assert right[-1] != skipped[-1] == "Air scatters blue."
+    assert waiting[-1] == "Guess!"
+    assert not any("✓" in line for line in waiting)
 
 
 def test_a_missing_or_binary_lesson_is_one_sentence(tmp_path):
@@ -154,19 +228,15 @@ def test_the_folder_begins_with_how_to_begin_and_goes_from_stop_to_stop():
     stops, gui = shipped.stops, ui.gui
     assert gui.text() == BEGIN
     gui.press("Go", "Back")
+    gui.press("Your guess", "1")
     assert shown == []
     for _ in range(len(stops) + 2):
         gui.press("Go", "Next")
+        gui.press("Your guess", "1")
     assert shown == [stop.look for stop in stops]
     gui.press("Go", "Back")
     assert shown[-1] == stops[-2].look
     assert stops[-2].title in gui.text()
-    asked, answer = stops[-2].text.split(ANSWER)
-    assert asked in gui.text()
-    assert answer not in gui.text()
-    gui.press("Go", "Answer")
-    assert stops[-2].text in gui.text()
-    assert shown[-1] == stops[-2].look
     gui.set("Stop", gui.find("Stop").options[1])
     assert shown[-1] == stops[0].look
     gui.set("Stop", OFF)

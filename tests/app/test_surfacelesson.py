@@ -144,7 +144,7 @@ def four_balls(room):
 
 def stop_named(title):
     (stop,) = (stop for stop in read_lesson(SHIPPED, SETTINGS, SurfaceLook()).stops if stop.title == title)
-    return stop.look, " ".join(stop.text.split())
+    return stop.look, " ".join(f"{stop.text} {stop.question.text} {stop.question.reveal}".split())
 
 
 def about(text, pattern, shares, points=2.0):

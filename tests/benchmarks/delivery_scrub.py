@@ -56,7 +56,7 @@ def measure(playwright, app, angle: str, clicks: int) -> None:
     )
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     page.add_init_script(WATCH + REST)
-    page.goto(app.url)
+    page.goto(f"{app.url}?explore")
     page.set_default_timeout(240_000)
     go(page, "Network")
     page.get_by_text("Up to date").wait_for()

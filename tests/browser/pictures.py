@@ -55,7 +55,7 @@ def _screen(step: str, prepare: Callable[[Page], None]) -> Image.Image:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium_path(), args=ARGUMENTS)
         page = browser.new_page(viewport=WINDOW_PX)
-        page.goto(app.url)
+        page.goto(f"{app.url}?explore")
         go(page, step)
         page.get_by_text("Up to date").wait_for(timeout=120_000)
         prepare(page)

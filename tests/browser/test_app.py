@@ -116,7 +116,7 @@ def test_a_browser_answers_while_another_one_meshes(page, browser, app):
     context = browser.new_context(viewport={"width": 620, "height": 240})
     other = context.new_page()
     other.set_default_timeout(60_000)
-    other.goto(app.url)
+    other.goto(f"{app.url}?explore")
     other.get_by_text("Up to date").wait_for()
     handle = slider(page, "Radius")
     handle.focus()
@@ -137,7 +137,7 @@ def test_a_browser_answers_while_another_one_meshes(page, browser, app):
 def test_a_closed_browser_leaves_no_session(page, browser, app):
     known = set(app.sessions)
     context = browser.new_context()
-    context.new_page().goto(app.url)
+    context.new_page().goto(f"{app.url}?explore")
     deadline = time.monotonic() + 30
     while set(app.sessions) == known and time.monotonic() < deadline:
         page.wait_for_timeout(100)

@@ -1,0 +1,105 @@
+// Lessons in the page: the keys that lead through one, and its text large over the picture.
+(() => {
+  if (window.packetmeshLesson) return;
+
+  const KEYS = {
+    ArrowRight: "Next", PageDown: "Next", " ": "Next", ArrowLeft: "Back", PageUp: "Back", // or a presenter's
+    1: "1", 2: "2", 3: "3", s: "Skip", S: "Skip",
+  };
+  const TYPING = "input:not([type=checkbox]), textarea, select, [role=slider], [role=dialog], [contenteditable=true]";
+  const PRESSED_BY_SPACE = "button, input";
+  const EDGE_PX = 16; // between the card and the picture's edges
+  const WIDTH = 0.55; // of the picture, at most
+  const FOLDERS_MS = 600; // until the folders of a stop are open
+
+  const card = Object.assign(document.createElement("div"), {className: "packetmesh-lesson-card"});
+  let mark = null; // of the lesson whose stop was shown last
+  let docked = false; // whether a hand was last on the dock
+  let waiting = false; // for the next frame
+
+  // The folder of the lesson: the nearest around its mark that has its buttons.
+  function button(name) {
+    for (let around = mark?.isConnected ? mark.parentElement : null; around; around = around.parentElement) {
+      const buttons = [...around.querySelectorAll("button")];
+      if (buttons.some(one => one.textContent === "Next"))
+        return buttons.find(one => one.textContent === name && one.offsetParent !== null);
+    }
+  }
+
+  function give(toDock) {
+    docked = toDock;
+    document.documentElement.classList.toggle("packetmesh-keys-docked", docked);
+  }
+
+  window.addEventListener("pointerdown", event => {
+    give(event.target.closest?.(".packetmesh-dock-row") != null);
+  }, true);
+
+  window.addEventListener("keydown", event => {
+    if (event.ctrlKey || event.metaKey || event.altKey || !button("Next")) return;
+    if (docked) {
+      if (event.key === "Escape") give(false);
+      return;
+    }
+    if (!(event.key in KEYS) || event.target.closest?.(TYPING)) return;
+    if (event.key === " " && event.target.closest?.(PRESSED_BY_SPACE)) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    button(KEYS[event.key])?.click();
+  }, true);
+
+  // The text stands in the control panel, before the buttons; what is large is a copy.
+  function show() {
+    waiting = false;
+    if (!mark?.isConnected) frame([]);
+    const canvas = document.querySelector("canvas[data-engine]");
+    const text = mark?.isConnected && "large" in mark.dataset && canvas ? written() : null;
+    if (!text) return card.remove();
+    const changed = card.innerHTML !== text.innerHTML;
+    const answered = changed && card.firstElementChild?.textContent === text.firstElementChild?.textContent;
+    if (changed) card.innerHTML = text.innerHTML;
+    const {left, top, width, height} = canvas.getBoundingClientRect();
+    Object.assign(card.style, {
+      left: `${left + EDGE_PX}px`, top: `${top + EDGE_PX}px`, maxWidth: `${WIDTH * width}px`,
+      maxHeight: `${height - 2 * EDGE_PX}px`,
+    });
+    if (!card.isConnected) document.body.append(card);
+    if (changed) card.scrollTop = answered ? card.scrollHeight : 0; // the answer stands last
+  }
+
+  function written() {
+    for (let around = mark.parentElement; around; around = around.parentElement) {
+      const found = [...around.querySelectorAll("p")].find(one => !card.contains(one) && one.querySelector("strong, b"));
+      if (found) return found.parentElement;
+    }
+    return null;
+  }
+
+  // The folders that the stop speaks of are framed, and in view where the text stands elsewhere.
+  function frame(titles) {
+    document.querySelectorAll(".packetmesh-here").forEach(one => one.classList.remove("packetmesh-here"));
+    const heads = [...document.querySelectorAll("svg[class*=tabler-icon-chevron-]")].map(arrow => arrow.parentElement);
+    for (const head of heads.filter(one => titles.includes(one.textContent.trim()) && one.offsetParent !== null)) {
+      head.parentElement.classList.add("packetmesh-here");
+      if (card.isConnected) head.parentElement.scrollIntoView({block: "center"});
+    }
+  }
+
+  new MutationObserver(records => {
+    if (waiting || !mark || records.every(record => card.contains(record.target))) return;
+    waiting = true;
+    requestAnimationFrame(show);
+  }).observe(document.body, {childList: true, subtree: true, characterData: true});
+  window.addEventListener("resize", show);
+
+  window.packetmeshLesson = {
+    // A stop is shown whose mark holds this image: the keys are its own, also after its list was used.
+    at(image, titles) {
+      mark = image.closest(".packetmesh-lesson");
+      give(false);
+      if (document.activeElement?.matches("input")) document.activeElement.blur();
+      show();
+      setTimeout(frame, FOLDERS_MS, titles);
+    },
+  };
+})();

@@ -1,0 +1,49 @@
+"""The landing screen as a new browser meets it."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import expect
+
+LONG_MS = 60_000
+
+
+@pytest.fixture
+def landing(browser, app):
+    """A new browser at the bare address, as soon as anything is there."""
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = context.new_page()
+    page.set_default_timeout(LONG_MS)
+    page.goto(app.url, wait_until="commit")
+    page.get_by_role("dialog", name="Welcome").wait_for()
+    yield page
+    context.close()
+
+
+def on_top(page):
+    """What lies over the middle of the page."""
+    return page.evaluate("document.elementFromPoint(640, 360).closest('#packetmesh-landing') !== null")
+
+
+def test_it_covers_the_page_while_the_scene_loads_and_escape_leaves_to_it(landing):
+    assert on_top(landing)
+    landing.get_by_text("Up to date").wait_for()
+    assert on_top(landing)
+    landing.keyboard.press("Escape")
+    expect(landing.get_by_role("dialog", name="Welcome")).to_have_count(0)
+    assert not on_top(landing)
+    landing.get_by_text("Each camera node delivers").wait_for()
+
+
+def test_a_lesson_opens_at_its_first_stop(landing):
+    landing.get_by_role("button", name="What one lost packet costs").click()
+    landing.get_by_text("(1 of 8)").locator("visible=true").wait_for()
+    expect(landing.get_by_role("dialog", name="Welcome")).to_have_count(0)
+    landing.keyboard.press("s")
+    landing.get_by_text("They were sent again.").locator("visible=true").first.wait_for()
+
+
+def test_a_scene_opens(landing):
+    landing.get_by_role("button", name="Office").click()
+    expect(landing.get_by_label("Scene", exact=True).first).to_have_value("Office", timeout=LONG_MS)
+    expect(landing.get_by_role("dialog", name="Welcome")).to_have_count(0)

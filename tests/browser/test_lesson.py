@@ -1,0 +1,88 @@
+"""Lessons led through by keys alone, and their text over the picture."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.hands import go, press, unfold
+
+LESSONS = {
+    "How good is my calibration?": ("Calibrate", 7),
+    "Can a picture measure?": ("Depth", 7),
+    "ICP against CEICP": ("Fuse", 10),
+    "Which ball radius?": ("Surface", 10),
+    "How images cross a sensor network": ("Network", 10),
+    "What one lost packet costs": ("Network", 8),
+}
+WAITS, FIRST, RIGHT = "Take a guess", "Guess before you go on", "Right."
+
+
+def seen(page, text):
+    return page.get_by_text(text).locator("visible=true").first
+
+
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_five_stops_are_led_through_by_keys_alone(page, lesson):
+    step, stops = LESSONS[lesson]
+    go(page, step)
+    unfold(page, f"Lesson: {lesson}")
+    press(page, "Next")
+    for stop in range(1, 6):
+        seen(page, f"({stop} of {stops})").wait_for()
+        seen(page, WAITS).wait_for()
+        page.keyboard.press("ArrowRight")
+        seen(page, FIRST).wait_for()
+        page.keyboard.press("s" if stop == 5 else str(1 + stop % 3))
+        expect(page.get_by_text(FIRST).locator("visible=true")).to_have_count(0)
+        expect(page.get_by_text("✓").locator("visible=true").first).to_be_visible()
+        page.keyboard.press("ArrowRight" if stop % 2 else "Space")
+    seen(page, f"(6 of {stops})").wait_for()
+    page.keyboard.press("ArrowLeft")
+    seen(page, f"(5 of {stops})").wait_for()
+    assert page.get_by_text(WAITS).locator("visible=true").count() == 0
+    unfold(page, f"Lesson: {lesson}")
+
+
+def test_the_dock_has_the_keys_after_a_click_on_it_until_escape(page):
+    go(page, "Fuse")
+    unfold(page, "Lesson: ICP against CEICP")
+    press(page, "Next")
+    seen(page, "(1 of 10)").wait_for()
+    page.locator(".packetmesh-dock-time").click()
+    seen(page, "The keys are the dock's now").wait_for()
+    seen(page, "Up to date").wait_for()
+    page.keyboard.press("Home")
+    expect(page.locator(".packetmesh-dock-time")).to_have_text(re.compile("^iteration 0 of"))
+    page.keyboard.press("ArrowRight")
+    expect(page.locator(".packetmesh-dock-time")).to_have_text(re.compile("^iteration 1 of"))
+    assert page.get_by_text(FIRST).locator("visible=true").count() == 0
+    page.keyboard.press("Escape")
+    seen(page, "and the keys are the dock's").wait_for()
+    page.keyboard.press("ArrowRight")
+    seen(page, FIRST).wait_for()
+    unfold(page, "Lesson: ICP against CEICP")
+
+
+def test_large_text_lies_over_the_picture_and_follows(page):
+    go(page, "Surface")
+    unfold(page, "Lesson: Which ball radius?")
+    press(page, "Next")
+    seen(page, "(1 of 10)").wait_for()
+    page.get_by_label("Large", exact=True).locator("visible=true").check()
+    card = page.locator(".packetmesh-lesson-card")
+    expect(card).to_contain_text("(1 of 10)")
+    page.keyboard.press("3")
+    expect(card).to_contain_text(RIGHT)
+    ball = page.locator(".packetmesh-here")
+    expect(ball).to_have_count(1)
+    expect(ball).to_contain_text("Watch the ball roll")
+    expect(ball).to_be_in_viewport()
+    assert float(card.evaluate("one => parseFloat(getComputedStyle(one).fontSize)")) >= 17.0
+    inner, outer = card.bounding_box(), page.locator("canvas").first.bounding_box()
+    assert inner["x"] + inner["width"] < outer["x"] + outer["width"]
+    assert inner["y"] + inner["height"] <= outer["y"] + outer["height"]
+    go(page, "Scene")
+    expect(card).to_have_count(0)
