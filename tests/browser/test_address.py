@@ -44,7 +44,7 @@ def test_a_link_shows_its_scene_settings_and_screen_and_survives_a_reload(page, 
 
 
 def test_back_and_forward_go_through_the_screens(page, app):
-    page.goto(app.url)
+    page.goto(f"{app.url}?explore")
     shown(page, "Scene")
     page.get_by_text("Up to date").wait_for()
     go(page, "Fuse")
