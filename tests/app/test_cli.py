@@ -63,7 +63,7 @@ def test_every_promised_file_is_written_and_agrees_with_the_metrics(pair_run):
     fused, inferred = read_cloud(out / "fused.ply"), read_cloud(out / "inferred.ply")
     assert 0 < len(inferred) < len(fused)
     report = (out / "report.html").read_text()
-    assert report.count("data:image/jpeg") == 7
+    assert report.count("data:image/jpeg") == 9
     assert "http" not in report
 
 
