@@ -7,6 +7,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
+from tests.browser.conftest import dismiss_notifications
 from tests.browser.hands import go, press, unfold
 
 LESSONS = {
@@ -18,6 +19,19 @@ LESSONS = {
     "What one lost packet costs": ("Network", 8),
 }
 WAITS, FIRST, RIGHT = "Take a guess", "Guess before you go on", "Right."
+
+
+@pytest.fixture
+def page(browser, app):
+    """A session of its own: a lesson goes on where somebody left it."""
+    context = browser.new_context(viewport={"width": 900, "height": 640})
+    page = context.new_page()
+    page.set_default_timeout(60_000)
+    page.goto(f"{app.url}?fixedDpr=1")
+    page.get_by_text("Up to date").wait_for()
+    dismiss_notifications(page)
+    yield page
+    context.close()
 
 
 def seen(page, text):
