@@ -14,12 +14,8 @@ window.packetmeshAddress ??= (() => {
 
   // To the server: what the address asks for. A number tells two that are alike apart.
   function say() {
-    const anchor = document.querySelector(`.packetmesh-dock[data-dock="${name}"]`);
-    const input = anchor?.parentElement.nextElementSibling?.querySelector("input");
-    if (!input) return void setTimeout(say, 100);
-    const text = `${++said} ${split()[0]}`;
-    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(input, text);
-    input.dispatchEvent(new Event("input", {bubbles: true}));
+    if (!window.packetmeshDockRow.write(name, `${said + 1} ${split()[0]}`)) return void setTimeout(say, 100);
+    said += 1;
   }
 
   window.addEventListener("popstate", say); // Back and forward
@@ -28,6 +24,12 @@ window.packetmeshAddress ??= (() => {
     // A session has begun: by a new page, a reload, or after the server was away.
     begin(session) {
       name = session;
+      say();
+    },
+
+    // Go to a place, as a link does.
+    ask(text) {
+      history.pushState(null, "", `${location.pathname}?${text}`);
       say();
     },
 

@@ -8,7 +8,7 @@
   const LATEST = ["look", "point", "seek"]; // of these only the last counts
   const PAGE = Math.random().toString(36).slice(2);
   const docks = new Map();
-  const {make} = window.packetmeshDockRow;
+  const {make, write} = window.packetmeshDockRow;
   const {AXIS_PX, DockView} = window.packetmeshDockView;
 
   class Dock extends DockView {
@@ -207,14 +207,10 @@
 
     send() {
       clearTimeout(this.again);
-      const input = this.anchor()?.parentElement.nextElementSibling?.querySelector("input");
-      if (input && this.unheard.length) {
-        this.attempt = (this.attempt ?? 0) + 1;
-        const text = JSON.stringify({page: PAGE, attempt: this.attempt, actions: this.unheard});
-        Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(input, text);
-        input.dispatchEvent(new Event("input", {bubbles: true}));
-        this.again = setTimeout(() => this.send(), AGAIN_MS);
-      }
+      if (!this.unheard.length) return;
+      this.attempt = (this.attempt ?? 0) + 1;
+      const text = JSON.stringify({page: PAGE, attempt: this.attempt, actions: this.unheard});
+      if (write(this.name, text)) this.again = setTimeout(() => this.send(), AGAIN_MS);
     }
 
     // What the server says.

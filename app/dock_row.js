@@ -49,5 +49,15 @@ window.packetmeshDockRow ??= (() => {
     }
   }
 
-  return {DockRow, make};
+  // The way to the server: the hidden text field beside the anchor of that name; false if it is not there.
+  function write(name, text) {
+    const anchor = document.querySelector(`.packetmesh-dock[data-dock="${name}"]`);
+    const input = anchor?.parentElement.nextElementSibling?.querySelector("input");
+    if (!input) return false;
+    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(input, text);
+    input.dispatchEvent(new Event("input", {bubbles: true}));
+    return true;
+  }
+
+  return {DockRow, make, write};
 })();

@@ -4,9 +4,6 @@
 
   const POLL_MS = 50;
   const POLL_TRIES = 1200; // a slow machine takes its time to begin
-  const buttons = () => [...document.querySelectorAll("button")].filter(one => !landing.contains(one));
-  const starting = text => () => buttons().find(one => one.textContent.startsWith(text));
-
   // Do something with what there is to be, once it is there.
   function once(find, act, tries = POLL_TRIES) {
     const found = find();
@@ -25,22 +22,19 @@
     leave();
   }
 
-  function openScene(name) {
-    once(starting(`Open scene ${name}`), button => { button.click(); leave(); });
+  function goTo(place) {
+    once(() => window.packetmeshAddress, address => address.ask(place));
   }
 
-  function openLesson(step, title) {
+  function openLesson(title) {
     const label = `Lesson: ${title}`;
     const seen = element => element.offsetParent !== null;
     const head = () => [...document.querySelectorAll("svg.tabler-icon-chevron-down")]
       .map(arrow => arrow.parentElement).find(one => one.textContent.trim() === label && seen(one));
     const next = folder => () => [...folder.querySelectorAll("button")].find(one => one.textContent === "Next" && seen(one));
-    once(starting(step), button => {
-      button.click();
-      once(head, found => {
-        found.click();
-        once(next(found.parentElement), go => { go.click(); leave(); });
-      });
+    once(head, found => {
+      found.click();
+      once(next(found.parentElement), go => { go.click(); leave(); });
     });
   }
 
@@ -49,8 +43,9 @@
     if (!card) return;
     if ("explore" in card.dataset) return leave();
     landing.style.cursor = "progress";
-    if (card.dataset.scene) openScene(card.dataset.scene);
-    else openLesson(card.dataset.step, card.dataset.title);
+    goTo(card.dataset.place);
+    if ("lesson" in card.dataset) openLesson(card.dataset.lesson);
+    else leave();
   });
   window.addEventListener("keydown", escape, true);
   landing.querySelector("[data-explore]").focus();

@@ -13,11 +13,14 @@ import http
 import ipaddress
 import socket
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from contextlib import AbstractContextManager
+from typing import Any, TypeAlias
 from urllib.parse import urlsplit
 
 from websockets.asyncio import server as websockets_server
 
+Answer: TypeAlias = Callable[[Any, Any], Any]
+"""To a connection and its request: a response, or None to go on to the websocket."""
 REFUSED = "PacketMesh answers only its own page: open the address that it printed when it started.\n"
 
 
@@ -43,23 +46,31 @@ def _names_this_machine(name: str) -> bool:
     return name.lower() in own | {f"{socket.gethostname().lower()}.local"}
 
 
+def only_own_page() -> AbstractContextManager[None]:
+    """Servers that start meanwhile refuse the pages of others."""
+    return answering(_guard)
+
+
 @contextlib.contextmanager
-def only_own_page() -> Iterator[None]:
-    """Servers that start meanwhile refuse the pages of others; viser has no option for it."""
+def answering(change: Callable[[Answer], Answer]) -> Iterator[None]:
+    """Servers that start meanwhile answer requests with what this makes of their own answer.
+
+    Viser has no option for it.
+    """
     serve = websockets_server.serve
 
     @functools.wraps(serve)
-    def guarded(*arguments: Any, process_request: Callable[[Any, Any], Any], **options: Any) -> Any:
-        return serve(*arguments, process_request=_guard(process_request), **options)
+    def changed(*arguments: Any, process_request: Answer, **options: Any) -> Any:
+        return serve(*arguments, process_request=change(process_request), **options)
 
-    setattr(websockets_server, "serve", guarded)  # noqa: B010
+    setattr(websockets_server, "serve", changed)  # noqa: B010
     try:
         yield
     finally:
         setattr(websockets_server, "serve", serve)  # noqa: B010
 
 
-def _guard(answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+def _guard(answer: Answer) -> Answer:
     """The server's own answer to a request, unless it comes from elsewhere."""
 
     def guarded(connection: Any, request: Any) -> Any:

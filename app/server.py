@@ -16,7 +16,7 @@ import viser
 
 from app.drawing.colors import BRAND
 from app.jobs import warm_up
-from app.landing import add_scene_buttons, landing_first
+from app.landing import landing_first
 from app.origin import only_own_page
 from app.pool import ComputePool
 from app.screens.calibrate.panel import CalibratePanel
@@ -98,9 +98,7 @@ def build_server(
     store, shared = Store(str(folder)), SharedViews()
 
     def begin(target: Target, number: int) -> None:
-        session = app.sessions[number] = Session(target, pool, store, shared, spec, PANELS)
-        if not lecture:
-            session.post(add_scene_buttons, session)
+        app.sessions[number] = Session(target, pool, store, shared, spec, PANELS)
 
     if lecture:
         begin(server, -1)

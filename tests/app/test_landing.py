@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import gzip
+import html
 import http.client
 import re
 
 import pytest
 import viser
 
-from app.landing import OPEN, PICTURES, STEP_OF_LESSON, landing_first, landing_html
+from app.address import Place, place_of
+from app.landing import LESSON_PLACES, PICTURES, landing_first, landing_html
 from app.lesson import LESSONS
 from app.server import PANELS
+from app.state import Spec
 from pipeline.io.demos import DEMO_SCENES
+from pipeline.sources import Demo
 
 
 @pytest.fixture(scope="module")
@@ -42,18 +46,26 @@ def test_it_is_in_the_page_of_the_bare_address_only(port):
 
 
 def test_it_offers_every_lesson_and_every_scene_with_a_small_picture():
-    assert set(STEP_OF_LESSON) == {path.stem for path in LESSONS.glob("*.md")}
-    assert set(STEP_OF_LESSON.values()) <= {panel.title for panel in PANELS}
-    names = {*STEP_OF_LESSON, *DEMO_SCENES}
+    assert set(LESSON_PLACES) == {path.stem for path in LESSONS.glob("*.md")}
+    assert {screen for _, screen in LESSON_PLACES.values()} <= {panel.title.lower() for panel in PANELS}
+    assert {scene for scene, _ in LESSON_PLACES.values()} <= set(DEMO_SCENES)
+    names = {*LESSON_PLACES, *DEMO_SCENES}
     assert {path.stem for path in PICTURES.iterdir()} == names
     assert all(path.stat().st_size <= 40_000 for path in PICTURES.iterdir())
     page = landing_html()
     assert page.count("data:image/jpeg") == len(names)
-    assert set(re.findall('data-scene="([^"]+)"', page)) == set(DEMO_SCENES)
-    for name in STEP_OF_LESSON:
+    assert all(f">{scene.title}</span>" in page for scene in DEMO_SCENES.values())
+    for name in LESSON_PLACES:
         title = (LESSONS / f"{name}.md").read_text().splitlines()[0].removeprefix("# ")
         assert f">{title}</span>" in page
 
 
-def test_its_script_presses_the_buttons_that_the_session_adds():
-    assert f"starting(`{OPEN}${{name}}`)" in landing_html()
+def test_every_card_leads_to_a_place_that_an_address_can_name():
+    start = Place(Spec(Demo("office")), "Scene")
+    sources = {name: Demo(name) for name in DEMO_SCENES}
+    titles = tuple(panel.title for panel in PANELS)
+    places = [html.unescape(place) for place in re.findall('data-place="([^"]+)"', landing_html())]
+    found = [place_of(place, start, titles, sources) for place in places]
+    wanted = [(scene, screen) for scene, screen in LESSON_PLACES.values()]
+    wanted += [(name, "scene") for name in DEMO_SCENES]
+    assert [(place.spec.source.name, place.screen.lower()) for place in found] == wanted

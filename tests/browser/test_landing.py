@@ -47,3 +47,12 @@ def test_a_scene_opens(landing):
     landing.get_by_role("button", name="Office").click()
     expect(landing.get_by_label("Scene", exact=True).first).to_have_value("Office", timeout=LONG_MS)
     expect(landing.get_by_role("dialog", name="Welcome")).to_have_count(0)
+
+
+def test_a_lesson_opens_in_the_scene_that_it_speaks_of(landing):
+    """That of calibration needs photographs of a board, which only one scene has."""
+    landing.get_by_role("button", name="How good is my calibration?").click()
+    landing.get_by_text("(1 of 7)").locator("visible=true").wait_for()
+    landing.wait_for_url("**scene=uncalibrated**")
+    landing.get_by_text("Up to date").wait_for()
+    expect(landing.get_by_text("without photographs of a board").locator("visible=true")).to_have_count(0)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-import zipfile
-import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
 from typing import get_args
@@ -15,6 +13,7 @@ import viser
 from app.screens.calibrate.request import shots_of, views_in
 from app.state import BoardViews
 from app.ui import Ui
+from app.zips import opened_zip
 from packetmesh.errors import InputError
 from pipeline.calibration.shots import BOARD_FILE
 from pipeline.config import Pattern
@@ -150,22 +149,16 @@ def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[
 
 
 def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
-    try:
-        with zipfile.ZipFile(io.BytesIO(file.content)) as archive:
-            inside = [
-                one for one in archive.infolist() if one.filename.lower().endswith((*ENDINGS, BOARD_FILE))
-            ]
-            if sum(one.file_size for one in inside) > UNPACKED_LIMIT_BYTES:
-                raise InputError(
-                    f"{file.name} unpacks to more than {UNPACKED_LIMIT_BYTES >> 20} MB; {INSTEAD}."
-                )
-            found = {
-                _place(one.filename, node): archive.read(one)
-                for one in inside
-                if not PurePosixPath(one.filename).name.startswith(".")
-            }
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error):
-        raise InputError(f"{file.name} cannot be read as a ZIP; pack the photographs again.") from None
+    sentence = f"{file.name} cannot be read as a ZIP; pack the photographs again."
+    with opened_zip(io.BytesIO(file.content), sentence) as archive:
+        inside = [one for one in archive.infolist() if one.filename.lower().endswith((*ENDINGS, BOARD_FILE))]
+        if sum(one.file_size for one in inside) > UNPACKED_LIMIT_BYTES:
+            raise InputError(f"{file.name} unpacks to more than {UNPACKED_LIMIT_BYTES >> 20} MB; {INSTEAD}.")
+        found = {
+            _place(one.filename, node): archive.read(one)
+            for one in inside
+            if not PurePosixPath(one.filename).name.startswith(".")
+        }
     if not set(found) - {BOARD_FILE}:
         raise InputError(f"{file.name} holds no PNG or JPEG; try a ZIP of photographs.")
     return found

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import zipfile
-import zlib
 from collections.abc import Generator
 from pathlib import Path
 
 from app.screens.scene.recording import ReadRecording
 from app.state import Spec
 from app.store import Store
+from app.zips import opened_zip
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.importing import is_recording, iterate_import
@@ -62,18 +61,15 @@ def unpack(path: Path, folder: Path) -> None:
     Raises:
         InputError: it cannot be read as a ZIP, or holds too much.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            inside = archive.infolist()
-            size_bytes = sum(one.file_size for one in inside)
-            if len(inside) > MOST_FILES or size_bytes > UNPACKED_LIMIT_BYTES:
-                raise InputError(
-                    f"The ZIP unpacks to {len(inside):,} files of {size_bytes >> 20:,} MB; the app takes up "
-                    f"to {MOST_FILES:,} of {UNPACKED_LIMIT_BYTES >> 20:,} MB, so {INSTEAD}."
-                )
-            archive.extractall(folder)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error, ValueError):
-        raise InputError("The file cannot be read as a ZIP; pack the recording again.") from None
+    with opened_zip(path, "The file cannot be read as a ZIP; pack the recording again.") as archive:
+        inside = archive.infolist()
+        size_bytes = sum(one.file_size for one in inside)
+        if len(inside) > MOST_FILES or size_bytes > UNPACKED_LIMIT_BYTES:
+            raise InputError(
+                f"The ZIP unpacks to {len(inside):,} files of {size_bytes >> 20:,} MB; the app takes up "
+                f"to {MOST_FILES:,} of {UNPACKED_LIMIT_BYTES >> 20:,} MB, so {INSTEAD}."
+            )
+        archive.extractall(folder)
 
 
 def _imported(path: Path, rig: Path) -> Generator[Progress, None, ReadRecording]:

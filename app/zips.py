@@ -1,0 +1,38 @@
+"""ZIP files that people upload."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from packetmesh.errors import InputError
+
+_BROKEN = (
+    zipfile.BadZipFile,
+    NotImplementedError,  # compressed in a way that Python does not know
+    RuntimeError,  # encrypted
+    EOFError,
+    OSError,
+    ValueError,
+    zlib.error,
+)
+
+
+@contextmanager
+def opened_zip(file: Path | BinaryIO, sentence: str) -> Iterator[zipfile.ZipFile]:
+    """A ZIP to read from.
+
+    Raises:
+        InputError: with that sentence, where it or what is in it cannot be read.
+    """
+    try:
+        with zipfile.ZipFile(file) as archive:
+            yield archive
+    except InputError:
+        raise
+    except _BROKEN:
+        raise InputError(sentence) from None
