@@ -9,7 +9,6 @@
   const TYPING = "input:not([type=checkbox]), textarea, select, [role=slider], [role=dialog], [contenteditable=true]";
   const PRESSED_BY_SPACE = "button, input";
   const EDGE_PX = 16; // between the card and the picture's edges
-  const WIDTH = 0.55; // of the picture, at most
   const FOLDERS_MS = 600; // until the folders of a stop are open
 
   const card = Object.assign(document.createElement("div"), {className: "packetmesh-lesson-card"});
@@ -48,23 +47,39 @@
     button(KEYS[event.key])?.click();
   }, true);
 
-  // The text stands in the control panel, before the buttons; what is large is a copy.
+  // The text stands in the control panel, before the buttons; what is large is a copy of what a class needs, as
+  // low a strip as it can be, for below it is what the lesson speaks of.
   function show() {
     waiting = false;
     if (!mark?.isConnected) frame([]);
     const canvas = document.querySelector("canvas[data-engine]");
     const text = mark?.isConnected && "large" in mark.dataset && canvas ? written() : null;
     if (!text) return card.remove();
-    const changed = card.innerHTML !== text.innerHTML;
-    const answered = changed && card.firstElementChild?.textContent === text.firstElementChild?.textContent;
-    if (changed) card.innerHTML = text.innerHTML;
+    const html = strip([...text.children]);
+    const changed = card.innerHTML !== html;
+    if (changed) card.innerHTML = html;
     const {left, top, width, height} = canvas.getBoundingClientRect();
     Object.assign(card.style, {
-      left: `${left + EDGE_PX}px`, top: `${top + EDGE_PX}px`, maxWidth: `${WIDTH * width}px`,
+      left: `${left + EDGE_PX}px`, top: `${top + EDGE_PX}px`, maxWidth: `${width - 2 * EDGE_PX - 1}px`,
       maxHeight: `${height - 2 * EDGE_PX}px`,
     });
     if (!card.isConnected) document.body.append(card);
-    if (changed) card.scrollTop = answered ? card.scrollHeight : 0; // the answer stands last
+    if (changed) card.scrollTop = 0;
+  }
+
+  // Before a guess the title, the question and its choices; then the question, what is right and why.
+  function strip(parts) {
+    const asked = parts.findIndex((one, index) => index > 0 && isQuestion(one));
+    const right = parts.flatMap(one => [...one.querySelectorAll("li")]).find(one => one.textContent.trim().startsWith("✓"));
+    const kept = parts.filter((one, index) => right ? index >= asked && !one.contains(right) : index === 0 || index >= asked);
+    if (right) kept.splice(1, 0, Object.assign(document.createElement("p"), {textContent: right.textContent.trim()}));
+    return kept.map(one => one.outerHTML).join("");
+  }
+
+  // A paragraph that is bold from end to end.
+  function isQuestion(one) {
+    const bold = one.querySelector(":scope > strong, :scope > b");
+    return one.matches("p") && bold !== null && bold.textContent.trim() === one.textContent.trim();
   }
 
   function written() {

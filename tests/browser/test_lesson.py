@@ -99,6 +99,7 @@ def test_large_text_lies_over_the_picture_and_follows(page):
     expect(card).to_contain_text("(1 of 10)")
     page.keyboard.press("3")
     expect(card).to_contain_text(RIGHT)
+    expect(card).not_to_contain_text("(1 of 10)")  # no more than is needed lies over the picture
     ball = page.locator(".packetmesh-here")
     expect(ball).to_have_count(1)
     expect(ball).to_contain_text("Watch the ball roll")
