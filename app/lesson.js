@@ -108,11 +108,12 @@
   window.addEventListener("resize", show);
 
   window.packetmeshLesson = {
-    // A stop is shown whose mark holds this image: the keys are its own, also after its list was used.
+    // A stop is shown whose mark holds this image: the keys are its own, also after its list was used. A list
+    // that somebody has opened again meanwhile stays open.
     at(image, titles) {
       mark = image.closest(".packetmesh-lesson");
       give(false);
-      if (document.activeElement?.matches("input")) document.activeElement.blur();
+      if (document.activeElement?.matches("input:not([aria-expanded=true])")) document.activeElement.blur();
       show();
       setTimeout(frame, FOLDERS_MS, titles);
     },
