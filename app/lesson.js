@@ -13,16 +13,25 @@
 
   const card = Object.assign(document.createElement("div"), {className: "packetmesh-lesson-card"});
   let mark = null; // of the lesson whose stop was shown last
+  let folder = null; // that it stands in
   let docked = false; // whether a hand was last on the dock
   let waiting = false; // for the next frame
 
-  // The folder of the lesson: the nearest around its mark that has its buttons.
+  function buttons(around) {
+    return [...around.querySelectorAll("button")];
+  }
+
+  // The folder of a lesson: the nearest around its mark that has its buttons.
+  function folderOf(mark) {
+    let around = mark.parentElement;
+    while (around && !buttons(around).some(one => one.textContent === "Next")) around = around.parentElement;
+    return around;
+  }
+
+  // One that is seen of the lesson that is shown. Between two stops there is a new mark before it is told of.
   function button(name) {
-    for (let around = mark?.isConnected ? mark.parentElement : null; around; around = around.parentElement) {
-      const buttons = [...around.querySelectorAll("button")];
-      if (buttons.some(one => one.textContent === "Next"))
-        return buttons.find(one => one.textContent === name && one.offsetParent !== null);
-    }
+    if (!folder?.isConnected || !folder.querySelector(".packetmesh-lesson")) return undefined;
+    return buttons(folder).find(one => one.textContent === name && one.offsetParent !== null);
   }
 
   function give(toDock) {
@@ -112,6 +121,7 @@
     // that somebody has opened again meanwhile stays open.
     at(image, titles) {
       mark = image.closest(".packetmesh-lesson");
+      folder = folderOf(mark);
       give(false);
       if (document.activeElement?.matches("input:not([aria-expanded=true])")) document.activeElement.blur();
       show();
