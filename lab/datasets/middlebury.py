@@ -17,7 +17,7 @@ from lab.datasets.pair import Load, Pair
 from packetmesh.errors import InputError
 from packetmesh.files import read_text
 from pipeline.io.images import read_color
-from pipeline.types import FloatArray
+from pipeline.types import CameraIntrinsics, FloatArray
 
 _NUMBER = r"(-?[\d.]+(?:e[-+]?\d+)?)"
 
@@ -25,6 +25,8 @@ _NUMBER = r"(-?[\d.]+(?:e[-+]?\d+)?)"
 ARCHIVE, ARCHIVE_PICTURE = "motorcycle_disp.npz", "motorcycle_left.png"
 MOTORCYCLE = (994.978, 0.193001, 31.086)
 """Focal length, baseline and offset of the quarter-size pictures in scikit-image (data.stereo_motorcycle)."""
+MOTORCYCLE_CENTER_PX = (311.193, 254.877)
+"""The left camera's principal point, from the same place."""
 
 
 def find(root: Path) -> list[Load]:
@@ -54,7 +56,10 @@ def _load_motorcycle(file: Path) -> Pair:
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         raise InputError(f"The disparities {file} are damaged; try scikit-image's file again") from None
     picture = file.with_name(ARCHIVE_PICTURE)
-    return Pair(picture, read_color(picture), depth_m(disparity_px, *MOTORCYCLE))
+    rgb, z_m = read_color(picture), depth_m(disparity_px, *MOTORCYCLE)
+    focal_px, height, width = MOTORCYCLE[0], *z_m.shape
+    camera = CameraIntrinsics.pinhole(focal_px, focal_px, *MOTORCYCLE_CENTER_PX, width, height)
+    return Pair(picture, rgb, z_m, camera=camera)
 
 
 def depth_m(disparity_px: FloatArray, focal_px: float, baseline_m: float, doffs_px: float) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.io.images import read_color, read_depth
-from pipeline.types import BoolArray, ByteArray, FloatArray
+from pipeline.types import BoolArray, ByteArray, CameraIntrinsics, FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +25,8 @@ class Pair:
     """(H, W) float32, metres along the optical axis, NaN where unknown."""
     judged: BoolArray | None = None
     """(H, W) the pixels that this set's evaluations compare; None when all of them."""
+    camera: CameraIntrinsics | None = None
+    """Of the picture, where the set's reader knows it."""
 
     def __post_init__(self) -> None:
         """Raise InputError for depth of another size than the picture's."""

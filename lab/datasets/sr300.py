@@ -42,7 +42,7 @@ def _load(extrinsics: Path, picture: Path, depth: Path) -> Pair:
     color_camera = _camera(extrinsics.with_name("chateau.xml"), grey.shape)
     depth_camera = _camera(extrinsics.with_name("chateau_depth.xml"), z_m.shape)
     truth_m = registered(z_m, depth_camera, color_camera, np.linalg.inv(_pose(extrinsics)))
-    return Pair(picture, np.repeat(grey[..., None], 3, axis=2), truth_m)
+    return Pair(picture, np.repeat(grey[..., None], 3, axis=2), truth_m, camera=color_camera)
 
 
 def registered(
