@@ -105,8 +105,9 @@ class DepthConfig:
     colour network's aligned depth; auto completes unless a network of one's own is named."""
     reach: float = 0.1
     """How far from measured pixels inferred depth counts, as a share of the image's diagonal."""
-    least_confidence: float = 0.0
-    """Inferred depth that is believed less does not count, 0 to 1."""
+    least_confidence: float = 0.5
+    """Inferred depth that is believed less does not count, 0 to 1: what is more likely wrong than right makes
+    skirts from objects to what stands behind them (``python tests/benchmarks/least_confidence.py``)."""
 
     def of_network(self) -> DepthConfig:
         """Only the settings of the network itself, which is all that its inference depends on."""
@@ -245,7 +246,7 @@ PRESETS: dict[str, PipelineConfig] = {
     "packetmesh": PipelineConfig(),
     "thesis": PipelineConfig(
         acquisition=AcquisitionConfig(outlier_mode="thesis", average=False),
-        depth=DepthConfig(crop=True, alignment="median", fill="network"),
+        depth=DepthConfig(crop=True, alignment="median", fill="network", least_confidence=0.0),
         inferred_registration=RegistrationConfig(method="ceicp-n", metric="point"),
         node_registration=RegistrationConfig(method="ceicp-n", metric="point"),
         fusion=FusionConfig(mode="union", align_nodes_with="fused", register_inferred=True),

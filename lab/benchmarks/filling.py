@@ -136,7 +136,7 @@ def without(hole: BoolArray, place: str, group: str, rgb: ByteArray, depth: Dept
 
 def chain_filling(infer: Callable[[ByteArray], DepthMap], completes: bool) -> Filler:
     """Depth as the chain fills it with what ``infer`` makes of the colours, with or without completion."""
-    config = DepthConfig()
+    config = DepthConfig(least_confidence=0.0)  # every hidden pixel counts
 
     def fill(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
         aligned = align_depth(infer(rgb), sensor, config.alignment)

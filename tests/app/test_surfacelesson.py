@@ -173,7 +173,7 @@ def test_r_F_uses_nine_points_in_ten_and_leaves_much_open_and_the_thesis_closes_
     look, _ = stop_named("A ball of r_F")
     least = room.roll(look, room.fused)
     assert 0.07 < unused(least, room.fused) < 0.12
-    assert 0.41 < missed(least) < 0.46
+    assert 0.38 < missed(least) < 0.42
     look, text = stop_named("The thesis's radii")
     thesis = room.roll(look, room.fused)
     largest_m = room.r_F_m + room.sigma_D_m
@@ -219,7 +219,7 @@ def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, fo
     noisy = clouds(room.rig, room.nodes, room.poses, look.smoothing_passes)
     torn = noisy.roll(look, noisy.fused)
     assert missed(torn) > 1.1 * missed(four_balls)
-    assert 1.4 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 1.6
+    assert 1.2 < torn.quality.hole_area_m2 / four_balls.quality.hole_area_m2 < 1.45
     old_normals = room.roll(look, replace(room.fused, normals=noisy.fused.normals))
     new_normals = noisy.roll(look, replace(noisy.fused, normals=room.fused.normals))
     assert missed(old_normals) <= missed(four_balls) < missed(torn) <= missed(new_normals)
