@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -37,6 +37,9 @@ CHOICES = 3
 """Of every question; they are the keys 1, 2 and 3."""
 GUESS = f"Take a guess: 1, 2 or 3. Or press **{SKIP}**."
 FIRST = "**Guess before you go on: 1, 2 or 3.** A wrong guess costs nothing. Or press **Skip**."
+VOTING = f"The class votes: 1, 2 or 3. A guess of the teacher's, or **{SKIP}**, shows the answer."
+BAR = 12
+"""Blocks of a bar that holds all votes."""
 KEYS = (
     "<span><b>→</b> or <b>space</b> next, <b>←</b> back, <b>1 2 3</b> guess, <b>S</b> skip. "
     "Click the dock, and the keys are the dock's.</span>"
@@ -205,6 +208,9 @@ class LessonFolder(Generic[Look]):
         self._lesson, self._on_stop = lesson, on_stop
         self._names = [f"{i}. {stop.title}" for i, stop in enumerate(lesson.stops, 1)]
         self._guesses: dict[int, int] = {}
+        self._votes: dict[int, dict[int, int]] = {}
+        """By stop and voter."""
+        self._lecture = ui.lecture
         with ui.gui.add_folder(f"Lesson: {lesson.title}", expand_by_default=False):
             self._stop = ui.gui.add_dropdown(
                 "Stop",
@@ -213,7 +219,9 @@ class LessonFolder(Generic[Look]):
             )
             ui.when_changed(self._stop, self._picked)
             self._large = ui.gui.add_checkbox(
-                "Large", ui.shared, hint="Shows the text large over the picture, for a room to read."
+                "Large",
+                ui.lecture is not None,
+                hint="Shows the text large over the picture, for a room to read.",
             )
             ui.when_changed(self._large, self._point_out)
             self._text = ui.gui.add_markdown(BEGIN)
@@ -252,11 +260,14 @@ class LessonFolder(Generic[Look]):
         index = self._index()
         if index < 0:
             self._guesses.clear()
+            self._votes.clear()
             self._text.content, self._guess.visible = BEGIN, False
+            self._poll()
             self._point_out()
             return
         stop = self._lesson.stops[index]
-        self._write(GUESS)
+        self._write(self._asking())
+        self._poll()
         self._on_stop(stop.look)
         self._point_out()
 
@@ -278,7 +289,22 @@ class LessonFolder(Generic[Look]):
         """Answer a guess; the first one counts."""
         if self._waits():
             self._guesses[self._index()] = guess
-            self._write(GUESS)
+            self._write(self._asking())
+            self._poll()
+
+    def _voted(self, voter: int, vote: int) -> None:
+        """Count a vote of the class; the last one of each counts, until the answer is shown."""
+        if self._waits():
+            self._votes.setdefault(self._index(), {})[voter] = vote - 1
+            self._write(self._asking())
+
+    def _poll(self) -> None:
+        """Have the class vote while the stop waits for an answer."""
+        if self._lecture is not None:
+            self._lecture.poll(self._voted if self._waits() else None)
+
+    def _asking(self) -> str:
+        return GUESS if self._lecture is None else VOTING
 
     def _write(self, waiting: str) -> None:
         """Show the stop; ``waiting`` stands where the answer will be."""
@@ -286,9 +312,28 @@ class LessonFolder(Generic[Look]):
         stop = self._lesson.stops[index]
         lines = [f"**{stop.title}** ({index + 1} of {len(self._names)})", stop.text]
         if stop.question is not None:
-            lines += [f"**{stop.question.text}**", *told(stop.question, self._guesses.get(index), waiting)]
+            asked = with_votes(stop.question, self._votes.get(index, {}).values())
+            lines += [f"**{stop.question.text}**", *told(asked, self._guesses.get(index), waiting)]
         self._text.content = "\n\n".join(lines)
         self._guess.visible = self._waits()
+
+
+def with_votes(question: Question, votes: Collection[int]) -> Question:
+    """The question with a bar and a count behind each choice, once anybody has voted.
+
+    Args:
+        question: what is asked.
+        votes: indices of choices.
+    """
+    if not votes:
+        return question
+    counts = [sum(vote == index for vote in votes) for index in range(CHOICES)]
+    bars = ("█" * round(BAR * count / len(votes)) for count in counts)
+    choices = (
+        replace(choice, text=f"{choice.text} {bar} **{count}**".replace("  ", " "))
+        for choice, bar, count in zip(question.choices, bars, counts, strict=True)
+    )
+    return replace(question, choices=tuple(choices))
 
 
 def told(question: Question, guess: int | None, waiting: str) -> list[str]:

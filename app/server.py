@@ -9,6 +9,7 @@ import os
 import shutil
 import socket
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import viser
 from app.drawing.colors import BRAND
 from app.jobs import warm_up
 from app.landing import landing_first
+from app.lecture import Lecture
 from app.origin import only_own_page
 from app.pool import ComputePool
 from app.screens.calibrate.panel import CalibratePanel
@@ -29,11 +31,14 @@ from app.screens.surface.panel import SurfacePanel
 from app.session import Session, Target
 from app.state import SharedViews, Spec
 from app.store import Store
+from app.teacher import Token
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Demo, RigFolder
 
 PANEL_WIDTH_PX = 440
+ANYWHERE = "0.0.0.0"
+"""As a host: all addresses of this machine."""
 PANELS = (ScenePanel, CalibratePanel, DepthPanel, FusePanel, SurfacePanel, NetworkPanel, ExportPanel)
 """The steps of the app, in their order."""
 
@@ -46,12 +51,27 @@ class AppServer:
     pool: ComputePool
     folder: Path
     sessions: dict[int, Session] = field(default_factory=dict)
+    teacher: Token | None = None
+    """Of a lecture."""
 
     @property
     def url(self) -> str:
-        """Where a browser finds it."""
-        host = self.viser_server.get_host()
-        return f"http://{'127.0.0.1' if host == '0.0.0.0' else host}:{self.viser_server.get_port()}"
+        """Where a browser of this machine finds it."""
+        return self._at(lambda: "127.0.0.1")
+
+    @property
+    def class_url(self) -> str:
+        """Where browsers of other machines find it, if it listens to them."""
+        return self._at(own_address)
+
+    @property
+    def teacher_url(self) -> str:
+        """By which the teacher of a lecture comes."""
+        return f"{self.url}/{self.teacher.query if self.teacher is not None else ''}"
+
+    def _at(self, anywhere: Callable[[], str]) -> str:
+        host, port = self.viser_server.get_host(), self.viser_server.get_port()
+        return f"http://{anywhere() if host == ANYWHERE else host}:{port}"
 
     def stop(self) -> None:
         """End all sessions and processes."""
@@ -77,7 +97,7 @@ def build_server(
         config: settings to start with; None takes the preset ``packetmesh``.
         host: address to listen on.
         port: port to listen on; 0 lets the system choose one.
-        lecture: share one session among all browsers.
+        lecture: share one session among all browsers, steered by those who come by ``teacher_url``.
 
     Raises:
         InputError: the port is taken or the address is not this machine's.
@@ -87,21 +107,25 @@ def build_server(
     spec = start_spec(scene, config or PipelineConfig())
     folder = Path(tempfile.mkdtemp(prefix="packetmesh-"))
     pool = ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
-    landing = contextlib.nullcontext() if lecture else landing_first()
-    with contextlib.redirect_stdout(io.StringIO()), landing, only_own_page():
+    teacher = Token() if lecture else None
+    entrance = landing_first() if teacher is None else teacher.accepted()
+    with contextlib.redirect_stdout(io.StringIO()), entrance, only_own_page():
         server = viser.ViserServer(host=host, port=port, label="PacketMesh", verbose=False)
-    app = AppServer(server, pool, folder)
+    app = AppServer(server, pool, folder, teacher=teacher)
     if port and server.get_port() != port:
         app.stop()
         raise InputError(_taken(port))
     _dress(server)
     store, shared = Store(str(folder)), SharedViews()
 
-    def begin(target: Target, number: int) -> None:
-        app.sessions[number] = Session(target, pool, store, shared, spec, PANELS)
+    def begin(target: Target, number: int, lecture: Lecture | None = None) -> Session:
+        app.sessions[number] = Session(target, pool, store, shared, spec, PANELS, lecture)
+        return app.sessions[number]
 
-    if lecture:
-        begin(server, -1)
+    if teacher is not None:
+        together = Lecture(server, teacher, app.class_url)
+        session = begin(server, -1, together)
+        together.begin(session.post, lambda: session.frame_view(anew=True))
     else:
         server.on_client_connect(lambda client: begin(client, client.client_id))
 
@@ -119,6 +143,16 @@ def start_spec(scene: str, config: PipelineConfig) -> Spec:
     preset = next((name for name, known in PRESETS.items() if known == config), "packetmesh")
     source = RigFolder(str(Path(scene).resolve())) if Path(scene).is_dir() else Demo(scene)
     return Spec(source, preset, config)
+
+
+def own_address() -> str:
+    """The address by which other machines of the network reach this one; loopback if it has none."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # sends nothing, but is told which way it would go
+            return str(probe.getsockname()[0])
+        except OSError:
+            return "127.0.0.1"
 
 
 def _check_address(host: str, port: int) -> None:

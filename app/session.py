@@ -18,6 +18,7 @@ from app import jobs
 from app.address import Address, Place
 from app.drawing.cameras import look, stage_of
 from app.drawing.colors import BRAND, DELIVERED
+from app.lecture import Lecture
 from app.page import add_script
 from app.pool import ComputePool, LatestWins, Outcome
 from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
@@ -62,11 +63,11 @@ class Session:
         shared: SharedViews,
         spec: Spec,
         panels: Sequence[type[Panel]],
+        lecture: Lecture | None = None,
     ) -> None:
         self.target = target
         self.gui, self.scene = target.gui, target.scene
-        shared_ui = isinstance(target, viser.ViserServer)
-        self.ui = Ui(target.gui, target.scene, self.post, target.atomic, target.flush, shared=shared_ui)
+        self.ui = Ui(target.gui, target.scene, self.post, target.atomic, target.flush, lecture=lecture)
         self.store = store
         self._shared = shared
         self.spec = spec
@@ -112,14 +113,15 @@ class Session:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def clients(self) -> Iterable[viser.ClientHandle]:
-        """The browsers that show this session."""
+        """The browsers whose view is this session's to turn."""
         if isinstance(self.target, viser.ViserServer):
-            return self.target.get_clients().values()
+            return self.ui.lecture.followers() if self.ui.lecture is not None else ()
         return [self.target]
 
     def notify(self, title: str, sentence: str, color: Any = "red") -> None:
         """Tell the people who watch."""
-        for client in self.clients():
+        everybody = self.clients() if self.ui.lecture is None else self.ui.lecture.everybody()
+        for client in everybody:
             client.add_notification(title, sentence, color=color, auto_close_seconds=15.0)
 
     # What panels ask of it, on its thread.

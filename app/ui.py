@@ -19,6 +19,7 @@ from packetmesh.errors import InputError
 from pipeline.types import FloatArray
 
 if TYPE_CHECKING:
+    from app.lecture import Lecture
     from app.session import Session
 
 Input = TypeVar("Input", bound="viser.GuiInputHandle[Any]")
@@ -38,8 +39,8 @@ class Ui:
     """Sends it now."""
     closers: list[Callable[[], None]] = field(default_factory=list)
     """What ends the timers and threads of the screens."""
-    shared: bool = False
-    """Whether all browsers see the same, as in a lecture."""
+    lecture: Lecture | None = None
+    """Whose browsers all see the same."""
 
     def when_changed(self, handle: Input, action: Callable[[], object]) -> Input:
         """The handle, whose changes by a person, not by the program, cause ``action``."""

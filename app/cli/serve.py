@@ -11,6 +11,8 @@ from app.cli.text import say
 from packetmesh.settings import config_named
 from pipeline.config import PRESETS
 
+ALONE = ", from this machine only; --host 0.0.0.0 lets others in"
+
 
 def serve(
     scene: str = "living-room",
@@ -28,7 +30,8 @@ def serve(
         host: Address to listen on; other machines can reach only what is not loopback.
         port: Port to listen on.
         open: Open a browser window.
-        lecture: Share one session among all browsers instead of one each.
+        lecture: Share one session among all browsers: who has the teacher's link steers, the class follows,
+            votes and looks around.
     """
     from app.server import build_server
 
@@ -37,9 +40,13 @@ def serve(
         signal.signal(number, lambda *_: stopped.set())
     app = build_server(scene, config_named(preset, PRESETS), host, port, lecture)
     try:
-        say(f"PacketMesh is at {app.url} (stop with Ctrl-C)")
+        if lecture:
+            say(f"You teach at {app.teacher_url} (keep it to yourself; stop with Ctrl-C)")
+            say(f"The class comes to {app.class_url}" + ALONE * (app.class_url == app.url))
+        else:
+            say(f"PacketMesh is at {app.url} (stop with Ctrl-C)")
         if open:
-            webbrowser.open(app.url)
+            webbrowser.open(app.teacher_url if lecture else app.url)
         stopped.wait()
     finally:
         app.stop()

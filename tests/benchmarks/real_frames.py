@@ -31,9 +31,7 @@ HEAD = ("set", "frames", "kept", "within 2 %", "within 5 %", "rays without", "gu
 def frames_of(spec: str) -> Iterator[RgbdFrame]:
     for pair in open_set(spec):
         if pair.camera is None:
-            raise InputError(
-                f"Nothing says which camera took {pair.picture}; try sr300 or middlebury"
-            )
+            raise InputError(f"Nothing says which camera took {pair.picture}; try sr300 or middlebury")
         yield RgbdFrame(pair.picture.stem, pair.rgb, DepthMap(pair.truth_m), pair.camera, np.eye(4))
 
 

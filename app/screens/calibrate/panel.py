@@ -390,9 +390,10 @@ class CalibratePanel(Panel):
         if camera is None or camera.calibration is None or around == "rig":
             self._framed = ()
             return False
-        framed = (camera.name, around, len(camera.photographs))
+        clients = list(self.session.clients())
+        framed = (camera.name, around, len(camera.photographs), *(client.client_id for client in clients))
         if framed != self._framed:
             self._framed, stage = framed, place_of(camera, around)
-            for client in self.session.clients():
+            for client in clients:
                 stand_before(client, stage)
         return True

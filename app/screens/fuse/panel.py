@@ -76,7 +76,7 @@ class FusePanel(Panel):
         self._drawn: Start = Start()
         self._gizmo: Any = None
         self._seek_at: int | None = 0
-        self._framed: tuple[float, ...] = ()
+        self._framed: tuple[tuple[int, float], ...] = ()
         self._fov_rad: float | None = None
         self._here = False
         self._seen: tuple[int, ...] = ()
@@ -312,7 +312,7 @@ class FusePanel(Panel):
             self._widen()
             return False
         clients = list(self.session.clients())
-        shape = tuple(round(client.camera.aspect, 2) for client in clients)
+        shape = tuple((client.client_id, round(client.camera.aspect, 2)) for client in clients)
         if shape != self._framed and clients:
             if self._fov_rad is None:
                 self._fov_rad = clients[0].camera.fov

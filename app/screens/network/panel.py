@@ -66,7 +66,7 @@ class NetworkPanel(Panel):
         self._frames: list[Frames] = []
         self._drawing: DeliveryDrawing | NetworkDrawing | None = None
         self._drawn = 0
-        self._framed: tuple[float, ...] = ()
+        self._framed: tuple[tuple[int, float], ...] = ()
         self._visited = self._streaming = self._here = False
         self._moment_s = 0.0
         self._resting = ui.debounce(REST_S, self._run)
@@ -156,7 +156,7 @@ class NetworkPanel(Panel):
     def look(self) -> bool:
         """Turn the view to the cameras and the room, or the streets, once for each shape of the window."""
         clients = list(self.session.clients())
-        shape = tuple(round(client.camera.aspect, 1) for client in clients)
+        shape = tuple((client.client_id, round(client.camera.aspect, 1)) for client in clients)
         if self._drawing is None or shape == self._framed:
             return True
         self._framed = shape
