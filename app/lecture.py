@@ -77,7 +77,7 @@ class Lecture:
 
     def followers(self) -> list[viser.ClientHandle]:
         """The browsers whose view is turned for them."""
-        return [seat.client for seat in self._seats.values() if seat.follows]
+        return [seat.client for seat in self._present() if seat.follows]
 
     def everybody(self) -> Iterable[viser.ClientHandle]:
         """All browsers."""
@@ -86,7 +86,7 @@ class Lecture:
     def poll(self, count: Count | None) -> None:
         """Have the class vote, or no longer; what they voted before is dropped."""
         self._count_vote = count
-        for seat in self._seats.values():
+        for seat in self._present():
             seat.vote = 0
             self._show(seat)
 
@@ -113,7 +113,12 @@ class Lecture:
         self._count()
 
     def _leader(self) -> _Seat | None:
-        return next((seat for seat in self._seats.values() if seat.teaches), None)
+        return next((seat for seat in self._present() if seat.teaches), None)
+
+    def _present(self) -> list[_Seat]:
+        """All but those who have just gone, to whom nothing more can be said."""
+        there = self._server.get_clients()
+        return [seat for number, seat in self._seats.items() if number in there]
 
     def _catch_up(self, seat: _Seat) -> None:
         """Turn a browser to what the class sees."""
@@ -131,7 +136,7 @@ class Lecture:
 
     def _lead(self, leader: _Seat) -> None:
         self._leading = False
-        for seat in list(self._seats.values()):
+        for seat in self._present():
             if seat is not leader and seat.follows:
                 _turn_as(leader.client, seat.client)
 
@@ -161,14 +166,14 @@ class Lecture:
 
     def _let_steer(self, all_steer: bool) -> None:
         self._all_steer = all_steer
-        for seat in self._seats.values():
+        for seat in self._present():
             self._show(seat)
 
     def _count(self) -> None:
         following = sum(seat.follows for seat in self._seats.values() if not seat.teaches)
         size = self.class_size
         told = f"**{size}** in the class, **{following}** of them follow your view."
-        for seat in self._seats.values():
+        for seat in self._present():
             seat.tell(told if size else "**Nobody is in the class yet.**")
 
     def _add_chip(self, seat: _Seat) -> None:

@@ -6,13 +6,21 @@ import base64
 
 import cv2
 
+from pipeline.types import ByteArray
+
 SIDE_PX = 360
+PX_PER_MODULE = 8
+
+
+def modules_of(text: str) -> ByteArray:
+    """(N, N) the text as a QR code, 0 for dark, with a quiet zone of four modules."""
+    encoded = cv2.QRCodeEncoder.create().encode(text)  # with two
+    return cv2.copyMakeBorder(encoded, 2, 2, 2, 2, cv2.BORDER_CONSTANT, value=(255,))
 
 
 def qr_html(text: str) -> str:
-    """An image of the text as a QR code, with a quiet zone of four modules (two are the encoder's)."""
-    modules = cv2.QRCodeEncoder.create().encode(text)
-    quiet = cv2.copyMakeBorder(modules, 2, 2, 2, 2, cv2.BORDER_CONSTANT, value=(255,))
-    png = cv2.imencode(".png", cv2.resize(quiet, None, fx=8, fy=8, interpolation=cv2.INTER_NEAREST))[1]
-    data = base64.b64encode(png.tobytes()).decode()
+    """An image of the text as a QR code."""
+    modules = modules_of(text)
+    picture = cv2.resize(modules, None, fx=PX_PER_MODULE, fy=PX_PER_MODULE, interpolation=cv2.INTER_NEAREST)
+    data = base64.b64encode(cv2.imencode(".png", picture)[1].tobytes()).decode()
     return f'<img alt="QR code of {text}" width="{SIDE_PX}" src="data:image/png;base64,{data}">'

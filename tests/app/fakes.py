@@ -195,7 +195,7 @@ class Bench:
         self.refuse = ""
         """Why nothing can be computed now."""
         camera = SimpleNamespace(aspect=1.5, fov=0.9, position=None, look_at=None)
-        self.client = SimpleNamespace(camera=camera, atomic=contextlib.nullcontext)
+        self.client = SimpleNamespace(client_id=0, camera=camera, atomic=contextlib.nullcontext)
         self.panel = panel(self)
         self.ui.scene.add_frame(panel.drawn_below, show_axes=False)
         self.panel.build()

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hands import ALIKE, STEPS, TEXTS, canvas, changed_from, differing, go, slider
+from tests.browser.hands import ALIKE, STEPS, canvas, changed_from, differing, go, slider
 
 
 def test_all_of_these_run_on_one_worker(request):
@@ -146,25 +146,3 @@ def test_a_closed_browser_leaves_no_session(page, browser, app):
     while set(app.sessions) != known and time.monotonic() < deadline:
         page.wait_for_timeout(100)
     assert set(app.sessions) == known
-
-
-@pytest.fixture
-def lecture(browser):
-    from app.server import build_server
-
-    app = build_server("box-on-table", port=0, lecture=True)
-    yield app
-    app.stop()
-
-
-def test_a_lecture_is_one_session_for_all(lecture, browser):
-    pages = []
-    for _ in range(2):
-        page = browser.new_context(viewport={"width": 700, "height": 480}).new_page()
-        page.set_default_timeout(60_000)
-        page.goto(lecture.url)
-        pages.append(page)
-    go(pages[0], "Export")
-    pages[1].get_by_text(TEXTS["Export"]).wait_for()
-    for page in pages:
-        page.context.close()

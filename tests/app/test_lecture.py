@@ -1,0 +1,158 @@
+"""Lectures: who steers, who follows, and whose votes are counted."""
+
+import http.client
+from contextlib import closing
+from urllib.parse import urlsplit
+
+import cv2
+import numpy as np
+import pytest
+
+from app.lesson import Choice, Question, told, with_votes
+from app.qr import modules_of, qr_html
+from app.server import build_server
+from app.teacher import Token
+from tests.app.connections import Connection, wait_for
+
+pytestmark = pytest.mark.xdist_group("lecture")  # one worker starts the server once
+CLASS = 30
+
+
+@pytest.fixture(scope="module")
+def lecture():
+    app = build_server("box-on-table", port=0, lecture=True)
+    yield app
+    app.stop()
+
+
+@pytest.fixture(scope="module")
+def cookie(lecture):
+    return answer(lecture.teacher_url).headers["Set-Cookie"].partition(";")[0]
+
+
+def answer(url):
+    """The server's own answer, no redirection followed."""
+    parts = urlsplit(url)
+    with closing(http.client.HTTPConnection(parts.netloc)) as connection:
+        connection.request("GET", f"{parts.path or '/'}?{parts.query}")
+        response = connection.getresponse()
+        response.text = response.read().decode()
+        return response
+
+
+@pytest.fixture
+def teacher(lecture, cookie):
+    with closing(Connection(lecture.url, cookie)) as one:
+        wait_for(lambda: "The class may steer" in one.uuids)
+        yield one
+        one.set("The class may steer", False)
+
+
+@pytest.fixture
+def student(lecture, teacher):
+    with closing(Connection(lecture.url)) as one:
+        wait_for(lambda: "Seat" in one.uuids)
+        yield one
+
+
+def test_the_teachers_link_gives_a_cookie_and_leaves_no_token_in_the_address(lecture):
+    response = answer(lecture.teacher_url)
+    assert (response.status, response.headers["Location"]) == (303, "/")
+    assert "HttpOnly" in response.headers["Set-Cookie"]
+    assert "SameSite=Strict" in response.headers["Set-Cookie"]
+
+
+def test_another_token_is_refused_in_one_sentence_and_none_gives_the_page(lecture):
+    wrong = answer(f"{lecture.url}/?teacher=x")
+    assert (wrong.status, wrong.text.count(".")) == (403, 1)
+    assert "Set-Cookie" not in wrong.headers
+    assert answer(lecture.url).status == 200
+
+
+@pytest.mark.parametrize(
+    "cookies", ["", "{name}=x", "other={text}", "{name}=", "{name}={text}x", "@\x00;;=,"]
+)
+def test_only_its_own_cookie_makes_a_teacher(cookies):
+    token = Token()
+    assert not token.is_in(cookies.format(name=token.cookie, text=token.text))
+    assert token.is_in(f"a=b; {token.cookie}={token.text}; c=d")
+
+
+def test_a_student_cannot_change_a_setting_and_gets_its_value_back(lecture, teacher, student):
+    before = lecture.sessions[-1].spec
+    wait_for(lambda: student.uuids.keys() >= {"Preset", "Steps"})
+    student.values.clear()
+    student.set("Preset", "thesis")
+    wait_for(lambda: student.values.get(student.uuids["Preset"][0]) == "packetmesh")
+    student.set("Steps", "Export")
+    teacher.set("Preset", "thesis")
+    wait_for(lambda: lecture.sessions[-1].spec.preset == "thesis")
+    teacher.set("Preset", "packetmesh")
+    wait_for(lambda: lecture.sessions[-1].spec == before)
+    assert lecture.sessions[-1]._current.title == "Scene"
+
+
+def test_the_class_steers_once_the_teacher_lets_it(lecture, teacher, student):
+    teacher.set("The class may steer", True)
+    wait_for(lambda: lecture.sessions[-1].ui.lecture._all_steer)
+    student.set("Preset", "thesis")
+    wait_for(lambda: lecture.sessions[-1].spec.preset == "thesis")
+    student.set("Preset", "packetmesh")
+    wait_for(lambda: lecture.sessions[-1].spec.preset == "packetmesh")
+
+
+def test_a_student_sees_what_the_teacher_sees_until_a_hand_turns_the_view(teacher, student):
+    teacher.stand((4.0, 5.0, 6.0))
+    wait_for(lambda: student.positions[-1:] == [(4.0, 5.0, 6.0)])
+    student.set("Seat", "1 roam")
+    wait_for(lambda: teacher.reads("**0** of them follow"))
+    teacher.stand((7.0, 8.0, 9.0))
+    student.set("Seat", "2 follow")
+    wait_for(lambda: student.positions[-1:] == [(7.0, 8.0, 9.0)])
+    wait_for(lambda: teacher.reads("**1** of them follow"))
+
+
+def test_what_no_page_says_is_not_heard(teacher, student):
+    student.set("Seat", "1 vote 9")
+    student.set("Seat", "roam")
+    student.set("Seat", "2 roam")
+    wait_for(lambda: teacher.reads("**0** of them follow"))
+
+
+def test_thirty_browsers_see_the_room_and_each_vote_is_counted_once(lecture, teacher):
+    wait_for(lambda: "Go" in teacher.uuids)
+    students = [Connection(lecture.url) for _ in range(CLASS)]
+    try:
+        wait_for(lambda: teacher.reads(f"**{CLASS}** in the class"))
+        wait_for(lambda: all("Seat" in one.uuids and "Scene" in one.uuids for one in students))
+        wait_for(lambda: all(one.positions for one in students))
+        teacher.set("Go", "Next")
+        wait_for(lambda: all(one.reads("The class votes") for one in students))
+        for number, one in enumerate(students):
+            one.set("Seat", "1 vote 3")
+            one.set("Seat", f"2 vote {1 if number < 20 else 2}")
+        wait_for(lambda: all(one.reads("████████ **20**") and one.reads("████ **10**") for one in students))
+        teacher.set("Your guess", "Skip")
+        wait_for(lambda: all(not one.reads("The class votes") for one in students))
+        students[0].set("Seat", "3 vote 3")
+        teacher.set("Go", "Back")
+        assert students[1].reads("**20**")
+    finally:
+        for one in students:
+            one.close()
+    wait_for(lambda: teacher.reads("Nobody is in the class yet"))
+
+
+def test_bars_are_as_long_as_their_share_and_stay_when_the_answer_is_told():
+    question = Question("q?", (Choice("a"), Choice("b", "no"), Choice("c", "no")), "why")
+    assert with_votes(question, []) == question
+    voted = with_votes(question, [0, 0, 0, 1])
+    assert [choice.text for choice in voted.choices] == ["a █████████ **3**", "b ███ **1**", "c **0**"]
+    assert told(voted, 0, "")[0].startswith("1. ✓ a █████████ **3**")
+
+
+def test_the_qr_code_says_the_address():
+    text = "http://192.168.178.23:8080"
+    picture = cv2.resize(modules_of(text), None, fx=6, fy=6, interpolation=cv2.INTER_NEAREST)
+    assert cv2.QRCodeDetector().detectAndDecode(np.pad(picture, 40, constant_values=255))[0] == text
+    assert f'alt="QR code of {text}"' in qr_html(text)

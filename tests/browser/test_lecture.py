@@ -1,0 +1,139 @@
+"""A lecture in three browsers: a teacher's, a student's, and that of one who comes late."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.conftest import dismiss_notifications
+from tests.browser.hands import ALIKE, TEXTS, canvas, differing, go, press, unfold
+
+STEERS = "You see what the teacher sees"
+
+
+@pytest.fixture(scope="module")
+def lecture(browser):
+    from app.server import build_server
+
+    app = build_server("box-on-table", port=0, lecture=True)
+    yield app
+    app.stop()
+
+
+@pytest.fixture
+def come(browser):
+    """Opens a browser of its own at an address; all are closed at the end."""
+    contexts = []
+
+    def come(url):
+        contexts.append(browser.new_context(viewport={"width": 900, "height": 640}))
+        page = contexts[-1].new_page()
+        page.set_default_timeout(60_000)
+        page.goto(url)
+        page.get_by_text("Up to date").wait_for()
+        dismiss_notifications(page)
+        return page
+
+    yield come
+    for context in contexts:
+        context.close()
+
+
+@pytest.fixture
+def teacher(lecture, come):
+    page = come(lecture.teacher_url)
+    assert lecture.teacher.text not in page.url
+    page.get_by_text("The class may steer").wait_for()
+    go(page, "Scene")
+    return page
+
+
+@pytest.fixture
+def student(lecture, teacher, come):
+    page = come(lecture.url)
+    page.get_by_text(STEERS).wait_for()
+    return page
+
+
+def chip(page):
+    return page.locator(".packetmesh-seat")
+
+
+def drag(page):
+    """Turn the view with a hand."""
+    box = page.locator("canvas").first.bounding_box()
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 120, y + 20, steps=6)
+    page.mouse.up()
+
+
+def alike(one, other):
+    """Whether two browsers come to show the same, but for what stands over the picture at its lower edge."""
+    script = "document.querySelectorAll('.packetmesh-seat').forEach(one => one.style.visibility = 'hidden')"
+    for _ in range(20):
+        pictures = []
+        for page in (one, other):
+            page.evaluate(script)
+            pictures.append(canvas(page))
+            page.evaluate(script.replace("hidden", "visible"))
+        if differing(*pictures) <= ALIKE:
+            return True
+    return False
+
+
+def test_who_comes_late_sees_the_room_as_the_teacher_has_turned_it(teacher, student, lecture, come):
+    drag(teacher)
+    late = come(lecture.url)
+    assert alike(teacher, late)
+    assert alike(teacher, student)
+    expect(teacher.get_by_text("2 in the class, 2 of them follow your view")).to_be_visible()
+
+
+def test_a_student_changes_nothing_and_is_told_who_steers(teacher, student):
+    press(student, re.compile("^Export"))
+    expect(chip(student)).to_contain_text("The teacher steers")
+    expect(student.get_by_text(TEXTS["Scene"])).to_be_visible()
+    go(teacher, "Export")
+    student.get_by_text(TEXTS["Export"]).wait_for()
+    teacher.get_by_text("The class may steer").click()
+    expect(chip(student)).to_contain_text("You may steer")
+    go(student, "Scene")
+    teacher.get_by_text(TEXTS["Scene"]).wait_for()
+    teacher.get_by_text("The class may steer").click()
+
+
+def test_a_hand_turns_the_own_view_and_one_click_brings_the_class_back(teacher, student):
+    assert alike(teacher, student)
+    drag(student)
+    expect(chip(student)).to_contain_text("You look around on your own")
+    assert differing(canvas(teacher), canvas(student)) > ALIKE
+    expect(teacher.get_by_text("1 in the class, 0 of them follow your view")).to_be_visible()
+    press(student, "Back to the class")
+    assert alike(teacher, student)
+
+
+def test_votes_are_counted_by_keys_and_by_buttons_and_stay_with_the_answer(teacher, student, lecture, come):
+    other = come(lecture.url)
+    go(teacher, "Depth")
+    unfold(teacher, "Lesson: Can a picture measure?")
+    press(teacher, "Next")
+    for page in (student, other):
+        expect(page.locator(".packetmesh-ballot")).to_be_visible()
+    student.keyboard.press("3")
+    student.keyboard.press("2")
+    chip(other).get_by_role("button", name="2", exact=True).click()
+    bar = "████████████ 2"
+    for page in (teacher, student, other):
+        expect(page.locator(".packetmesh-lesson-card")).to_contain_text(bar)
+    teacher.keyboard.press("s")
+    expect(student.locator(".packetmesh-ballot")).to_be_hidden()
+    expect(student.locator(".packetmesh-lesson-card")).to_contain_text(bar)
+
+
+def test_the_address_of_the_class_is_shown_large(teacher, lecture):
+    press(teacher, "Address of the class")
+    expect(teacher.get_by_alt_text(f"QR code of {lecture.class_url}")).to_be_visible()
+    expect(teacher.locator(".packetmesh-join")).to_contain_text(lecture.class_url)
+    press(teacher, "Close")
