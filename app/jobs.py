@@ -25,10 +25,10 @@ def run_step(step: str, *arguments: Any) -> Any:
 
 
 def warm_up() -> None:
-    """Import every screen's jobs, and load or compile the ball, before the first job comes."""
+    """Import every screen's jobs, and load or compile what is compiled, before the first job comes."""
     screens = importlib.import_module(SCREENS)
     for screen in pkgutil.iter_modules(screens.__path__, f"{SCREENS}."):
         for module in pkgutil.iter_modules(importlib.import_module(screen.name).__path__, f"{screen.name}."):
             if module.name.endswith("job"):
                 importlib.import_module(module.name)
-    importlib.import_module("pipeline.surface.pivoting").compile_all()
+    importlib.import_module("pipeline.warm").warm_up()

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from pipeline.kdtree import KdTree
 from pipeline.types import FloatArray, IntArray
 
 
 def neighbour_distances_m(points_m: FloatArray, count: int) -> FloatArray:
     """(N, count) distances of (N, 3) points to their nearest others; fewer columns if there are no more."""
-    count = min(count + 1, len(points_m))
-    return cKDTree(points_m).query(points_m, k=range(1, count + 1), workers=-1)[0][:, 1:]
+    return KdTree(points_m).nearest(points_m, min(count + 1, len(points_m)))[0][:, 1:]
 
 
 def distinct_rows(points_m: FloatArray) -> IntArray:

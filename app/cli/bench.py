@@ -12,7 +12,7 @@ def bench(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
 
     Args:
         out: Folder for bench.json.
-        only: Cases to run; all without it.
+        only: Cases to run, or what stands before their colons, as `chain,network`; all without it.
         json: Print the results as one JSON object.
     """
     from lab.benchmarks import run_benchmarks
@@ -20,7 +20,7 @@ def bench(out: Path, only: tuple[str, ...] = (), json: bool = False) -> None:
 
     writable_folder(out)
     results = {}
-    for case, result in run_benchmarks(only):
+    for case, result in run_benchmarks(name for names in only for name in names.split(",")):
         peers = ", ".join(f"{name} {seconds:.3f} s" for name, seconds in result.peers.items()) or "no peer"
         say(f"{case}: {result.ours_s:.3f} s ({peers}), {result.peak_memory_bytes / 1e6:.0f} MB at most")
         for note in result.notes:

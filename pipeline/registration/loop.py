@@ -138,7 +138,7 @@ def _iterations(
 ) -> Generator[RegistrationStep, None, str]:
     method = start(config, source.cloud, target.cloud)
     matcher = Matcher(source.cloud, target.cloud, method.direction or config.direction, method.features)
-    residual = residual_for(config, target.cloud, method.unweighted_centroids)
+    residual = residual_for(config, target.cloud, matcher, method.unweighted_centroids)
     stop = StopRule(TRANSLATION_TOLERANCE_OF_GATE * config.gate_m)
     acceleration = Acceleration(apply(T, source.points_m)) if method.accelerated else None
     center_m = source.points_m.mean(axis=0, keepdims=True)
@@ -164,9 +164,9 @@ def _iterations(
             distances_m=support.distances_m,
             sigma_m=kept.sigma_m,
             gate_m=min(method.gate_m, kept.gate_m),
-            objective=float(kept.weights @ residual.squared_m2(support, motion)),
-            rmse_m=float(np.sqrt(kept.weights @ support.distances_m**2)),
-            mean_distance_m=float(kept.weights @ support.distances_m),
+            objective=_mean(residual.squared_m2(support, motion), kept.weights),
+            rmse_m=float(np.sqrt(_mean(support.distances_m**2, kept.weights))),
+            mean_distance_m=_mean(support.distances_m, kept.weights),
             effective_pairs=_effective(kept.weights),
             entropy_nat=kept.entropy_nat,
             rotation_step_rad=_turn_rad(motion),
@@ -204,6 +204,11 @@ def _weigh(
     if _effective(kept.weights) < MIN_EFFECTIVE_PAIRS:
         raise DegenerateError(f"only {_effective(kept.weights):.1f} pairs carry all the weight")
     return method, matching, kept
+
+
+def _mean(values: FloatArray, weights: FloatArray) -> float:
+    """With weights that sum to one; without BLAS, whose threads go on spinning beside the next search."""
+    return float(np.einsum("m,m->", values, weights))
 
 
 def _effective(weights: FloatArray) -> float:

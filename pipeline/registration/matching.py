@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.config import Direction
-from pipeline.geometry import apply
+from pipeline.kdtree import KdTree, compiled, in_parts, search, squared_distance, working_space
 from pipeline.registration.sample import random_keys
-from pipeline.types import FloatArray, IntArray, PointCloud
+from pipeline.types import ByteArray, FloatArray, IntArray, PointCloud
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,9 @@ class Matching:
     """(M,)."""
 
     def select(self, rows: IntArray) -> Matching:
-        """The pairs at ``rows``."""
+        """The pairs at ``rows``, ascending."""
+        if len(rows) == len(self.distances_m):
+            return self
         return Matching(
             self.source_rows[rows],
             self.target_rows[rows],
@@ -38,6 +41,10 @@ class Matching:
             self.target_m[rows],
             self.distances_m[rows],
         )
+
+
+BEYOND_GATE = 1.5
+"""How far a search for the nearest goes, over the gate."""
 
 
 class Matcher:
@@ -62,6 +69,11 @@ class Matcher:
         self._target = _Cloud(target.points_m, features(target))
         self._direction = direction
 
+    @property
+    def target_tree(self) -> KdTree:
+        """Of all points of the target."""
+        return self._target.subset(1.0).tree
+
     def match(
         self,
         T_target_source: FloatArray,
@@ -80,88 +92,183 @@ class Matcher:
             gate_m: a point whose nearest neighbour is farther may be left out, which saves its search.
         """
         source, target = self._source.subset(source_share), self._target.subset(target_share)
-        moved_m = apply(T_target_source, source.points_m)
+        moved_m = _moved(T_target_source, source.points_m)
         found = []
         if self._direction != "p2q":
             found.append(target.nearest(source, moved_m, neighbours, gate_m))
         if self._direction != "q2p":
-            back_m = apply(np.linalg.inv(T_target_source), target.points_m)
+            back_m = _moved(np.linalg.inv(T_target_source), target.points_m)
             scale = float(np.cbrt(np.linalg.det(T_target_source[:3, :3])))
-            found.append(source.nearest(target, back_m, neighbours, gate_m / scale)[:, ::-1])
-        pairs = found[0] if len(found) == 1 else np.unique(np.concatenate(found), axis=0)
-        moved_m, target_m = moved_m[pairs[:, 0]], target.points_m[pairs[:, 1]]
-        distances_m = np.linalg.norm(moved_m - target_m, axis=1)
-        return Matching(source.rows[pairs[:, 0]], target.rows[pairs[:, 1]], moved_m, target_m, distances_m)
+            found.append(source.nearest(target, back_m, neighbours, gate_m / scale)[::-1])
+        if len(found) == 1:
+            return Matching(*_pairs(*found[0], moved_m, target.points_m, source.rows, target.rows))
+        both = np.unique(np.concatenate([np.stack(pairs, axis=1) for pairs in found]), axis=0)
+        near, partners = np.ascontiguousarray(both.T)
+        return Matching(*_pairs(near, partners, moved_m, target.points_m, source.rows, target.rows))
 
 
 class _Subset:
-    """Some of a cloud's points; their search tree is built at the first search."""
+    """Some of a cloud's points; what searches among them is built at the first search."""
 
-    def __init__(self, rows: IntArray, points_m: FloatArray, features: FloatArray | None) -> None:
-        self.rows, self.points_m, self.features = rows, points_m, features
-        self._tree: cKDTree | None = None
-        self._reused: dict[int, _NearestCache] = {}
+    def __init__(self, cloud: _Cloud, rows: IntArray) -> None:
+        self.cloud, self.rows = cloud, rows
+        self.points_m = np.ascontiguousarray(cloud.points_m[rows])
 
-    def nearest(self, queries: _Subset, places_m: FloatArray, neighbours: int, gate_m: float) -> IntArray:
-        """(M, 2) rows of ``queries``, whose points are at (n, 3) places, and of their nearest points here."""
-        if self._tree is None:
-            self._tree = cKDTree(_stacked(self.points_m, self.features))
+    @cached_property
+    def features(self) -> FloatArray | None:
+        """(n, k) coordinates beside x, y, z."""
+        return None if self.cloud.features is None else self.cloud.features[self.rows]
+
+    def nearest(
+        self, queries: _Subset, places_m: FloatArray, neighbours: int, gate_m: float
+    ) -> tuple[IntArray, IntArray]:
+        """(M,) rows of ``queries``, whose points are at (n, 3) places, and of their nearest points here."""
         count = min(neighbours, len(self.points_m))
-        queries_m = _stacked(places_m, queries.features)
-        if count > 1 or len(self.points_m) == 1:
-            found = np.asarray(self._tree.query(queries_m, k=count, workers=-1)[1]).reshape(-1)
-            return np.stack([np.repeat(np.arange(len(places_m)), count), found], axis=1)
-        cache = self._reused.setdefault(id(queries), _NearestCache(*queries_m.shape))
-        # In more dimensions than three the distance says nothing about the gate.
-        found = cache.nearest(self._tree, queries_m, gate_m if self.features is None else np.inf)
-        near = np.flatnonzero(found < len(self.points_m))
-        return np.stack([near, found[near]], axis=1)
+        if count > 1 or len(self.points_m) == 1 or self.features is not None:
+            queries_m = _stacked(places_m, queries.features)
+            found = np.asarray(self._any_tree.query(queries_m, k=count, workers=-1)[1]).reshape(-1)
+            return np.repeat(np.arange(len(places_m)), count), found
+        if self._partners is None:
+            self._partners = _Partners(self.tree, len(queries.cloud.points_m))
+        found = self._partners.nearest(queries.rows, places_m, gate_m)
+        near = np.flatnonzero(found >= 0)
+        return near, found[near]
+
+    _partners: _Partners | None = None
+
+    @cached_property
+    def tree(self) -> KdTree:
+        """Of these points, whose order it keeps."""
+        return KdTree(self.points_m)
+
+    @cached_property
+    def _any_tree(self) -> cKDTree:
+        """For several neighbours, and for more coordinates than three."""
+        return cKDTree(_stacked(self.points_m, self.features))
 
 
-class _NearestCache:
-    """The nearest points of an earlier search, reused for queries that have moved too little for another.
+class _Partners:
+    """The nearest points of one cloud's points in another, searched anew only where they may have changed.
 
-    If a query's nearest point was at d1 and the second nearest at d2, a motion by s brings the first to
-    d1 + s at most and every other to d2 - s at least: the nearest stays nearest while s < (d2 - d1) / 2.
+    If a point's nearest was at d1 and the second nearest at d2, a motion by s brings the first to d1 + s at
+    most and every other to d2 - s at least: the nearest stays nearest while s < (d2 - d1) / 2, and none is
+    within a gate g while s < d1 - g. A search goes some way beyond the gate, so that those without a partner
+    need not be searched at every motion, and begins with the distances of the old two, which rules most
+    others out.
     """
 
-    def __init__(self, count: int, dimensions: int) -> None:
-        self._found = np.zeros(count, dtype=np.intp)
-        self._places_m = np.zeros((count, dimensions))
-        self._safe_motion_m = np.full(count, -1.0)
+    def __init__(self, tree: KdTree, count: int) -> None:
+        """For ``count`` points that look for partners among a tree's, two at least."""
+        self._tree = tree
+        self._two = np.full((count, 2), -1, dtype=np.intp)
+        """The nearest and the second nearest in the tree's order; -1 where the search did not go so far."""
+        self._places_m = np.zeros((count, 3))
+        """Where each was searched."""
+        self._clear_m = np.full((count, 2), -np.inf)
+        """How far the nearest and the second nearest were from there at least."""
 
-    def nearest(self, tree: cKDTree, places_m: FloatArray, gate_m: float) -> IntArray:
-        """(n,) exact nearest point of each (n, k) place; ``tree.n`` where none lies within the gate.
+    def nearest(self, rows: IntArray, places_m: FloatArray, gate_m: float) -> IntArray:
+        """Rows of the nearest points of those ``rows``, which are at (n, 3) places.
 
-        A reused neighbour may lie beyond a gate that has shrunk since its search.
+        Returns:
+            (n,), -1 where none is within the gate.
         """
-        moved_m = np.sqrt(np.sum((places_m - self._places_m) ** 2, axis=1))
-        search = np.flatnonzero(moved_m >= self._safe_motion_m)
-        if len(search):
-            distances_m, nearest = tree.query(places_m[search], k=2, distance_upper_bound=gate_m, workers=-1)
-            self._found[search] = nearest[:, 0]
-            self._places_m[search] = places_m[search]
-            second_m = np.minimum(distances_m[:, 1], gate_m)
-            missing = nearest[:, 0] == tree.n
-            self._safe_motion_m[search] = np.where(missing, -1.0, 0.5 * (second_m - distances_m[:, 0]))
-        return self._found
+        found = np.empty(len(rows), dtype=np.intp)
+        tree, state = (*self._tree.parts, self._tree.order), (self._two, self._places_m, self._clear_m)
+
+        def work(first: int, last: int) -> None:
+            _nearest_again(*tree, rows, places_m, first, last, gate_m, *state, found)
+
+        in_parts(work, len(rows))
+        return found
+
+
+@compiled
+def _moved(T: FloatArray, points: FloatArray) -> FloatArray:
+    """(n, 3) points by a (4, 4) motion, as ``geometry.apply`` moves them, without a library's threads."""
+    moved = np.empty_like(points)
+    for i in range(len(points)):
+        for k in range(3):
+            moved[i, k] = T[k, 0] * points[i, 0] + T[k, 1] * points[i, 1] + T[k, 2] * points[i, 2] + T[k, 3]
+    return moved
+
+
+@compiled
+def _nearest_again(
+    points: FloatArray,
+    axes: ByteArray,
+    splits: FloatArray,
+    levels: int,
+    order: IntArray,
+    rows: IntArray,
+    places: FloatArray,
+    first: int,
+    last: int,
+    gate: float,
+    two: IntArray,
+    searched_at: FloatArray,
+    clear: FloatArray,
+    found: IntArray,
+) -> None:
+    stack, bounds = working_space()
+    squared, near = np.empty(2), np.empty(2, dtype=np.intp)
+    for i in range(first, last):
+        row, place = rows[i], places[i]
+        motion = np.sqrt(squared_distance(place, searched_at[row]))
+        stays = two[row, 0] >= 0 and 2.0 * motion < clear[row, 1] - clear[row, 0]
+        if not stays and motion >= clear[row, 0] - gate:
+            within = (BEYOND_GATE * gate) ** 2
+            if two[row, 1] >= 0:
+                first_old, second_old = points[two[row, 0]], points[two[row, 1]]
+                farther = max(squared_distance(place, first_old), squared_distance(place, second_old))
+                within = min(within, farther * (1.0 + 1e-12))
+            squared[:], near[:] = within, -1
+            search(points, axes, splits, levels, place, squared, near, stack, bounds)
+            two[row], searched_at[row] = near, place
+            clear[row, 0], clear[row, 1] = np.sqrt(squared[0]), np.sqrt(squared[1])
+            stays = near[0] >= 0
+        partner = two[row, 0]
+        if stays and squared_distance(place, points[partner]) <= gate * gate:
+            found[i] = order[partner]
+        else:
+            found[i] = -1
+
+
+@compiled
+def _pairs(
+    near: IntArray,
+    partners: IntArray,
+    moved: FloatArray,
+    targets: FloatArray,
+    source_rows: IntArray,
+    target_rows: IntArray,
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
+    """The arrays of a matching, whose rows are those of two subsets."""
+    count = len(near)
+    rows = np.empty((2, count), dtype=np.intp)
+    points = np.empty((2, count, 3))
+    distances = np.empty(count)
+    for m in range(count):
+        i, j = near[m], partners[m]
+        rows[0, m], rows[1, m] = source_rows[i], target_rows[j]
+        points[0, m], points[1, m] = moved[i], targets[j]
+        distances[m] = np.sqrt(squared_distance(moved[i], targets[j]))
+    return rows[0], rows[1], points[0], points[1], distances
 
 
 class _Cloud:
     """One cloud and the subsets of it that have been searched."""
 
     def __init__(self, points_m: FloatArray, features: FloatArray | None) -> None:
-        self._points_m, self._features = points_m, features
+        self.points_m, self.features = points_m, features
         self._order = np.argsort(random_keys(points_m, 0))
         self._subsets: dict[int, _Subset] = {}
 
     def subset(self, share: float) -> _Subset:
         """A random share of the points, in their own order; smaller shares lie within larger ones."""
-        count = min(len(self._points_m), max(6, round(share * len(self._points_m))))
+        count = min(len(self.points_m), max(6, round(share * len(self.points_m))))
         if count not in self._subsets:
-            rows = np.sort(self._order[:count])
-            features = None if self._features is None else self._features[rows]
-            self._subsets[count] = _Subset(rows, self._points_m[rows], features)
+            self._subsets[count] = _Subset(self, np.sort(self._order[:count]))
         return self._subsets[count]
 
 

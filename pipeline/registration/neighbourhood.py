@@ -2,30 +2,58 @@
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.spatial import cKDTree
+from collections.abc import Callable
+from functools import cached_property, partial
 
+import numpy as np
+
+from pipeline.kdtree import KdTree
+from pipeline.patches import patch_normals
 from pipeline.points import neighbour_distances_m
-from pipeline.types import FloatArray
+from pipeline.types import FloatArray, IntArray
 
 NORMAL_NEIGHBOURS, SPACING_NEIGHBOURS = 20, 4
+
+
+class Normals:
+    """Unit normals of a cloud's points, each found when it is first asked for.
+
+    They are those of the planes through each point's nearest 20, towards a camera at the origin.
+    """
+
+    def __init__(
+        self, points_m: FloatArray, known: FloatArray | None = None, tree: Callable[[], KdTree] | None = None
+    ) -> None:
+        """Of (N, 3) points; ``known`` are their normals if they have some, ``tree`` gives their tree."""
+        self._points_m, self._tree_of = points_m, tree or partial(KdTree, points_m)
+        self._found = np.full(len(points_m), known is not None)
+        given = np.empty((len(points_m), 3)) if known is None else known
+        self._normals = np.ascontiguousarray(given, dtype=np.float64)
+
+    def at(self, rows: IntArray) -> FloatArray:
+        """(N, 3), of which those at the ``rows`` are found."""
+        missing = np.unique(rows[~self._found[rows]])
+        if len(missing):
+            places_m = self._points_m[missing]
+            normals = patch_normals(self._tree, places_m, NORMAL_NEIGHBOURS)
+            away = np.einsum("ni,ni->n", normals, places_m) > 0
+            self._normals[missing] = np.where(away[:, None], -normals, normals)
+            self._found[missing] = True
+        return self._normals
+
+    @cached_property
+    def _tree(self) -> KdTree:
+        return self._tree_of()
+
+
+def pca_normals(points_m: FloatArray) -> FloatArray:
+    """(N, 3) unit normals of the planes through each point's nearest 20, towards a camera at the origin."""
+    return Normals(points_m).at(np.arange(len(points_m)))
 
 
 def median_spacing_m(points_m: FloatArray) -> float:
     """Median distance of (N, 3) points to their nearest other point."""
     return float(np.median(neighbour_distances_m(points_m, 1)))
-
-
-def pca_normals(points_m: FloatArray) -> FloatArray:
-    """(N, 3) unit normals of the planes through each point's nearest 20, towards a camera at the origin."""
-    count = min(NORMAL_NEIGHBOURS, len(points_m))
-    _, nearest = cKDTree(points_m).query(points_m, k=count, workers=-1)
-    patches_m = points_m[nearest]
-    patches_m = patches_m - patches_m.mean(axis=1, keepdims=True)
-    _, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", patches_m, patches_m))
-    normals = axes[:, :, 0]
-    away = np.einsum("ni,ni->n", normals, points_m) > 0
-    return np.where(away[:, None], -normals, normals)
 
 
 def local_spacing_m(points_m: FloatArray) -> FloatArray:

@@ -12,10 +12,11 @@ import numpy as np
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import apply, rigid, rotation_exp
-from pipeline.registration.matching import Matching
-from pipeline.registration.neighbourhood import pca_normals
+from pipeline.kdtree import compiled, squared_distance
+from pipeline.registration.matching import Matcher, Matching
+from pipeline.registration.neighbourhood import Normals
 from pipeline.registration.observability import open_motions
-from pipeline.types import FloatArray, PointCloud
+from pipeline.types import FloatArray, IntArray, PointCloud
 
 _SMALLEST_SINGULAR_RATIO = 1e-9
 _DAMPING = 1e-9
@@ -49,26 +50,27 @@ class PointResidual:
 class PlaneResidual:
     """The distance of the source point from the plane through the target point."""
 
-    normals: FloatArray
-    """(N, 3) unit normals of the thinned target."""
+    normals: Normals
+    """Of the thinned target."""
 
     def solve(self, pairs: Matching, weights: FloatArray) -> FloatArray:
         """The (4, 4) motion, to follow the present pose: one Gauss-Newton step."""
-        return solve_plane(pairs.moved_m, pairs.target_m, self.normals[pairs.target_rows], weights)
+        rows = pairs.target_rows
+        return solve_plane(pairs.moved_m, pairs.target_m, self.normals.at(rows), weights, rows)
 
     def squared_m2(self, pairs: Matching, motion: FloatArray) -> FloatArray:
         """(M,) squared distances along the normals after a motion."""
-        offsets_m = apply(motion, pairs.moved_m) - pairs.target_m
-        return np.einsum("mi,mi->m", offsets_m, self.normals[pairs.target_rows]) ** 2
+        rows = pairs.target_rows
+        return _squared_heights(pairs.moved_m, pairs.target_m, self.normals.at(rows), rows, motion)
 
 
 def residual_for(
-    config: RegistrationConfig, target: PointCloud, unweighted_centroids: bool = False
+    config: RegistrationConfig, target: PointCloud, matcher: Matcher, unweighted_centroids: bool = False
 ) -> PointResidual | PlaneResidual:
     """The configured residual; normals the target does not have are estimated from its points."""
     if config.metric == "point":
         return PointResidual(config.with_scale, unweighted_centroids)
-    return PlaneResidual(pca_normals(target.points_m) if target.normals is None else target.normals)
+    return PlaneResidual(Normals(target.points_m, target.normals, lambda: matcher.target_tree))
 
 
 def weighted_procrustes(
@@ -101,30 +103,90 @@ def weighted_procrustes(
 
 
 def solve_plane(
-    source_m: FloatArray, target_m: FloatArray, normals: FloatArray, weights: FloatArray
+    source_m: FloatArray,
+    target_m: FloatArray,
+    normals: FloatArray,
+    weights: FloatArray,
+    normal_rows: IntArray | None = None,
 ) -> FloatArray:
     """The (4, 4) rigid step that minimises sum w (n . (q + omega x q + v - p))^2, linear in omega and v.
 
     Rotation is taken about the pairs' centroid and lengths in units of their spread, so that neither
     the damping nor the condition depends on where the origin is or what a metre is.
 
+    Args:
+        source_m: (M, 3) points q.
+        target_m: (M, 3) points p.
+        normals: (N, 3) unit normals n.
+        weights: (M,) of the pairs.
+        normal_rows: (M,) each pair's row of ``normals``; None where they come in the pairs' order.
+
     Raises:
         DegenerateError: the planes leave motions free (all parallel, one cylinder, one sphere).
     """
-    share = weights / weights.sum()
-    center_m = share @ source_m
-    arms = source_m - center_m
-    spread_m = float(np.sqrt(share @ np.sum(arms**2, axis=1)))
+    rows = np.arange(len(normals)) if normal_rows is None else normal_rows
+    center_m, spread_m, hessian, gradient = _normal_equations(source_m, target_m, normals, rows, weights)
     if spread_m == 0.0:
         raise DegenerateError("all pairs share one point, which leaves the rotation open")
-    arms = arms / spread_m
-    residuals = np.einsum("mi,mi->m", normals, target_m - source_m) / spread_m
-    jacobian = np.concatenate([np.cross(arms, normals), normals], axis=1)
-    hessian = (share[:, None] * jacobian).T @ jacobian
     if not np.linalg.cond(hessian) <= _LARGEST_CONDITION:
-        motions = open_motions(source_m, normals, 1.0 / _LARGEST_CONDITION) or "some motion"
+        motions = open_motions(source_m, normals[rows], 1.0 / _LARGEST_CONDITION) or "some motion"
         raise DegenerateError(f"{motions} changes no distance to the target's surfaces")
     damped = hessian + _DAMPING * np.trace(hessian) / 6.0 * np.eye(6)
-    step = np.linalg.solve(damped, jacobian.T @ (share * residuals))
+    step = np.linalg.solve(damped, gradient)
     rotation = rotation_exp(step[:3])
     return rigid(rotation, center_m - rotation @ center_m + spread_m * step[3:])
+
+
+@compiled
+def _normal_equations(
+    source: FloatArray, target: FloatArray, normals: FloatArray, rows: IntArray, weights: FloatArray
+) -> tuple[FloatArray, float, FloatArray, FloatArray]:
+    """The pairs' weighted centre, their spread about it, a step's (6, 6) matrix and (6,) right side."""
+    center, total = np.zeros(3), 0.0
+    for m in range(len(weights)):
+        total += weights[m]
+        for k in range(3):
+            center[k] += weights[m] * source[m, k]
+    center /= total
+    spread = 0.0
+    for m in range(len(weights)):
+        spread += weights[m] * squared_distance(source[m], center)
+    spread = np.sqrt(spread / total)
+    upper, gradient = np.zeros((6, 6)), np.zeros(6)
+    if spread == 0.0:
+        return center, spread, upper, gradient
+    row = np.empty(6)
+    for m in range(len(weights)):
+        nx, ny, nz = normals[rows[m], 0], normals[rows[m], 1], normals[rows[m], 2]
+        x, y, z = source[m, 0], source[m, 1], source[m, 2]
+        height = nx * (target[m, 0] - x) + ny * (target[m, 1] - y) + nz * (target[m, 2] - z)
+        x, y, z = (x - center[0]) / spread, (y - center[1]) / spread, (z - center[2]) / spread
+        row[0], row[1], row[2] = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
+        row[3], row[4], row[5] = nx, ny, nz
+        share = weights[m] / total
+        for a in range(6):
+            weighed = share * row[a]
+            gradient[a] += weighed * height / spread
+            for b in range(a, 6):
+                upper[a, b] += weighed * row[b]
+    for a in range(6):
+        for b in range(a):
+            upper[a, b] = upper[b, a]
+    return center, spread, upper, gradient
+
+
+@compiled
+def _squared_heights(
+    source: FloatArray, target: FloatArray, normals: FloatArray, rows: IntArray, motion: FloatArray
+) -> FloatArray:
+    """(M,) squared distances of moved points from the planes through their partners."""
+    squared = np.empty(len(rows))
+    for m in range(len(rows)):
+        height = 0.0
+        for k in range(3):
+            moved = motion[k, 3]
+            for j in range(3):
+                moved += motion[k, j] * source[m, j]
+            height += normals[rows[m], k] * (moved - target[m, k])
+        squared[m] = height * height
+    return squared

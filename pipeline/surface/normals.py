@@ -10,7 +10,8 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
-from pipeline.open3d_runtime import o3d
+from pipeline.kdtree import KdTree
+from pipeline.patches import patch_normals
 from pipeline.surface.boundary import connected_parts
 from pipeline.types import FloatArray, IntArray, PointCloud
 
@@ -95,9 +96,7 @@ def _with_normals(cloud: PointCloud, neighbours: int) -> PointCloud:
         raise InputError(
             f"Normals need at least 3 points and 3 neighbours, not {len(cloud)} and {neighbours}; try more"
         )
-    points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
-    points.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(neighbours))
-    return replace(cloud, normals=np.array(points.normals))
+    return replace(cloud, normals=patch_normals(KdTree(cloud.points_m), cloud.points_m, neighbours))
 
 
 def _off_lines(points_m: FloatArray, normals: FloatArray) -> FloatArray:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from pipeline.types import FloatArray, PointCloud
+from pipeline.patches import onto_patches
+from pipeline.types import PointCloud
 
 NEIGHBOURS = 20
 KERNEL_SHARE = 0.5
@@ -33,19 +33,6 @@ def smooth(cloud: PointCloud, passes: int) -> PointCloud:
 def _pass(cloud: PointCloud) -> PointCloud:
     if cloud.normals is None or len(cloud) < 4:
         return cloud
-    count = min(NEIGHBOURS, len(cloud))
-    distances_m, rows = cKDTree(cloud.points_m).query(cloud.points_m, k=count, workers=-1)
-    reach_m = np.maximum(KERNEL_SHARE * distances_m[:, -1:], 1e-12)
-    weights = np.exp(-0.5 * (distances_m / reach_m) ** 2)
-    centers_m, normals = _planes(cloud.points_m[rows], weights / weights.sum(axis=1, keepdims=True))
+    points_m, normals = onto_patches(cloud.points_m, min(NEIGHBOURS, len(cloud)), KERNEL_SHARE)
     normals *= np.where(np.sum(normals * cloud.normals, axis=1, keepdims=True) < 0, -1.0, 1.0)
-    offsets_m = np.sum((centers_m - cloud.points_m) * normals, axis=1, keepdims=True)
-    return replace(cloud, points_m=cloud.points_m + offsets_m * normals, normals=normals)
-
-
-def _planes(neighbours_m: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(N, 3) weighted centres and (N, 3) unit normals of (N, k, 3) neighbourhoods."""
-    centers_m = np.einsum("nk,nki->ni", weights, neighbours_m)
-    spread_m = neighbours_m - centers_m[:, None]
-    covariance_m2 = np.einsum("nk,nki,nkj->nij", weights, spread_m, spread_m)
-    return centers_m, np.linalg.eigh(covariance_m2)[1][:, :, 0]
+    return replace(cloud, points_m=points_m, normals=normals)

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
-from pipeline.registration.neighbourhood import local_spacing_m, median_spacing_m, pca_normals
+from pipeline.registration.neighbourhood import Normals, local_spacing_m, median_spacing_m, pca_normals
 
 
 def test_normals_of_a_sphere_point_along_its_radius_towards_the_camera():
@@ -26,3 +27,30 @@ def test_spacing_of_a_grid():
     assert median_spacing_m(grid) == pytest.approx(0.02)
     assert np.median(local_spacing_m(grid)) == pytest.approx(0.02)
     assert local_spacing_m(grid[:1]).tolist() == [0.0]
+
+
+def test_normals_are_the_thinnest_axes_of_patches_and_found_once_asked_for():
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(-1.0, 1.0, (2, 3000))
+    points = np.stack([x, y, 3.0 + 0.3 * np.sin(3.0 * x) * y + rng.normal(0.0, 0.01, 3000)], axis=1)
+    _, near = cKDTree(points).query(points, k=20)
+    arms = points[near] - points[near].mean(axis=1, keepdims=True)
+    thinnest = np.linalg.eigh(np.einsum("nki,nkj->nij", arms, arms))[1][:, :, 0]
+    few = Normals(points)
+    rows = np.array([7, 7, 2999, 0])
+    for normals, at in ((pca_normals(points), np.arange(3000)), (few.at(rows), rows)):
+        np.testing.assert_allclose(np.abs(np.sum(normals[at] * thinnest[at], axis=1)), 1.0, atol=1e-9)
+        assert (np.sum(normals[at] * points[at], axis=1) <= 0.0).all()
+
+
+@pytest.mark.parametrize("width", [1e-6, 1.0, 1e6])
+def test_normals_do_not_depend_on_the_unit(width):
+    points = np.random.default_rng(4).normal(size=(50, 3)) * [1.0, 0.7, 0.2] + [0.0, 0.0, 4.0]
+    np.testing.assert_allclose(pca_normals(width * points), pca_normals(points), atol=1e-7)
+
+
+def test_points_on_a_line_or_in_one_place_have_some_unit_normal():
+    line = np.zeros((30, 3))
+    line[:, 0] = np.arange(30.0)
+    for points in (line, np.ones((30, 3))):
+        np.testing.assert_allclose(np.linalg.norm(pca_normals(points), axis=1), 1.0, atol=1e-12)

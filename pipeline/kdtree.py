@@ -1,0 +1,255 @@
+"""A k-d tree of points whose searches run compiled, on all cores and without Python's lock.
+
+SciPy's tree answers any query; this one also begins a search with what the caller already knows (the distance
+of an old neighbour), which is what iterations ask for, and keeps the points of a leaf beside each other.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from itertools import pairwise
+
+import numba
+import numpy as np
+
+from pipeline.types import ByteArray, FloatArray, IntArray
+
+LEAF_POINTS = 10
+"""A node with more points is split."""
+SERIAL_POINTS = 512
+"""Fewer points are searched on the calling thread: others would take longer to wake."""
+_MOST_LEVELS = 64
+compiled = numba.njit(cache=True, nogil=True)
+
+
+class KdTree:
+    """A balanced tree: every node halves its points along the longer side of their box."""
+
+    def __init__(self, points_m: FloatArray) -> None:
+        """Of (N, 3) points."""
+        count = len(points_m)
+        self.order = np.arange(count)
+        """(N,) rows of the points, those of a leaf beside each other."""
+        self.points_m = np.ascontiguousarray(points_m, dtype=np.float64).copy()
+        """(N, 3) the points in this order."""
+        levels = levels_of(count)
+        self.axes = np.zeros(max(1, 2**levels - 1), dtype=np.uint8)
+        """(K,) axis along which each inner node is split; node k has the children 2k + 1 and 2k + 2."""
+        self.splits_m = np.zeros(max(1, 2**levels - 1))
+        """(K,) coordinate at which it is."""
+        self.levels = levels
+        """How often the points are halved."""
+        if count:
+            _build(self.points_m, self.order, self.axes, self.splits_m, levels)
+
+    @property
+    def parts(self) -> tuple[FloatArray, ByteArray, FloatArray, int]:
+        """What compiled searches take of it."""
+        return self.points_m, self.axes, self.splits_m, self.levels
+
+    def __len__(self) -> int:
+        return len(self.order)
+
+    def nearest(self, places_m: FloatArray, count: int) -> tuple[FloatArray, IntArray]:
+        """The nearest points of (M, 3) places.
+
+        Returns:
+            (M, count) distances, ascending, and rows of the points; ``count`` is at most N.
+        """
+        places_m = np.ascontiguousarray(places_m, dtype=np.float64)
+        squared = np.full((len(places_m), count), np.inf)
+        rows = np.zeros((len(places_m), count), dtype=np.intp)
+
+        def search(first: int, last: int) -> None:
+            _nearest(*self.parts, places_m, first, last, squared, rows)
+
+        in_parts(search, len(places_m))
+        return np.sqrt(squared), self.order[rows]
+
+
+def levels_of(count: int) -> int:
+    """How often ``count`` points are halved until every leaf is small enough."""
+    levels = 0
+    while count > LEAF_POINTS << levels:
+        levels += 1
+    return levels
+
+
+def in_parts(work: Callable[[int, int], None], count: int) -> None:
+    """Call ``work(first, last)`` for parts of ``range(count)`` on all cores; it must release the lock."""
+    parts = _cores() if count >= SERIAL_POINTS else 1
+    if parts == 1:
+        work(0, count)
+        return
+    bounds = [count * part // parts for part in range(parts + 1)]
+    others = [_threads().submit(work, *part) for part in pairwise(bounds[1:])]
+    work(*bounds[:2])
+    for other in others:
+        other.result()
+
+
+@cache
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(_cores(), "k-d tree")
+
+
+@compiled
+def _build(points: FloatArray, order: IntArray, axes: ByteArray, splits: FloatArray, levels: int) -> None:
+    """Sort the points into leaves, and their rows with them."""
+    stack = np.empty((_MOST_LEVELS, 4), dtype=np.int64)
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, 0, len(points), levels
+    size = 1
+    while size:
+        size -= 1
+        node, first, last, level = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
+        if level == 0:
+            continue
+        axis = _longest_axis(points, first, last)
+        middle = (first + last) // 2
+        _select(points, order, first, last, middle, axis)
+        axes[node], splits[node] = axis, points[middle, axis]
+        for side in range(2):
+            stack[size, 0], stack[size, 3] = 2 * node + 1 + side, level - 1
+            stack[size, 1], stack[size, 2] = (first, middle) if side == 0 else (middle, last)
+            size += 1
+
+
+@compiled
+def _longest_axis(points: FloatArray, first: int, last: int) -> int:
+    """The axis along which the points spread most."""
+    best, longest = 0, -1.0
+    for axis in range(3):
+        low = high = points[first, axis]
+        for i in range(first + 1, last):
+            value = points[i, axis]
+            low, high = min(low, value), max(high, value)
+        if high - low > longest:
+            best, longest = axis, high - low
+    return best
+
+
+@compiled
+def _select(points: FloatArray, order: IntArray, first: int, last: int, middle: int, axis: int) -> None:
+    """Swap until no point before ``middle`` lies beyond it along an axis and none behind it before."""
+    low, high = first, last - 1
+    while low < high:
+        pivot = points[(low + high) // 2, axis]
+        i, j = low, high
+        while i <= j:
+            while points[i, axis] < pivot:
+                i += 1
+            while points[j, axis] > pivot:
+                j -= 1
+            if i <= j:
+                for k in range(3):
+                    points[i, k], points[j, k] = points[j, k], points[i, k]
+                order[i], order[j] = order[j], order[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            high = j
+        elif middle >= i:
+            low = i
+        else:
+            return
+
+
+@compiled
+def _nearest(
+    points: FloatArray,
+    axes: ByteArray,
+    splits: FloatArray,
+    levels: int,
+    places: FloatArray,
+    first: int,
+    last: int,
+    squared: FloatArray,
+    rows: IntArray,
+) -> None:
+    stack, bounds = working_space()
+    for i in range(first, last):
+        search(points, axes, splits, levels, places[i], squared[i], rows[i], stack, bounds)
+
+
+@compiled
+def search(
+    points: FloatArray,
+    axes: ByteArray,
+    splits: FloatArray,
+    levels: int,
+    place: FloatArray,
+    squared: FloatArray,
+    rows: IntArray,
+    stack: IntArray,
+    bounds: FloatArray,
+) -> None:
+    """Fill in the nearest points of a place.
+
+    Args:
+        points, axes, splits, levels: of the tree.
+        place: (3,).
+        squared: (k,) in ascending order, where only nearer points count; their squared distances after it.
+        rows: (k,) those of the tree's own order; untouched where no nearer point is found.
+        stack, bounds: working space.
+    """
+    worst = len(squared) - 1
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, 0, len(points), levels
+    bounds[0, 0] = bounds[0, 1] = bounds[0, 2] = bounds[0, 3] = 0.0
+    size = 1
+    while size:
+        size -= 1
+        apart = bounds[size, 3]
+        if apart >= squared[worst]:
+            continue
+        node, start, end, level = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
+        along_0, along_1, along_2 = bounds[size, 0], bounds[size, 1], bounds[size, 2]
+        while level:
+            axis = axes[node]
+            middle = (start + end) // 2
+            offset = place[axis] - splits[node]
+            level -= 1
+            old = along_0 if axis == 0 else along_1 if axis == 1 else along_2
+            far = apart + offset * offset - old
+            if far < squared[worst]:
+                bounds[size, 0], bounds[size, 1], bounds[size, 2] = along_0, along_1, along_2
+                bounds[size, axis] = offset * offset
+                bounds[size, 3] = far
+                stack[size, 3] = level
+                if offset < 0:
+                    stack[size, 0], stack[size, 1], stack[size, 2] = 2 * node + 2, middle, end
+                else:
+                    stack[size, 0], stack[size, 1], stack[size, 2] = 2 * node + 1, start, middle
+                size += 1
+            if offset < 0:
+                node, end = 2 * node + 1, middle
+            else:
+                node, start = 2 * node + 2, middle
+        for j in range(start, end):
+            distance = squared_distance(points[j], place)
+            if distance < squared[worst]:
+                k = worst
+                while k > 0 and squared[k - 1] > distance:
+                    squared[k], rows[k] = squared[k - 1], rows[k - 1]
+                    k -= 1
+                squared[k], rows[k] = distance, j
+
+
+@compiled
+def working_space() -> tuple[IntArray, FloatArray]:
+    """What ``search`` writes in: once for many searches."""
+    return np.empty((_MOST_LEVELS, 4), dtype=np.int64), np.empty((_MOST_LEVELS, 4))
+
+
+@compiled
+def squared_distance(a: FloatArray, b: FloatArray) -> float:
+    """Of two points (3,)."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return x * x + y * y + z * z
