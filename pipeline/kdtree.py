@@ -6,7 +6,6 @@ of an old neighbour), which is what iterations ask for, and keeps the points of 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -21,6 +20,8 @@ LEAF_POINTS = 10
 """A node with more points is split."""
 SERIAL_POINTS = 512
 """Fewer points are searched on the calling thread: others would take longer to wake."""
+CORES = int(numba.get_num_threads())
+"""Of this machine, or fewer where ``NUMBA_NUM_THREADS`` says so, as for processes that work side by side."""
 _MOST_LEVELS = 64
 compiled = numba.njit(cache=True, nogil=True)
 
@@ -80,7 +81,7 @@ def levels_of(count: int) -> int:
 
 def in_parts(work: Callable[[int, int], None], count: int) -> None:
     """Call ``work(first, last)`` for parts of ``range(count)`` on all cores; it must release the lock."""
-    parts = _cores() if count >= SERIAL_POINTS else 1
+    parts = CORES if count >= SERIAL_POINTS else 1
     if parts == 1:
         work(0, count)
         return
@@ -92,13 +93,8 @@ def in_parts(work: Callable[[int, int], None], count: int) -> None:
 
 
 @cache
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-@cache
 def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(_cores(), "k-d tree")
+    return ThreadPoolExecutor(CORES, "k-d tree")
 
 
 @compiled

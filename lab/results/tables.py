@@ -253,8 +253,8 @@ def registration_speed(numbers: Row) -> str:
         parts.append(f"**{case}**\n\n{table(header, rows)}")
     return "\n\n".join(
         (
-            "Two views of a room, 6° and 13 cm apart, preparation included, the programs in turn; medians and "
-            "95th percentiles of the rounds.",
+            "Two views of a room, 6° and 13 cm apart, preparation included, the programs in turn; medians "
+            "and 95th percentiles of the rounds.",
             *parts,
         )
     )

@@ -1,0 +1,209 @@
+"""Registration problems in the lists of a public benchmark, solved by our method and the peers.
+
+The form is that of Fontana et al., "A benchmark for point clouds registration algorithms" (arXiv 2003.12841):
+a folder with clouds that already lie on each other, and lists ``*_local.txt`` and ``*_global.txt`` whose
+lines name a source, a target and the motion that the source is moved by before it is registered back.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lab.trials import iterate_trials
+from packetmesh.errors import InputError, PacketMeshError
+from packetmesh.progress import Progress
+from pipeline.config import RegistrationConfig
+from pipeline.geometry import apply
+from pipeline.io.clouds import read_cloud, write_cloud
+from pipeline.register_draws import with_gate
+from pipeline.register_pair import Pair, prepared_pair
+from pipeline.registration import register
+from pipeline.registration.peers import available_peers, run_peer
+from pipeline.types import FloatArray, PointCloud
+
+LISTS = ("*_local.txt", "*_global.txt")
+COLUMNS = ("id", "source", "target", "overlap", *(f"t{k}" for k in range(1, 13)))
+OURS = "ceicp-a"
+PEERS = ("open3d-plane", "open3d-gicp", "small-gicp", "small-gicp-staged")
+SOLVED = 0.05
+"""A problem is solved if its points are off by less than this share of their distances to the centroid."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One line of a list."""
+
+    list_name: str
+    id: str
+    source: str
+    """A file."""
+    target: str
+    overlap: float
+    """0 to 1."""
+    motion: tuple[float, ...]
+    """(12,) the first three rows of the matrix that moves the source away."""
+
+    @property
+    def T_moved(self) -> FloatArray:
+        """(4, 4) of the motion."""
+        return np.vstack([np.reshape(self.motion, (3, 4)), [0.0, 0.0, 0.0, 1.0]])
+
+
+def scaled_displacement(T_left: FloatArray, points_m: FloatArray) -> float:
+    """The benchmark's error: the mean over points of how far each is moved over its distance to the centroid.
+
+    Args:
+        T_left: (4, 4) the motion that is left: identity where the problem is solved.
+        points_m: (N, 3) the source where it belongs.
+
+    Source: Fontana et al. 2020, eq. 3.
+    """
+    arms_m = np.linalg.norm(points_m - points_m.mean(axis=0), axis=1)
+    apart_m = np.linalg.norm(apply(T_left, points_m) - points_m, axis=1)
+    away = arms_m > 0.0
+    return float(np.mean(apart_m[away] / arms_m[away]))
+
+
+def read_problems(folder: Path) -> list[Problem]:
+    """Every line of every list below a folder; clouds lie beside their list.
+
+    Raises:
+        InputError: no list, or a line that is not one; the sentence names file and line.
+    """
+    paths = sorted(path for pattern in LISTS for path in folder.rglob(pattern))
+    if not paths:
+        raise InputError(f"{folder} holds no list of problems; try a folder with files like stairs_local.txt")
+    return [problem for path in paths for problem in _list(path)]
+
+
+def _list(path: Path) -> Iterator[Problem]:
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    header = lines[0].split() if lines else []
+    missing = [column for column in COLUMNS if column not in header]
+    if missing:
+        raise InputError(f"{path}: the first line has no column '{missing[0]}'; try {' '.join(COLUMNS)}")
+    for number, line in enumerate(lines[1:], 2):
+        if not line.strip():
+            continue
+        row = dict(zip(header, line.split(), strict=False))
+        try:
+            numbers = [float(row[column]) for column in COLUMNS[3:]]
+        except (KeyError, ValueError):
+            raise InputError(f"{path}, line {number}: not a problem; try {len(header)} values") from None
+        overlap, motion = numbers[0], tuple(numbers[1:])
+        source, target = (str(path.parent / row[column]) for column in ("source", "target"))
+        yield Problem(path.stem, row["id"], source, target, overlap, motion)
+
+
+def iterate_problems(
+    folder: Path, store: Path, scheduler: str | None = None
+) -> Generator[Progress, None, list[dict[str, Any]]]:
+    """Solve every problem below ``folder``; what ``store`` holds already is not solved again.
+
+    Returns:
+        A row for each problem and method: list, id, overlap, gate, error before and after, seconds, reason.
+
+    Raises:
+        InputError: no lists, or lists that cannot be read.
+    """
+    problems = read_problems(folder)
+    files = [Path(path) for path in sorted({path for one in problems for path in (one.source, one.target)})]
+    answers = yield from iterate_trials("problems", solve, problems, store, processes=1, data=files)
+    return [row for rows in answers for row in rows]
+
+
+def solve(problem: Problem) -> list[dict[str, Any]]:
+    """One problem by every method, from the same start with the same gate.
+
+    The gate is the one that `packetmesh register` finds from the data; its search counts in our time only.
+    """
+    source, target = read_cloud(problem.source), read_cloud(problem.target)
+    moved = source.transformed(problem.T_moved)
+    known = {"list": problem.list_name, "id": problem.id, "overlap": problem.overlap}
+    known["error_before"] = scaled_displacement(problem.T_moved, source.points_m)
+    started = time.perf_counter()
+    try:
+        pair = prepared_pair(moved, target, RegistrationConfig(seed=0))
+        config = with_gate(pair, RegistrationConfig(seed=0))
+        result = register(pair.source, pair.target, config, pair.T_init)
+    except PacketMeshError as error:
+        return [known | {"method": OURS, "error": None, "elapsed_s": None, "reason": str(error)}]
+    elapsed_s = time.perf_counter() - started
+    answers = [(OURS, result.T_target_source, elapsed_s, result.stop_reason)]
+    for name in (name for name in PEERS if name in available_peers()):
+        peer = run_peer(name, pair.source, pair.target, config.gate_m, pair.T_init)
+        answers.append((name, peer.T_target_source, peer.elapsed_s, peer.stop_reason))
+    return [
+        known
+        | {
+            "method": name,
+            "gate_m": config.gate_m,
+            "error": scaled_displacement(T @ problem.T_moved, source.points_m),
+            "elapsed_s": seconds,
+            "reason": reason,
+        }
+        for name, T, seconds, reason in answers
+    ]
+
+
+def summary(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """For each list and method: problems, median and upper quartile of the error, share solved, seconds.
+
+    A problem without an answer counts as not solved and keeps the error that it began with.
+    """
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault((row["list"], row["method"]), []).append(row)
+    result = []
+    for (name, method), some in groups.items():
+        errors = np.array([row["error_before"] if row["error"] is None else row["error"] for row in some])
+        seconds = [row["elapsed_s"] for row in some if row["elapsed_s"] is not None]
+        result.append(
+            {
+                "list": name,
+                "method": method,
+                "problems": len(some),
+                "median_error": float(np.median(errors)),
+                "upper_quartile_error": float(np.quantile(errors, 0.75)),
+                "solved_share": float(np.mean(errors < SOLVED)),
+                "median_s": float(np.median(seconds)) if seconds else None,
+            }
+        )
+    return result
+
+
+def write_problems(
+    folder: Path,
+    name: str,
+    pairs: Sequence[Pair],
+    motions: Sequence[Sequence[FloatArray]],
+    overlaps: Sequence[float],
+) -> Path:
+    """A list of problems with its clouds, as ``read_problems`` takes it.
+
+    Args:
+        folder: gets the clouds as PLY and ``NAME_local.txt``.
+        name: of the list.
+        pairs: clouds with their ``T_true``, by which the source is laid on the target.
+        motions: for each pair the (4, 4) motions that its source is moved by.
+        overlaps: of each pair, 0 to 1.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = [" ".join(COLUMNS)]
+    for index, (pair, some, overlap) in enumerate(zip(pairs, motions, overlaps, strict=True)):
+        T_true = np.eye(4) if pair.T_true is None else pair.T_true
+        files = [f"{name}_{index:02d}_{role}.ply" for role in ("source", "target")]
+        for file, cloud in zip(files, (pair.source.transformed(T_true), pair.target), strict=True):
+            write_cloud(folder / file, PointCloud(cloud.points_m))
+        for turn, T in enumerate(some):
+            numbers = " ".join(f"{value!r}" for value in T[:3].ravel().tolist())
+            lines.append(f"{name}_{index:02d}_{turn:03d} {files[0]} {files[1]} {overlap:.3f} {numbers}")
+    path = folder / f"{name}_local.txt"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
