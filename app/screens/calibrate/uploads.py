@@ -15,6 +15,7 @@ from app.state import BoardViews
 from app.ui import Ui
 from app.zips import opened_zip
 from packetmesh.errors import InputError
+from packetmesh.files import unpacked
 from pipeline.calibration.shots import BOARD_FILE
 from pipeline.config import Pattern
 
@@ -155,7 +156,7 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
         if sum(one.file_size for one in inside) > UNPACKED_LIMIT_BYTES:
             raise InputError(f"{file.name} unpacks to more than {UNPACKED_LIMIT_BYTES >> 20} MB; {INSTEAD}.")
         found = {
-            _place(one.filename, node): archive.read(one)
+            _place(one.filename, node): unpacked(archive, one)
             for one in inside
             if not PurePosixPath(one.filename).name.startswith(".")
         }
