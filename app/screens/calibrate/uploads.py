@@ -158,7 +158,7 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
         found = {
             _place(one.filename, node): unpacked(archive, one)
             for one in inside
-            if not PurePosixPath(one.filename).name.startswith(".")
+            if not _path(one.filename).name.startswith(".")
         }
     if not set(found) - {BOARD_FILE}:
         raise InputError(f"{file.name} holds no PNG or JPEG; try a ZIP of photographs.")
@@ -167,8 +167,13 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
 
 def _place(name: str, node: str) -> str:
     """``NODE/NAME`` of a file, in the node's folder that its own path names or else in ``node``."""
-    path = PurePosixPath(name.replace("\\", "/"))
+    path = _path(name)
     if path.name == BOARD_FILE:
         return BOARD_FILE
     named = next((part for part in path.parts[:-1] if re.fullmatch(r"node_\d\d", part)), node)
     return f"{named}/{re.sub(r'[^A-Za-z0-9._-]', '-', path.name)[-60:]}"
+
+
+def _path(name: str) -> PurePosixPath:
+    """A file's name as any system writes it."""
+    return PurePosixPath(name.replace("\\", "/"))

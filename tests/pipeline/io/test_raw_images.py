@@ -116,7 +116,7 @@ BAD = {
     "nameless.exr": (exr(a=METRES, b=METRES), "truncated or damaged"),
     "colours.exr": (exr(R=METRES, G=METRES, B=METRES), "3 channels"),
     "bomb.npy": (header_only((200_000, 200_000)), "truncated or damaged"),
-    "bomb.pfm": (b"Pf\n200000 200000\n-1.0\n", "truncated or damaged"),
+    "bomb.pfm": (b"Pf\n200000 200000\n-1.0\n", "200000 x 200000 pixels"),
     "pickle.npy": (npy(np.array([{}], object)), "truncated or damaged"),
     "text.npy": (npy(np.array([["a"]])), "no image"),
     "line.npy": (npy(METRES[0]), "no image"),
