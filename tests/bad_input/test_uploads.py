@@ -2,6 +2,7 @@
 
 import zipfile
 from types import SimpleNamespace
+from urllib.parse import urlencode
 
 import pytest
 
@@ -14,7 +15,7 @@ from packetmesh.progress import drain
 from pipeline.io.demos import DEMO_SCENES
 from pipeline.sources import Demo
 from tests.bad_input.makers import png_of, zip_bomb, zipped
-from tests.bad_input.samples import MM, RGB, WIDTH, data_of, opencv
+from tests.bad_input.samples import MM, RGB, data_of, opencv
 
 K = b'{"width": 32, "height": 24, "fx": 28, "fy": 28, "cx": 15, "cy": 11}'
 NAMES = (
@@ -116,12 +117,6 @@ def test_photographs_stay_in_their_folder_whatever_they_are_called(folder, name)
     "setting", ["depth.model=/etc/passwd", " depth.model=/etc/passwd", "depth.model =/x", "\tdepth.model=x"]
 )
 def test_an_address_opens_no_file(setting):
-    from urllib.parse import urlencode
-
     start = Place(Spec(Demo("office")), "Scene")
     with pytest.raises(InputError, match="names a file"):
         place_of(urlencode({"set": setting}), start, ("Scene",), {name: Demo(name) for name in DEMO_SCENES})
-
-
-def test_an_image_is_as_wide_as_the_tests_say():
-    assert RGB.shape[1] == WIDTH
