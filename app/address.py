@@ -20,14 +20,14 @@ from app.records import Shown
 from app.state import Spec
 from app.ui import Ui
 from packetmesh.errors import InputError
-from packetmesh.settings import differences, with_settings
+from packetmesh.settings import differences, key_of, with_settings
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.io.demos import DEMO_SCENES
 from pipeline.sources import Demo, Source
 
 WAIT_S = 0.3
 """After a change, before the address follows."""
-FILES = ("depth.model=",)
+FILES = {"depth.model"}
 """Settings that name a file, which an address may not."""
 _SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
 
@@ -45,7 +45,7 @@ class Place:
         spec = self.spec
         parts = [("scene", name_of(spec.source)), ("preset", spec.preset)]
         changed = differences(spec.config, PRESETS.get(spec.preset, PipelineConfig()))
-        parts += [("set", change) for change in changed if not change.startswith(FILES)]
+        parts += [("set", change) for change in changed if key_of(change) not in FILES]
         if spec.shown != "after":
             parts.append(("surface", spec.shown))
         return urlencode([*parts, ("screen", self.screen.lower())])
@@ -83,7 +83,7 @@ def place_of(text: str, start: Place, screens: tuple[str, ...], sources: Mapping
         spec = replace(spec, source=sources[named["scene"]])
     if "preset" in named:
         spec = spec.with_preset(named["preset"])
-    if any(change.startswith(FILES) for change in changes):
+    if any(key_of(change) in FILES for change in changes):
         raise InputError("The address names a file of the server; choose a network on the Depth screen")
     config = with_settings(spec.config, changes)
     spec = replace(spec, config=config, shown=cast(Shown, named.get("surface", spec.shown)))

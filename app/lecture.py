@@ -21,9 +21,9 @@ from viser import _messages as messages
 
 from app.dock_row import add_hidden
 from app.drawing.cameras import turn
+from app.entrance import Token
 from app.page import running
 from app.qr import qr_html
-from app.teacher import Token
 from app.ui import Ui
 
 HEARD = (messages.FileTransferPartAck, messages.GetRenderResponseMessage, messages.ViewerCameraMessage)

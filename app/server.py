@@ -16,6 +16,8 @@ from pathlib import Path
 import viser
 
 from app.drawing.colors import BRAND
+from app.entrance import Entrance, Token, is_loopback
+from app.headers import strict_headers
 from app.jobs import warm_up
 from app.landing import landing_first
 from app.lecture import Lecture
@@ -31,7 +33,7 @@ from app.screens.surface.panel import SurfacePanel
 from app.session import Session, Target
 from app.state import SharedViews, Spec
 from app.store import Store
-from app.teacher import Token
+from app.uploads import limit_uploads
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Demo, RigFolder
@@ -51,8 +53,7 @@ class AppServer:
     pool: ComputePool
     folder: Path
     sessions: dict[int, Session] = field(default_factory=dict)
-    teacher: Token | None = None
-    """Of a lecture."""
+    entrance: Entrance = field(default_factory=Entrance)
 
     @property
     def url(self) -> str:
@@ -60,14 +61,19 @@ class AppServer:
         return self._at(lambda: "127.0.0.1")
 
     @property
-    def class_url(self) -> str:
-        """Where browsers of other machines find it, if it listens to them."""
-        return self._at(own_address)
+    def link(self) -> str:
+        """By which a browser of this machine comes in."""
+        return self.url + _behind(self.entrance.visitor)
+
+    @property
+    def class_link(self) -> str:
+        """By which browsers of other machines come in, if it listens to them."""
+        return self._at(own_address) + _behind(self.entrance.visitor)
 
     @property
     def teacher_url(self) -> str:
         """By which the teacher of a lecture comes."""
-        return f"{self.url}/{self.teacher.query if self.teacher is not None else ''}"
+        return self.url + _behind(self.entrance.teacher)
 
     def _at(self, anywhere: Callable[[], str]) -> str:
         host, port = self.viser_server.get_host(), self.viser_server.get_port()
@@ -89,6 +95,7 @@ def build_server(
     host: str = "127.0.0.1",
     port: int = 8080,
     lecture: bool = False,
+    with_token: bool = True,
 ) -> AppServer:
     """Start serving and return at once.
 
@@ -98,6 +105,7 @@ def build_server(
         host: address to listen on.
         port: port to listen on; 0 lets the system choose one.
         lecture: share one session among all browsers, steered by those who come by ``teacher_url``.
+        with_token: let only those in who come by ``class_link``, where other machines reach the host.
 
     Raises:
         InputError: the port is taken or the address is not this machine's.
@@ -107,11 +115,17 @@ def build_server(
     spec = start_spec(scene, config or PipelineConfig())
     folder = Path(tempfile.mkdtemp(prefix="packetmesh-"))
     pool = ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
-    teacher = Token() if lecture else None
-    entrance = landing_first() if teacher is None else teacher.accepted()
-    with contextlib.redirect_stdout(io.StringIO()), entrance, only_own_page():
+    teacher = Token("teacher") if lecture else None
+    visitor = Token("token") if with_token and not is_loopback(host) else None
+    entrance = Entrance(visitor, teacher)
+    with contextlib.ExitStack() as outermost_first:
+        for answers in (strict_headers(), only_own_page(), entrance.guarded()):
+            outermost_first.enter_context(answers)
+        if teacher is None:
+            outermost_first.enter_context(landing_first())
+        outermost_first.enter_context(contextlib.redirect_stdout(io.StringIO()))
         server = viser.ViserServer(host=host, port=port, label="PacketMesh", verbose=False)
-    app = AppServer(server, pool, folder, teacher=teacher)
+    app = AppServer(server, pool, folder, entrance=entrance)
     if port and server.get_port() != port:
         app.stop()
         raise InputError(_taken(port))
@@ -123,11 +137,21 @@ def build_server(
         return app.sessions[number]
 
     if teacher is not None:
-        together = Lecture(server, teacher, app.class_url)
+        limit_uploads(server._websock_server, lambda _: None)
+        together = Lecture(server, teacher, app.class_link)
         session = begin(server, -1, together)
         together.begin(session.post, lambda: session.frame_view(anew=True))
     else:
-        server.on_client_connect(lambda client: begin(client, client.client_id))
+
+        @server.on_client_connect
+        def _(client: viser.ClientHandle) -> None:
+            def tell(sentence: str) -> None:
+                session = app.sessions.get(client.client_id)
+                if session is not None:
+                    session.post(session.notify, "That did not work", sentence)
+
+            limit_uploads(client._websock_connection, tell)
+            begin(client, client.client_id)
 
         @server.on_client_disconnect
         def _(client: viser.ClientHandle) -> None:
@@ -136,6 +160,11 @@ def build_server(
                 session.close()
 
     return app
+
+
+def _behind(token: Token | None) -> str:
+    """What stands behind an address to come in."""
+    return "" if token is None else f"/{token.query}"
 
 
 def start_spec(scene: str, config: PipelineConfig) -> Spec:

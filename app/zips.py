@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 from packetmesh.errors import InputError
-
-_BROKEN = (
-    zipfile.BadZipFile,
-    NotImplementedError,  # compressed in a way that Python does not know
-    RuntimeError,  # encrypted
-    EOFError,
-    OSError,
-    ValueError,
-    zlib.error,
-)
+from packetmesh.files import BROKEN_ZIP
 
 
 @contextmanager
@@ -34,5 +24,5 @@ def opened_zip(file: Path | BinaryIO, sentence: str) -> Iterator[zipfile.ZipFile
             yield archive
     except InputError:
         raise
-    except _BROKEN:
+    except BROKEN_ZIP:
         raise InputError(sentence) from None

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from network_sim.types import NS_PER_S, to_ns
 from packetmesh.errors import InputError
+from packetmesh.files import read_text
 
 FloatArray = NDArray[np.float64]
 
@@ -20,6 +21,8 @@ HOLE_ROWS = 10.0
 HOLE_S = 1.0
 """A gap is a hole from this long, and from this many times the usual time between rows."""
 _COLUMNS = ("time in s", "rate in Mbit/s", "round trip in ms", "share lost from 0 to 1")
+MOST_BYTES = 20_000_000
+"""Of a recording: half a million rows."""
 _FOR_EVER_NS = 2**62
 
 
@@ -67,10 +70,7 @@ def read_link_trace(path: str | Path) -> LinkTrace:
             no number or out of range; times that do not rise; a hole in time, in which nobody knows what the
             link did; or a rate of 0 throughout.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise InputError(f"The recorded link {path} cannot be read ({error}); try a text file") from None
+    text = read_text(path, "recorded link", MOST_BYTES)
     lines, rows = [], []
     for number, line in enumerate(text.splitlines(), 1):
         if fields := line.partition("#")[0].split():

@@ -7,6 +7,8 @@ import json
 import math
 import os
 import secrets
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -20,6 +22,18 @@ MAX_IMAGE_BYTES = 64_000_000
 MAX_IMAGE_PIXELS = 25_000_000
 MAX_GEOMETRY_BYTES = 1_000_000_000
 """Largest cloud or mesh file that is read."""
+MAX_UNPACKED_BYTES = 1 << 30
+"""Of all files in an archive."""
+BROKEN_ZIP = (
+    zipfile.BadZipFile,
+    NotImplementedError,  # compressed in a way that Python does not know
+    RuntimeError,  # encrypted
+    EOFError,
+    OSError,
+    ValueError,
+    zlib.error,
+)
+"""What reading a damaged ZIP raises."""
 
 
 @contextmanager
@@ -117,13 +131,45 @@ def read_bytes(path: str | os.PathLike[str], max_bytes: int, what: str) -> bytes
     return data
 
 
-def read_text(path: str | os.PathLike[str], what: str) -> str:
-    """The content of a UTF-8 text file of at most ``MAX_TEXT_BYTES``.
+def read_text(path: str | os.PathLike[str], what: str, max_bytes: int | None = None) -> str:
+    """The content of a UTF-8 text file of at most ``max_bytes``; None takes ``MAX_TEXT_BYTES``.
 
     Raises:
         InputError: as for ``read_bytes``, or it is not UTF-8 text.
     """
     try:
-        return read_bytes(path, MAX_TEXT_BYTES, what).decode("utf-8-sig")
+        return read_bytes(path, MAX_TEXT_BYTES if max_bytes is None else max_bytes, what).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"The {what} {path} is not a text file; check the path") from None
+
+
+def unpacked(archive: zipfile.ZipFile, item: zipfile.ZipInfo) -> bytes:
+    """A file in a ZIP, of which no more is unpacked than the archive says: ``ZipFile.read`` would unpack all.
+
+    Raises:
+        Exception: one of ``BROKEN_ZIP``.
+    """
+    with archive.open(item) as file:
+        return file.read(item.file_size)
+
+
+def read_json(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
+    """The object in a JSON file of at most ``MAX_TEXT_BYTES``.
+
+    Raises:
+        InputError: as for ``read_text``, or it is no JSON, nested too deeply, or no object.
+    """
+    return json_object(read_text(path, what), path, what)
+
+
+def json_object(text: str, path: str | os.PathLike[str], what: str) -> dict[str, Any]:
+    """The object that the text of a file is; raises as ``read_json``."""
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"The {what} {path} is not valid JSON ({error}); try to write or export it again"
+        ) from None
+    if not isinstance(value, dict):
+        raise InputError(f"The {what} {path} holds no JSON object, such as {{...}}; check the path")
+    return value

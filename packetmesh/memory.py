@@ -1,8 +1,10 @@
-"""Peak memory of this process."""
+"""Peak memory of this process, and a limit on what it may take further."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import psutil
@@ -23,3 +25,26 @@ def peak_memory_bytes() -> int:
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return int(peak if sys.platform == "darwin" else peak * 1024)
+
+
+@contextmanager
+def at_most_further(size_bytes: int) -> Iterator[None]:
+    """Let the process take no more than so much memory beside what it has; more is a MemoryError.
+
+    It counts addresses, which threads that run meanwhile share. Windows knows no such limit.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    import resource
+
+    before, most = resource.getrlimit(resource.RLIMIT_AS)
+    limit = psutil.Process().memory_info().vms + size_bytes
+    for known in (before, most):
+        limit = limit if known == resource.RLIM_INFINITY else min(limit, known)
+    with suppress(ValueError, OSError):  # a system that knows no such limit
+        resource.setrlimit(resource.RLIMIT_AS, (limit, most))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (before, most))

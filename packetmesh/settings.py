@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import json
 import math
 import types
 import typing
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from packetmesh.errors import InputError
+from packetmesh.files import read_json
 
 Config = TypeVar("Config")
 """Any config: a frozen dataclass whose fields are settings or further configs."""
@@ -30,17 +29,14 @@ def config_named(preset: str, presets: Mapping[str, Config]) -> Config:
         near = difflib.get_close_matches(preset, presets, n=1)
         names = near + [name for name in presets if name not in near]
         raise InputError(f"There is no preset '{preset}'; try {' or '.join(names)}, or a config.json file")
-    try:
-        values = json.loads(Path(preset).read_text())
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"The config file {preset} cannot be read ({error}); try one that a run wrote"
-        ) from None
-    text = values.get("settings") if isinstance(values, dict) else None
+    text = read_json(preset, "config file").get("settings")
     if not isinstance(text, dict):
         raise InputError(f"The config file {preset} has no settings; try the config.json of a finished run")
     defaults = type(next(iter(presets.values())))()
-    return with_settings(defaults, [f"{key}={value}" for key, value in text.items()])
+    try:
+        return with_settings(defaults, [f"{key}={value}" for key, value in text.items()])
+    except InputError as error:
+        raise InputError(f"The config file {preset} cannot be used: {error}") from None
 
 
 def with_settings(config: Config, changes: Iterable[str]) -> Config:
@@ -57,11 +53,11 @@ def with_settings(config: Config, changes: Iterable[str]) -> Config:
     """
     values = {}
     for setting in changes:
-        key, equals, value = setting.partition("=")
+        _, equals, value = setting.partition("=")
         if not equals:
             example = next(f"{key}={value}" for key, value in settings(config).items() if "." in key)
             raise InputError(f"'{setting}' is not a setting; try key=value, for example {example}")
-        values[key.strip()] = value.strip()
+        values[key_of(setting)] = value.strip()
     return _replaced(config, values, list(settings(config)))
 
 
@@ -82,6 +78,11 @@ def settings(config: Any, prefix: str = "") -> dict[str, str]:
         else:
             text[key] = str(value)
     return text
+
+
+def key_of(change: str) -> str:
+    """The key of ``key=value``."""
+    return change.partition("=")[0].strip()
 
 
 def differences(config: Config, base: Config) -> list[str]:

@@ -21,6 +21,7 @@ def serve(
     port: int = 8080,
     open: bool = False,
     lecture: bool = False,
+    no_token: bool = False,
 ) -> None:
     """Open the app: step through a reconstruction in the browser.
 
@@ -32,21 +33,27 @@ def serve(
         open: Open a browser window.
         lecture: Share one session among all browsers: who has the teacher's link steers, the class follows,
             votes and looks around.
+        no_token: With another --host: let in whoever reaches it, not only who has the link that is printed.
     """
+    from app.entrance import is_loopback
     from app.server import build_server
 
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
-    app = build_server(scene, config_named(preset, PRESETS), host, port, lecture)
+    app = build_server(scene, config_named(preset, PRESETS), host, port, lecture, not no_token)
     try:
         if lecture:
             say(f"You teach at {app.teacher_url} (keep it to yourself; stop with Ctrl-C)")
-            say(f"The class comes to {app.class_url}" + ALONE * (app.class_url == app.url))
+            say(f"The class comes to {app.class_link}" + ALONE * is_loopback(host))
         else:
-            say(f"PacketMesh is at {app.url} (stop with Ctrl-C)")
+            say(f"PacketMesh is at {app.link if is_loopback(host) else app.class_link} (stop with Ctrl-C)")
+        if app.entrance.visitor is not None:
+            say("Only who has this link comes in: it is not encrypted, so keep to a network that you trust")
+        elif not is_loopback(host):
+            say("Whoever reaches this address comes in")
         if open:
-            webbrowser.open(app.teacher_url if lecture else app.url)
+            webbrowser.open(app.teacher_url if lecture else app.link)
         stopped.wait()
     finally:
         app.stop()

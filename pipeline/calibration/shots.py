@@ -6,14 +6,14 @@ photographs for each camera. The last number in an image's name is its moment, o
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 from packetmesh.errors import InputError
-from packetmesh.files import read_text
+from packetmesh.files import read_json
 from pipeline.calibration.board import Board
 from pipeline.config import Pattern
 from pipeline.types import AnyPath
@@ -129,15 +129,18 @@ def read_board(path: AnyPath) -> Board:
     Raises:
         InputError: the file lacks pattern, columns, rows or spacing_mm, or no board is like that.
     """
+    values = read_json(path, "board file")
     try:
-        values = json.loads(read_text(path, "board file"))
-        pattern, columns, rows = values["pattern"], int(values["columns"]), int(values["rows"])
+        pattern, columns, rows = str(values["pattern"]), int(values["columns"]), int(values["rows"])
         spacing_m = float(values["spacing_mm"]) / 1000.0
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except (ValueError, KeyError, TypeError, OverflowError):
         raise InputError(
             f"The board file {path} does not say what the board is; try pattern, columns, rows and spacing_mm"
         ) from None
-    return Board(pattern, columns, rows, spacing_m)
+    try:
+        return Board(cast(Pattern, pattern), columns, rows, spacing_m)
+    except InputError as error:
+        raise InputError(f"The board file {path} is of no board: {error}") from None
 
 
 def photographs(folder: Path) -> list[Path]:

@@ -11,7 +11,7 @@ from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import DepthConfig
 from pipeline.depth.conventions import Convention, Overrides, convention_of
 from pipeline.depth.preprocessing import centre_crop, fitted, free_size, padded, resized, unpad
-from pipeline.depth.sessions import modified_ns, open_session
+from pipeline.depth.sessions import modified_ns, open_session, run_session
 from pipeline.depth.signature import signature_of
 from pipeline.types import ByteArray, DepthMap, FloatArray
 
@@ -98,9 +98,8 @@ class DepthNetwork:
         """(H, W) float32 output for the input of one image."""
         signature = self._signature
         try:
-            (output,) = self._session.run(
-                [signature.output_name], {signature.input_name: tensor.astype(signature.dtype, copy=False)}
-            )
+            given = {signature.input_name: tensor.astype(signature.dtype, copy=False)}
+            output = run_session(self._session, self.model_path, signature.output_name, given)
         except Exception as error:  # onnxruntime raises a dozen unrelated types
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(

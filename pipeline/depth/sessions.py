@@ -1,16 +1,25 @@
-"""ONNX networks opened to be run, and kept while they are used."""
+"""ONNX networks opened to be run, kept while they are used, and bounded in time and memory."""
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 
 import onnxruntime
 
 from packetmesh.errors import InputError
+from packetmesh.memory import at_most_further
+from pipeline.types import FloatArray
 
 PREFERRED_PROVIDERS = ("CUDAExecutionProvider", "CPUExecutionProvider")
 THREADS = 2
+MOST_SECONDS = 60.0
+"""For opening a network, and for one image."""
+MOST_BYTES = 1_500_000_000
+"""Beside twice its file, the weights as they come and as they are packed to be run."""
 
 
 def modified_ns(model_path: Path) -> int:
@@ -22,7 +31,11 @@ def modified_ns(model_path: Path) -> int:
 
 @lru_cache(maxsize=2)
 def open_session(model_path: Path, modified_ns: int) -> onnxruntime.InferenceSession:
-    """A session with few, non-spinning threads; the last two are kept: opening takes as long as inferring."""
+    """A session with few, non-spinning threads; the last two are kept: opening takes as long as inferring.
+
+    Raises:
+        InputError: no ONNX network, or one that takes too much time or memory.
+    """
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = THREADS
     options.inter_op_num_threads = 1
@@ -31,8 +44,52 @@ def open_session(model_path: Path, modified_ns: int) -> onnxruntime.InferenceSes
     available = onnxruntime.get_available_providers()
     providers = [name for name in PREFERRED_PROVIDERS if name in available]
     try:
-        return onnxruntime.InferenceSession(str(model_path), options, providers=providers)
+        with _bounded(model_path, lambda: options.set_load_cancellation_flag(True)):
+            return onnxruntime.InferenceSession(str(model_path), options, providers=providers)
     except Exception as error:  # onnxruntime raises a dozen unrelated types for damaged files
         raise InputError(
-            f"{model_path} is not a readable ONNX network, or is cut short: export or download it again."
+            f"{model_path} is not a readable ONNX network, is cut short, or needs more than "
+            f"{MOST_SECONDS:g} s or {MOST_BYTES / 1e9:g} GB: export or download it again, or take a smaller "
+            "one."
         ) from error
+
+
+def run_session(
+    session: onnxruntime.InferenceSession, model_path: Path, output: str, image: dict[str, FloatArray]
+) -> FloatArray:
+    """The output of that name for one image.
+
+    Raises:
+        Exception: onnxruntime's, where the network cannot take the image.
+        MemoryError, TimeoutError: it takes too much memory or time.
+    """
+    options = onnxruntime.RunOptions()
+    late = threading.Event()
+
+    def end() -> None:
+        late.set()
+        options.terminate = True
+
+    try:
+        with _bounded(model_path, end):
+            (values,) = session.run([output], image, options)
+    except Exception as error:
+        if late.is_set():
+            raise TimeoutError(f"more than {MOST_SECONDS:g} s for an image") from error
+        if "Failed to allocate memory" in str(error) or "bad_alloc" in str(error):
+            raise MemoryError(f"more than {MOST_BYTES / 1e9:g} GB") from error
+        raise
+    return values
+
+
+@contextmanager
+def _bounded(model_path: Path, end: Callable[[], object]) -> Iterator[None]:
+    """Within the time, after which ``end`` is called, and the memory."""
+    timer = threading.Timer(MOST_SECONDS, end)
+    timer.daemon = True
+    timer.start()
+    try:
+        with at_most_further(MOST_BYTES + 2 * model_path.stat().st_size):
+            yield
+    finally:
+        timer.cancel()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -96,17 +95,15 @@ def read_bag(path: Path, frames: int, depth_scale: float | None) -> BagNodes:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    import apsw  # by which rosbags reads .db3
-    from rosbags.highlevel import AnyReader, AnyReaderError
-    from rosbags.rosbag1 import ReaderError as ReaderError1
-    from rosbags.rosbag2 import ReaderError as ReaderError2
+    from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    broken = (AnyReaderError, ReaderError1, ReaderError2, OSError, ValueError, LookupError, apsw.Error)
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             yield reader
-    except (*broken, AssertionError, struct.error) as error:
+    except InputError:
+        raise
+    except Exception as error:  # a parser fails on damaged data in more ways than can be listed
         why = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"The bag {path} cannot be read ({why}); try to record or copy it again") from None
 

@@ -17,7 +17,7 @@ from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes
 from pipeline.geometry import inverse, rigid, scaled
 from pipeline.importing.cameras import camera_of
-from pipeline.importing.sequence import Candidate, Sequence
+from pipeline.importing.sequence import Candidate, Sequence, named_inside
 from pipeline.io.images import read_depth_units
 from pipeline.types import CameraIntrinsics, FloatArray
 
@@ -254,8 +254,7 @@ def _model_folder(folder: Path, suffix: str) -> Path | None:
 
 def _beside(folder: Path, places: tuple[str, ...], name: str) -> Path | None:
     """A file of that name in one of the places; none outside the folder."""
-    if ".." in Path(name).parts or Path(name).is_absolute():
-        raise InputError(f"images.txt in {folder} names {name}, which is outside; check the file")
+    named_inside(folder, name, "images.txt")
     return next((path for place in places if (path := folder / place / name).is_file()), None)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from packetmesh.errors import InputError
 from pipeline.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
@@ -52,6 +53,17 @@ class Sequence:
             factor = self.units_per_metre / units_per_metre
             candidates = tuple(candidate.enlarged(factor) for candidate in candidates)
         return replace(self, candidates=candidates, units_per_metre=units_per_metre, rotated_bits=False)
+
+
+def named_inside(folder: Path, name: str, file: str) -> Path:
+    """What a file of a recording calls ``name``.
+
+    Raises:
+        InputError: it lies outside the recording's folder.
+    """
+    if ".." in Path(name).parts or Path(name).is_absolute():
+        raise InputError(f"{file} in {folder} names {name}, which is outside; check the file")
+    return folder / name
 
 
 def posed(candidates: list[Candidate], what: str) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:

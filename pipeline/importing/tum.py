@@ -15,7 +15,7 @@ from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, read_bytes
 from pipeline.geometry import rigid
 from pipeline.importing.cameras import PRIMESENSE, camera_of
-from pipeline.importing.sequence import Candidate, Sequence, posed
+from pipeline.importing.sequence import Candidate, Sequence, named_inside, posed
 from pipeline.types import CameraIntrinsics, FloatArray
 
 UNITS_PER_METRE = 5000.0
@@ -49,7 +49,12 @@ def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
     poses = _poses(folder / "groundtruth.txt", rgb_s)
     candidates, notes = posed(
         [
-            Candidate(folder / pictures[i], folder / depths[j], poses.get(i), float(rgb_s[i]))
+            Candidate(
+                named_inside(folder, pictures[i], "rgb.txt"),
+                named_inside(folder, depths[j], "depth.txt"),
+                poses.get(i),
+                float(rgb_s[i]),
+            )
             for i, j in pairs
         ],
         "pose in groundtruth.txt at the time of an image",

@@ -20,6 +20,8 @@ from pipeline.types import AnyPath, CameraIntrinsics
 COLMAP_MIDDLE, MATLAB_MIDDLE = 0.5, 1.0
 """Of the first pixel."""
 _COLMAP = re.compile(r"^\s*\d+\s+(PINHOLE|OPENCV|FULL_OPENCV)\s+(.*)$", re.MULTILINE)
+_COLMAP_NUMBERS = {"PINHOLE": 4, "OPENCV": 8, "FULL_OPENCV": 12}
+"""After the size."""
 _FISHEYE = re.compile(r"\bequidistant\b|\bOPENCV_FISHEYE\b|^fisheye_model:\s*1", re.MULTILINE)
 _KALIBR = re.compile(r"^\s+(intrinsics|distortion_coeffs|resolution):\s*\[([^\]]*)\]", re.MULTILINE)
 _MATLAB = re.compile(
@@ -178,7 +180,10 @@ def _from_colmap(text: str) -> CameraIntrinsics | None:
     found = _COLMAP.search(text)
     if found is None:
         return None
-    width, height, fx, fy, cx, cy, *lens = (float(word) for word in found[2].split())
+    width, height, *numbers = (float(word) for word in found[2].split())
+    if len(numbers) != _COLMAP_NUMBERS[found[1]]:
+        raise ValueError
+    fx, fy, cx, cy, *lens = numbers
     return _camera((fx, fy, cx - COLMAP_MIDDLE, cy - COLMAP_MIDDLE), lens, width, height)
 
 
@@ -194,6 +199,8 @@ def _from_matlab(text: str) -> CameraIntrinsics | None:
     found = {name: _numbers(words) for name, words in _MATLAB.findall(text)}
     if not {"FocalLength", "PrincipalPoint", "ImageSize"} <= found.keys():
         return None
+    if "Distortion" in text and not {"RadialDistortion", "TangentialDistortion"} <= found.keys():
+        return None  # it ends too soon
     k1, k2, k3 = (*found.get("RadialDistortion", []), 0.0, 0.0, 0.0)[:3]
     p1, p2 = (*found.get("TangentialDistortion", []), 0.0, 0.0)[:2]
     cx, cy = (value - MATLAB_MIDDLE for value in found["PrincipalPoint"])

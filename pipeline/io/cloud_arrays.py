@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
-
 import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.io.cloud_table import POSITION, check_count
 from pipeline.io.cloud_text import table_of_columns
+from pipeline.io.numpy_files import array_in
 from pipeline.types import AnyPath
 
 SWEEP_ROW = np.dtype([(name, "<f4") for name in (*POSITION, "reflectance")])
@@ -23,8 +22,8 @@ def parse_npy(path: AnyPath, data: bytes) -> np.ndarray:
         InputError: damaged, or no such array of numbers.
     """
     try:
-        array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
-    except (ValueError, OSError, EOFError, MemoryError):
+        array = array_in(data)
+    except ValueError:
         raise InputError(
             f"The point cloud {path} is a truncated or damaged array, or holds more than numbers; "
             "try numpy.save(file, points)"

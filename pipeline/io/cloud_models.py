@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import PurePath
 
 import numpy as np
@@ -10,7 +9,7 @@ import trimesh
 
 from packetmesh.errors import InputError
 from pipeline.io.cloud_table import COLOR, POSITION, check_count
-from pipeline.io.meshes import T_GLTF_WORLD
+from pipeline.io.meshes import scene_in
 from pipeline.types import AnyPath
 
 
@@ -22,10 +21,7 @@ def parse_model(path: AnyPath, data: bytes) -> np.ndarray:
     """
     suffix = PurePath(path).suffix.lower()
     try:
-        scene = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
-        if suffix == ".glb":
-            scene.apply_transform(T_GLTF_WORLD.T)
-        parts = scene.dump()
+        parts = scene_in(data, suffix).dump()
         points = np.concatenate([np.asarray(part.vertices, np.float64).reshape(-1, 3) for part in parts])
         colors = [_colors(part) for part in parts]
     except Exception:  # a parser fails on damaged data in more ways than can be listed

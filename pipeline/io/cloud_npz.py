@@ -8,8 +8,9 @@ import zipfile
 import numpy as np
 
 from packetmesh.errors import InputError
-from packetmesh.files import MAX_GEOMETRY_BYTES
+from packetmesh.files import BROKEN_ZIP, MAX_UNPACKED_BYTES, unpacked
 from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count
+from pipeline.io.numpy_files import array_in
 from pipeline.types import AnyPath
 
 _COLUMNS = {"points": POSITION, "colors": COLOR, "normals": NORMAL}
@@ -23,14 +24,14 @@ def parse_npz(path: AnyPath, data: bytes) -> np.ndarray:
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            unpacked = sum(item.file_size for item in archive.infolist())
-        if unpacked > MAX_GEOMETRY_BYTES:
-            raise InputError(
-                f"The point cloud {path} unpacks to more than {MAX_GEOMETRY_BYTES / 1e6:g} MB; try to thin it"
-            )
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in _COLUMNS if name in archive.files}
-    except (ValueError, OSError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile):
+            inside = {item.filename.removesuffix(".npy"): item for item in archive.infolist()}
+            if sum(item.file_size for item in inside.values()) > MAX_UNPACKED_BYTES:
+                raise InputError(
+                    f"The point cloud {path} unpacks to more than {MAX_UNPACKED_BYTES / 1e6:g} MB; try to "
+                    "thin it"
+                )
+            arrays = {name: array_in(unpacked(archive, inside[name])) for name in _COLUMNS if name in inside}
+    except (*BROKEN_ZIP, ValueError):
         raise InputError(
             f"The point cloud {path} is a truncated or damaged archive, or holds more than numbers; "
             "try numpy.savez(file, points=...)"

@@ -25,6 +25,8 @@ def parse_las(path: AnyPath, data: bytes) -> np.ndarray:
         InputError: the extra is not installed, or the file is damaged.
     """
     laspy = _library("laspy", path)
+    if not _las_records_fit(data):
+        raise InputError(_DAMAGED.format(path))
     try:
         with laspy.open(io.BytesIO(data)) as reader:
             check_count(path, reader.header.point_count)
@@ -66,6 +68,19 @@ def parse_e57(path: AnyPath, data: bytes) -> np.ndarray:
     except Exception:  # libE57 has one exception for everything
         raise InputError(_DAMAGED.format(path)) from None
     return _table(xyz, rgb)
+
+
+def _las_records_fit(data: bytes) -> bool:
+    """Whether a file is as long as its variable length records at least (LAS 1.4, tables 3, 5 and 7)."""
+    if len(data) < 227:
+        return False
+    header_bytes, records = (
+        int.from_bytes(data[at : at + size], "little") for at, size in ((94, 2), (100, 4))
+    )
+    further = 0
+    if data[25] >= 4 and len(data) >= 247:
+        further = int.from_bytes(data[243:247], "little")
+    return header_bytes + 54 * records + 60 * further <= len(data)
 
 
 def _joined(scans: Sequence[dict[str, np.ndarray]], names: Sequence[str]) -> np.ndarray:

@@ -12,6 +12,8 @@ from pipeline.types import AnyPath, PointCloud
 _log = logging.getLogger(__name__)
 
 MAX_POINTS = 20_000_000
+FARTHEST, MOST_FAR_SHARE = 1e12, 0.1
+"""Coordinates beyond, in any unit, are none; so many of them tell of a file that is understood wrongly."""
 POSITION, NORMAL, COLOR = ("x", "y", "z"), ("nx", "ny", "nz"), ("red", "green", "blue")
 LABEL = "source"
 
@@ -40,6 +42,11 @@ def cloud_of(path: AnyPath, table: np.ndarray) -> PointCloud:
     finite = np.isfinite(points_m).all(axis=1)
     if not finite.any():
         raise InputError(f"The point cloud {path} holds no point with finite coordinates; try another file")
+    if (np.abs(points_m[finite]) > FARTHEST).any(axis=1).mean() > MOST_FAR_SHARE:
+        raise InputError(
+            f"The numbers in the point cloud {path} are no positions, as if their bytes were in another "
+            "order; try to export it again"
+        )
     if finite.all():
         return cloud
     _log.warning("%d points of %s are left out: their coordinates are not finite", np.sum(~finite), path)

@@ -9,6 +9,7 @@ from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count, number
 from pipeline.types import AnyPath
 
 _NAMES = {"r": "red", "g": "green", "b": "blue", "normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
+MOST_COLUMNS = 1000
 _UNIT_TOLERANCE = 0.02
 """How far from one the lengths of triples may be that are taken for normals."""
 
@@ -36,8 +37,14 @@ def parse_text(path: AnyPath, data: bytes) -> np.ndarray:
     if not lines or len(lines[0].split()) < 3:
         raise InputError(f"The point cloud {path} has no lines of three numbers or more; try another file")
     check_count(path, len(lines))
-    rows = number_rows(path, "\n".join(lines).encode(), len(lines), len(lines[0].split()))
-    if names is not None and len(names) == rows.shape[1]:
+    width = len(lines[0].split())
+    if width > MOST_COLUMNS:
+        raise InputError(f"The point cloud {path} has {width} columns; try one with a point on each line")
+    rows = number_rows(path, "\n".join(lines).encode(), len(lines), width)
+    if names is not None and len(names) == width:
+        twice = [name for name in (*POSITION, *NORMAL, *COLOR) if names.count(name) > 1]
+        if twice:
+            raise InputError(f"The point cloud {path} has two columns {twice[0]}; try to name one otherwise")
         return _table(rows, names)
     return table_of_columns(rows)
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path, read_text
+from packetmesh.files import atomic_path, read_json
 from pipeline.types import AnyPath, DepthMap, DepthNoise, FloatArray, IntArray
 
 DEPTH_CORRECTION = "depth_correction.json"
@@ -139,13 +139,8 @@ def read_depth_correction(path: AnyPath) -> DepthCorrection:
     Raises:
         InputError: missing, no JSON, another kind of file, or terms that no sensor has.
     """
-    try:
-        values = json.loads(read_text(path, "depth correction"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"The depth correction {path} is not valid JSON ({error}); try to calibrate again"
-        ) from None
-    if not isinstance(values, dict) or values.get("format") != FORMAT:
+    values = read_json(path, "depth correction")
+    if values.get("format") != FORMAT:
         raise InputError(
             f"The file {path} is no depth correction ('format' is not '{FORMAT}'); try to calibrate again"
         )

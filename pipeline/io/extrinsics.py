@@ -7,7 +7,7 @@ import json
 import numpy as np
 
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path, read_text
+from packetmesh.files import atomic_path, read_json
 from pipeline.io.poses import rigid_or_none
 from pipeline.types import AnyPath, FloatArray
 
@@ -20,11 +20,10 @@ def read_extrinsics(path: AnyPath) -> FloatArray:
     Raises:
         InputError: unreadable, or no rigid transform of that name.
     """
-    text = read_text(path, "extrinsics file")
+    values = read_json(path, "extrinsics file")
     try:
-        values = json.loads(text)[KEY]
-        T = rigid_or_none(np.array(values, dtype=np.float64))
-    except (ValueError, KeyError, TypeError, RecursionError):
+        T = rigid_or_none(np.array(values[KEY], dtype=np.float64))
+    except (ValueError, KeyError, TypeError, OverflowError):
         T = None
     if T is None:
         raise InputError(

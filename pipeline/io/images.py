@@ -21,6 +21,8 @@ NO_VALUE = 65535
 """What some data sets (7-Scenes) write where the depth is unknown, beside 0."""
 FARTHEST_M = 65.534
 """What is left for 16 bits of millimetres."""
+FARTHEST_FLOAT_M, MOST_FAR_SHARE = 1e6, 0.05
+"""Floating-point depths beyond are none; so many of them tell of a file that is understood wrongly."""
 _TYPICAL_DEPTH_M = 2.0
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _JPEG_SIGNATURE = b"\xff\xd8"
@@ -149,6 +151,11 @@ def _metres_of(path: AnyPath, values: np.ndarray) -> DepthMap:
         raise InputError(
             f"The depth image {path} has a median depth of {median_m:.3g}; floating-point depth is in "
             "metres, so try to divide it by 1000 if it is millimetres"
+        )
+    if (values[known] > FARTHEST_FLOAT_M).mean() > MOST_FAR_SHARE:
+        raise InputError(
+            f"The numbers in the depth image {path} are no depths, as if their bytes were in another order; "
+            "try to export it again"
         )
     return DepthMap(np.where(known, values, np.nan).astype(np.float32))
 

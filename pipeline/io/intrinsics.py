@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path, read_text
+from packetmesh.files import atomic_path, json_object, read_text
 from pipeline.io.camera_files import camera_in, is_fisheye
 from pipeline.types import AnyPath, CameraIntrinsics, FloatArray
 
 _BROWN_CONRADY = {"", "plumb_bob", "rational_polynomial"}
 """Distortion models whose first five coefficients are k1, k2, p1, p2, k3."""
 _YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTILINE)
+_LIST = re.compile(r"\[[^\]]*\]")
+_WORDS = re.compile(r"\s*[^\s#%.-]")
+"""A line that is neither empty nor a comment, nor part of a list, nor the end of a document."""
 _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?(?![\w.])")
 
 
@@ -44,8 +47,9 @@ def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> Ca
             f"The intrinsics file {path} has the distortion model equidistant, that of a fisheye lens; try a "
             "calibration with plumb_bob, which has five coefficients, or undistort the images first"
         )
-    values = _parse_json(text, path) if text.lstrip().startswith("{") else _parse_yaml(text)
+    is_json = text.lstrip().startswith("{")
     try:
+        values = json_object(text, path, "intrinsics file") if is_json else _parse_yaml(text)
         camera = _from_keys(values) or camera_in(text)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         camera = None
@@ -101,22 +105,21 @@ def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics) -> None:
         sibling.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n")
 
 
-def _parse_json(text: str, path: AnyPath) -> dict[str, Any]:
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"The intrinsics file {path} is not valid JSON ({error}); try to export it again"
-        ) from None
-
-
 def _parse_yaml(text: str) -> dict[str, Any]:
-    """The numbers and words of block-style YAML, two levels deep, which is all that camera files use."""
+    """The numbers and words of block-style YAML, two levels deep, which is all that camera files use.
+
+    Raises:
+        ValueError: it ends within a list or a name.
+    """
+    if text.count("[") != text.count("]"):
+        raise ValueError
     values: dict[str, Any] = {}
     parent = ""
     for indent, key, body in _YAML_ENTRY.findall(text):
         numbers = [float(number) for number in _NUMBER.findall(body)]
         is_list = "[" in body or body.lstrip().startswith("-")
+        if any(_WORDS.match(line) for line in _LIST.sub("", body).splitlines()[1:]):
+            raise ValueError
         value = numbers if is_list else numbers[0] if numbers else body.strip().strip("\"'")
         if indent and isinstance(values.get(parent), dict):
             values[parent][key] = value
@@ -127,28 +130,42 @@ def _parse_yaml(text: str) -> dict[str, Any]:
 
 
 def _from_keys(values: dict[str, Any]) -> CameraIntrinsics | None:
-    """The camera as the file has it, with five distortion coefficients or more; None in an unknown style."""
+    """The camera as the file has it, with five distortion coefficients or more; None in an unknown style.
+
+    Raises:
+        KeyError, TypeError, ValueError, OverflowError: a value is missing or none that belongs there.
+    """
     if "intrinsic_matrix" in values:
         matrix = np.array(values["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T
         distortion: Any = []
     elif "camera_matrix" in values or "K" in values or "k" in values:
-        rows = values.get("camera_matrix") or values.get("K") or values.get("k")
+        rows = _first(values, "camera_matrix", "K", "k")
         matrix = np.array(_data(rows), dtype=np.float64).reshape(3, 3)
-        distortion = values.get("distortion_coefficients") or values.get("D") or values.get("d") or []
+        distortion = _first(values, "distortion_coefficients", "D", "d")
     elif "fx" in values:
         fx, fy, cx, cy = (float(values[key]) for key in ("fx", "fy", "cx", "cy"))
         matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-        distortion = values.get("distortion") or []
+        distortion = _first(values, "distortion")
     else:
         return None
-    coefficients = np.array(_data(distortion), dtype=np.float64).reshape(-1)
+    coefficients = np.array([] if distortion is None else _data(distortion), dtype=np.float64).reshape(-1)
     coefficients = np.pad(coefficients, (0, max(0, 5 - len(coefficients))))
     width, height = (values.get(f"image_{key}") or values[key] for key in ("width", "height"))
     return CameraIntrinsics(matrix, coefficients, int(width), int(height))
 
 
+def _first(values: dict[str, Any], *keys: str) -> Any:
+    return next((values[key] for key in keys if values.get(key) is not None), None)
+
+
 def _data(value: Any) -> Any:
-    return value["data"] if isinstance(value, dict) else value
+    """A list, or that of a matrix, which has as many numbers as it says."""
+    if not isinstance(value, dict):
+        return value
+    numbers = value["data"]
+    if "rows" in value and "cols" in value and len(numbers) != value["rows"] * value["cols"]:
+        raise ValueError
+    return numbers
 
 
 def _check(path: AnyPath, camera: CameraIntrinsics, distortion_model: str) -> None:

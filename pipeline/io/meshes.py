@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,8 @@ from pipeline.texture import Texture
 from pipeline.types import AnyPath, Surface
 
 MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")
+_MAX_HEADER_BYTES = 10_000
+_PLY_FACES = re.compile(rb"^element face (\d{1,18})\s*$", re.MULTILINE)
 SRGB_GAMMA = 2.2
 """About that of sRGB; glTF has vertex colours in linear light."""
 T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.zeros(3))
@@ -95,10 +99,7 @@ def read_mesh(path: AnyPath) -> Surface:
     suffix = mesh_suffix(path)
     data = read_bytes(path, MAX_GEOMETRY_BYTES, "mesh")
     try:
-        loaded = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
-        if suffix == ".glb":
-            loaded.apply_transform(T_GLTF_WORLD.T)
-        mesh = loaded.to_mesh()
+        mesh = scene_in(data, suffix).to_mesh()
         triangles = np.asarray(mesh.faces, dtype=np.int32)
         vertices_m = np.asarray(mesh.vertices, dtype=np.float64)
         if suffix == ".stl":
@@ -108,9 +109,41 @@ def read_mesh(path: AnyPath) -> Surface:
         raise InputError(f"The mesh {path} is truncated or damaged; try to copy or export it again") from None
     if not len(triangles) or not np.isfinite(vertices_m).all():
         raise InputError(f"The mesh {path} holds no triangle with finite corners; try another file")
+    faces = _PLY_FACES.search(data, 0, _MAX_HEADER_BYTES) if suffix == ".ply" else None
+    if (
+        triangles.min() < 0
+        or triangles.max() >= len(vertices_m)
+        or (faces and len(triangles) < int(faces[1]))
+    ):
+        raise InputError(
+            f"The mesh {path} lacks faces that its header promises, or corners that its faces name; try to "
+            "export it again"
+        )
     colored = mesh.visual.kind == "vertex"
     colors = np.asarray(mesh.visual.vertex_colors, dtype=np.uint8)[:, :3] if colored else None
     return Surface(vertices_m, triangles, colors)
+
+
+def scene_in(data: bytes, suffix: str) -> trimesh.Scene:
+    """What trimesh makes of a file in memory, Z up; no other file is opened for it.
+
+    Raises:
+        Exception: of any kind, where it is damaged.
+    """
+    if suffix == ".glb":
+        _check_accessors(data)
+    scene = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
+    if suffix == ".glb":
+        scene.apply_transform(T_GLTF_WORLD.T)
+    return scene
+
+
+def _check_accessors(data: bytes) -> None:
+    """Raise ValueError for numbers of vertices or places below 0, from which slices would be taken."""
+    document = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    for part in (*document.get("accessors", ()), *document.get("bufferViews", ())):
+        if min(part.get(name, 0) for name in ("count", "byteOffset", "byteLength", "byteStride")) < 0:
+            raise ValueError
 
 
 def mesh_suffix(path: AnyPath) -> str:

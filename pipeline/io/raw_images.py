@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import re
 
@@ -10,6 +11,7 @@ from PIL import Image
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_PIXELS
+from pipeline.io.numpy_files import array_in
 from pipeline.types import AnyPath
 
 _NPY = b"\x93NUMPY"
@@ -64,12 +66,10 @@ def _check(height_px: int, width_px: int) -> None:
 
 
 def _numpy(data: bytes) -> np.ndarray:
-    stream = io.BytesIO(data)
-    version = np.lib.format.read_magic(stream)
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape = read(stream)[0]
-    _check(*shape[:2])
-    return np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    values = array_in(data)
+    if values.ndim > 1:
+        _check(*values.shape[:2])
+    return values
 
 
 def _tiff(data: bytes) -> np.ndarray:
@@ -85,7 +85,8 @@ def _exr(data: bytes) -> np.ndarray:
     corners = OpenEXR.File(io.BytesIO(data), header_only=True).header()["dataWindow"]
     width_px, height_px = (int(last - first) + 1 for first, last in zip(*corners, strict=True))
     _check(height_px, width_px)
-    with OpenEXR.File(io.BytesIO(data), separate_channels=True) as file:
+    quiet = contextlib.redirect_stdout(io.StringIO())  # where OpenEXR prints warnings
+    with quiet, OpenEXR.File(io.BytesIO(data), separate_channels=True) as file:
         channels = {name: channel.pixels for name, channel in file.channels().items()}
     if {"R", "G", "B"} <= channels.keys():
         return np.stack([channels[name] for name in "RGB"], axis=-1)

@@ -42,7 +42,7 @@ def come(browser):
 @pytest.fixture
 def teacher(lecture, come):
     page = come(lecture.teacher_url)
-    assert lecture.teacher.text not in page.url
+    assert lecture.entrance.teacher.text not in page.url
     page.get_by_text("The class may steer").wait_for()
     go(page, "Scene")
     return page
@@ -134,6 +134,6 @@ def test_votes_are_counted_by_keys_and_by_buttons_and_stay_with_the_answer(teach
 
 def test_the_address_of_the_class_is_shown_large(teacher, lecture):
     press(teacher, "Address of the class")
-    expect(teacher.get_by_alt_text(f"QR code of {lecture.class_url}")).to_be_visible()
-    expect(teacher.locator(".packetmesh-join")).to_contain_text(lecture.class_url)
+    expect(teacher.get_by_alt_text(f"QR code of {lecture.class_link}")).to_be_visible()
+    expect(teacher.locator(".packetmesh-join")).to_contain_text(lecture.class_link)
     press(teacher, "Close")

@@ -15,6 +15,7 @@ from app.state import BoardViews
 from app.ui import Ui
 from app.zips import opened_zip
 from packetmesh.errors import InputError
+from packetmesh.files import unpacked
 from pipeline.calibration.shots import BOARD_FILE
 from pipeline.config import Pattern
 
@@ -155,9 +156,9 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
         if sum(one.file_size for one in inside) > UNPACKED_LIMIT_BYTES:
             raise InputError(f"{file.name} unpacks to more than {UNPACKED_LIMIT_BYTES >> 20} MB; {INSTEAD}.")
         found = {
-            _place(one.filename, node): archive.read(one)
+            _place(one.filename, node): unpacked(archive, one)
             for one in inside
-            if not PurePosixPath(one.filename).name.startswith(".")
+            if not _path(one.filename).name.startswith(".")
         }
     if not set(found) - {BOARD_FILE}:
         raise InputError(f"{file.name} holds no PNG or JPEG; try a ZIP of photographs.")
@@ -166,8 +167,13 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
 
 def _place(name: str, node: str) -> str:
     """``NODE/NAME`` of a file, in the node's folder that its own path names or else in ``node``."""
-    path = PurePosixPath(name.replace("\\", "/"))
+    path = _path(name)
     if path.name == BOARD_FILE:
         return BOARD_FILE
     named = next((part for part in path.parts[:-1] if re.fullmatch(r"node_\d\d", part)), node)
     return f"{named}/{re.sub(r'[^A-Za-z0-9._-]', '-', path.name)[-60:]}"
+
+
+def _path(name: str) -> PurePosixPath:
+    """A file's name as any system writes it."""
+    return PurePosixPath(name.replace("\\", "/"))

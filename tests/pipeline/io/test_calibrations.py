@@ -165,7 +165,7 @@ def test_extrinsics_survive_their_file(tmp_path):
 @pytest.mark.parametrize("text", ["{", "[]", '{"T_color_depth": [[1, 0], [0, 1]]}', '{"T_color_depth": "x"}'])
 def test_other_extrinsics_are_refused(tmp_path, text):
     (tmp_path / "e.json").write_text(text)
-    with pytest.raises(InputError, match="holds no rigid transform"):
+    with pytest.raises(InputError, match=r"holds no rigid transform|JSON"):
         read_extrinsics(tmp_path / "e.json")
 
 

@@ -141,7 +141,7 @@ def test_a_bad_cloud_gets_its_sentence(tmp_path, name):
 
 
 def test_an_archive_that_unpacks_to_too_much_is_not_unpacked(tmp_path, monkeypatch):
-    monkeypatch.setattr("pipeline.io.cloud_npz.MAX_GEOMETRY_BYTES", 100_000)
+    monkeypatch.setattr("pipeline.io.cloud_npz.MAX_UNPACKED_BYTES", 100_000)
     with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("points.npy", bytes(1_000_000))
     assert (tmp_path / "bomb.npz").stat().st_size < 10_000

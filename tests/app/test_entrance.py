@@ -1,0 +1,194 @@
+"""Who comes in where other machines reach the server, and what browsers are told to forbid."""
+
+import contextlib
+import http.client
+from contextlib import closing
+from urllib.parse import quote
+
+import pytest
+import viser
+from viser import _messages as messages
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from app.cli import main
+from app.entrance import Entrance, Token, is_loopback
+from app.headers import strict_headers
+from app.origin import only_own_page
+from app.uploads import MOST_A_MINUTE, MOST_BYTES, MOST_TOTAL_BYTES, REFUSED, UploadGate, limit_uploads
+from packetmesh.errors import InputError
+from tests.app.connections import Connection, wait_for
+
+ENTRANCE = Entrance(Token("token"), Token("teacher"))
+
+
+@pytest.fixture(scope="module")
+def server():
+    with strict_headers(), only_own_page(), ENTRANCE.guarded():
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+def get(server, path="/", **headers):
+    with closing(http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=10)) as connection:
+        connection.request("GET", path, headers=headers)
+        response = connection.getresponse()
+        response.text = response.read()
+        return response
+
+
+def cookie_of(server, token):
+    return get(server, f"/{token.query}").headers["Set-Cookie"].partition(";")[0]
+
+
+def open_socket(server, **headers):
+    origin = headers.pop("Origin", None)
+    protocols = [f"viser-v{viser.__version__}"]
+    url = f"ws://127.0.0.1:{server.get_port()}"
+    connect(url, origin=origin, subprotocols=protocols, additional_headers=headers, proxy=None).close()
+
+
+@pytest.mark.parametrize("path", ["/", "/index.html", "/?scene=office", "/nothing"])
+def test_without_the_link_there_is_one_sentence_and_no_page(server, path):
+    response = get(server, path)
+    assert (response.status, response.text.count(b".")) == (403, 1)
+    assert b"<" not in response.text
+
+
+@pytest.mark.parametrize("token", [ENTRANCE.visitor, ENTRANCE.teacher], ids=["token", "teacher"])
+def test_a_link_gives_a_cookie_that_lets_in_and_keeps_the_rest_of_the_address(server, token):
+    response = get(server, f"/{token.query}&scene=office&set=depth.reach%3D0.2")
+    assert (response.status, response.headers["Location"]) == (303, "/?scene=office&set=depth.reach%3D0.2")
+    assert token.text not in response.headers["Location"]
+    assert "HttpOnly" in response.headers["Set-Cookie"]
+    cookie = cookie_of(server, token)
+    assert get(server, Cookie=cookie).status == 200
+    open_socket(server, Cookie=cookie)
+
+
+@pytest.mark.parametrize("key", ["token", "teacher"])
+@pytest.mark.parametrize("text", ["", "x", "é", "{other}", "{own}x"])
+def test_another_token_is_refused(server, key, text):
+    own, other = ENTRANCE.visitor, ENTRANCE.teacher
+    if key == "teacher":
+        own, other = other, own
+    wrong = quote(text.format(own=own.text, other=other.text))
+    response = get(server, f"/?{key}={wrong}")
+    assert response.status == 403
+    assert "Set-Cookie" not in response.headers
+
+
+def test_a_websocket_needs_the_cookie_and_its_own_page(server):
+    cookie, own = cookie_of(server, ENTRANCE.visitor), f"http://127.0.0.1:{server.get_port()}"
+    open_socket(server, Cookie=cookie, Origin=own)
+    wrong = {"Cookie": f"{ENTRANCE.visitor.cookie}=x"}, {"Cookie": cookie, "Origin": "http://evil.example"}
+    for headers in ({}, *wrong):
+        with pytest.raises(InvalidStatus, match="403"):
+            open_socket(server, **headers)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/../../etc/passwd",
+        "/%2e%2e/%2e%2e/etc/passwd",
+        "/..%5c..%5cetc/passwd",
+        "//etc/passwd",
+        "/C:/boot.ini",
+    ],
+)
+def test_no_file_outside_the_page_is_sent(server, path):
+    response = get(server, path, Cookie=cookie_of(server, ENTRANCE.visitor))
+    assert response.status == 404
+    assert b"root" not in response.text
+
+
+@pytest.mark.parametrize("lets_in", [True, False])
+def test_every_answer_forbids_other_sites(server, lets_in):
+    headers = {"Cookie": cookie_of(server, ENTRANCE.visitor)} if lets_in else {}
+    response = get(server, **headers)
+    policy = dict(part.split(" ", 1) for part in response.headers["Content-Security-Policy"].split("; "))
+    assert policy["default-src"] == policy["frame-ancestors"] == policy["base-uri"] == "'none'"
+    assert f"ws://127.0.0.1:{server.get_port()}" in policy["connect-src"]
+    assert not any("http" in sources or "*" in sources for sources in policy.values())
+    assert response.headers["X-Content-Type-Options"] == "nosniff"
+
+
+def test_the_policy_holds_no_header_of_a_stranger(server):
+    response = get(server, Host="127.0.0.1; script-src *")
+    assert "script-src *" not in response.headers["Content-Security-Policy"]
+
+
+@pytest.mark.parametrize(
+    ("host", "alone"),
+    [("127.0.0.1", True), ("127.8.8.8", True), ("::1", True), ("localhost", True)]
+    + [(host, False) for host in ("0.0.0.0", "::", "192.168.1.7", "example.org", "localhost.evil.example")],
+)
+def test_only_loopback_needs_no_token(host, alone):
+    assert is_loopback(host) == alone
+
+
+@pytest.mark.parametrize("words", [(), ("--no-token",)])
+def test_the_command_passes_on_whether_a_token_is_wanted(monkeypatch, words):
+    asked = []
+
+    def refuse(*arguments):
+        asked.append(arguments[-1])
+        raise InputError("not now")
+
+    monkeypatch.setattr("app.server.build_server", refuse)
+    with pytest.raises(SystemExit):
+        main(["serve", "--host", "192.0.2.1", *words])
+    assert asked == [not words]
+
+
+def test_a_file_is_too_large_too_many_or_more_than_it_said():
+    gate = UploadGate()
+    assert not gate.begins(MOST_BYTES + 1, 1, "large")
+    assert not gate.begins(-1, 1, "negative")
+    assert not gate.begins(9, 10**9, "parts")
+    assert gate.begins(10, 2, "a")
+    assert not gate.begins(10, 2, "a")
+    assert gate.goes_on("a", 6)
+    assert not gate.goes_on("a", 5)
+    assert not gate.goes_on("unknown", 1)
+    whole = (MOST_TOTAL_BYTES - 10) // MOST_BYTES
+    assert all(gate.begins(MOST_BYTES, 1, f"b{k}") for k in range(whole))
+    assert not gate.begins(MOST_BYTES, 1, "total")
+    quick = UploadGate()
+    assert all(quick.begins(0, 0, str(k)) for k in range(MOST_A_MINUTE))
+    assert not quick.begins(0, 0, "one more")
+
+
+def test_what_is_too_much_is_not_kept():
+    told, got = [], []
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+
+        @server.on_client_connect
+        def _(client):
+            limit_uploads(client._websock_connection, told.append)
+            client.gui.add_upload_button("File").on_upload(
+                lambda event: got.append(event.target.value.content)
+            )
+
+        with contextlib.closing(Connection(f"http://127.0.0.1:{server.get_port()}")) as browser:
+            wait_for(lambda: "File" in browser.uuids)
+            button = browser.uuids["File"][0]
+
+            def send(transfer, said, *parts):
+                browser.say(
+                    messages.FileTransferStartUpload(button, transfer, "../../x", "", len(parts), said)
+                )
+                for index, part in enumerate(parts):
+                    browser.say(messages.FileTransferPart(button, transfer, index, part))
+
+            send("large", MOST_BYTES + 1, b"x")
+            send("more", 2, b"x", b"more")
+            send("good", 2, b"o", b"k")
+            wait_for(lambda: bool(got))
+            assert got == [b"ok"]
+            assert told == [REFUSED]
+    finally:
+        server.stop()
