@@ -6,9 +6,7 @@ import contextlib
 import io
 import logging
 import os
-import shutil
 import socket
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +18,7 @@ from app.jobs import warm_up
 from app.landing import landing_first
 from app.lecture import Lecture
 from app.origin import only_own_page
+from app.own_folder import OwnFolder, own_folder
 from app.pool import ComputePool
 from app.screens.calibrate.panel import CalibratePanel
 from app.screens.depth.panel import DepthPanel
@@ -33,6 +32,7 @@ from app.state import SharedViews, Spec
 from app.store import Store
 from app.teacher import Token
 from packetmesh.errors import InputError
+from packetmesh.files import file_trouble
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Demo, RigFolder
 
@@ -49,7 +49,7 @@ class AppServer:
 
     viser_server: viser.ViserServer
     pool: ComputePool
-    folder: Path
+    folder: OwnFolder
     sessions: dict[int, Session] = field(default_factory=dict)
     teacher: Token | None = None
     """Of a lecture."""
@@ -80,7 +80,7 @@ class AppServer:
         with contextlib.redirect_stdout(io.StringIO()):
             self.viser_server.stop()
         self.pool.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        self.folder.delete()
 
 
 def build_server(
@@ -101,11 +101,12 @@ def build_server(
 
     Raises:
         InputError: the port is taken or the address is not this machine's.
+        OSError: there is no place for the server's folder.
     """
     _check_address(host, port)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a port scan is no reason for a stack trace
     spec = start_spec(scene, config or PipelineConfig())
-    folder = Path(tempfile.mkdtemp(prefix="packetmesh-"))
+    folder = own_folder()
     pool = ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
     teacher = Token() if lecture else None
     entrance = landing_first() if teacher is None else teacher.accepted()
@@ -116,7 +117,7 @@ def build_server(
         app.stop()
         raise InputError(_taken(port))
     _dress(server)
-    store, shared = Store(str(folder)), SharedViews()
+    store, shared = Store(str(folder.path)), SharedViews()
 
     def begin(target: Target, number: int, lecture: Lecture | None = None) -> Session:
         app.sessions[number] = Session(target, pool, store, shared, spec, PANELS, lecture)
@@ -127,13 +128,22 @@ def build_server(
         session = begin(server, -1, together)
         together.begin(session.post, lambda: session.frame_view(anew=True))
     else:
-        server.on_client_connect(lambda client: begin(client, client.client_id))
 
-        @server.on_client_disconnect
-        def _(client: viser.ClientHandle) -> None:
+        def leave(client: viser.ClientHandle) -> None:
             session = app.sessions.pop(client.client_id, None)
             if session is not None:
                 session.close()
+
+        def come(client: viser.ClientHandle) -> None:
+            try:
+                begin(client, client.client_id)
+            except OSError as error:
+                client.add_notification("You cannot come in", file_trouble(error), color="red")
+            if client.client_id not in server.get_clients():  # it left before its session was there
+                leave(client)
+
+        server.on_client_connect(come)
+        server.on_client_disconnect(leave)
 
     return app
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -64,6 +65,14 @@ def write_json(path: Path, value: Any) -> None:
     """Write ``value`` as strict JSON (NaN and infinity become null)."""
     with atomic_path(path) as temporary:
         Path(temporary).write_text(json.dumps(finite(value), indent=1, allow_nan=False) + "\n")
+
+
+def file_trouble(error: OSError) -> str:
+    """One sentence on a file that could not be written or read."""
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        return f"The disk is full ({error.strerror}); delete something there and try again."
+    what = error.filename or "A file"
+    return f"{what} cannot be used ({error.strerror or error}); try another place."
 
 
 def finite(value: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -28,15 +28,17 @@ CASES: dict[str, Callable[[], Benchmark]] = {
 }
 
 
-def run_benchmarks(only: Iterable[str] = ()) -> Iterator[tuple[str, Benchmark]]:
+def run_benchmarks(
+    only: Iterable[str] = (), cases: Mapping[str, Callable[[], Benchmark]] = CASES
+) -> Iterator[tuple[str, Benchmark]]:
     """Measure the cases named, or all, one after the other.
 
     Raises:
         InputError: a name is not a case.
     """
-    wanted = list(only) or list(CASES)
-    unknown = [name for name in wanted if name not in CASES]
+    wanted = list(only) or list(cases)
+    unknown = [name for name in wanted if name not in cases]
     if unknown:
-        raise InputError(f"There is no benchmark '{unknown[0]}'; known are {', '.join(CASES)}")
+        raise InputError(f"There is no benchmark '{unknown[0]}'; known are {', '.join(cases)}")
     for name in wanted:
-        yield name, run_alone(CASES[name])
+        yield name, run_alone(cases[name])

@@ -11,7 +11,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 import pool_jobs as jobs
 
-from app.pool import DIED, ComputePool, LatestWins, Outcome
+from app.lane import LatestWins
+from app.pool import DIED, ComputePool, Outcome
 
 TIMEOUT_S = 60.0
 
