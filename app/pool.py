@@ -189,7 +189,10 @@ class ComputePool:
 
     def _attend(self, slot: _Slot) -> None:
         """Keep one process alive and hand on what it says, until the pool closes."""
-        while self._start(slot):
+        while not self._closed:
+            if not self._start(slot):
+                self._closing.wait(RESPAWN_PAUSE_S)
+                continue
             assert slot.connection is not None
             assert slot.process is not None
             try:
@@ -205,14 +208,20 @@ class ComputePool:
             self._bury(slot)
 
     def _start(self, slot: _Slot) -> bool:
+        """Whether there is a new process: the system may have none to give just now."""
         with self._lock:
             if self._closed:
                 return False
-            here, there = self._context.Pipe()
-            slot.process = self._context.Process(
-                target=_child, args=(there, self._warm_up, self._threads_each), daemon=True
-            )
-            slot.process.start()
+            try:
+                here, there = self._context.Pipe()
+                slot.process = self._context.Process(
+                    target=_child, args=(there, self._warm_up, self._threads_each), daemon=True
+                )
+                slot.process.start()
+            except OSError:
+                logger.warning("a computing process could not be started; it is tried again")
+                slot.process = None
+                return False
             there.close()
             slot.connection = here
             return True

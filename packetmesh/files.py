@@ -6,6 +6,7 @@ import errno
 import json
 import math
 import os
+import re
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -20,6 +21,10 @@ MAX_IMAGE_BYTES = 64_000_000
 MAX_IMAGE_PIXELS = 25_000_000
 MAX_GEOMETRY_BYTES = 1_000_000_000
 """Largest cloud or mesh file that is read."""
+
+
+_UNFINISHED = re.compile(r"\..*-[0-9a-f]{8}(\..*)?")
+"""The names of what ``atomic_path`` gives."""
 
 
 @contextmanager
@@ -40,12 +45,18 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield sibling
         sibling.replace(path)
     except OSError as error:
-        raise InputError(
-            f"{path} cannot be written ({error.strerror or error}); try another folder for the output"
-        ) from None
+        remedy = "delete something there" if _is_full(error) else "try another folder for the output"
+        raise InputError(f"{path} cannot be written ({error.strerror or error}); {remedy}") from None
     finally:
         with suppress(OSError):  # its folder does not exist, so neither does it
             sibling.unlink(missing_ok=True)
+
+
+def delete_unfinished(folder: Path) -> None:
+    """Delete the temporary siblings that killed processes left in a folder that nobody else writes to."""
+    for path in folder.glob(".*"):
+        if path.is_file() and _UNFINISHED.fullmatch(path.name):
+            path.unlink(missing_ok=True)
 
 
 def writable_folder(path: str | os.PathLike[str]) -> Path:
@@ -69,10 +80,14 @@ def write_json(path: Path, value: Any) -> None:
 
 def file_trouble(error: OSError) -> str:
     """One sentence on a file that could not be written or read."""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+    if _is_full(error):
         return f"The disk is full ({error.strerror}); delete something there and try again."
     what = error.filename or "A file"
     return f"{what} cannot be used ({error.strerror or error}); try another place."
+
+
+def _is_full(error: OSError) -> bool:
+    return error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def finite(value: Any) -> Any:
