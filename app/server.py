@@ -33,6 +33,7 @@ from app.store import Store
 from app.teacher import Token
 from packetmesh.errors import InputError
 from packetmesh.files import file_trouble
+from packetmesh.memory import give_back_memory, share_arenas
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Demo, RigFolder
 
@@ -105,6 +106,7 @@ def build_server(
     """
     _check_address(host, port)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a port scan is no reason for a stack trace
+    share_arenas()
     spec = start_spec(scene, config or PipelineConfig())
     folder = own_folder()
     pool = ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
@@ -133,6 +135,7 @@ def build_server(
             session = app.sessions.pop(client.client_id, None)
             if session is not None:
                 session.close()
+                give_back_memory()
 
         def come(client: viser.ClientHandle) -> None:
             try:

@@ -45,8 +45,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield sibling
         sibling.replace(path)
     except OSError as error:
-        remedy = "delete something there" if _is_full(error) else "try another folder for the output"
-        raise InputError(f"{path} cannot be written ({error.strerror or error}); {remedy}") from None
+        raise InputError(f"{path} cannot be written ({error.strerror or error}); {remedy(error)}") from None
     finally:
         with suppress(OSError):  # its folder does not exist, so neither does it
             sibling.unlink(missing_ok=True)
@@ -80,14 +79,13 @@ def write_json(path: Path, value: Any) -> None:
 
 def file_trouble(error: OSError) -> str:
     """One sentence on a file that could not be written or read."""
-    if _is_full(error):
-        return f"The disk is full ({error.strerror}); delete something there and try again."
-    what = error.filename or "A file"
-    return f"{what} cannot be used ({error.strerror or error}); try another place."
+    return f"{error.filename or 'A file'} cannot be used ({error.strerror or error}); {remedy(error)}"
 
 
-def _is_full(error: OSError) -> bool:
-    return error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+def remedy(error: OSError) -> str:
+    """What to try when a file cannot be written."""
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    return "delete something there, as the disk is full" if full else "try another folder"
 
 
 def finite(value: Any) -> Any:

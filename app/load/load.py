@@ -67,7 +67,7 @@ class Load:
             "meshes_s": "drag to surface",
         }
         spreads = [(name, record[key]) for key, name in names.items() if record[key]["count"]]
-        quarters = record["quarters"]
+        quarters = [quarter for quarter in record["quarters"] if quarter]
         return (
             *(
                 f"{name}: median {one['median']:.2f}, 95 % {one['p95']:.2f}, most {one['max']:.2f} s "

@@ -73,7 +73,7 @@ class Visitor:
     def _stay(self, page: Connection, started_s: float) -> None:
         wait_for(lambda: "Radius (mm)" in page.uuids and bool(page.steps), FIRST_S)
         self.diary.opened_s = time.monotonic() - started_s
-        first = page.heard_s.get("surface") is not None
+        first = False
         while not self._leaving.wait(self._rng.exponential(THINKING_S)):
             if page.lost:
                 raise ConnectionError("the server ended the connection")
