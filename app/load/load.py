@@ -20,6 +20,8 @@ LEAVING = 5
 STAY_S = 90.0
 """That a browser stays when they come and go."""
 LOOK_S = 0.5
+LATE_S = 2.0
+"""An answer that needs nothing computed should come sooner, whatever others do."""
 SETTLE_S = 2.0 * PATIENCE_S
 """After the last has left."""
 
@@ -44,6 +46,7 @@ class Load:
             "browsers": len(self.diaries),
             "clicks": sum(len(diary.answers_s) for diary in self.diaries),
             "answers_s": _spread([s for diary in self.diaries for s in diary.answers_s]),
+            "late": sum(s > LATE_S for diary in self.diaries for s in diary.answers_s),
             "opened_s": _spread([diary.opened_s for diary in self.diaries]),
             "first_mesh_s": _spread([diary.first_mesh_s for diary in self.diaries]),
             "meshes_s": _spread([s for diary in self.diaries for s in diary.meshes_s]),
@@ -74,6 +77,7 @@ class Load:
                 f"({one['count']})"
                 for name, one in spreads
             ),
+            f"later than {LATE_S:g} s: {record['late']} of {record['clicks']} answers",
             f"memory: server {record['server_peak_bytes'] / 1e6:.0f} MB, "
             f"workers {record['workers_peak_bytes'] / 1e6:.0f} MB at most; server by quarters "
             + ", ".join(f"{quarter['server_bytes'] / 1e6:.0f}" for quarter in quarters),

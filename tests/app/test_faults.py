@@ -4,26 +4,35 @@ import ast
 import contextlib
 import errno
 import os
+import resource
 import signal
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import psutil
 import pytest
+import viser
+
+sys.path.insert(0, str(Path(__file__).parent))
+import pool_jobs
 
 import app.server
 from app.load.connection import Connection, wait_for
 from app.own_folder import LOCK, PREFIX, delete_abandoned, own_folder
-from app.pool import DIED, PATIENCE_S
+from app.pool import DIED
+from app.screens.calibrate.uploads import keep_photographs
 from app.server import build_server
 from app.session import Session
 from app.stepper import MARKS
+from app.ui import keep_upload
+from packetmesh.errors import InputError
 from tests.paths import ROOT
 
 pytestmark = pytest.mark.xdist_group("faults")  # one worker starts the server once
-LONG_S = 120.0
+LONG_S = 240.0
 """On a machine that does much else."""
 
 
@@ -84,16 +93,18 @@ def test_a_worker_killed_beside_the_chain_costs_only_that_answer(running, page):
     assert up_to_date(page)
 
 
-def test_no_job_of_a_browser_that_left_runs_on(running):
+def test_no_job_of_a_browser_that_left_runs_on(running, tmp_path):
+    """Not one that reports, and not one that never does."""
     with contextlib.closing(Connection(running.url)) as one:
-        wait_for(lambda: "Preset" in one.uuids, LONG_S)
-        one.set("Preset", "thesis")
-        wait_for(lambda: bool(running.pool.running()), LONG_S)
-    left_s = time.monotonic()
-    wait_for(lambda: not running.sessions, LONG_S)
-    wait_for(lambda: not running.pool.running(), LONG_S)
-    assert time.monotonic() - left_s < PATIENCE_S + 10.0
-    wait_for(lambda: not list(running.folder.path.glob("upload-*")))
+        wait_for(lambda: bool(one.steps) and up_to_date(one) and len(running.sessions) == 1, LONG_S)
+        (session,) = running.sessions.values()
+        for lane, job in ((session._side, pool_jobs.count_forever), (session._quick, pool_jobs.deaf)):
+            (tmp_path / job.__name__).mkdir()
+            lane.submit(job, str(tmp_path / job.__name__), on_progress=repr, on_end=repr)
+        wait_for(lambda: len(list(tmp_path.glob("*/began"))) == 2, LONG_S)
+    wait_for(lambda: not running.sessions and not running.pool.running(), LONG_S)
+    assert (tmp_path / "count_forever" / "tidied").exists()
+    assert not list(running.folder.path.glob("upload-*"))
 
 
 def test_a_browser_that_leaves_before_its_session_is_there_leaves_none(running, monkeypatch):
@@ -127,6 +138,25 @@ def test_a_disk_without_room_for_another_session_is_one_sentence_and_others_go_o
     other_step = "Fuse" if page.current != "Fuse" else "Depth"
     page.go(other_step)
     wait_for(lambda: page.current == other_step)
+
+
+UPLOADS = {
+    "pair": lambda file, folder: keep_upload(file, folder, "color", 1 << 20, "use the command line"),
+    "photographs": lambda file, folder: keep_photographs(file, folder, "node_00"),
+}
+
+
+@pytest.mark.parametrize("keep", UPLOADS)
+def test_an_upload_for_which_the_disk_has_no_room_is_one_sentence_and_leaves_no_part(tmp_path, keep):
+    file = viser.UploadedFile("color.png", bytes(50_000))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000, hard))
+    try:
+        with pytest.raises(InputError, match=r"cannot be written \(File too large\); delete something there"):
+            UPLOADS[keep](file, tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
 def test_with_the_clock_set_back_nothing_waits_for_ever(running, monkeypatch):

@@ -25,6 +25,7 @@ def test_the_figures_of_a_load():
     record = load.record()
     assert record["clicks"] == 3
     assert record["answers_s"] == pytest.approx({"count": 3, "median": 0.2, "p95": 0.29, "max": 0.3})
+    assert record["late"] == 0
     assert record["opened_s"]["count"] == 1
     assert len(record["lost"]) == 1
     assert record["longest_stray_s"] == 8.0
