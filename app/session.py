@@ -392,5 +392,7 @@ class Session:
         except OSError as error:
             self.notify("That did not work", file_trouble(error))
         except Exception as error:
+            if self._closed:  # while it was at work; the pool and the folder may be gone, too
+                return
             logger.exception("a session callback failed")
             self.notify("Something unexpected happened", f"{type(error).__name__}: {error}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 import threading
 from collections.abc import Iterator
@@ -102,7 +103,7 @@ def _serve(pipe: Connection, scene: str) -> None:
 
 def _sizes(folder: Path) -> Iterator[int]:
     """Of all files below it that do not vanish meanwhile."""
-    for path in folder.rglob("*"):
-        with suppress(OSError):
-            if path.is_file():
-                yield path.stat().st_size
+    for below, _, names in os.walk(folder):
+        for name in names:
+            with suppress(OSError):
+                yield Path(below, name).stat().st_size
