@@ -14,9 +14,8 @@ import os
 import signal
 import threading
 import traceback
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, Literal
@@ -25,11 +24,14 @@ import psutil
 
 from packetmesh.batch import THREAD_LIMITS
 from packetmesh.errors import PacketMeshError
+from packetmesh.files import file_trouble
 
 logger = logging.getLogger(__name__)
 
 PATIENCE_S = 3.0
 """How long a superseded job may go on before its process is ended."""
+NICENESS = 5
+"""Of the computing processes, so that the serving one answers first."""
 RESPAWN_PAUSE_S = 1.0
 """Before a process is started again that died before it was ready."""
 MEMORY_LIMIT_BYTES = 2 << 30
@@ -56,6 +58,10 @@ class Ticket:
     arguments: tuple[Any, ...]
     on_progress: Callable[[Any], None]
     on_end: Callable[[Outcome], None]
+    key: Hashable = None
+    """What the result depends on, where others may ask for the same."""
+    urgent: bool = False
+    """Whether it goes before those that are not."""
     stopping: bool = False
 
 
@@ -70,7 +76,10 @@ class _Slot:
 
 
 class ComputePool:
-    """Spawned processes that take jobs in the order of submission, one at a time for each owner."""
+    """Spawned processes that take jobs in the order of submission, one at a time for each owner.
+
+    What several ask for is computed once: whoever waits for the key of a job that runs gets what that gives.
+    """
 
     def __init__(
         self, size: int = 2, warm_up: Callable[[], None] | None = None, patience_s: float = PATIENCE_S
@@ -98,9 +107,11 @@ class ComputePool:
         *arguments: Any,
         on_progress: Callable[[Any], None],
         on_end: Callable[[Outcome], None],
+        key: Hashable = None,
+        urgent: bool = False,
     ) -> Ticket:
         """Queue a job; the callbacks run on a thread of the pool and must be brief."""
-        ticket = Ticket(owner, function, arguments, on_progress, on_end)
+        ticket = Ticket(owner, function, arguments, on_progress, on_end, key, urgent)
         with self._lock:
             if self._closed:
                 raise RuntimeError("the pool is closed")
@@ -108,7 +119,7 @@ class ComputePool:
             self._dispatch()
         return ticket
 
-    def stop(self, ticket: Ticket) -> None:
+    def stop(self, ticket: Ticket, patience_s: float | None = None) -> None:
         """Ask a job to stop at its next report; end its process if it is deaf for too long."""
         if self._withdraw(ticket):
             return
@@ -118,19 +129,22 @@ class ComputePool:
                 return
             ticket.stopping = True
             _send(slot, ("stop", None))
-        timer = threading.Timer(self._patience_s, self.cancel, (ticket,))
+        patience_s = self._patience_s if patience_s is None else patience_s
+        timer = threading.Timer(patience_s, self._end_process, (ticket,))
         timer.daemon = True
         timer.start()
 
-    def cancel(self, ticket: Ticket) -> None:
-        """End a job now, with its process if it runs."""
-        if self._withdraw(ticket):
-            return
+    def _end_process(self, ticket: Ticket) -> None:
+        """End a job with its process, if it still runs."""
         with self._lock:
             slot = self._slot_of(ticket)
             if slot is not None and slot.process is not None:
-                ticket.stopping = True
                 slot.process.terminate()
+
+    def running(self) -> list[object]:
+        """The owners of the jobs that run now."""
+        with self._lock:
+            return [slot.ticket.owner for slot in self._slots if slot.ticket is not None]
 
     def close(self) -> None:
         """End all processes; jobs that have not ended are stopped."""
@@ -163,17 +177,22 @@ class ComputePool:
         for slot in self._slots:
             if slot.ticket is not None or not slot.ready:
                 continue
-            busy = {id(other.ticket.owner) for other in self._slots if other.ticket is not None}
-            ticket = next((t for t in self._waiting if id(t.owner) not in busy), None)
-            if ticket is None:
+            running = [other.ticket for other in self._slots if other.ticket is not None]
+            owners, keys = {id(one.owner) for one in running}, {one.key for one in running} - {None}
+            free = [one for one in self._waiting if id(one.owner) not in owners and one.key not in keys]
+            if not free:
                 return
+            ticket = next((one for one in free if one.urgent), free[0])
             self._waiting.remove(ticket)
             slot.ticket = ticket
             _send(slot, ("job", (ticket.function, ticket.arguments)))
 
     def _attend(self, slot: _Slot) -> None:
         """Keep one process alive and hand on what it says, until the pool closes."""
-        while self._start(slot):
+        while not self._closed:
+            if not self._start(slot):
+                self._closing.wait(RESPAWN_PAUSE_S)
+                continue
             assert slot.connection is not None
             assert slot.process is not None
             try:
@@ -189,14 +208,20 @@ class ComputePool:
             self._bury(slot)
 
     def _start(self, slot: _Slot) -> bool:
+        """Whether there is a new process: the system may have none to give just now."""
         with self._lock:
             if self._closed:
                 return False
-            here, there = self._context.Pipe()
-            slot.process = self._context.Process(
-                target=_child, args=(there, self._warm_up, self._threads_each), daemon=True
-            )
-            slot.process.start()
+            try:
+                here, there = self._context.Pipe()
+                slot.process = self._context.Process(
+                    target=_child, args=(there, self._warm_up, self._threads_each), daemon=True
+                )
+                slot.process.start()
+            except OSError:
+                logger.warning("a computing process could not be started; it is tried again")
+                slot.process = None
+                return False
             there.close()
             slot.connection = here
             return True
@@ -204,17 +229,32 @@ class ComputePool:
     def _hear(self, slot: _Slot, kind: str, value: Any) -> None:
         ticket = slot.ticket
         if kind == "progress" and ticket is not None:
-            _tell(ticket.on_progress, value)
+            with self._lock:
+                others = self._others(ticket)
+            for one in (ticket, *others):
+                _tell(one.on_progress, value)
             return
         with self._lock:
             slot.ready, slot.ticket = True, None
+            others = self._served(ticket, kind)
             if kind != "ready" and _memory_bytes(slot.process) > MEMORY_LIMIT_BYTES:
                 slot.ready = False
                 assert slot.process is not None
                 slot.process.terminate()
             self._dispatch()
         if ticket is not None:
-            _tell(ticket.on_end, Outcome(kind, value))  # type: ignore[arg-type]
+            for one in (ticket, *others):
+                _tell(one.on_end, Outcome(kind, value))  # type: ignore[arg-type]
+
+    def _others(self, ticket: Ticket) -> list[Ticket]:
+        """Those who wait for the same; the lock is held."""
+        return [one for one in self._waiting if one.key is not None and one.key == ticket.key]
+
+    def _served(self, ticket: Ticket | None, kind: str) -> list[Ticket]:
+        """Those who wait no more, as a job ended that was theirs, too; the lock is held."""
+        others = [] if ticket is None or kind == "stopped" else self._others(ticket)
+        self._waiting = [one for one in self._waiting if one not in others]
+        return others
 
     def _bury(self, slot: _Slot) -> None:
         with self._lock:
@@ -222,9 +262,12 @@ class ComputePool:
             slot.ready = False
             if slot.connection is not None:
                 slot.connection.close()
+            stopped = self._closed or (ticket is not None and ticket.stopping)
+            outcome = Outcome("stopped") if stopped else Outcome("error", DIED)
+            others = self._served(ticket, outcome.kind)
         if ticket is not None:
-            stopped = ticket.stopping or self._closed
-            _tell(ticket.on_end, Outcome("stopped") if stopped else Outcome("error", DIED))
+            for one in (ticket, *others):
+                _tell(one.on_end, outcome)
 
 
 def _send(slot: _Slot, message: tuple[str, Any]) -> None:
@@ -254,6 +297,9 @@ def _memory_bytes(process: BaseProcess | None) -> int:
 def _child(connection: Connection, warm_up: Callable[[], None] | None, threads: int) -> None:
     """Main function of a computing process: take a job, report, repeat until the server is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_server, daemon=True).start()
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
     for name in THREAD_LIMITS:
         os.environ.setdefault(name, str(threads))
     try:
@@ -269,6 +315,14 @@ def _child(connection: Connection, warm_up: Callable[[], None] | None, threads: 
                 connection.send(_answer(connection, *job))
     except (EOFError, OSError):
         return
+
+
+def _end_with_server() -> None:
+    """However it ends: a job that never reports would not notice."""
+    server = multiprocessing.parent_process()
+    assert server is not None
+    server.join()
+    os._exit(1)
 
 
 def _answer(
@@ -295,65 +349,7 @@ def _answer(
     except OSError as error:
         if isinstance(error, (BrokenPipeError, ConnectionError)):
             raise
-        return "error", f"A file could not be used: {error}."
+        return "error", file_trouble(error)
     except Exception as error:
         traceback.print_exc()
         return "error", f"This step failed unexpectedly ({type(error).__name__}: {error})."
-
-
-@dataclass(slots=True)
-class LatestWins:
-    """A lane of one running and one waiting job; a newer job replaces the waiting one.
-
-    The running job is asked to stop when a newer one arrives. If it ends first its result is still
-    delivered, before the newer one's.
-    """
-
-    pool: ComputePool
-    owner: object
-    _running: Ticket | None = None
-    _start_waiting: Callable[[], Ticket] | None = None
-    _lock: threading.RLock = field(default_factory=threading.RLock)
-
-    @property
-    def busy(self) -> bool:
-        return self._running is not None
-
-    def submit(
-        self,
-        function: Callable[..., Any],
-        *arguments: Any,
-        on_progress: Callable[[Any], None],
-        on_end: Callable[[Outcome], None],
-    ) -> None:
-        """Run this job as soon as the one before it is out of the way."""
-        ended = partial(self._ended, on_end)
-        start = partial(
-            self.pool.submit, self.owner, function, *arguments, on_progress=on_progress, on_end=ended
-        )
-        with self._lock:
-            if self._running is None:
-                self._running = start()
-                return
-            self._start_waiting, running = start, self._running
-        self.pool.stop(running)
-
-    def stop(self) -> None:
-        """Forget the waiting job and ask the running one to stop at its next report."""
-        with self._lock:
-            self._start_waiting, running = None, self._running
-        if running is not None:
-            self.pool.stop(running)
-
-    def cancel(self) -> None:
-        """Forget the waiting job and end the running one now."""
-        with self._lock:
-            self._start_waiting, running = None, self._running
-        if running is not None:
-            self.pool.cancel(running)
-
-    def _ended(self, on_end: Callable[[Outcome], None], outcome: Outcome) -> None:
-        with self._lock:
-            start, self._start_waiting = self._start_waiting, None
-            self._running = None if start is None else start()
-        on_end(outcome)

@@ -22,7 +22,7 @@ from packetmesh.settings import settings
 from pipeline.config import PipelineConfig
 from pipeline.importing import is_recording, iterate_import
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.run_folder import metrics_of, write_run_folder
+from pipeline.run_folder import METRICS, clear_run_folder, metrics_of, write_run_folder
 from pipeline.sources import MILLIMETRES, FileSource, RigFolder
 from pipeline.spec import Spec
 from pipeline.stages import RunCache, cameras_of, run
@@ -80,8 +80,9 @@ def iterate_run(
     writable_folder(out)
     result = yield from iterate_reconstruction(spec, cache)
     metrics = metrics_of(result)
-    write_run_folder(result, metrics, out)
+    clear_run_folder(out)
     write_reconstruction_report(result, metrics, out / REPORT)
+    write_run_folder(result, metrics, out)
     return result, metrics
 
 
@@ -129,8 +130,9 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
     """Do one task, unless an earlier run has, and never raise for what is wrong with its images."""
     out = Path(task.out)
     try:
-        if _is_done(task):
-            return _outcome(task, "kept", json.loads((out / "metrics.json").read_text(encoding="utf-8")))
+        kept = _kept(task)
+        if kept is not None:
+            return kept
         (out / TASK).unlink(missing_ok=True)
         result, metrics = drain(iterate_run(_source_of(task), task.preset, task.config, out))
         _write_picture(result, out)
@@ -147,8 +149,8 @@ def _source_of(task: RigTask) -> RigFolder:
     if is_rig(Path(task.path)):
         return RigFolder(task.path, MILLIMETRES if task.depth_scale is None else task.depth_scale)
     rig = Path(task.out) / "rig"
-    if rig.is_dir():
-        shutil.rmtree(rig)  # of other settings
+    for earlier in (rig, *rig.parent.glob(".rig-*")):  # of other settings, or unfinished
+        shutil.rmtree(earlier, ignore_errors=True)
     drain(iterate_import(task.path, rig, depth_scale=task.depth_scale))
     return RigFolder(str(rig))
 
@@ -158,13 +160,15 @@ def _record(task: RigTask) -> dict[str, Any]:
     return {"path": task.path, "depth_scale": task.depth_scale, "settings": settings(task.config)}
 
 
-def _is_done(task: RigTask) -> bool:
-    """Whether the folder holds a whole run of the same."""
+def _kept(task: RigTask) -> RigOutcome | None:
+    """What an earlier run of the same gave; None if there is none, or it is not whole."""
     try:
         written = json.loads((Path(task.out) / TASK).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return bool(written == json.loads(json.dumps(_record(task))))
+        if written != json.loads(json.dumps(_record(task))):
+            return None
+        return _outcome(task, "kept", json.loads((Path(task.out) / METRICS).read_text(encoding="utf-8")))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
 
 
 def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome:

@@ -6,9 +6,7 @@ import contextlib
 import io
 import logging
 import os
-import shutil
 import socket
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +20,7 @@ from app.jobs import warm_up
 from app.landing import landing_first
 from app.lecture import Lecture
 from app.origin import only_own_page
+from app.own_folder import OwnFolder, own_folder
 from app.pool import ComputePool
 from app.screens.calibrate.panel import CalibratePanel
 from app.screens.depth.panel import DepthPanel
@@ -35,6 +34,8 @@ from app.state import SharedViews, Spec
 from app.store import Store
 from app.uploads import limit_uploads
 from packetmesh.errors import InputError
+from packetmesh.files import file_trouble
+from packetmesh.memory import give_back_memory, share_arenas
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Demo, RigFolder
 
@@ -51,7 +52,7 @@ class AppServer:
 
     viser_server: viser.ViserServer
     pool: ComputePool
-    folder: Path
+    folder: OwnFolder
     sessions: dict[int, Session] = field(default_factory=dict)
     entrance: Entrance = field(default_factory=Entrance)
 
@@ -86,7 +87,7 @@ class AppServer:
         with contextlib.redirect_stdout(io.StringIO()):
             self.viser_server.stop()
         self.pool.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        self.folder.delete()
 
 
 def build_server(
@@ -109,11 +110,13 @@ def build_server(
 
     Raises:
         InputError: the port is taken or the address is not this machine's.
+        OSError: there is no place for the server's folder.
     """
     _check_address(host, port)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a port scan is no reason for a stack trace
+    share_arenas()
     spec = start_spec(scene, config or PipelineConfig())
-    folder = Path(tempfile.mkdtemp(prefix="packetmesh-"))
+    folder = own_folder()
     pool = ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
     teacher = Token("teacher") if lecture else None
     visitor = Token("token") if with_token and not is_loopback(host) else None
@@ -130,7 +133,7 @@ def build_server(
         app.stop()
         raise InputError(_taken(port))
     _dress(server)
-    store, shared = Store(str(folder)), SharedViews()
+    store, shared = Store(str(folder.path)), SharedViews()
 
     def begin(target: Target, number: int, lecture: Lecture | None = None) -> Session:
         app.sessions[number] = Session(target, pool, store, shared, spec, PANELS, lecture)
@@ -143,21 +146,28 @@ def build_server(
         together.begin(session.post, lambda: session.frame_view(anew=True))
     else:
 
-        @server.on_client_connect
-        def _(client: viser.ClientHandle) -> None:
+        def leave(client: viser.ClientHandle) -> None:
+            session = app.sessions.pop(client.client_id, None)
+            if session is not None:
+                session.close()
+                give_back_memory()
+
+        def come(client: viser.ClientHandle) -> None:
             def tell(sentence: str) -> None:
                 session = app.sessions.get(client.client_id)
                 if session is not None:
                     session.post(session.notify, "That did not work", sentence)
 
             limit_uploads(client._websock_connection, tell)
-            begin(client, client.client_id)
+            try:
+                begin(client, client.client_id)
+            except OSError as error:
+                client.add_notification("You cannot come in", file_trouble(error), color="red")
+            if client.client_id not in server.get_clients():  # it left before its session was there
+                leave(client)
 
-        @server.on_client_disconnect
-        def _(client: viser.ClientHandle) -> None:
-            session = app.sessions.pop(client.client_id, None)
-            if session is not None:
-                session.close()
+        server.on_client_connect(come)
+        server.on_client_disconnect(leave)
 
     return app
 

@@ -7,8 +7,8 @@ import logging
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -17,15 +17,16 @@ import viser
 from app import jobs
 from app.address import Address, Place
 from app.drawing.cameras import look, stage_of
-from app.drawing.colors import BRAND, DELIVERED
+from app.header import Header
+from app.lane import LatestWins, Track
 from app.lecture import Lecture
 from app.page import add_script
-from app.pool import ComputePool, LatestWins, Outcome
+from app.pool import ComputePool, Outcome
 from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
-from app.stepper import Stepper
 from app.store import Store
 from app.ui import Panel, Ui
 from packetmesh.errors import PacketMeshError
+from packetmesh.files import file_trouble
 from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig
 
@@ -35,17 +36,6 @@ Target: TypeAlias = viser.ClientHandle | viser.ViserServer
 """Where a session lives: one browser, or the server for a session that all browsers share."""
 
 CANCELLED = "Cancelled."
-
-
-@dataclass(slots=True, eq=False)
-class _Track:
-    """Steps that are computed one after the other, beside those of other tracks."""
-
-    lane: LatestWins
-    steps: tuple[Step, ...]
-    running: Step | None = None
-    submitted: tuple[Any, ...] | None = None
-    """The key of what is running."""
 
 
 class Session:
@@ -75,19 +65,19 @@ class Session:
         self.results = Results()
         self.folder = Path(tempfile.mkdtemp(prefix="upload-", dir=store.folder))
         self._tracks = (
-            _Track(LatestWins(pool, self), CHAIN),
-            _Track(LatestWins(pool, object()), ("calibrate",)),
-            _Track(LatestWins(pool, object()), ("network",)),
+            Track(LatestWins(pool, self), CHAIN),
+            Track(LatestWins(pool, object()), ("calibrate",)),
+            Track(LatestWins(pool, object()), ("network",)),
         )
         self._side = LatestWins(pool, self)
-        self._quick = LatestWins(pool, object())
+        self._quick = LatestWins(pool, object(), urgent=True)
         self._wide = False
         self._shape = self._seen_shape = 0.0
         self._closed = False
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="session")
         self._panels = [panel(self) for panel in panels]
         self._current = self._panels[0]
-        self._thread.submit(self._guarded, self._build)
+        self._thread.submit(self._guarded, self._build_in_turn)
         if isinstance(target, viser.ClientHandle):
             target.camera.on_update(lambda _: self._look_at_window())
 
@@ -95,9 +85,17 @@ class Session:
 
     def post(self, function: Callable[..., None], *arguments: Any) -> None:
         """Have something done on the session's thread; its errors become notifications."""
+        self._submit(function, *arguments)
+
+    def _submit(self, function: Callable[..., None], *arguments: Any) -> Future[None] | None:
         if not self._closed:
             with contextlib.suppress(RuntimeError):
-                self._thread.submit(self._guarded, function, *arguments)
+                return self._thread.submit(self._guarded, function, *arguments)
+        return None
+
+    def _post_in_turn(self, function: Callable[..., None], *arguments: Any) -> None:
+        """The same as ``post`` for what draws much: when no other session does."""
+        self._shared.turns.give(lambda: self._submit(function, *arguments))
 
     def close(self) -> None:
         """Have the session end on its own thread, whoever calls; what was posted to it before is dropped."""
@@ -108,9 +106,19 @@ class Session:
 
     def _end(self) -> None:
         """Stop computing and delete what was uploaded; the browser is gone."""
-        self._cancel()
+        for lane in self._lanes:
+            lane.stop()
         self.ui.close()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+    @property
+    def owners(self) -> list[object]:
+        """Whose its jobs are in the pool."""
+        return [lane.owner for lane in self._lanes]
+
+    @property
+    def _lanes(self) -> list[LatestWins]:
+        return [self._side, self._quick, *(track.lane for track in self._tracks)]
 
     def clients(self) -> Iterable[viser.ClientHandle]:
         """The browsers whose view is this session's to turn."""
@@ -167,7 +175,7 @@ class Session:
         def progressed(value: Any) -> None:
             if not isinstance(value, Progress):
                 on_partial(value)
-            elif lane is not self._quick:
+            elif not lane.urgent:
                 self._progressed(None, value)
 
         def ended(outcome: Outcome) -> None:
@@ -176,23 +184,21 @@ class Session:
             on_end(outcome.value if outcome.kind == "result" else None)
             self._show_status()
 
+        post = self.post if lane.urgent else self._post_in_turn
         lane.submit(
             jobs.run,
             job,
             self.store,
             self.spec,
             *arguments,
-            on_progress=lambda value: self.post(progressed, value),
-            on_end=lambda outcome: self.post(ended, outcome),
+            on_progress=lambda value: post(progressed, value),
+            on_end=lambda outcome: post(ended, outcome),
+            key=(job, self.spec, arguments),
         )
 
     def cancel_side_job(self) -> None:
         """End the job beside the chain now."""
         self._side.cancel()
-
-    def _cancel(self) -> None:
-        for lane in (self._side, *(track.lane for track in self._tracks)):
-            lane.cancel()
 
     def advance(self) -> None:
         """Compute the first step of each track that is out of date."""
@@ -200,7 +206,7 @@ class Session:
             self._advance(track)
         self._show_status()
 
-    def _advance(self, track: _Track) -> None:
+    def _advance(self, track: Track) -> None:
         while (step := self.results.first_stale(self.spec, track.steps)) is not None:
             view = self._shared.get(self.spec.key(step))
             if view is None:
@@ -218,8 +224,9 @@ class Session:
             step,
             self.store,
             self.spec,
-            on_progress=lambda value: self.post(self._progressed, step, value),
-            on_end=lambda outcome: self.post(self._ended, track, step, key, outcome),
+            on_progress=lambda value: self._post_in_turn(self._progressed, step, value),
+            on_end=lambda outcome: self._post_in_turn(self._ended, track, step, key, outcome),
+            key=key,
         )
 
     def _waits(self, step: Step) -> bool:
@@ -229,7 +236,7 @@ class Session:
             for panel in self._panels
         )
 
-    def _ended(self, track: _Track, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
+    def _ended(self, track: Track, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
         latest = key == track.submitted
         if latest:
             track.running = track.submitted = None
@@ -256,8 +263,7 @@ class Session:
 
     def _progressed(self, step: Step | None, value: Any) -> None:
         if isinstance(value, Progress):
-            self._bar.value = min(100.0, 100.0 * value.fraction)
-            self._status.content = f"**Computing** · {value.stage}"
+            self._header.progressed(value)
             return
         for panel in self._panels:
             if panel.step == step:
@@ -265,19 +271,19 @@ class Session:
 
     # Its own part of the control panel.
 
+    def _build_in_turn(self) -> None:
+        with self._shared.turns.taken():
+            self._build()
+
     def _build(self) -> None:
         titles = [panel.title for panel in self._panels]
         add_script(self.gui)
-        self._stepper = Stepper(self.gui, titles, lambda title: self.post(self.show, title))
-        self._status = self.gui.add_markdown("**Starting** …")
-        self._bar = self.gui.add_progress_bar(0.0)
-        actions = self.gui.add_button_group(
-            "All steps",
-            ("Cancel", "Retry", "Reset", "Copy as command"),
-            hint="Cancel stops what is computing; Retry runs a cancelled or failed step again; Reset goes "
-            "back to the settings of the start; Copy as command shows the command that computes the same.",
+        self._header = Header(
+            self.gui,
+            titles,
+            lambda title: self.post(self.show, title),
+            lambda action: self.post(self._act, action),
         )
-        actions.on_click(lambda event: self.post(self._act, event.target.value))
         self._address: Address | None = None
         if isinstance(self.target, viser.ClientHandle):  # one that many share is nobody's to move
             start = Place(self._start, self._current.title)
@@ -351,7 +357,8 @@ class Session:
         for panel in self._panels:
             panel.on_action(action)
         if action == "Cancel":
-            self._cancel()
+            for lane in self._lanes:
+                lane.cancel()
         elif action == "Retry":
             self.results.retry_failed()
             self.advance()
@@ -368,29 +375,24 @@ class Session:
             for panel in self._panels
             if panel.step is not None
         }
-        self._stepper.show(self._current.title, statuses)
-        if self._address is not None:
-            self._address.show(Place(self.spec, self._current.title))
         failures = [self.results.failure(step, self.spec) for step in STEPS]
         failure = next((sentence for sentence in failures if sentence), None)
-        if running:
-            self._status.content = f"**Computing** · {running[0]}"
-        elif failure is not None:
-            self._status.content = f"**Stopped** · {failure} Change a setting or press Retry."
-            self._bar.value = 0.0
-        elif not self._side.busy:
-            self._status.content = "**Up to date**"
-            self._bar.value = 100.0
-        working = bool(running) or self._side.busy
-        self._bar.color = BRAND if working else DELIVERED
+        self._header.show(self._current.title, statuses, running, failure, self._side.busy)
+        if self._address is not None:
+            self._address.show(Place(self.spec, self._current.title))
 
     def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
         if self._closed:
             return
         try:
-            function(*arguments)
+            with self.target.atomic():
+                function(*arguments)
         except PacketMeshError as error:
             self.notify("That did not work", str(error))
+        except OSError as error:
+            self.notify("That did not work", file_trouble(error))
         except Exception as error:
+            if self._closed:  # while it was at work; the pool and the folder may be gone, too
+                return
             logger.exception("a session callback failed")
             self.notify("Something unexpected happened", f"{type(error).__name__}: {error}")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from app.records import Shown
+from app.turns import Turns
 from network_sim.config import NetworkConfig
 from pipeline import spec
 from pipeline.config import Lens, Pattern
@@ -93,6 +94,7 @@ class SharedViews:
     """The newest views of all sessions: who wants what another has just got gets it at once."""
 
     def __init__(self, capacity: int = 24) -> None:
+        self.turns = Turns()
         self._views: OrderedDict[Hashable, Any] = OrderedDict()
         self._capacity = capacity
         self._lock = threading.Lock()

@@ -6,16 +6,22 @@ import contextlib
 import hashlib
 import os
 import pickle
+import time
+import zlib
 from collections.abc import Callable, Generator, Hashable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path
 from pipeline.spec import Spec, StageName
 
 Step = TypeVar("Step")
+
+CHECKSUM_BYTES = 4
+"""In front of every file: the CRC-32 of the rest."""
+BLOCK_BYTES = 1 << 20
 
 _newest: dict[tuple[str, str], tuple[Path, Any]] = {}
 """By folder and stage: the file of the newest result that this process has had, and the result."""
@@ -64,21 +70,29 @@ class Store:
         return tuple(one.value for one in done.values())
 
     def _write(self, path: Path, value: Any) -> None:
-        """Keep a result; a full disk costs only the time to compute it again."""
+        """Keep a result behind its checksum; a full disk costs only the time to compute it again."""
         with contextlib.suppress(InputError, OSError):
             with atomic_path(path) as temporary, temporary.open("wb") as file:
-                pickle.dump(value, file, protocol=pickle.HIGHEST_PROTOCOL)
+                file.write(bytes(CHECKSUM_BYTES))
+                summed = _Summed(file)
+                pickle.dump(value, summed, protocol=pickle.HIGHEST_PROTOCOL)
+                file.seek(0)
+                file.write(_as_bytes(summed.checksum))
             self._prune(path)
 
     def _prune(self, newest: Path) -> None:
-        """Delete the files unused for longest until the rest fits the limit; the newest stays."""
-        files = []
+        """Delete the files unused for longest until the rest fits the limit; the newest stays.
+
+        Those of the future were used before the clock was set back, longer ago than what is of now.
+        """
+        files, now_ns = [], time.time_ns()
         for path in Path(self.folder).iterdir():
             with contextlib.suppress(OSError):  # another process may be deleting it
                 if path.is_file():
-                    files.append((path.stat().st_mtime_ns, path.stat().st_size, path))
-        excess = sum(size for _, size, _ in files) - self.limit_bytes
-        for _, size, path in sorted(files):
+                    used_ns = path.stat().st_mtime_ns
+                    files.append((used_ns <= now_ns, used_ns, path.stat().st_size, path))
+        excess = sum(size for *_, size, _ in files) - self.limit_bytes
+        for *_, size, path in sorted(files):
             if excess <= 0:
                 return
             if path != newest:
@@ -86,12 +100,34 @@ class Store:
                 excess -= size
 
 
+class _Summed:
+    """A file to write to, and the checksum of what was written."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.checksum = 0
+        self._file = file
+
+    def write(self, data: bytes) -> int:
+        self.checksum = zlib.crc32(data, self.checksum)
+        return self._file.write(data)
+
+
+def _as_bytes(checksum: int) -> bytes:
+    return checksum.to_bytes(CHECKSUM_BYTES, "little")
+
+
 def _read(path: Path) -> Any:
-    """A kept result; None if there is none or it cannot be read, so that it is computed again."""
+    """A kept result; None if there is none or it is damaged, so that it is computed again."""
     try:
         with path.open("rb") as file:
+            said, checksum = file.read(CHECKSUM_BYTES), 0
+            while block := file.read(BLOCK_BYTES):
+                checksum = zlib.crc32(block, checksum)
+            if said != _as_bytes(checksum):
+                return None
+            file.seek(CHECKSUM_BYTES)
             value = pickle.load(file)
         os.utime(path)
         return value
-    except (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError, IndexError, ValueError):
+    except (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError):  # or of other code
         return None

@@ -16,6 +16,7 @@ from app.debounce import Debounce
 from app.state import Spec, Step
 from app.tables import command_html
 from packetmesh.errors import InputError
+from packetmesh.files import atomic_path
 from pipeline.types import FloatArray
 
 if TYPE_CHECKING:
@@ -106,7 +107,8 @@ def keep_upload(file: viser.UploadedFile, folder: Path, kind: str, limit_bytes: 
         )
     suffix = Path(file.name).suffix.lower()[:8]
     path = folder / f"{kind}_{len(list(folder.iterdir())):03d}{suffix}"
-    path.write_bytes(file.content)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(file.content)
     return path
 
 

@@ -19,7 +19,7 @@ from network_sim.ledger import Outcomes
 from network_sim.trace import COLUMNS, Events, NetworkTrace
 from network_sim.types import Cause, EventKind, PacketKind
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path
+from packetmesh.files import atomic_path, remedy
 from packetmesh.settings import settings
 
 _ENUMS: dict[str, type[IntEnum]] = {"kind": EventKind, "cause": Cause, "packet_kind": PacketKind}
@@ -45,7 +45,7 @@ def write_trace(trace: NetworkTrace, folder: Path) -> None:
             _write(trace, ndjson, table, rest)
         except OSError as error:
             raise InputError(
-                f"The trace cannot be written to {folder} ({error.strerror}); try another folder"
+                f"The trace cannot be written to {folder} ({error.strerror}); {remedy(error)}"
             ) from None
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import math
 import os
+import re
 import secrets
 import zipfile
 import zlib
@@ -36,6 +38,10 @@ BROKEN_ZIP = (
 """What reading a damaged ZIP raises."""
 
 
+_UNFINISHED = re.compile(r"\..*-[0-9a-f]{8}(\..*)?")
+"""The names of what ``atomic_path`` gives."""
+
+
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary sibling of ``path`` to write to, renamed to ``path`` if the body succeeds.
@@ -54,12 +60,17 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield sibling
         sibling.replace(path)
     except OSError as error:
-        raise InputError(
-            f"{path} cannot be written ({error.strerror or error}); try another folder for the output"
-        ) from None
+        raise InputError(f"{path} cannot be written ({error.strerror or error}); {remedy(error)}") from None
     finally:
         with suppress(OSError):  # its folder does not exist, so neither does it
             sibling.unlink(missing_ok=True)
+
+
+def delete_unfinished(folder: Path) -> None:
+    """Delete the temporary siblings that killed processes left in a folder that nobody else writes to."""
+    for path in folder.glob(".*"):
+        if path.is_file() and _UNFINISHED.fullmatch(path.name):
+            path.unlink(missing_ok=True)
 
 
 def writable_folder(path: str | os.PathLike[str]) -> Path:
@@ -88,6 +99,17 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         writer = csv.DictWriter(file, columns, lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
+
+
+def file_trouble(error: OSError) -> str:
+    """One sentence on a file that could not be written or read."""
+    return f"{error.filename or 'A file'} cannot be used ({error.strerror or error}); {remedy(error)}"
+
+
+def remedy(error: OSError) -> str:
+    """What to try when a file cannot be written."""
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    return "delete something there, as the disk is full" if full else "try another folder"
 
 
 def finite(value: Any) -> Any:

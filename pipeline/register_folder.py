@@ -63,7 +63,7 @@ def write_register_folder(
     command: dict[str, Any],
     with_truth: bool,
 ) -> None:
-    """Write transform.txt, aligned.ply, metrics.json, steps.csv and config.json, each whole or not at all.
+    """Write config.json, steps.csv, transform.txt, aligned.ply and metrics.json, each whole or not at all.
 
     Args:
         folder: made if it is missing.
@@ -82,10 +82,10 @@ def write_register_folder(
         folder / "config.json",
         command | {"settings": settings(replace(PipelineConfig(), node_registration=config))},
     )
-    write_json(folder / "metrics.json", answer_metrics(answers, with_truth))
     _write_steps(folder / "steps.csv", answers)
     write_pose(folder / "transform.txt", pose)
     write_cloud(folder / "aligned.ply", source.transformed(pose))
+    write_json(folder / "metrics.json", answer_metrics(answers, with_truth))
 
 
 def _write_steps(path: Path, answers: Iterable[Answer]) -> None:

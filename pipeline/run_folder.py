@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from packetmesh.files import write_json
+from packetmesh.errors import InputError
+from packetmesh.files import delete_unfinished, file_trouble, write_json
 from packetmesh.memory import peak_memory_bytes
 from packetmesh.settings import settings
 from pipeline.io.clouds import write_cloud
@@ -21,11 +22,41 @@ from pipeline.spec import Spec
 from pipeline.stages import dressed
 from pipeline.types import PointCloud, PointSource, SurfaceResult
 
+METRICS = "metrics.json"
+CLOUD_FILES = ("sensor.ply", "inferred.ply", "fused.ply")
+MESH_FILES = ("surface_before.ply", "surface_after.ply", "surface.glb")
 
-def write_run_folder(reconstruction: Reconstruction, metrics: dict[str, Any], folder: Path) -> list[Path]:
+
+def clear_run_folder(folder: Path) -> None:
+    """Delete what an earlier run left there, whole or interrupted, the metrics first.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    try:
+        for name in (METRICS, "config.json", "poses.json", *CLOUD_FILES, *MESH_FILES):
+            (folder / name).unlink(missing_ok=True)
+        delete_unfinished(folder)
+    except OSError as error:
+        raise InputError(file_trouble(error)) from None
+
+
+def write_run_folder(
+    reconstruction: Reconstruction,
+    metrics: dict[str, Any],
+    folder: Path,
+    config: dict[str, Any] | None = None,
+) -> list[Path]:
     """Write everything but the report into ``folder``, each file whole or not at all.
 
-    A surface without a triangle, where the ball falls through everywhere, leaves no mesh file.
+    The metrics come last: where they are, everything is there, and of one run. A surface without a
+    triangle, where the ball falls through everywhere, leaves no mesh file.
+
+    Args:
+        reconstruction: what is written.
+        metrics: its numbers.
+        folder: where; made when it is missing.
+        config: how the run was asked for; None takes ``config_of``.
 
     Returns:
         The files written.
@@ -33,24 +64,21 @@ def write_run_folder(reconstruction: Reconstruction, metrics: dict[str, Any], fo
     Raises:
         InputError: the folder cannot be written.
     """
-    files = [folder / "config.json", folder / "metrics.json", folder / "poses.json"]
-    write_json(files[0], config_of(reconstruction.spec))
-    write_json(files[1], metrics)
-    write_json(files[2], metrics["poses"])
+    clear_run_folder(folder)
+    files = [folder / "config.json", folder / "poses.json"]
+    write_json(files[0], config or config_of(reconstruction.spec))
+    write_json(files[1], metrics["poses"])
     for name, cloud in clouds_of(reconstruction.clouds).items():
         files.append(folder / name)
         write_cloud(files[-1], cloud)
-    meshes = {
-        "surface_before.ply": reconstruction.before,
-        "surface_after.ply": reconstruction.after,
-        "surface.glb": reconstruction.after,
-    }
+    meshes = zip(MESH_FILES, (reconstruction.before, reconstruction.after, reconstruction.after), strict=True)
     texture = dressed(reconstruction.rig, reconstruction.placement, reconstruction.after)
-    for name, mesh in meshes.items():
+    for name, mesh in meshes:
         if len(mesh.triangles):
             files.append(folder / name)
             write_mesh(files[-1], mesh, texture if name.endswith(".glb") else None)
-    return files
+    write_json(folder / METRICS, metrics)
+    return [*files, folder / METRICS]
 
 
 def config_of(spec: Spec) -> dict[str, Any]:
@@ -62,7 +90,7 @@ def clouds_of(clouds: MergedClouds) -> dict[str, PointCloud]:
     """The clouds of a run by the names of their files."""
     fused = clouds.fused
     inferred = fused.select(fused.source == PointSource.INFERRED) if fused.source is not None else fused
-    return {"sensor.ply": clouds.sensor, "inferred.ply": inferred, "fused.ply": fused}
+    return dict(zip(CLOUD_FILES, (clouds.sensor, inferred, fused), strict=True))
 
 
 def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from app.cli.simulate import simulate
 from app.cli.target import target
 from app.cli.text import say
 from packetmesh.errors import PacketMeshError
+from packetmesh.files import file_trouble
 
 COMMANDS: dict[str, Any] = {
     "serve": serve,
@@ -65,6 +66,9 @@ def main(argv: list[str] | None = None) -> None:
         sys.exit(1)
     except BrokenPipeError:  # whoever read the output has gone, and wants no more of it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except OSError as error:
+        say(f"packetmesh: {file_trouble(error)}")
         sys.exit(1)
     except KeyboardInterrupt:
         say("packetmesh: stopped")

@@ -52,6 +52,7 @@ def deliver(
     from pipeline.deliver import iterate_delivery
     from pipeline.delivery.folder import delivery_metrics, summary, write_delivery_folder
     from pipeline.delivery.sending import DeliverySpec
+    from pipeline.run_folder import clear_run_folder
     from pipeline.spec import Spec
 
     network, config = _settings(preset, chain, set)
@@ -64,8 +65,9 @@ def deliver(
     _say_moment(first)
     delivery = drain(steps, _say_moment)
     metrics = delivery_metrics(delivery)
-    write_delivery_folder(delivery, metrics, preset, out)
+    clear_run_folder(out)
     page = write_hand_out(delivery, out)
+    write_delivery_folder(delivery, metrics, preset, out)
     say(f"100%  {summary(delivery)}; see {page}")
     if json:
         print_json(metrics)

@@ -83,8 +83,8 @@ def _run(
     estimates = estimates_of(runs)
     if out is not None:
         write_trace(trace, out)
-        write_json(out / "metrics.json", _record(estimates))
         write_json(out / "config.json", {"preset": preset, "settings": settings(config)})
+        write_json(out / "metrics.json", _record(estimates))
     _show(estimates, json)
 
 
@@ -117,8 +117,8 @@ def _sweep(
     cases = _told(iterate_sweep(config, key, values.split(","), count, scheduler))
     record = {f"{key}={value}": _record(estimates) for value, estimates in cases.items()}
     if out is not None:
-        write_json(out / "metrics.json", record)
         write_json(out / "config.json", {"preset": preset, "sweep": sweep, "settings": settings(config)})
+        write_json(out / "metrics.json", record)
     if json:
         print_json(record)
         return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -33,18 +33,19 @@ CASES: dict[str, Callable[[], Benchmark]] = {
 """What comes before a colon names several cases at once."""
 
 
-def run_benchmarks(only: Iterable[str] = ()) -> Iterator[tuple[str, Benchmark]]:
+def run_benchmarks(
+    only: Iterable[str] = (), cases: Mapping[str, Callable[[], Benchmark]] = CASES
+) -> Iterator[tuple[str, Benchmark]]:
     """Measure the cases or groups of cases named, or all, one after the other.
 
     Raises:
         InputError: a name is none of them.
     """
-    wanted = list(only)
-    named = {case: {case, case.partition(":")[0]} for case in CASES}
+    wanted = set(only)
+    named = {case: {case, case.partition(":")[0]} for case in cases}
     known = {name: None for names in named.values() for name in sorted(names)}
-    unknown = [name for name in wanted if name not in known]
-    if unknown:
-        raise InputError(f"There is no benchmark '{unknown[0]}'; known are {', '.join(known)}")
+    for name in sorted(wanted - set(known)):
+        raise InputError(f"There is no benchmark '{name}'; known are {', '.join(known)}")
     for case, names in named.items():
-        if not wanted or names & set(wanted):
-            yield case, run_alone(CASES[case])
+        if not wanted or names & wanted:
+            yield case, run_alone(cases[case])

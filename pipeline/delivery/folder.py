@@ -10,7 +10,14 @@ from packetmesh.files import atomic_path, write_json
 from packetmesh.settings import settings
 from pipeline.deliver import Delivery
 from pipeline.delivery.moments import Moment, NodeArrival
-from pipeline.run_folder import config_of, metrics_of, surface_metrics, write_run_folder
+from pipeline.run_folder import (
+    METRICS,
+    clear_run_folder,
+    config_of,
+    metrics_of,
+    surface_metrics,
+    write_run_folder,
+)
 
 
 def delivery_metrics(delivery: Delivery) -> dict[str, Any]:
@@ -40,18 +47,19 @@ def write_delivery_folder(delivery: Delivery, metrics: dict[str, Any], preset: s
         InputError: the folder cannot be written.
     """
     spec = delivery.sending.spec
-    record = metrics
-    if delivery.last is not None:
-        record = metrics_of(delivery.last) | {"delivery": metrics}
-        write_run_folder(delivery.last, record, folder)
-    write_json(folder / "metrics.json", record)
-    write_json(
-        folder / "config.json",
+    config = (
         config_of(spec.spec)
         | {"coding": spec.coding, "moments": spec.moments, "network": preset}
-        | {"network_settings": settings(delivery.sending.trace.config)},
+        | {"network_settings": settings(delivery.sending.trace.config)}
     )
+    clear_run_folder(folder)
     _write_table(delivery.moments, folder / "moments.csv")
+    if delivery.last is not None:
+        record = metrics_of(delivery.last) | {"delivery": metrics}
+        write_run_folder(delivery.last, record, folder, config)
+        return
+    write_json(folder / "config.json", config)
+    write_json(folder / METRICS, metrics)
 
 
 def summary(delivery: Delivery) -> str:

@@ -16,6 +16,24 @@ def note(folder: str, name: str) -> str:
     return name
 
 
+def report_and_note(folder: str, name: str):
+    """Report until the file ``go`` is there."""
+    Path(folder, name).touch()
+    while not Path(folder, "go").exists():
+        yield Progress("waiting", 0.5)
+        time.sleep(0.005)
+    yield Progress("going", 0.9)
+    return name
+
+
+def crash_when_told(folder: str) -> None:
+    """Die once the file ``go`` is there."""
+    Path(folder, "began").touch()
+    while not Path(folder, "go").exists():
+        time.sleep(0.005)
+    os._exit(3)
+
+
 def count(n: int):
     """Report n times, return n."""
     for i in range(n):

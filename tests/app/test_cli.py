@@ -114,7 +114,7 @@ def test_wrong_use_is_one_sentence_and_leaves_nothing_behind(capsys, tmp_path, a
 
 def test_bench_tells_the_notes_of_a_case_below_its_times(capsys, monkeypatch, tmp_path):
     measured = Benchmark(1.5, {}, 10**7, notes=("one station", "no peer was found"))
-    monkeypatch.setattr(benchmarks, "run_benchmarks", lambda only: [("network", measured)])
+    monkeypatch.setattr(benchmarks, "run_benchmarks", lambda only, cases: [("network", measured)])
     code, out, err = run(capsys, "bench", "--out", str(tmp_path), "--json")
     assert code == 0
     assert err == "network: 1.500 s (no peer), 10 MB at most\n  one station\n  no peer was found\n"

@@ -10,9 +10,9 @@ import pytest
 
 from app.entrance import Token
 from app.lesson import Choice, Question, told, with_votes
+from app.load.connection import Connection, wait_for
 from app.qr import modules_of, qr_html
 from app.server import build_server
-from tests.app.connections import Connection, wait_for
 
 pytestmark = pytest.mark.xdist_group("lecture")  # one worker starts the server once
 CLASS = 30

@@ -1,5 +1,7 @@
 """The pool of computing processes and its latest-wins lanes."""
 
+import functools
+import multiprocessing
 import queue
 import sys
 import threading
@@ -11,7 +13,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 import pool_jobs as jobs
 
-from app.pool import DIED, ComputePool, LatestWins, Outcome
+from app.lane import LatestWins
+from app.pool import DIED, ComputePool, Outcome
 
 TIMEOUT_S = 60.0
 
@@ -144,6 +147,73 @@ def test_one_owner_never_holds_all_processes(pool, tmp_path):
     assert not (tmp_path / "greedy1").exists()
     (tmp_path / "go").touch()
     assert [inbox.end().value for inbox in greedy] == ["greedy0", "greedy1", "greedy2"]
+
+
+def test_what_several_ask_for_is_computed_once(pool, tmp_path):
+    inboxes = [Inbox() for _ in range(5)]
+    for i, inbox in enumerate(inboxes):
+        pool.submit(
+            f"one of {i}", jobs.report_and_note, str(tmp_path), f"run{i}", key="same", **inbox.callbacks()
+        )
+        if i == 0:
+            wait_for(tmp_path / "run0")
+    (tmp_path / "go").touch()
+    assert [inbox.end() for inbox in inboxes] == [Outcome("result", "run0")] * 5
+    assert [path.name for path in tmp_path.glob("run*")] == ["run0"]
+    assert all(len(inbox.progress) >= 1 for inbox in inboxes[1:])
+
+
+def test_who_waits_for_a_job_that_is_stopped_has_it_computed(pool, tmp_path):
+    first, second = Inbox(), Inbox()
+    ticket = pool.submit("leaves", jobs.note, str(tmp_path), "left", key="shared", **first.callbacks())
+    wait_for(tmp_path / "left")
+    pool.submit("stays", jobs.count, 1, key="shared", **second.callbacks())
+    pool.stop(ticket)
+    assert first.end().kind == "stopped"
+    assert second.end() == Outcome("result", 1)
+
+
+def test_who_waits_for_a_job_whose_process_dies_gets_the_same_sentence(pool, tmp_path):
+    inboxes = [Inbox(), Inbox()]
+    for i, inbox in enumerate(inboxes):
+        pool.submit(f"unlucky {i}", jobs.crash_when_told, str(tmp_path), key="deadly", **inbox.callbacks())
+    wait_for(tmp_path / "began")
+    (tmp_path / "go").touch()
+    assert [inbox.end() for inbox in inboxes] == [Outcome("error", DIED)] * 2
+
+
+def test_what_is_urgent_goes_before_all_that_waits(tmp_path):
+    pool, running, order = ComputePool(size=1), Inbox(), queue.Queue()
+    try:
+        pool.submit("busy", jobs.note, str(tmp_path), "busy", **running.callbacks())
+        wait_for(tmp_path / "busy")
+        for name, urgent in (("first", False), ("second", False), ("urgent", True)):
+            ended = functools.partial(lambda name, _: order.put(name), name)
+            pool.submit(name, jobs.count, 0, urgent=urgent, on_progress=print, on_end=ended)
+        (tmp_path / "go").touch()
+        assert [order.get(timeout=TIMEOUT_S) for _ in range(3)] == ["urgent", "first", "second"]
+    finally:
+        pool.close()
+
+
+def test_a_process_that_cannot_be_started_is_tried_again(monkeypatch):
+    failures = [OSError(11, "Resource temporarily unavailable")] * 2
+    context = multiprocessing.get_context("spawn").Process
+
+    def start(process):
+        if failures:
+            raise failures.pop()
+        return begin(process)
+
+    begin = context.start
+    monkeypatch.setattr(context, "start", start)
+    pool, inbox = ComputePool(size=1), Inbox()
+    try:
+        pool.submit("a", jobs.count, 1, **inbox.callbacks())
+        assert inbox.end() == Outcome("result", 1)
+        assert not failures
+    finally:
+        pool.close()
 
 
 def test_close_leaves_no_process_behind():

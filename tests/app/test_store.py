@@ -2,10 +2,12 @@
 
 import os
 import pickle
+import resource
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.store import Store
@@ -134,6 +136,49 @@ def test_a_damaged_file_is_computed_again(tmp_path, damage):
     for path in files(store):
         path.write_bytes(damage)
     assert counted(store, ("stage", 0), "good") == ("good", 1)
+
+
+def test_damage_anywhere_is_noticed_and_the_result_is_never_a_wrong_one(tmp_path):
+    """A flipped bit within an array would otherwise be read as another array."""
+    rng = np.random.default_rng(0)
+    value, store = rng.standard_normal(500), Store(str(tmp_path))
+    counted(store, ("stage", 0), value)
+    (path,) = files(store)
+    whole = path.read_bytes()
+    cut = [whole[:end] for end in np.linspace(0, len(whole) - 1, 20).astype(int)]
+    flipped = [bytearray(whole) for _ in range(60)]
+    for damaged, at in zip(flipped, rng.choice(len(whole), 60, replace=False), strict=True):
+        damaged[at] ^= 1 << int(rng.integers(8))
+    for damaged in (*cut, *flipped, whole + b"x", whole[4:], bytes(len(whole))):
+        path.write_bytes(damaged)
+        counted(store, ("stage", 1), "newer")  # so that the other is not in memory
+        found, computed = counted(store, ("stage", 0), value)
+        np.testing.assert_array_equal(found, value)
+        assert computed == 1
+    counted(store, ("stage", 1), "newer")
+    assert counted(store, ("stage", 0), value)[1] == 0
+
+
+def test_on_a_full_disk_results_are_given_and_no_part_of_a_file_is_kept(tmp_path):
+    store = Store(str(tmp_path))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000, hard))
+    try:
+        assert counted(store, ("stage", 0), bytes(50_000)) == (bytes(50_000), 1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_with_the_clock_set_back_what_is_used_now_outlives_what_was_used_before(tmp_path):
+    store = Store(str(tmp_path), limit_bytes=3_500)
+    for key in range(3):
+        counted(store, ("stage", key), bytes(1_000))
+    for path in files(store):
+        os.utime(path, (4e9, 4e9))
+    for key in (3, 4, 5):
+        counted(store, ("stage", key), bytes(1_000))
+    assert [counted(store, ("stage", key), bytes(1_000))[1] for key in (3, 4, 5)] == [0, 0, 0]
 
 
 def test_a_folder_that_cannot_be_written_costs_only_time(tmp_path):

@@ -15,7 +15,7 @@ from app.state import BoardViews
 from app.ui import Ui
 from app.zips import opened_zip
 from packetmesh.errors import InputError
-from packetmesh.files import unpacked
+from packetmesh.files import atomic_path, unpacked
 from pipeline.calibration.shots import BOARD_FILE
 from pipeline.config import Pattern
 
@@ -143,9 +143,8 @@ def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[
     if there + len(photographs) > MOST_FILES:
         raise InputError(f"The app takes up to {MOST_FILES} images; {INSTEAD}.")
     for place, content in photographs.items():
-        path = folder / place
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+        with atomic_path(folder / place) as temporary:
+            temporary.write_bytes(content)
     return list(photographs)
 
 

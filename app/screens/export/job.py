@@ -25,12 +25,10 @@ from packetmesh.progress import Progress
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.run_folder import clouds_of, config_of, metrics_of, write_run_folder
+from pipeline.run_folder import CLOUD_FILES, clouds_of, config_of, metrics_of, write_run_folder
 from pipeline.stages import dressed
 from pipeline.texture import Texture
 from pipeline.types import SurfaceResult
-
-CLOUD_FILES = ("sensor.ply", "inferred.ply", "fused.ply")
 
 
 def export_job(store: Store, spec: Spec, name: str, shown: Shown = "after") -> Generator[Any, None, bytes]:

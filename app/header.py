@@ -1,0 +1,68 @@
+"""The top of the control panel: the steps, what is being computed, and buttons for all steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import viser
+
+from app.drawing.colors import BRAND, DELIVERED
+from app.state import Step, StepStatus
+from app.stepper import Stepper
+from packetmesh.progress import Progress
+
+
+class Header:
+    """Stepper, status line, bar and buttons."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        titles: Sequence[str],
+        on_pick: Callable[[str], None],
+        on_action: Callable[[str], None],
+    ) -> None:
+        """Add them to the current container."""
+        self._stepper = Stepper(gui, titles, on_pick)
+        self._status = gui.add_markdown("**Starting** …")
+        self._bar = gui.add_progress_bar(0.0)
+        actions = gui.add_button_group(
+            "All steps",
+            ("Cancel", "Retry", "Reset", "Copy as command"),
+            hint="Cancel stops what is computing; Retry runs a cancelled or failed step again; Reset goes "
+            "back to the settings of the start; Copy as command shows the command that computes the same.",
+        )
+        actions.on_click(lambda event: on_action(event.target.value))
+
+    def progressed(self, report: Progress) -> None:
+        """How far a computation is."""
+        self._bar.value = min(100.0, 100.0 * report.fraction)
+        self._status.content = f"**Computing** · {report.stage}"
+
+    def show(
+        self,
+        current: str,
+        statuses: Mapping[str, StepStatus],
+        running: Sequence[Step],
+        failure: str | None,
+        busy: bool,
+    ) -> None:
+        """Bring everything up to date.
+
+        Args:
+            current: title of the step that is shown.
+            statuses: by title.
+            running: the steps that are computed now.
+            failure: why one cannot be.
+            busy: whether something beside the steps is computed.
+        """
+        self._stepper.show(current, statuses)
+        if running:
+            self._status.content = f"**Computing** · {running[0]}"
+        elif failure is not None:
+            self._status.content = f"**Stopped** · {failure} Change a setting or press Retry."
+            self._bar.value = 0.0
+        elif not busy:
+            self._status.content = "**Up to date**"
+            self._bar.value = 100.0
+        self._bar.color = BRAND if running or busy else DELIVERED

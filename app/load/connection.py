@@ -1,0 +1,157 @@
+"""Connections to a running app that say and hear what a page does, without a page."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections.abc import Callable
+
+import msgspec.msgpack
+import viser
+import zstandard
+from viser import _messages as messages
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from app.stepper import MARKS
+
+PATIENCE_S = 30.0
+ASKED = "packetmesh.ask("
+"""In the script by which the server asks whether all is drawn."""
+DRAWN = "Say that all is drawn"
+"""The label of the command that answers it."""
+_CURRENT = re.compile(r"nth-of-type\((\d+)\) {[^}]*color: white;")
+
+
+def wait_for(happened: Callable[[], bool], patience_s: float = PATIENCE_S) -> None:
+    """Return once it has.
+
+    Raises:
+        TimeoutError: it has not for long.
+    """
+    end_s = time.monotonic() + patience_s
+    while not happened():
+        if time.monotonic() > end_s:
+            raise TimeoutError("that did not happen")
+        time.sleep(0.02)
+
+
+class Connection:
+    """One browser's connection: its controls by their labels, and what it was told of its camera."""
+
+    def __init__(self, url: str, cookie: str = "") -> None:
+        self._socket = connect(
+            url.replace("http://", "ws://"),
+            subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
+            additional_headers={"Cookie": cookie} if cookie else {},
+            max_size=None,
+        )
+        self.uuids: dict[str, list[str]] = {}
+        self.values: dict[str, object] = {}
+        """By the control's uuid, what the server said last."""
+        self.texts: dict[str, str] = {}
+        self.positions: list[tuple[float, ...]] = []
+        self.notices: list[str] = []
+        """Titles and sentences of the notifications."""
+        self.steps: tuple[str, ...] = ()
+        """The steps' labels, with their marks."""
+        self.current = ""
+        """The step that is shown."""
+        self.heard_s: dict[str, float] = {}
+        """When each step was shown last, and when ``surface`` was last up to date."""
+        self.lost = False
+        """Whether the server ended the connection."""
+        self._drawn: set[str] = set()
+        self._closing = False
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self.stand((1.0, 2.0, 3.0))
+
+    def close(self) -> None:
+        self._closing = True
+        self._socket.close()
+        self._reader.join()
+
+    def say(self, message: messages.Message) -> None:
+        self._socket.send(msgspec.msgpack.encode(message.as_serializable_dict()))
+
+    def stand(self, position: tuple[float, float, float]) -> None:
+        """Where a hand has turned the view to."""
+        up, ahead = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+        self.say(
+            messages.ViewerCameraMessage(
+                (1.0, 0.0, 0.0, 0.0), position, 0.9, 0.01, 100.0, 600, 900, ahead, up
+            )
+        )
+
+    def set(self, label: str, value: object, which: int = 0) -> None:
+        """What a hand does with the control of that label, or with the one ``which`` of many."""
+        wait_for(lambda: len(self.uuids.get(label, ())) > which)
+        self.say(messages.GuiUpdateMessage(self.uuids[label][which], {"value": value}))
+
+    def value(self, label: str) -> object:
+        return self.values[self.uuids[label][0]]
+
+    def reads(self, text: str) -> bool:
+        """Whether some text in the control panel has it."""
+        return any(text in one for one in list(self.texts.values()))
+
+    def go(self, step: str) -> None:
+        """Click a step."""
+        label = next(label for label in self.steps if label.split(" ")[0] == step)
+        self.set("Steps", label)
+
+    def mark(self, step: str) -> str:
+        """How the stepper marks a step; empty without a mark."""
+        return next(label for label in self.steps if label.startswith(step)).partition(" ")[2]
+
+    def _read(self) -> None:
+        try:
+            for packet in self._socket:
+                assert isinstance(packet, bytes)
+                self._take(packet)
+        except ConnectionClosed:
+            pass
+        self.lost = not self._closing
+
+    def _take(self, packet: bytes) -> None:
+        size = int.from_bytes(packet[8:16], "little")
+        inner = zstandard.ZstdDecompressor().decompress(packet[16 : 16 + size])
+        for message in msgspec.msgpack.decode(inner)["messages"]:
+            if message["type"] == "SetCameraPositionMessage":
+                self.positions.append(tuple(message["position"]))
+            if "uuid" in message:
+                self._take_control(message["uuid"], message)
+
+    def _take_control(self, uuid: str, message: dict[str, object]) -> None:
+        props = message.get("props")
+        told = props or message.get("updates") or {}
+        assert isinstance(told, dict)
+        if message["type"] == "NotificationShowMessage":
+            self.notices.append(f"{told['title']}: {told['body']}")
+        if props is not None and told.get("label"):
+            self.uuids.setdefault(told["label"], []).append(uuid)
+            if told["label"] == DRAWN:
+                self._drawn.add(uuid)
+        if "_markdown" in told:
+            self.texts[uuid] = told["_markdown"]
+        if "content" in told:
+            self._take_html(told["content"])
+        if "options" in told and uuid in self.uuids.get("Steps", ()):
+            self.steps = tuple(told["options"])
+            if self.mark("Surface") == MARKS["fresh"]:
+                self.heard_s["surface"] = time.monotonic()
+        value = message.get("value", told.get("value"))
+        if value is not None:
+            self.values[uuid] = value
+
+    def _take_html(self, content: str) -> None:
+        """See which step is shown; say that all is drawn, when asked."""
+        if ASKED in content:
+            for uuid in self._drawn:
+                self.say(messages.CommandTriggerMessage(uuid))
+        current = _CURRENT.search(content)
+        if current is not None and self.steps:
+            self.current = self.steps[int(current[1]) - 1].split(" ")[0]
+            self.heard_s[self.current] = time.monotonic()

@@ -1,0 +1,109 @@
+"""The server under load, in a process of its own that also tells what is going on in it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import psutil
+
+READY_S = 120.0
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What there is in the server at one moment."""
+
+    sessions: int
+    threads: int
+    files: int
+    """In the store, with those of uploads."""
+    bytes: int
+    strays: tuple[int, ...]
+    """Running jobs of browsers that have left, each with a number of its own."""
+    server_bytes: int = 0
+    """Memory of the serving process."""
+    workers_bytes: int = 0
+    """Memory of the computing processes together."""
+
+
+class Serving:
+    """A server that can be looked into."""
+
+    def __init__(self, url: str, process_id: int, pipe: Connection) -> None:
+        self.url = url
+        self._process, self._pipe = psutil.Process(process_id), pipe
+
+    def look(self) -> Look:
+        """What there is now."""
+        self._pipe.send("look")
+        inside: tuple[int, int, int, int, tuple[int, ...]] = self._pipe.recv()
+        return Look(*inside, _memory_bytes(self._process), sum(map(_memory_bytes, self._workers())))
+
+    def _workers(self) -> list[psutil.Process]:
+        return self._process.children(recursive=True)
+
+
+def _memory_bytes(process: psutil.Process) -> int:
+    try:
+        return int(process.memory_info().rss)
+    except psutil.Error:
+        return 0
+
+
+@contextmanager
+def serving(scene: str) -> Iterator[Serving]:
+    """A server on loopback that starts with a scene; it is stopped at the end.
+
+    Raises:
+        TimeoutError: it did not start.
+    """
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=_serve, args=(there, scene))
+    process.start()
+    there.close()
+    try:
+        if not here.poll(READY_S):
+            raise TimeoutError("the server did not start")
+        yield Serving(here.recv(), process.pid or 0, here)
+    finally:
+        here.close()
+        process.join(20.0)
+        process.kill()
+
+
+def _serve(pipe: Connection, scene: str) -> None:
+    """Main function of the process: serve, and answer until the other end is closed."""
+    from app.server import build_server
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    app = build_server(scene, port=0)
+    numbers: dict[object, int] = {}
+    try:
+        pipe.send(app.url)
+        while pipe.recv() == "look":
+            there = {id(owner) for session in list(app.sessions.values()) for owner in session.owners}
+            gone = [owner for owner in app.pool.running() if id(owner) not in there]
+            sizes = list(_sizes(app.folder.path))
+            strays = tuple(numbers.setdefault(owner, len(numbers)) for owner in gone)
+            pipe.send((len(app.sessions), threading.active_count(), len(sizes), sum(sizes), strays))
+    except EOFError:
+        pass
+    finally:
+        app.stop()
+
+
+def _sizes(folder: Path) -> Iterator[int]:
+    """Of all files below it that do not vanish meanwhile."""
+    for below, _, names in os.walk(folder):
+        for name in names:
+            with suppress(OSError):
+                yield Path(below, name).stat().st_size

@@ -1,0 +1,109 @@
+"""One of many browsers: it clicks steps, drags the ball's radius and waits for meshes, as a person does."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from websockets.exceptions import WebSocketException
+
+from app.load.connection import Connection, wait_for
+from app.stepper import MARKS
+
+STEPS = ("Scene", "Depth", "Fuse", "Surface", "Export")
+"""Those that are clicked: none of them has anything computed by being shown."""
+RADIUS_MM = (12.0, 40.0)
+MOVES, MOVE_S = 8, 0.08
+"""Of a hand that drags."""
+THINKING_S = 1.5
+"""Mean time between two things that a person does."""
+MESH_SHARE = 0.3
+"""Of what is done while no mesh is awaited."""
+FIRST_S = 240.0
+"""Patience with the first surface: all come at once."""
+LONGEST_S = 30.0
+"""An answer that takes longer is none."""
+
+
+@dataclass(slots=True)
+class Diary:
+    """What one browser has seen."""
+
+    opened_s: float = float("nan")
+    """Until the panel was there."""
+    first_mesh_s: float = float("nan")
+    """Until all steps of the room were computed."""
+    answers_s: list[float] = field(default_factory=list)
+    """Of clicks that need nothing computed."""
+    meshes_s: list[float] = field(default_factory=list)
+    """From the last move of the radius until everything of that surface is there."""
+    lost: str = ""
+    """Why it could not go on; empty if it could."""
+    notices: list[str] = field(default_factory=list)
+
+
+class Visitor:
+    """A thread that uses the app until it is told to leave."""
+
+    def __init__(self, url: str, seed: int) -> None:
+        self.diary = Diary()
+        self._url, self._rng = url, np.random.default_rng(seed)
+        self._leaving = threading.Event()
+        self._dragged_s: float | None = None
+        self._thread = threading.Thread(target=self._visit, daemon=True)
+        self._thread.start()
+
+    def leave(self) -> None:
+        """Close the connection, whatever is being computed."""
+        self._leaving.set()
+        self._thread.join()
+
+    def _visit(self) -> None:
+        started_s = time.monotonic()
+        try:
+            with contextlib.closing(Connection(self._url)) as page:
+                self._stay(page, started_s)
+                self.diary.notices = page.notices
+        except (TimeoutError, OSError, WebSocketException) as error:
+            self.diary.lost = f"{type(error).__name__}: {error}"
+
+    def _stay(self, page: Connection, started_s: float) -> None:
+        wait_for(lambda: "Radius (mm)" in page.uuids and bool(page.steps), FIRST_S)
+        self.diary.opened_s = time.monotonic() - started_s
+        first = False
+        while not self._leaving.wait(self._rng.exponential(THINKING_S)):
+            if page.lost:
+                raise ConnectionError("the server ended the connection")
+            if not first and (first := "surface" in page.heard_s):
+                self.diary.first_mesh_s = page.heard_s["surface"] - started_s
+            self._look_for_mesh(page)
+            if first and self._dragged_s is None and self._rng.random() < MESH_SHARE:
+                self._click(page, "Surface")
+                self._drag(page)
+            else:
+                self._click(page, str(self._rng.choice([step for step in STEPS if step != page.current])))
+
+    def _click(self, page: Connection, step: str) -> None:
+        if page.current == step:
+            return
+        asked_s = time.monotonic()
+        page.go(step)
+        wait_for(lambda: page.current == step, LONGEST_S)
+        self.diary.answers_s.append(page.heard_s[step] - asked_s)
+
+    def _drag(self, page: Connection) -> None:
+        for radius_mm in np.sort(self._rng.uniform(*RADIUS_MM, MOVES)):
+            page.set("Radius (mm)", float(radius_mm))
+            time.sleep(MOVE_S)
+        self._dragged_s = time.monotonic()
+
+    def _look_for_mesh(self, page: Connection) -> None:
+        """Note when the surface of the last drag was there."""
+        if self._dragged_s is None or page.mark("Surface") != MARKS["fresh"]:
+            return
+        if page.heard_s["surface"] > self._dragged_s:
+            self.diary.meshes_s.append(page.heard_s["surface"] - self._dragged_s)
+            self._dragged_s = None

@@ -1,0 +1,161 @@
+"""A disk that fills while a command writes, and run folders that a killed command left half written."""
+
+import contextlib
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.runs import RigTask, reconstruct_one
+from pipeline.config import PipelineConfig
+from pipeline.io.clouds import read_cloud, write_cloud
+from pipeline.io.demos import load_demo
+from pipeline.io.rigs import save_rig
+from pipeline.types import PointCloud, Rig
+from tests.app.commands import check_one_sentence, run
+from tests.paths import ROOT
+
+QUICK = ("--set", "surface.max_points=3000")
+ROOM_BYTES = 10_000
+FILES = {"config.json", "metrics.json", "poses.json", "report.html", "surface.glb"} | {
+    f"{name}.ply" for name in ("sensor", "inferred", "fused", "surface_before", "surface_after")
+}
+
+
+@contextlib.contextmanager
+def disk_with_room(size):
+    """The system lets no file grow beyond a size; on a full disk a write fails alike."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """One node."""
+    folder = tmp_path_factory.mktemp("rig") / "office"
+    save_rig(folder, Rig("office", load_demo("office").frames[:1]))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def ellipsoid(tmp_path_factory):
+    """Not a round one, whose pose would be anyone's guess."""
+    path = tmp_path_factory.mktemp("cloud") / "ellipsoid.ply"
+    points_m = np.random.default_rng(0).standard_normal((2000, 3))
+    directions = points_m / np.linalg.norm(points_m, axis=1, keepdims=True)
+    write_cloud(path, PointCloud(directions * (1.0, 0.6, 0.3)))
+    return path
+
+
+COMMANDS = {
+    "reconstruct": lambda rig, cloud: ["--rig", rig, *QUICK, "--out"],
+    "deliver": lambda rig, cloud: ["--rig", rig, "--moments", "1", *QUICK, "--out"],
+    "register": lambda rig, cloud: [cloud, cloud, "--method", "icp", "--out"],
+    "mesh": lambda rig, cloud: [cloud, "--radii-m", "0.2", "--out"],
+    "simulate": lambda rig, cloud: ["--preset", "thesis-link", "--out"],
+    "infer-depth": lambda rig, cloud: [rig / "node_00" / "color.png", "--out"],
+    "target": lambda rig, cloud: ["--out"],
+}
+"""The options of each command, the last of which names the output."""
+AS_FILES = {"mesh": "mesh.ply", "target": "board.svg"}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_disk_that_fills_is_one_sentence_and_leaves_nothing_half_written(
+    capsys, rig, ellipsoid, tmp_path, command
+):
+    out = tmp_path / "out" / AS_FILES.get(command, "")
+    options = COMMANDS[command](rig, ellipsoid)
+    room = 1000 if command in AS_FILES else ROOM_BYTES
+    with disk_with_room(room):
+        got = run(capsys, command, *options, out)
+    check_one_sentence((got[0], "", got[2]), 1, "delete something there")
+    left = [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
+    assert [path.name for path in left if path.name.startswith(".")] == []
+    assert "metrics.json" not in {path.name for path in left}
+    assert all(path.stat().st_size < room for path in left)
+
+
+def killed_while_writing(rig, out):
+    """``reconstruct``, killed as soon as the first of its files is there."""
+    words = ["reconstruct", "--rig", str(rig), "--out", str(out), *QUICK]
+    process = subprocess.Popen([sys.executable, "-m", "app.cli", *words], cwd=ROOT, stderr=subprocess.PIPE)
+    end_s = time.monotonic() + 120.0
+    while not (out / "config.json").exists() and process.poll() is None:
+        assert time.monotonic() < end_s
+        time.sleep(0.0005)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    return process.returncode
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_a_killed_reconstruction_has_no_metrics_and_the_next_one_leaves_no_trace_of_it(capsys, rig, tmp_path):
+    out = tmp_path / "out"
+    assert killed_while_writing(rig, out) == -signal.SIGKILL
+    assert not (out / "metrics.json").exists()
+    (out / ".surface-0123abcd.glb").write_bytes(b"half")  # what it was writing, if it was
+    assert run(capsys, "reconstruct", "--rig", rig, "--out", out, *QUICK)[0] == 0
+    assert {path.name for path in out.iterdir()} == FILES
+    assert len(read_cloud(out / "fused.ply")) > 1000
+
+
+def test_a_run_over_an_older_one_leaves_none_of_its_surfaces(capsys, rig, tmp_path):
+    out = tmp_path / "out"
+    assert run(capsys, "reconstruct", "--rig", rig, "--out", out, *QUICK)[0] == 0
+    too_small = ("surface.radius_rule=manual", "surface.radii_m=0.0001")
+    run(capsys, "reconstruct", "--rig", rig, "--out", out, *QUICK, *too_small)
+    meshes = {"surface_before.ply", "surface_after.ply", "surface.glb"}
+    assert {path.name for path in out.iterdir()} == FILES - meshes
+
+
+DAMAGE = {
+    "no metrics": lambda out: (out / "metrics.json").unlink(),
+    "half the metrics": lambda out: os.truncate(out / "metrics.json", 500),
+    "other metrics": lambda out: (out / "metrics.json").write_text("[]"),
+    "half a task": lambda out: os.truncate(out / "task.json", 20),
+    "no rig": lambda out: (out / "task.json").write_text("null"),
+}
+
+
+@pytest.fixture(scope="module")
+def task(rig, tmp_path_factory):
+    """A rig of many, done once."""
+    settings = PipelineConfig()
+    task = RigTask("office", str(rig), str(tmp_path_factory.mktemp("many")), "packetmesh", settings, None)
+    assert reconstruct_one(task).state == "done"
+    assert reconstruct_one(task).state == "kept"
+    return task
+
+
+class ComputedAgain(Exception):
+    """As it should be."""
+
+
+def begun(*arguments):
+    raise ComputedAgain
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_run_of_many_is_computed_again(task, tmp_path, monkeypatch, damage):
+    out = tmp_path / "out"
+    shutil.copytree(task.out, out)
+    DAMAGE[damage](out)
+    monkeypatch.setattr("app.runs.iterate_run", begun)
+    with pytest.raises(ComputedAgain):
+        reconstruct_one(replace(task, out=str(out)))
+    assert not (out / "task.json").exists()

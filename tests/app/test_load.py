@@ -1,0 +1,51 @@
+"""The load of many browsers: its figures, and turns in drawing."""
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from app.load.load import Load
+from app.load.serving import Look
+from app.load.visitor import Diary
+from app.turns import Turns
+
+
+def look(strays=(), server=100, files=3):
+    return Look(2, 10, files, 1000, strays, server, 200)
+
+
+def test_the_figures_of_a_load():
+    diaries = (
+        Diary(opened_s=1.0, answers_s=[0.1, 0.3], meshes_s=[2.0]),
+        Diary(answers_s=[0.2], lost="ConnectionError: the server ended the connection"),
+    )
+    looks = ((0.0, look()), (1.0, look((7,))), (2.0, look((7, 8), server=150)), (9.0, look((7,), files=4)))
+    load = Load(diaries, looks, look(), look())
+    record = load.record()
+    assert record["clicks"] == 3
+    assert record["answers_s"] == pytest.approx({"count": 3, "median": 0.2, "p95": 0.29, "max": 0.3})
+    assert record["late"] == 0
+    assert record["opened_s"]["count"] == 1
+    assert len(record["lost"]) == 1
+    assert record["longest_stray_s"] == 8.0
+    assert record["strays_beyond_patience"] == 1
+    assert (record["server_peak_bytes"], record["workers_peak_bytes"]) == (150, 200)
+    assert [quarter["files"] for quarter in record["quarters"] if quarter] == [3, 4]
+    assert any("lost: 1 of 2" in note for note in load.notes())
+
+
+def test_one_draws_after_the_other_and_who_waits_goes_on_with_other_things():
+    turns, order, first_may_end = Turns(), [], threading.Event()
+    with ThreadPoolExecutor(1) as slow, ThreadPoolExecutor(1) as quick:
+        turns.give(lambda: slow.submit(lambda: (first_may_end.wait(10.0), order.append("drawn"))))
+        turns.give(lambda: quick.submit(order.append, "drawn second"))
+        turns.give(lambda: None)  # a session that has gone
+        quick.submit(order.append, "clicked").result(10.0)
+        first_may_end.set()
+        with turns.taken():
+            pass
+        done = threading.Event()
+        turns.give(lambda: quick.submit(done.set))
+        assert done.wait(10.0)
+    assert order == ["clicked", "drawn", "drawn second"]
