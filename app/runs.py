@@ -23,7 +23,7 @@ from pipeline.config import PipelineConfig
 from pipeline.importing import is_recording, iterate_import
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.run_folder import metrics_of, write_run_folder
-from pipeline.sources import MILLIMETRES, FileSource, RigFolder
+from pipeline.sources import FileSource, RigFolder
 from pipeline.spec import Spec
 from pipeline.stages import RunCache, cameras_of, run
 from pipeline.surface.pictures import mesh_picture
@@ -43,7 +43,7 @@ class RigTask:
     preset: str
     config: PipelineConfig
     depth_scale: float | None
-    """Depth units in a metre; None takes millimetres, or what the kind of recording uses."""
+    """Depth units in a metre; None takes what the images or the kind of recording use."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +145,7 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
 def _source_of(task: RigTask) -> RigFolder:
     """The rig itself, or the one that a recording is imported to, beside its run."""
     if is_rig(Path(task.path)):
-        return RigFolder(task.path, MILLIMETRES if task.depth_scale is None else task.depth_scale)
+        return RigFolder(task.path, task.depth_scale)
     rig = Path(task.out) / "rig"
     if rig.is_dir():
         shutil.rmtree(rig)  # of other settings
@@ -179,7 +179,12 @@ def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome
         sum(metrics["timings_s"].values()),
     )
     known = (float("nan") if number is None else float(number) for number in numbers)
-    sentences = [sentence for node in metrics["nodes"] if (sentence := node["place"]["sentence"])]
+    sentences = [
+        sentence
+        for node in metrics["nodes"]
+        for sentence in (node["place"]["sentence"], *(f"{node['name']}: {note}" for note in node["notes"]))
+        if sentence
+    ]
     return RigOutcome(task.name, state, "; ".join(sentences), len(metrics["nodes"]), *known)
 
 

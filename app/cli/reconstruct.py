@@ -60,6 +60,8 @@ def reconstruct(
     )
     if not after["triangles"]:
         say("The ball falls through everywhere; try larger surface.radii_m")
+    for note in result.rig.notes:
+        say(note)
     if json:
         print_json(metrics)
     say_places(result.placement)

@@ -16,15 +16,16 @@ from pipeline.geometry import inverse
 from pipeline.importing.bag_messages import (
     camera_in,
     color_of,
-    depth_units_of,
+    depth_values_of,
     is_depth,
     stamp_s,
     transform_in,
 )
+from pipeline.importing.depth_units import depth_of
 from pipeline.importing.rig_folder import NodeImages
-from pipeline.io.images import FARTHEST_M, NO_VALUE
+from pipeline.io.depth_scale import known_in, usual_scale
 from pipeline.io.rigs import MAX_NODES
-from pipeline.types import CameraIntrinsics, DepthMap, FloatArray
+from pipeline.types import CameraIntrinsics, FloatArray
 
 LARGEST_GAP_S = 0.05
 """Between images that are taken as of one moment: more than a frame at 30 Hz."""
@@ -90,7 +91,9 @@ def read_bag(path: Path, frames: int, depth_scale: float | None) -> BagNodes:
                 messages = _message(reader, color, color_s), _message(reader, depth, depth_s)
                 node = _node(color, depth, *messages, depth_scale, T_world_color, transforms)
                 nodes.append((float(color_s), node))
-        scale = depth_units_of(messages[1], depth.name)[1] if depth_scale is None else depth_scale
+        values = depth_values_of(messages[1], depth.name)
+        scale = usual_scale(values) if depth_scale is None else depth_scale
+        notes += [f"{node.depth_name}: {note}" for _, node in nodes for note in node.notes]
         return BagNodes(tuple(nodes), len(first.times_s), scale, tuple(notes))
 
 
@@ -242,12 +245,11 @@ def _node(
     transforms: dict[str, dict[str, FloatArray]],
 ) -> NodeImages:
     assert color.camera is not None
-    units, usual_scale = depth_units_of(depth_message, depth.name)
-    scale = usual_scale if depth_scale is None else depth_scale
-    z_m = (np.where(units == NO_VALUE, 0.0, units) / scale).astype(np.float32)
-    z_m[(z_m <= 0.0) | (z_m > FARTHEST_M)] = np.nan
-    if not np.isfinite(z_m).any():
+    values = depth_values_of(depth_message, depth.name)
+    if not known_in(values).any():
         raise InputError(f"A depth image of {depth.name} is empty; try another recording of the scene")
+    scale = usual_scale(values) if depth_scale is None else depth_scale
+    read = depth_of(f"of {depth.name}", values, scale, depth_scale is not None)
     depth_camera = T_color_depth = None
     if depth.frame != color.frame:
         T_color_depth = transforms.get(color.frame, {}).get(depth.frame)
@@ -258,5 +260,5 @@ def _node(
                 "camera_info or a static transform between both is missing; try to record them, too"
             )
     rgb = color_of(color_message, color.name)
-    images = color.name, depth.name, rgb, DepthMap(z_m), color.camera
-    return NodeImages(*images, T_world_color, depth_camera, T_color_depth)
+    images = color.name, depth.name, rgb, read.depth, color.camera
+    return NodeImages(*images, T_world_color, depth_camera, T_color_depth, read.notes)

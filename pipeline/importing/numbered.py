@@ -12,8 +12,8 @@ from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, read_bytes, read_text
 from pipeline.geometry import inverse
 from pipeline.importing.cameras import PRIMESENSE, camera_of
-from pipeline.importing.sequence import Candidate, Sequence, posed
-from pipeline.io.images import read_color, read_depth_units
+from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, posed
+from pipeline.io.images import read_color, read_depth_values
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.poses import read_pose, rigid_or_none
 from pipeline.types import CameraIntrinsics, FloatArray
@@ -35,8 +35,8 @@ def read_seven_scenes(folder: Path, intrinsics: Path | None) -> Sequence:
     found = []
     for color in _thinned(sorted(folder.glob("frame-*.color.*"))):
         stem = color.name.split(".")[0]
-        depth = folder / f"{stem}.depth.png"
-        if depth.is_file():
+        depth = next(iter(_depths(folder, f"{stem}.depth.*")), None)
+        if depth is not None:
             found.append(Candidate(color, depth, _pose_or_none(folder / f"{stem}.pose.txt")))
     _some(found, folder, "frame-000000.depth.png beside frame-000000.color.png")
     candidates, notes = posed(found, "frame-000000.pose.txt")
@@ -63,7 +63,7 @@ def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
         camera = read_intrinsics(beside / "intrinsic_color.txt", (width_px, height_px))
     else:
         camera, _ = camera_of(folder, first.color, intrinsics, None, "")
-    depth_height_px, depth_width_px = read_depth_units(first.depth).shape
+    depth_height_px, depth_width_px = read_depth_values(first.depth).shape
     if (depth_height_px, depth_width_px) == (height_px, width_px):
         return Sequence(candidates, camera, notes=notes)
     depth_camera = read_intrinsics(beside / "intrinsic_depth.txt", (depth_width_px, depth_height_px))
@@ -120,9 +120,9 @@ def is_sunrgbd(folder: Path) -> bool:
 def read_sunrgbd(folder: Path, intrinsics: Path | None) -> Sequence:
     """The one frame of a SUN RGB-D folder (Song et al., CVPR 2015); its depth merged if it is there."""
     colors = [path for path in sorted((folder / "image").iterdir()) if path.suffix.lower() in _COLOR_SUFFIXES]
-    depths = [path for name in ("depth_bfx", "depth") for path in sorted((folder / name).glob("*.png"))]
+    depths = [path for name in ("depth_bfx", "depth") for path in _depths(folder / name, "*")]
     _some(colors, folder, "an image in image/")
-    _some(depths, folder, "a PNG in depth_bfx/ or depth/")
+    _some(depths, folder, "an image in depth_bfx/ or depth/")
     camera, notes = camera_of(folder, colors[0], intrinsics, None, "")
     return Sequence((Candidate(colors[0], depths[0]),), camera, rotated_bits=True, notes=notes)
 
@@ -131,11 +131,16 @@ def _paired(colors: Path, depths: Path) -> list[tuple[Path, Path]]:
     """Images whose names have the same number, in its order."""
     by_number = [
         _by_number(path for path in folder.iterdir() if path.suffix.lower() in suffixes)
-        for folder, suffixes in ((colors, _COLOR_SUFFIXES), (depths, (".png",)))
+        for folder, suffixes in ((colors, _COLOR_SUFFIXES), (depths, DEPTH_SUFFIXES))
     ]
     both = sorted(by_number[0].keys() & by_number[1].keys())
-    _some(both, colors.parent, f"a PNG in {depths.name}/ with the number of an image in {colors.name}/")
+    _some(both, colors.parent, f"an image in {depths.name}/ with the number of an image in {colors.name}/")
     return [(by_number[0][number], by_number[1][number]) for number in both]
+
+
+def _depths(folder: Path, pattern: str) -> list[Path]:
+    """Depth images by name."""
+    return [path for path in sorted(folder.glob(pattern)) if path.suffix.lower() in DEPTH_SUFFIXES]
 
 
 def _by_number(paths: Iterable[Path]) -> dict[tuple[int, ...], Path]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.io.demos import load_demo
 from pipeline.io.rigs import save_rig
-from pipeline.types import RgbdFrame, Rig
+from pipeline.types import DepthMap, RgbdFrame, Rig
 from tests.app.commands import run
 
 QUICK = ("--set", "surface.max_points=3000")
@@ -40,3 +40,19 @@ def test_a_rig_that_finds_its_places_says_how_well_it_agrees(capsys, tmp_path):
     poses = json.loads((tmp_path / "out" / "poses.json").read_text())
     assert poses == metrics["poses"]
     assert np.shape(poses["node_01"]) == (4, 4)
+
+
+def test_a_doubtful_depth_scale_reaches_the_command_line_the_report_and_the_metrics(capsys, tmp_path):
+    """Millimetres times five, as TUM stores them."""
+    frame = load_demo("office").frames[0]
+    save_rig(tmp_path / "rig", Rig("one", (replace(frame, depth=DepthMap(5.0 * frame.depth.z_m)),)))
+    words = ["reconstruct", "--rig", tmp_path / "rig", "--out", tmp_path / "out", *QUICK]
+    code, _, err = run(capsys, *words)
+    assert code == 0
+    note = err.splitlines()[-1]
+    assert "try --depth-scale 5000" in note
+    assert note in (tmp_path / "out" / "report.html").read_text()
+    (node,) = json.loads((tmp_path / "out" / "metrics.json").read_text())["nodes"]
+    assert [f"{node['name']}: {own}" for own in node["notes"]] == [note]
+    _, _, err = run(capsys, *words, "--depth-scale", 5000)
+    assert "--depth-scale" not in err

@@ -56,11 +56,12 @@ class OwnFolder:
                 self._add_button(label, mime, self._keep_file, kind)
             self._scale = gui.add_number(
                 "Units per m",
-                1000.0,
-                min=1.0,
+                0.0,
+                min=0.0,
                 max=100_000.0,
                 step=1.0,
-                hint="Depth units in one metre: 1000 for millimetres; floating-point images have metres.",
+                hint="Depth units in one metre (--depth-scale): 5000 for TUM's images. 0 takes whole numbers "
+                "as millimetres, floating-point numbers as metres.",
             )
             self._have = gui.add_markdown("Add all three files, then press the button.")
             gui.add_button("Reconstruct this pair", icon=viser.Icon.PLAYER_PLAY).on_click(
@@ -89,7 +90,7 @@ class OwnFolder:
         if len(self._files) < len(FILES):
             raise InputError("A pair needs a colour image, a depth image and intrinsics; add all three.")
         files = {kind: str(path) for kind, path in self._files.items()}
-        self._on_pair(ImagePair(**files, depth_scale=float(self._scale.value)))
+        self._on_pair(ImagePair(**files, depth_scale=float(self._scale.value) or None))
 
     def _keep_recording(self, file: viser.UploadedFile) -> None:
         path = keep_upload(file, self._below, "recording", RECORDING_LIMIT_BYTES, INSTEAD)

@@ -193,7 +193,7 @@ def all_unknown(folder):
         (damaged_trajectory, "Redwood's format"),
         (bad_list, "noon"),
         (two_recordings, "seq-01, seq-02"),
-        (all_unknown, "zero everywhere"),
+        (all_unknown, "no depth anywhere"),
     ],
 )
 def test_what_cannot_be_used_gets_one_sentence_and_leaves_nothing(tmp_path, spoil, says):
