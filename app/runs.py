@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
+import traceback
 from collections.abc import Generator, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from html import escape
 from pathlib import Path
@@ -21,6 +23,7 @@ from packetmesh.progress import Progress, drain
 from packetmesh.settings import settings
 from pipeline.config import PipelineConfig
 from pipeline.importing import is_recording, iterate_import
+from pipeline.placement import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.run_folder import metrics_of, write_run_folder
 from pipeline.sources import FileSource, RigFolder
@@ -108,26 +111,40 @@ def is_rig(path: Path) -> bool:
 
 
 def iterate_rigs(
-    tasks: list[RigTask], scheduler: str | None
+    tasks: list[RigTask], out: Path, scheduler: str | None
 ) -> Generator[Progress, None, tuple[RigOutcome, ...]]:
     """Reconstruct all of them, on every core or on a Dask cluster that sees the same folders.
 
-    One that fails leaves its sentence, and the others go on.
+    One that fails leaves its sentence, and the others go on. However it ends, ``out`` gets a table of those
+    that were done.
 
     Returns:
         What became of each, in the order of the tasks.
     """
     outcomes: dict[int, RigOutcome] = {}
-    for index, outcome in run_batch(reconstruct_one, tasks, scheduler):
-        outcomes[index] = outcome
-        said = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays find no surface"
-        yield Progress(f"{outcome.name} {outcome.state}: {said}", len(outcomes) / len(tasks))
-    return tuple(outcomes[index] for index in range(len(tasks)))
+    try:
+        for index, outcome in run_batch(reconstruct_one, tasks, scheduler, killed=_killed):
+            outcomes[index] = outcome
+            said = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays find no surface"
+            yield Progress(f"{outcome.name} {outcome.state}: {said}", len(outcomes) / len(tasks))
+    finally:
+        done = tuple(outcomes[index] for index in sorted(outcomes))
+        write_rigs_table(done, out)
+    return done
+
+
+def _killed(task: RigTask) -> RigOutcome:
+    return RigOutcome(task.name, "failed", "Its process was killed, perhaps for lack of memory")
 
 
 def reconstruct_one(task: RigTask) -> RigOutcome:
-    """Do one task, unless an earlier run has, and never raise for what is wrong with its images."""
+    """Do one task, unless an earlier run has, and never raise for what is wrong with its images.
+
+    An error of the program itself leaves ``NAME.log`` beside the run's folder.
+    """
     out = Path(task.out)
+    log = out.with_name(f"{out.name}.log")
+    log.unlink(missing_ok=True)
     try:
         if _is_done(task):
             return _outcome(task, "kept", json.loads((out / "metrics.json").read_text(encoding="utf-8")))
@@ -140,6 +157,11 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
         return RigOutcome(task.name, "failed", str(error))
     except OSError as error:
         return RigOutcome(task.name, "failed", f"{error.filename or task.path}: {error.strerror or error}")
+    except Exception as error:  # one rig must not end the others
+        with suppress(OSError):
+            log.write_text(traceback.format_exc(), encoding="utf-8")
+        said = f"An error of the program, {type(error).__name__}: {error}; see {log.name}"
+        return RigOutcome(task.name, "failed", " ".join(said.split()))
 
 
 def _source_of(task: RigTask) -> RigFolder:
@@ -178,14 +200,17 @@ def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome
         measured["agreement_between_nodes"],
         sum(metrics["timings_s"].values()),
     )
-    known = (float("nan") if number is None else float(number) for number in numbers)
     sentences = [
         sentence
         for node in metrics["nodes"]
         for sentence in (node["place"]["sentence"], *(f"{node['name']}: {note}" for note in node["notes"]))
         if sentence
     ]
-    return RigOutcome(task.name, state, "; ".join(sentences), len(metrics["nodes"]), *known)
+    nodes = len(metrics["nodes"])
+    if nodes > 1 and not metrics["agreement"]:
+        return RigOutcome(task.name, "failed", "; ".join([*sentences, APART]), nodes)
+    known = (float("nan") if number is None else float(number) for number in numbers)
+    return RigOutcome(task.name, state, "; ".join(sentences), nodes, *known)
 
 
 def _write_picture(result: Reconstruction, out: Path) -> None:

@@ -81,7 +81,7 @@ def _many(
 
     from dataclasses import asdict
 
-    from app.runs import HEADINGS, RigTask, iterate_rigs, rigs_in, rigs_row, write_rigs_table
+    from app.runs import HEADINGS, RigTask, iterate_rigs, rigs_in, rigs_row
     from packetmesh.files import writable_folder
 
     found = rigs_in(rigs)
@@ -90,8 +90,7 @@ def _many(
         RigTask(path.name, str(path.resolve()), str(out.resolve() / path.name), preset, config, depth_scale)
         for path in found
     ]
-    outcomes = drain(iterate_rigs(tasks, scheduler), say_progress)
-    write_rigs_table(outcomes, out)
+    outcomes = drain(iterate_rigs(tasks, out, scheduler), say_progress)
     if json:
         print_json([asdict(outcome) for outcome in outcomes])
     else:
@@ -104,6 +103,8 @@ def _many(
 
 def say_places(placement: Placement) -> None:
     """How far the nodes of a rig agree, and which found no place; exits with 1 if no two did."""
+    from pipeline.placement import APART
+
     if len(placement.verdicts) < 2:
         return
     if placement.agreements:
@@ -111,6 +112,6 @@ def say_places(placement: Placement) -> None:
         say(f"Of what two cameras both measured, {share:.1%} is within 2 %")
     for sentence in placement.sentences:
         say(sentence)
-    if not placement.agreements:
-        say("No two nodes stand beside each other: the surface is of one node only")
+    if placement.apart:
+        say(APART)
         sys.exit(1)

@@ -3,6 +3,7 @@
 import csv
 import json
 import shutil
+from dataclasses import replace
 
 import pytest
 
@@ -90,6 +91,41 @@ def test_a_cluster_of_two_workers_gives_the_same_surfaces(capsys, rigs, tmp_path
     assert [row["state"] for row in rows] == ["done", "done", "failed"]
     for row, own in zip(rows, json.loads(local), strict=True):
         assert row | {"elapsed_s": 0.0} == own | {"elapsed_s": 0.0}
+
+
+def test_an_error_of_the_program_and_a_rig_that_failed_are_rows_and_the_table_is_written(
+    capsys, rigs, tmp_path, monkeypatch
+):
+    """Two rooms are no rig; an exception that nobody foresaw leaves a log; both are not done twice."""
+    two = (replace(load_demo(scene).frames[0], pose_known=False) for scene in ("office", "living-room"))
+    folder = tmp_path / "rigs"
+    shutil.copytree(rigs / "a-rig", folder / "a-rig")
+    save_rig(folder / "b-strangers", Rig("b", tuple(two)))
+    out = tmp_path / "out"
+    monkeypatch.setattr("app.runs.run_batch", lambda do, tasks, *_, **__: enumerate(map(do, tasks)))
+    monkeypatch.setattr("pipeline.stages.acquire", nothing)
+    words = ["reconstruct", "--rigs", folder, "--out", out, *QUICK]
+    code, _, err = run(capsys, *words)
+    assert code == 1
+    assert "Traceback" not in err
+    rows = table(out)
+    assert {row["state"] for row in rows.values()} == {"failed"}
+    assert "ZeroDivisionError" in rows["a-rig"]["sentence"]
+    assert "ZeroDivisionError" in (out / "a-rig.log").read_text()
+    monkeypatch.undo()
+    run(capsys, *words)
+    rows = table(out)
+    assert [row["state"] for row in rows.values()] == ["done", "failed"]
+    assert "No two nodes stand beside each other" in rows["b-strangers"]["sentence"]
+    assert not (out / "a-rig.log").exists()
+    written = (out / "b-strangers" / "metrics.json").stat().st_mtime_ns
+    _, printed, _ = run(capsys, *words, "--json")
+    assert [row["state"] for row in json.loads(printed)] == ["kept", "failed"]
+    assert (out / "b-strangers" / "metrics.json").stat().st_mtime_ns == written
+
+
+def nothing(frame, config):
+    return 1 / 0
 
 
 def test_what_is_taken_for_a_rig(rigs, tmp_path):

@@ -97,6 +97,11 @@ BAD_FILES = {
     "intrinsics: nested JSON": (read_intrinsics, b'{"a":' * 100_000, "not valid JSON"),
     "intrinsics: other keys": (read_intrinsics, b'{"focal": 3}', "no known style"),
     "intrinsics: text": (read_intrinsics, b"hello world", "no known style"),
+    "intrinsics: a focal length of no lens": (
+        read_intrinsics,
+        camera_json(fx=1e300),
+        "a focal length of 1e\\+300 px for .* px, which no lens has",
+    ),
     "intrinsics: without fy": (read_intrinsics, b'{"fx": 3, "width": 4}', "no known style"),
     "intrinsics: without size": (read_intrinsics, json.dumps({"K": K9}).encode(), "no known style"),
     "intrinsics: eight numbers": (read_intrinsics, json.dumps({"K": K9[1:]}).encode(), "no known style"),
