@@ -10,9 +10,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, part
 from pipeline.geometry import rigid
-from pipeline.importing.bag import is_bag, read_bag
+from pipeline.importing.bag import is_bag, iterate_bag
 from pipeline.importing.choosing import choose
 from pipeline.importing.depth_units import depth_in
 from pipeline.importing.kinds import kind_of, recognise
@@ -129,8 +129,7 @@ def iterate_import(
 def _from_bag(
     path: Path, out: Path, frames: int, depth_scale: float | None
 ) -> Generator[Progress, None, ImportReport]:
-    yield Progress("files", 0.0)
-    bag = read_bag(path, frames, depth_scale)
+    bag = yield from part(iterate_bag(path, frames, depth_scale), "files", 0.0, 0.7, detail=True)
     written = []
     with new_folder(out) as folder_of_rig:
         for done, (time_s, node) in enumerate(bag.nodes):
