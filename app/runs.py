@@ -23,6 +23,7 @@ from packetmesh.progress import Progress, drain
 from packetmesh.settings import settings
 from pipeline.config import PipelineConfig
 from pipeline.importing import is_recording, iterate_import
+from pipeline.io.rigs import is_rig
 from pipeline.placement import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.run_folder import metrics_of, write_run_folder
@@ -103,11 +104,6 @@ def rigs_in(folder: Path) -> list[Path]:
             "give the folder around them"
         )
     return found
-
-
-def is_rig(path: Path) -> bool:
-    """Whether it is a folder of nodes."""
-    return any(node.is_dir() for node in path.glob("node_*"))
 
 
 def iterate_rigs(

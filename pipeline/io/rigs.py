@@ -165,6 +165,17 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale
     return Rig(directory.resolve().name, frames, read_truth(directory, [frame.name for frame in frames]))
 
 
+def is_rig(path: Path) -> bool:
+    """Whether it is a folder of nodes."""
+    return any(node.is_dir() for node in path.glob("node_*"))
+
+
+def is_pair(path: Path) -> bool:
+    """Whether it is the folder of one node: a colour image, a depth image and intrinsics."""
+    images = (_image_in(path, stem).is_file() for stem in ("color", "depth"))
+    return path.is_dir() and _intrinsics_in(path).is_file() and all(images)
+
+
 def save_rig(directory: AnyPath, rig: Rig) -> None:
     """Write every frame of ``rig`` as ``directory/node_NN``; with its truth beside them, if it has one.
 
@@ -209,12 +220,16 @@ def _node_folders(directory: Path) -> list[Path]:
 
 
 def _load_node(folder: Path, over: NodeFiles, depth_scale: float | None) -> RgbdFrame:
-    intrinsics = folder / "intrinsics.json"
-    if not intrinsics.exists() and intrinsics.with_suffix(".txt").exists():
-        intrinsics = intrinsics.with_suffix(".txt")
-    files: NodeFiles = {"intrinsics": intrinsics, **node_files(folder), **over}
+    files: NodeFiles = {"intrinsics": _intrinsics_in(folder), **node_files(folder), **over}
     color, depth = (_image_in(folder, stem) for stem in ("color", "depth"))
     return load_frame(color, depth, depth_scale=depth_scale, name=folder.name, **files)
+
+
+def _intrinsics_in(folder: Path) -> Path:
+    """JSON, or where there is none text."""
+    intrinsics = folder / "intrinsics.json"
+    text = intrinsics.with_suffix(".txt")
+    return text if text.exists() and not intrinsics.exists() else intrinsics
 
 
 def _image_in(folder: Path, stem: str) -> Path:

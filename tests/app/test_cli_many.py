@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from app.runs import is_rig, rigs_in
+from app.runs import rigs_in
 from packetmesh.errors import InputError
 from pipeline.io.demos import load_demo
-from pipeline.io.rigs import save_rig
+from pipeline.io.rigs import is_rig, save_rig
 from pipeline.types import Rig
 from tests.app.commands import check_one_sentence, run
 

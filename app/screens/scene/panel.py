@@ -134,8 +134,9 @@ class ScenePanel(Panel):
     def _use_pair(self, source: ImagePair) -> None:
         self.session.want(dataclasses.replace(self.session.spec, source=source))
 
-    def _read_recording(self, path: Path, name: str) -> None:
-        self.session.side_job("scene.recording_job:recording_job", path, name, on_end=self._use_recording)
+    def _read_recording(self, path: Path, name: str, depth_scale: float | None, frames: int) -> None:
+        words = path, name, depth_scale, frames
+        self.session.side_job("scene.recording_job:recording_job", *words, on_end=self._use_recording)
 
     def _use_recording(self, read: ReadRecording | None) -> None:
         if read is None:
