@@ -7,7 +7,7 @@ import shutil
 import traceback
 from collections.abc import Generator, Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import Any, Literal
@@ -19,20 +19,20 @@ from app.reports.reconstruction import write_reconstruction_report
 from packetmesh.batch import run_batch
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.files import atomic_path, finite, writable_folder, write_json
-from packetmesh.progress import Progress, drain
+from packetmesh.progress import Progress, drain, part
 from packetmesh.settings import settings
 from pipeline.config import PipelineConfig
-from pipeline.importing import is_recording, iterate_import
+from pipeline.importing import ImportReport, is_recording, iterate_import
 from pipeline.io.rigs import is_rig
 from pipeline.placement import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.run_folder import metrics_of, write_run_folder
-from pipeline.sources import FileSource, RigFolder
+from pipeline.sources import Calibrated, FileSource, RigFolder
 from pipeline.spec import Spec
 from pipeline.stages import RunCache, cameras_of, run
 from pipeline.surface.pictures import mesh_picture
 
-REPORT, PICTURE, TASK = "report.html", "picture.jpg", "task.json"
+REPORT, PICTURE, TASK, IMPORTED = "report.html", "picture.jpg", "task.json", "imported"
 PICTURE_WIDTH_PX = 360
 State = Literal["done", "kept", "failed"]
 
@@ -73,20 +73,46 @@ def iterate_run(
 ) -> Generator[Progress, None, tuple[Reconstruction, dict[str, Any]]]:
     """Reconstruct, and write a run folder with its report; images that cannot be used leave no folder.
 
+    A recording that is named as a rig is imported first, to ``out/imported``.
+
     Returns:
-        The reconstruction and its metrics.
+        The reconstruction and its metrics, with what was imported.
 
     Raises:
         PacketMeshError: images, settings or a folder that cannot be used.
     """
-    spec, cache = Spec(source, preset, config), RunCache()
+    rig, report = yield from _imported(source, out)
+    spec, cache = Spec(rig, preset, config), RunCache()
     drain(run(spec, cache, ["rig"]))
     writable_folder(out)
     result = yield from iterate_reconstruction(spec, cache)
-    metrics = metrics_of(result)
+    metrics = metrics_of(result) | {"import": None if report is None else asdict(report)}
     write_run_folder(result, metrics, out)
     write_reconstruction_report(result, metrics, out / REPORT)
     return result, metrics
+
+
+def _imported(
+    source: FileSource, out: Path
+) -> Generator[Progress, None, tuple[FileSource, ImportReport | None]]:
+    """The source itself, or the rig that a recording is imported to, with what was found in it."""
+    if isinstance(source, Calibrated):
+        inner, report = yield from _imported(source.source, out)
+        assert not isinstance(inner, Calibrated)
+        return replace(source, source=inner), report
+    if not isinstance(source, RigFolder) or is_rig(Path(source.path)) or not is_recording(Path(source.path)):
+        return source, None
+    rig, new = out / IMPORTED, not out.exists()
+    if rig.is_dir():
+        shutil.rmtree(rig)  # of an earlier run
+    try:
+        steps = iterate_import(source.path, rig, depth_scale=source.depth_scale)
+        report = yield from part(steps, f"import of {source.path}", 0.0, 0.05, detail=True)
+    except PacketMeshError:
+        if new:
+            shutil.rmtree(out, ignore_errors=True)
+        raise
+    return RigFolder(str(rig)), report
 
 
 def rigs_in(folder: Path) -> list[Path]:
@@ -145,7 +171,8 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
         if _is_done(task):
             return _outcome(task, "kept", json.loads((out / "metrics.json").read_text(encoding="utf-8")))
         (out / TASK).unlink(missing_ok=True)
-        result, metrics = drain(iterate_run(_source_of(task), task.preset, task.config, out))
+        source = RigFolder(task.path, task.depth_scale)
+        result, metrics = drain(iterate_run(source, task.preset, task.config, out))
         _write_picture(result, out)
         write_json(out / TASK, _record(task))
         return _outcome(task, "done", finite(metrics))
@@ -158,17 +185,6 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
             log.write_text(traceback.format_exc(), encoding="utf-8")
         said = f"An error of the program, {type(error).__name__}: {error}; see {log.name}"
         return RigOutcome(task.name, "failed", " ".join(said.split()))
-
-
-def _source_of(task: RigTask) -> RigFolder:
-    """The rig itself, or the one that a recording is imported to, beside its run."""
-    if is_rig(Path(task.path)):
-        return RigFolder(task.path, task.depth_scale)
-    rig = Path(task.out) / "rig"
-    if rig.is_dir():
-        shutil.rmtree(rig)  # of other settings
-    drain(iterate_import(task.path, rig, depth_scale=task.depth_scale))
-    return RigFolder(str(rig))
 
 
 def _record(task: RigTask) -> dict[str, Any]:
@@ -196,17 +212,15 @@ def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome
         measured["agreement_between_nodes"],
         sum(metrics["timings_s"].values()),
     )
-    sentences = [
-        sentence
-        for node in metrics["nodes"]
-        for sentence in (node["place"]["sentence"], *(f"{node['name']}: {note}" for note in node["notes"]))
-        if sentence
-    ]
+    sentences = [] if metrics["import"] is None else [*metrics["import"]["notes"]]
+    for node in metrics["nodes"]:
+        sentences += [node["place"]["sentence"], *(f"{node['name']}: {note}" for note in node["notes"])]
+    said = "; ".join(filter(None, sentences))
     nodes = len(metrics["nodes"])
     if nodes > 1 and not metrics["agreement"]:
-        return RigOutcome(task.name, "failed", "; ".join([*sentences, APART]), nodes)
+        return RigOutcome(task.name, "failed", "; ".join(filter(None, [said, APART])), nodes)
     known = (float("nan") if number is None else float(number) for number in numbers)
-    return RigOutcome(task.name, state, "; ".join(sentences), nodes, *known)
+    return RigOutcome(task.name, state, said, nodes, *known)
 
 
 def _write_picture(result: Reconstruction, out: Path) -> None:

@@ -25,7 +25,8 @@ class SourceOptions:
     scene: str | None = None
     """A demo scene (see `packetmesh scenes`)."""
     rig: Path | None = None
-    """A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/..."""
+    """A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/...; `reconstruct`
+    also takes a recording that `import` knows."""
     color: Path | None = None
     """Colour image of a single RGB-D pair."""
     depth: Path | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from app.cli.options import Images, PresetName, Settings
 from app.cli.text import aligned, print_json, say, say_progress, wrong_use
@@ -60,11 +60,19 @@ def reconstruct(
     )
     if not after["triangles"]:
         say("The ball falls through everywhere; try larger surface.radii_m")
-    for note in result.rig.notes:
+    for note in (*imported_notes(metrics["import"]), *result.rig.notes):
         say(note)
     if json:
         print_json(metrics)
     say_places(result.placement)
+
+
+def imported_notes(report: dict[str, Any] | None) -> list[str]:
+    """What was made of a recording, and what had to be assumed."""
+    if report is None:
+        return []
+    taken = f"imported as {len(report['frames'])} nodes of {report['candidates']} moments"
+    return [f"{report['folder']} is a recording ({report['kind']}), {taken}", *report["notes"]]
 
 
 def _many(

@@ -86,6 +86,8 @@ def _agreeing(measured: dict[str, float]) -> str:
 
 def _must_be_known(metrics: dict[str, Any]) -> Iterator[str]:
     """What is doubtful about the images, and of nodes that found no place, or one that little speaks for."""
+    for note in metrics["import"]["notes"] if metrics.get("import") else ():
+        yield f'<p class="lead">{escape(note)}.</p>'
     for node in metrics["nodes"]:
         for note in node["notes"]:
             yield f'<p class="lead"><b>{escape(node["name"])}: {escape(note)}.</b></p>'

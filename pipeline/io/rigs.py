@@ -147,6 +147,8 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale
     ['node_00', 'node_01', 'node_02']
     """
     directory = Path(directory)
+    if directory.is_file():
+        raise InputError(f"The rig {directory} is a file; packetmesh import makes a rig of a recording")
     if not directory.is_dir():
         raise InputError(f"The rig folder {directory} does not exist; check the path")
     folders = _node_folders(directory)

@@ -55,7 +55,7 @@ def test_every_good_one_is_done_and_a_bad_one_gets_a_sentence(capsys, rigs, tmp_
         metrics = json.loads((out / name / "metrics.json").read_text())
         assert float(rows[name]["no_hit_after"]) == metrics["surface_after"]["no_hit_ray_share"]
         assert (out / name / "report.html").exists()
-    assert is_rig(out / "b-recording" / "rig")
+    assert is_rig(out / "b-recording" / "imported")
     page = (out / "rigs.html").read_text()
     assert page.count("data:image/jpeg;base64") == 2
     assert 'href="a-rig/report.html"' in page
@@ -103,16 +103,16 @@ def test_an_error_of_the_program_and_a_rig_that_failed_are_rows_and_the_table_is
     save_rig(folder / "b-strangers", Rig("b", tuple(two)))
     out = tmp_path / "out"
     monkeypatch.setattr("app.runs.run_batch", lambda do, tasks, *_, **__: enumerate(map(do, tasks)))
-    monkeypatch.setattr("pipeline.stages.acquire", nothing)
     words = ["reconstruct", "--rigs", folder, "--out", out, *QUICK]
-    code, _, err = run(capsys, *words)
+    with monkeypatch.context() as broken:
+        broken.setattr("pipeline.stages.acquire", nothing)
+        code, _, err = run(capsys, *words)
     assert code == 1
     assert "Traceback" not in err
     rows = table(out)
     assert {row["state"] for row in rows.values()} == {"failed"}
     assert "ZeroDivisionError" in rows["a-rig"]["sentence"]
     assert "ZeroDivisionError" in (out / "a-rig.log").read_text()
-    monkeypatch.undo()
     run(capsys, *words)
     rows = table(out)
     assert [row["state"] for row in rows.values()] == ["done", "failed"]

@@ -5,18 +5,11 @@ import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
-from packetmesh.settings import with_settings
-from pipeline.config import PRESETS
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.importing import iterate_import
-from pipeline.io.demos import load_demo
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import read_depth
 from pipeline.io.rigs import load_rig
-from pipeline.reconstruct import iterate_reconstruction
-from pipeline.run_folder import metrics_of
-from pipeline.sources import RigFolder
-from pipeline.spec import Spec
 from tests.pipeline.importing.bags import DEPTHS, write_bag
 from tests.pipeline.importing.recordings import orbit
 
@@ -62,17 +55,6 @@ def test_one_camera_gives_moments_spread_over_the_bag(tmp_path):
     assert len(rig.frames) == 3
     assert [frame.time_s for frame in report.frames] == pytest.approx([100.0, 102.0, 104.0])
     assert any("reconstruct looks for their poses" in note for note in report.notes)
-
-
-def test_a_demo_that_went_through_a_bag_is_reconstructed(tmp_path):
-    demo = load_demo("living-room")
-    write_bag(tmp_path / "recording", demo, moments=1)
-    imported(tmp_path)
-    config = with_settings(PRESETS["packetmesh"], ["surface.max_points=5000"])
-    spec = Spec(RigFolder(str(tmp_path / "rig")), "packetmesh", config)
-    after = metrics_of(drain(iterate_reconstruction(spec)))["surface_after"]
-    assert after["triangles"] > 1000
-    assert after["within_2pct_share"] > 0.8
 
 
 @pytest.mark.parametrize(
