@@ -1,34 +1,41 @@
 """What the chain keeps of measured depth, and what it closes, on real frames that have no truth.
 
-``python tests/benchmarks/real_frames.py [KIND=FOLDER ...]`` reconstructs every real frame beside the
-repository, and every picture of the sets named (``lab.datasets``; kinds that know their cameras: ``sr300``,
-as Debian's visp-images-data has it, and ``middlebury``). One line a set: the share of measured pixels that
-the outlier filter keeps, the share whose surface lies within 2 and within 5 % of the measurement before and
-after fusion, rays without a surface before and after, rays that guesses close, and the frames in which fusion
-made either share smaller. No network was trained on any of these frames.
+``python -m lab.benchmarks.real_frames`` reconstructs every real frame beside the repository, and every
+picture of the sets that ``PACKETMESH_DEPTH_SETS`` names and whose camera is known: ``sr300``, as Debian's
+visp-images-data has it, and ``middlebury``. No network was trained on any of these frames.
 """
 
 from __future__ import annotations
 
+import json
 import sys
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
-
-from lab.claims.depth.scenes import load_real, real_folders
+from lab.claims.depth.scenes import load_real, named_sets, real_folders
 from lab.datasets import open_set
 from packetmesh.errors import InputError
+from packetmesh.files import finite
 from pipeline.config import PRESETS
 from pipeline.reconstruct import reconstruct
 from pipeline.types import DepthMap, RgbdFrame, Rig
 
-HEAD = ("set", "frames", "kept", "within 2 %", "within 5 %", "rays without", "guessed", "lower after")
+MEASURES = (
+    "kept_share",
+    *("within_2pct_before", "within_2pct_after", "within_5pct_before", "within_5pct_after"),
+    *("no_hit_before", "no_hit_after", "guessed_ray_share"),
+)
+"""Shares of the measured pixels, then of all rays."""
 
 
 def frames_of(spec: str) -> Iterator[RgbdFrame]:
+    """The pictures of a set such as ``sr300=FOLDER``, their depth as it was measured.
+
+    Raises:
+        InputError: a set whose camera is not known.
+    """
     for pair in open_set(spec):
         if pair.camera is None:
             raise InputError(f"Nothing says which camera took {pair.picture}; try sr300 or middlebury")
@@ -36,6 +43,7 @@ def frames_of(spec: str) -> Iterator[RgbdFrame]:
 
 
 def measured(frame: RgbdFrame) -> tuple[float, ...]:
+    """``MEASURES`` of one frame."""
     result = reconstruct(Rig(frame.name, (frame,)), PRESETS["packetmesh"])
     kept = result.kept
     return (
@@ -47,23 +55,22 @@ def measured(frame: RgbdFrame) -> tuple[float, ...]:
     )
 
 
-def line(name: str, frames: Iterator[RgbdFrame]) -> tuple[str, ...]:
+def summary(frames: Iterable[RgbdFrame]) -> dict[str, Any]:
+    """Means of ``MEASURES``, and in how many frames fusion made a share near the measurement smaller."""
     shares = np.array([measured(frame) for frame in frames])
     lower = (shares[:, 2] < shares[:, 1]) | (shares[:, 4] < shares[:, 3])
-    mean = 100.0 * shares.mean(axis=0)
-    return (
-        *(name, str(len(shares)), f"{mean[0]:.2f}"),
-        *(f"{mean[start]:.1f} -> {mean[start + 1]:.1f}" for start in (1, 3, 5)),
-        *(f"{mean[7]:.1f}", str(lower.sum())),
-    )
+    means = dict(zip(MEASURES, shares.mean(axis=0).tolist(), strict=True))
+    return {"frames": len(shares), **means, "lower_after": int(lower.sum())}
 
 
 def main() -> None:
-    print(" | ".join(HEAD), "(means in per cent)")
+    """Print one JSON object, a summary for each set."""
+    found = {}
     for folder in real_folders():
-        print(" | ".join(line(folder.name, iter((load_real(folder),)))), flush=True)
-    for spec in sys.argv[1:]:
-        print(" | ".join(line(spec.rpartition("/")[2], frames_of(spec))), flush=True)
+        found[folder.name] = summary((load_real(folder),))
+    for spec in named_sets():
+        found[spec.partition("=")[0].strip()] = summary(frames_of(spec))
+    sys.stdout.write(f"{json.dumps(finite(found), allow_nan=False)}\n")
 
 
 if __name__ == "__main__":
