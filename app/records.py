@@ -70,6 +70,8 @@ class SceneView:
     title: str
     nodes: tuple[SceneNode, ...]
     has_truth: bool
+    notes: tuple[str, ...]
+    """What is doubtful about its images, a sentence each."""
 
 
 @dataclass(frozen=True, slots=True)

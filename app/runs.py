@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import shutil
+import traceback
 from collections.abc import Generator, Iterator
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import Any, Literal
@@ -17,18 +19,20 @@ from app.reports.reconstruction import write_reconstruction_report
 from packetmesh.batch import run_batch
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.files import atomic_path, finite, writable_folder, write_json
-from packetmesh.progress import Progress, drain
+from packetmesh.progress import Progress, drain, part
 from packetmesh.settings import settings
 from pipeline.config import PipelineConfig
-from pipeline.importing import is_recording, iterate_import
+from pipeline.importing import ImportReport, is_recording, iterate_import
+from pipeline.io.rigs import is_rig
+from pipeline.placement import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.run_folder import METRICS, clear_run_folder, metrics_of, write_run_folder
-from pipeline.sources import MILLIMETRES, FileSource, RigFolder
+from pipeline.sources import Calibrated, FileSource, RigFolder
 from pipeline.spec import Spec
 from pipeline.stages import RunCache, cameras_of, run
 from pipeline.surface.pictures import mesh_picture
 
-REPORT, PICTURE, TASK = "report.html", "picture.jpg", "task.json"
+REPORT, PICTURE, TASK, IMPORTED = "report.html", "picture.jpg", "task.json", "imported"
 PICTURE_WIDTH_PX = 360
 State = Literal["done", "kept", "failed"]
 
@@ -43,7 +47,7 @@ class RigTask:
     preset: str
     config: PipelineConfig
     depth_scale: float | None
-    """Depth units in a metre; None takes millimetres, or what the kind of recording uses."""
+    """Depth units in a metre; None takes what the images or the kind of recording use."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,21 +73,47 @@ def iterate_run(
 ) -> Generator[Progress, None, tuple[Reconstruction, dict[str, Any]]]:
     """Reconstruct, and write a run folder with its report; images that cannot be used leave no folder.
 
+    A recording that is named as a rig is imported first, to ``out/imported``.
+
     Returns:
-        The reconstruction and its metrics.
+        The reconstruction and its metrics, with what was imported.
 
     Raises:
         PacketMeshError: images, settings or a folder that cannot be used.
     """
-    spec, cache = Spec(source, preset, config), RunCache()
+    rig, report = yield from _imported(source, out)
+    spec, cache = Spec(rig, preset, config), RunCache()
     drain(run(spec, cache, ["rig"]))
     writable_folder(out)
     result = yield from iterate_reconstruction(spec, cache)
-    metrics = metrics_of(result)
+    metrics = metrics_of(result) | {"import": None if report is None else asdict(report)}
     clear_run_folder(out)
     write_reconstruction_report(result, metrics, out / REPORT)
     write_run_folder(result, metrics, out)
     return result, metrics
+
+
+def _imported(
+    source: FileSource, out: Path
+) -> Generator[Progress, None, tuple[FileSource, ImportReport | None]]:
+    """The source itself, or the rig that a recording is imported to, with what was found in it."""
+    if isinstance(source, Calibrated):
+        inner, report = yield from _imported(source.source, out)
+        assert not isinstance(inner, Calibrated)
+        return replace(source, source=inner), report
+    if not isinstance(source, RigFolder) or is_rig(Path(source.path)) or not is_recording(Path(source.path)):
+        return source, None
+    rig, new = out / IMPORTED, not out.exists()
+    if rig.is_dir():
+        shutil.rmtree(rig)  # of an earlier run
+    try:
+        steps = iterate_import(source.path, rig, depth_scale=source.depth_scale)
+        report = yield from part(steps, f"import of {source.path}", 0.0, 0.05, detail=True)
+    except PacketMeshError:
+        if new:
+            shutil.rmtree(out, ignore_errors=True)
+        raise
+    return RigFolder(str(rig)), report
 
 
 def rigs_in(folder: Path) -> list[Path]:
@@ -103,38 +133,48 @@ def rigs_in(folder: Path) -> list[Path]:
     return found
 
 
-def is_rig(path: Path) -> bool:
-    """Whether it is a folder of nodes."""
-    return any(node.is_dir() for node in path.glob("node_*"))
-
-
 def iterate_rigs(
-    tasks: list[RigTask], scheduler: str | None
+    tasks: list[RigTask], out: Path, scheduler: str | None
 ) -> Generator[Progress, None, tuple[RigOutcome, ...]]:
     """Reconstruct all of them, on every core or on a Dask cluster that sees the same folders.
 
-    One that fails leaves its sentence, and the others go on.
+    One that fails leaves its sentence, and the others go on. However it ends, ``out`` gets a table of those
+    that were done.
 
     Returns:
         What became of each, in the order of the tasks.
     """
     outcomes: dict[int, RigOutcome] = {}
-    for index, outcome in run_batch(reconstruct_one, tasks, scheduler):
-        outcomes[index] = outcome
-        said = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays find no surface"
-        yield Progress(f"{outcome.name} {outcome.state}: {said}", len(outcomes) / len(tasks))
-    return tuple(outcomes[index] for index in range(len(tasks)))
+    try:
+        for index, outcome in run_batch(reconstruct_one, tasks, scheduler, killed=_killed):
+            outcomes[index] = outcome
+            said = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays find no surface"
+            yield Progress(f"{outcome.name} {outcome.state}: {said}", len(outcomes) / len(tasks))
+    finally:
+        done = tuple(outcomes[index] for index in sorted(outcomes))
+        write_rigs_table(done, out)
+    return done
+
+
+def _killed(task: RigTask) -> RigOutcome:
+    return RigOutcome(task.name, "failed", "Its process was killed, perhaps for lack of memory")
 
 
 def reconstruct_one(task: RigTask) -> RigOutcome:
-    """Do one task, unless an earlier run has, and never raise for what is wrong with its images."""
+    """Do one task, unless an earlier run has, and never raise for what is wrong with its images.
+
+    An error of the program itself leaves ``NAME.log`` beside the run's folder.
+    """
     out = Path(task.out)
+    log = out.with_name(f"{out.name}.log")
+    log.unlink(missing_ok=True)
     try:
         kept = _kept(task)
         if kept is not None:
             return kept
         (out / TASK).unlink(missing_ok=True)
-        result, metrics = drain(iterate_run(_source_of(task), task.preset, task.config, out))
+        source = RigFolder(task.path, task.depth_scale)
+        result, metrics = drain(iterate_run(source, task.preset, task.config, out))
         _write_picture(result, out)
         write_json(out / TASK, _record(task))
         return _outcome(task, "done", finite(metrics))
@@ -142,17 +182,11 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
         return RigOutcome(task.name, "failed", str(error))
     except OSError as error:
         return RigOutcome(task.name, "failed", f"{error.filename or task.path}: {error.strerror or error}")
-
-
-def _source_of(task: RigTask) -> RigFolder:
-    """The rig itself, or the one that a recording is imported to, beside its run."""
-    if is_rig(Path(task.path)):
-        return RigFolder(task.path, MILLIMETRES if task.depth_scale is None else task.depth_scale)
-    rig = Path(task.out) / "rig"
-    for earlier in (rig, *rig.parent.glob(".rig-*")):  # of other settings, or unfinished
-        shutil.rmtree(earlier, ignore_errors=True)
-    drain(iterate_import(task.path, rig, depth_scale=task.depth_scale))
-    return RigFolder(str(rig))
+    except Exception as error:  # one rig must not end the others
+        with suppress(OSError):
+            log.write_text(traceback.format_exc(), encoding="utf-8")
+        said = f"An error of the program, {type(error).__name__}: {error}; see {log.name}"
+        return RigOutcome(task.name, "failed", " ".join(said.split()))
 
 
 def _record(task: RigTask) -> dict[str, Any]:
@@ -182,9 +216,15 @@ def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome
         measured["agreement_between_nodes"],
         sum(metrics["timings_s"].values()),
     )
+    sentences = [] if metrics["import"] is None else [*metrics["import"]["notes"]]
+    for node in metrics["nodes"]:
+        sentences += [node["place"]["sentence"], *(f"{node['name']}: {note}" for note in node["notes"])]
+    said = "; ".join(filter(None, sentences))
+    nodes = len(metrics["nodes"])
+    if nodes > 1 and not metrics["agreement"]:
+        return RigOutcome(task.name, "failed", "; ".join(filter(None, [said, APART])), nodes)
     known = (float("nan") if number is None else float(number) for number in numbers)
-    sentences = [sentence for node in metrics["nodes"] if (sentence := node["place"]["sentence"])]
-    return RigOutcome(task.name, state, "; ".join(sentences), len(metrics["nodes"]), *known)
+    return RigOutcome(task.name, state, said, nodes, *known)
 
 
 def _write_picture(result: Reconstruction, out: Path) -> None:

@@ -6,10 +6,10 @@ import multiprocessing
 import os
 import pickle
 import signal
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from itertools import islice
 from typing import Any, TypeVar
 
 from packetmesh.errors import InputError, PacketMeshError
@@ -26,6 +26,7 @@ def run_batch(
     tasks: Sequence[Task],
     scheduler: str | None = None,
     processes: int | None = None,
+    killed: Callable[[Task], Answer] | None = None,
 ) -> Iterator[tuple[int, Answer]]:
     """Each task's index and answer, in the order of completion.
 
@@ -37,28 +38,48 @@ def run_batch(
         tasks: what it is called with, one by one.
         scheduler: address of a Dask scheduler; None takes processes on this machine.
         processes: how many of them at most, one for each core by default; a single one is this process.
+        killed: answers for a task whose process was killed, alone as well as beside others; the other tasks
+            go on. Without it that is an error.
 
     Raises:
         InputError: the scheduler cannot be reached, or ``distributed`` is not installed.
         PacketMeshError: a process was killed, or the cluster was lost.
     """
     if scheduler is not None:
-        yield from _on_cluster(function, tasks, scheduler)
+        yield from _on_cluster(function, tasks, scheduler, killed)
         return
     processes = min(len(tasks), processes or os.cpu_count() or 1)
     if processes <= 1:
         yield from ((index, function(task)) for index, task in enumerate(tasks))
         return
-    pool = process_pool(processes)
-    try:
-        yield from _completed(pool, function, tasks, lambda: processes + 1)
-    except BrokenProcessPool:
-        raise PacketMeshError(
-            f"One of {processes} processes ended unexpectedly, perhaps for lack of memory; "
-            "try fewer processes or smaller tasks"
-        ) from None
-    finally:
-        pool.shutdown(cancel_futures=True)
+    waiting = deque(enumerate(tasks))
+    while waiting:
+        running: dict[Future[Answer], tuple[int, Task]] = {}
+        pool = process_pool(processes)
+        try:
+            for future in _completed(pool, function, waiting, running, lambda: processes + 1):
+                answer = future.result()
+                yield running.pop(future)[0], answer
+        except BrokenProcessPool:
+            if killed is None:
+                raise PacketMeshError(
+                    f"One of {processes} processes ended unexpectedly, perhaps for lack of memory; "
+                    "try fewer processes or smaller tasks"
+                ) from None
+        finally:
+            pool.shutdown(cancel_futures=True)
+        for index, task in running.values():
+            yield index, _alone(function, task, killed)
+
+
+def _alone(function: Callable[[Task], Answer], task: Task, killed: Callable[[Task], Answer] | None) -> Answer:
+    """The answer of one that ran when a process was killed, in a process of its own."""
+    with process_pool(1) as pool:
+        try:
+            return pool.submit(function, task).result()
+        except BrokenProcessPool:
+            assert killed is not None
+            return killed(task)
 
 
 def process_pool(processes: int, begin: Callable[..., None] | None = None, *given: Any) -> Executor:
@@ -93,22 +114,35 @@ def _begin(heeded: bool, threads: int, pickled: bytes) -> None:
 
 
 def _completed(
-    pool: Executor, function: Callable[[Task], Answer], tasks: Sequence[Task], most: Callable[[], int]
-) -> Iterator[tuple[int, Answer]]:
-    """Indices and answers as they come, while at most ``most()`` tasks are in the pool."""
-    remaining = iter(enumerate(tasks))
-    running: dict[Future[Answer], int] = {}
+    pool: Executor,
+    function: Callable[[Task], Answer],
+    waiting: deque[tuple[int, Task]],
+    running: dict[Future[Answer], tuple[int, Task]],
+    most: Callable[[], int],
+) -> Iterator[Future[Answer]]:
+    """What is done, as it comes, while at most ``most()`` tasks are in the pool.
+
+    Args:
+        pool: where they run.
+        function: what does them.
+        waiting: indices and tasks not handed out yet, which are taken from here.
+        running: those that are, from which the caller takes each that is done.
+        most: how many there may be.
+    """
     while True:
-        for index, task in islice(remaining, max(0, most() - len(running))):
-            running[pool.submit(function, task)] = index
+        while waiting and len(running) < most():
+            future = pool.submit(function, waiting[0][1])
+            running[future] = waiting.popleft()
         if not running:
             return
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            yield running.pop(future), future.result()
+        yield from wait(running, return_when=FIRST_COMPLETED).done
 
 
 def _on_cluster(
-    function: Callable[[Any], Any], tasks: Sequence[Any], scheduler: str
+    function: Callable[[Any], Any],
+    tasks: Sequence[Any],
+    scheduler: str,
+    killed: Callable[[Any], Any] | None,
 ) -> Iterator[tuple[int, Any]]:
     try:
         from distributed import Client, KilledWorker
@@ -125,8 +159,21 @@ def _on_cluster(
         ) from None
     with client:
         pool = client.get_executor(pure=False)
+        running: dict[Future[Any], tuple[int, Any]] = {}
+
+        def most() -> int:
+            return 2 * sum(client.nthreads().values()) + 1
+
         try:
-            yield from _completed(pool, function, tasks, lambda: 2 * sum(client.nthreads().values()) + 1)
+            for future in _completed(pool, function, deque(enumerate(tasks)), running, most):
+                index, task = running.pop(future)
+                try:
+                    answer = future.result()
+                except KilledWorker:
+                    if killed is None:
+                        raise
+                    answer = killed(task)
+                yield index, answer
         except (CancelledError, KilledWorker) as error:
             raise PacketMeshError(
                 f"The Dask cluster at {scheduler} was lost ({error}); look whether its scheduler and workers "

@@ -107,7 +107,7 @@ class DepthConfig:
     """How far from measured pixels inferred depth counts, as a share of the image's diagonal."""
     least_confidence: float = 0.5
     """Inferred depth that is believed less does not count, 0 to 1: what is more likely wrong than right makes
-    skirts from objects to what stands behind them (``python tests/benchmarks/least_confidence.py``)."""
+    skirts from objects to what stands behind them (``python -m lab.training.least_confidence``)."""
 
     def of_network(self) -> DepthConfig:
         """Only the settings of the network itself, which is all that its inference depends on."""

@@ -27,7 +27,7 @@ from pipeline.types import FloatArray, PointCloud, SurfaceResult
 _log = logging.getLogger(__name__)
 
 LEAST_POINTS = 3
-USUAL_M = 0.05, 100.0
+USUAL_M = 0.05, 50.0
 """Between these widths are things, rooms and houses."""
 OUTER_PERCENT = 1.0
 """On either side of the middle of a cloud: what may be outliers does not count for its width."""
@@ -74,10 +74,7 @@ class MeshOptions:
             raise InputError(f"At most {self.max_points} points make no surface; try at least {LEAST_POINTS}")
         if self.smoothing_passes < 0:
             raise InputError(f"There cannot be {self.smoothing_passes} smoothing passes; try 0 or more")
-        if not (math.isfinite(self.metres_per_unit) and self.metres_per_unit > 0.0):
-            raise InputError(
-                f"There cannot be {self.metres_per_unit:g} metres in a unit; try 0.001 for millimetres"
-            )
+        check_unit(self.metres_per_unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,8 +188,23 @@ def usable_points(cloud: PointCloud) -> PointCloud:
     return cloud
 
 
+def check_unit(metres_per_unit: float) -> None:
+    """Refuse what is no length.
+
+    Raises:
+        InputError: not finite or not positive.
+    """
+    if not (math.isfinite(metres_per_unit) and metres_per_unit > 0.0):
+        raise InputError(f"There cannot be {metres_per_unit:g} metres in a unit; try 0.001 for millimetres")
+
+
 def in_metres(cloud: PointCloud, metres_per_unit: float) -> PointCloud:
-    """The cloud in metres."""
+    """The cloud in metres.
+
+    Raises:
+        InputError: a unit that is no length.
+    """
+    check_unit(metres_per_unit)
     if metres_per_unit == 1.0:
         return cloud
     return replace(cloud, points_m=metres_per_unit * cloud.points_m)

@@ -13,6 +13,8 @@ from pipeline.registration.agreement import NOTHING_SHARED, Agreement
 from pipeline.types import FloatArray, RegistrationResult, Rig
 
 Item = TypeVar("Item")
+APART = "No two nodes stand beside each other: the surface is of one node only"
+"""What is said of a rig that failed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +79,11 @@ class Placement:
     def agreement(self) -> Agreement:
         """Of all pairs of placed nodes together."""
         return reduce(add, (pair.agreement for pair in self.agreements), NOTHING_SHARED)
+
+    @property
+    def apart(self) -> bool:
+        """Whether there are several nodes, of which no two stand beside each other."""
+        return len(self.verdicts) > 1 and not self.agreements
 
     @property
     def sentences(self) -> list[str]:

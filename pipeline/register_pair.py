@@ -150,7 +150,7 @@ def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> Point
         unit = "millimetres" if extent_m > LARGEST_M else "kilometres"
         raise InputError(
             f"The {name} cloud is {extent_m:.3g} m across, as if its numbers were {unit}; "
-            "try to convert it to metres"
+            "try --metres-per-unit with those of source and target"
         )
     return cloud if voxel_m is None else voxel_average(cloud, voxel_m)
 
@@ -171,10 +171,10 @@ def prepared_pair(
     """
     ratio = middle_extent_m(source.points_m) / max(middle_extent_m(target.points_m), 1e-300)
     if UNIT_RATIOS[0] < max(ratio, 1.0 / max(ratio, 1e-300)) < UNIT_RATIOS[1]:
-        larger = "source" if ratio > 1.0 else "target"
+        larger, units = ("source", "0.001 1") if ratio > 1.0 else ("target", "1 0.001")
         raise InputError(
             f"The {larger} cloud is {max(ratio, 1.0 / ratio):.0f} times as large as the other, as if it were "
-            "in millimetres and the other in metres; try to convert both to metres"
+            f"in millimetres and the other in metres; try --metres-per-unit {units}"
         )
     source, target = (
         prepared_cloud(cloud, name, voxel_m) for cloud, name in ((source, "source"), (target, "target"))

@@ -117,6 +117,7 @@ def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
                 },
                 "filled_points": int(np.sum(node.fused.source == PointSource.INFERRED)),
                 "place": _place(verdict),
+                "notes": frame.notes,
             }
             for node, frame, verdict in zip(
                 reconstruction.nodes, reconstruction.rig.frames, placement.verdicts, strict=True

@@ -14,9 +14,6 @@ from pipeline.types import Rig
 if TYPE_CHECKING:
     from pipeline.io.calibrations import NodeFiles
 
-MILLIMETRES = 1000.0
-"""Depth units in one metre where nothing else is said."""
-
 
 class Source(Protocol):
     """Anything that gives a rig; equal sources give equal rigs, so results are cached by them."""
@@ -67,8 +64,8 @@ class RigFolder:
     """A folder with node_00, node_01 and so on."""
 
     path: str
-    depth_scale: float = MILLIMETRES
-    """Depth image units in one metre."""
+    depth_scale: float | None = None
+    """Depth units in one metre; without it whole numbers are millimetres, floating-point ones metres."""
 
     @property
     def title(self) -> str:
@@ -94,8 +91,8 @@ class ImagePair:
     color: str
     depth: str
     intrinsics: str
-    depth_scale: float = MILLIMETRES
-    """Depth image units in one metre."""
+    depth_scale: float | None = None
+    """Depth units in one metre; without it whole numbers are millimetres, floating-point ones metres."""
     depth_intrinsics: str | None = None
     """Of the depth camera, if the depth image is not registered to the colour image; then with extrinsics."""
     extrinsics: str | None = None
@@ -170,8 +167,8 @@ class LoadedRig:
         return ["--rig", self.rig.name]
 
 
-def _depth_scale_argument(depth_scale: float) -> list[str]:
-    return [] if depth_scale == MILLIMETRES else ["--depth-scale", f"{depth_scale:g}"]
+def _depth_scale_argument(depth_scale: float | None) -> list[str]:
+    return [] if depth_scale is None else ["--depth-scale", f"{depth_scale:g}"]
 
 
 FileSource: TypeAlias = Demo | RigFolder | ImagePair | Calibrated

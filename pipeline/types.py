@@ -121,6 +121,8 @@ class RgbdFrame:
     """Of ``depth`` as its sensor's calibration found it; None is that of a Kinect."""
     pose_known: bool = True
     """False if nobody gave the pose, so that registration must find it from anywhere."""
+    notes: tuple[str, ...] = ()
+    """What is doubtful about its images, a sentence each, with what to try."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +148,11 @@ class Rig:
     name: str
     frames: tuple[RgbdFrame, ...]
     truth: RigTruth | None = None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is doubtful about the images of its nodes, a sentence each."""
+        return tuple(f"{frame.name}: {note}" for frame in self.frames for note in frame.notes)
 
 
 @dataclass(frozen=True, slots=True)

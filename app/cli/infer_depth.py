@@ -33,7 +33,7 @@ def infer_depth(
     channels: Literal["RGB", "BGR"] | None = None,
     sensor: Path | None = None,
     fill: bool = False,
-    depth_scale: float = 1000.0,
+    depth_scale: float | None = None,
     json: bool = False,
 ) -> None:
     """Infer the depth of photographs (PNG or JPEG) with our network or any other.
@@ -50,7 +50,7 @@ def infer_depth(
         channels: Order of its channels.
         sensor: The sensor's depth image of the one photograph, to make inferred depth metric.
         fill: Keep what the sensor measured and fill its holes only, as `reconstruct` does; with --sensor.
-        depth_scale: Depth units per metre in that image.
+        depth_scale: Depth units per metre in that image; else whole numbers are millimetres, others metres.
         json: Print what was done as one JSON object.
     """
     if not photos:
@@ -75,6 +75,8 @@ def infer_depth(
     inferred = {}
     for photo, record in _inferred(photos, network, out, sensor, depth_scale, fill):
         say(_line(photo, record))
+        for note in record.get("notes", ()):
+            say(f"{sensor}: {note}")
         inferred[str(photo)] = record
     if json:
         print_json({**report, "photos": inferred})
@@ -85,16 +87,17 @@ def _inferred(
     network: DepthNetwork,
     out: Path,
     sensor: Path | None,
-    depth_scale: float,
+    depth_scale: float | None,
     fill: bool,
 ) -> Iterator[tuple[Path, dict[str, Any]]]:
     """Each photograph with what was made of it."""
     from pipeline.depth import align_depth
-    from pipeline.io.images import read_color, read_depth
+    from pipeline.io.images import read_color, read_depth_noted
 
     for photo in photos:
         rgb = read_color(photo)
-        measured = None if sensor is None else read_depth(sensor, depth_scale)
+        read = None if sensor is None else read_depth_noted(sensor, depth_scale)
+        measured = None if read is None else read.depth
         started = time.perf_counter()
         depth = network.infer(rgb)
         record: dict[str, Any] = {
@@ -102,7 +105,8 @@ def _inferred(
             "height_px": rgb.shape[0],
             "inference_ms": 1000.0 * (time.perf_counter() - started),
         }
-        if measured is not None:
+        if read is not None and measured is not None:
+            record["notes"] = read.notes
             aligned = align_depth(depth, measured, disparity=network.convention.kind == "inverse")
             depth, record["alignment"] = aligned.depth, _alignment(aligned)
             if fill:

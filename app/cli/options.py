@@ -25,7 +25,8 @@ class SourceOptions:
     scene: str | None = None
     """A demo scene (see `packetmesh scenes`)."""
     rig: Path | None = None
-    """A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/..."""
+    """A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/...; `reconstruct`
+    also takes a recording that `import` knows."""
     color: Path | None = None
     """Colour image of a single RGB-D pair."""
     depth: Path | None = None
@@ -33,7 +34,8 @@ class SourceOptions:
     intrinsics: Path | None = None
     """Its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info."""
     depth_scale: float | None = None
-    """Depth units per metre in the depth images of a pair or a rig; 1000 without it."""
+    """Depth units per metre in the depth images of a pair or a rig; without it whole numbers are millimetres
+    and floating-point numbers metres."""
     depth_intrinsics: Path | None = None
     """The camera of a depth image that is not registered to the colour image."""
     extrinsics: Path | None = None
@@ -62,21 +64,21 @@ class SourceOptions:
             wrong_use(
                 "say what to reconstruct: --scene NAME, --rig DIR, or --color C --depth D --intrinsics K"
             )
-        from pipeline.sources import MILLIMETRES, Demo, ImagePair, RigFolder
-
-        scale = MILLIMETRES if self.depth_scale is None else self.depth_scale
+        from pipeline.sources import Demo, ImagePair, RigFolder
 
         if self.scene is not None:
+            if self.depth_scale is not None:
+                wrong_use("a demo scene has its own depth scale: leave out --depth-scale")
             return Demo(self.scene)
         if self.rig is not None:
-            return RigFolder(str(self.rig), scale)
+            return RigFolder(str(self.rig), self.depth_scale)
         if self.color is None or self.depth is None or self.intrinsics is None:
             wrong_use("a single pair needs all of --color, --depth and --intrinsics")
         if (self.depth_intrinsics is None) != (self.extrinsics is None):
             wrong_use("a depth image that is not registered needs both --depth-intrinsics and --extrinsics")
         beside = (None if part is None else str(part) for part in (self.depth_intrinsics, self.extrinsics))
         images = str(self.color), str(self.depth), str(self.intrinsics)
-        return ImagePair(*images, scale, *beside)
+        return ImagePair(*images, self.depth_scale, *beside)
 
 
 Images = Annotated[SourceOptions, tyro.conf.arg(name="")]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from app.cli.options import Images, PresetName, Settings
 from app.cli.text import aligned, print_json, say, say_progress, wrong_use
@@ -60,9 +60,19 @@ def reconstruct(
     )
     if not after["triangles"]:
         say("The ball falls through everywhere; try larger surface.radii_m")
+    for note in (*imported_notes(metrics["import"]), *result.rig.notes):
+        say(note)
     if json:
         print_json(metrics)
     say_places(result.placement)
+
+
+def imported_notes(report: dict[str, Any] | None) -> list[str]:
+    """What was made of a recording, and what had to be assumed."""
+    if report is None:
+        return []
+    taken = f"imported as {len(report['frames'])} nodes of {report['candidates']} moments"
+    return [f"{report['folder']} is a recording ({report['kind']}), {taken}", *report["notes"]]
 
 
 def _many(
@@ -79,7 +89,7 @@ def _many(
 
     from dataclasses import asdict
 
-    from app.runs import HEADINGS, RigTask, iterate_rigs, rigs_in, rigs_row, write_rigs_table
+    from app.runs import HEADINGS, RigTask, iterate_rigs, rigs_in, rigs_row
     from packetmesh.files import writable_folder
 
     found = rigs_in(rigs)
@@ -88,8 +98,7 @@ def _many(
         RigTask(path.name, str(path.resolve()), str(out.resolve() / path.name), preset, config, depth_scale)
         for path in found
     ]
-    outcomes = drain(iterate_rigs(tasks, scheduler), say_progress)
-    write_rigs_table(outcomes, out)
+    outcomes = drain(iterate_rigs(tasks, out, scheduler), say_progress)
     if json:
         print_json([asdict(outcome) for outcome in outcomes])
     else:
@@ -102,6 +111,8 @@ def _many(
 
 def say_places(placement: Placement) -> None:
     """How far the nodes of a rig agree, and which found no place; exits with 1 if no two did."""
+    from pipeline.placement import APART
+
     if len(placement.verdicts) < 2:
         return
     if placement.agreements:
@@ -109,6 +120,6 @@ def say_places(placement: Placement) -> None:
         say(f"Of what two cameras both measured, {share:.1%} is within 2 %")
     for sentence in placement.sentences:
         say(sentence)
-    if not placement.agreements:
-        say("No two nodes stand beside each other: the surface is of one node only")
+    if placement.apart:
+        say(APART)
         sys.exit(1)

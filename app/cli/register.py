@@ -27,6 +27,7 @@ def register(
     gate_m: float | None = None,
     start: Literal["given", "global"] = "given",
     scale: bool = False,
+    metres_per_unit: tuple[float, float] = (1.0, 1.0),
     json: bool = False,
 ) -> None:
     """Move one point cloud onto another, of the kinds that `packetmesh mesh` reads, in metres.
@@ -43,11 +44,14 @@ def register(
         gate_m: Largest distance of a pair; without it, of a ladder of gates the one that the data bear out.
         start: `global` finds the start pose by matching features.
         scale: Estimate a scale as well (our methods, point metric).
+        metres_per_unit: Of the coordinates of the source and of the target: `0.001 1` if the source is in
+            millimetres.
         json: Print the metrics as one JSON object.
     """
     from packetmesh.files import writable_folder
     from pipeline.io.clouds import read_cloud
     from pipeline.io.poses import read_pose
+    from pipeline.mesh_cloud import in_metres
     from pipeline.register_draws import run_draws, with_gate
     from pipeline.register_folder import answer_metrics, chosen_pose, write_register_folder
     from pipeline.register_pair import chosen_methods, config_for, prepared_pair, run_methods
@@ -59,7 +63,10 @@ def register(
         wrong_use(str(error))
     config = config_for(methods, metric=metric, gate_m=gate_m, start=start, with_scale=scale)
     T_init, T_true = (None if path is None else read_pose(path) for path in (init, truth))
-    moving, fixed = read_cloud(source), read_cloud(target)
+    moving, fixed = (
+        in_metres(read_cloud(path), unit)
+        for path, unit in zip((source, target), metres_per_unit, strict=True)
+    )
     pair = prepared_pair(moving, fixed, config, voxel_m, T_init, T_true)
     if gate_m is None:
         config = with_gate(pair, config)
@@ -73,7 +80,7 @@ def register(
     writable_folder(out)
     files = {"source": source, "target": target, "init": init, "truth": truth}
     command: dict[str, Any] = {name: None if path is None else str(path) for name, path in files.items()}
-    command |= {"method": method, "voxel_m": voxel_m}
+    command |= {"method": method, "voxel_m": voxel_m, "metres_per_unit": metres_per_unit}
     write_register_folder(out, answers, moving, config, command, truth is not None)
     metrics = answer_metrics(answers, truth is not None)
     if json:

@@ -56,6 +56,8 @@ def answers_table(metrics: dict[str, dict[str, Any]]) -> str:
 
 def mesh_lines(report: dict[str, Any]) -> str:
     """The quality of a mesh; millimetres and seconds."""
+    from pipeline.surface.boundary import LONGEST_HOLE_M
+
     closed = "" if report["genus"] is None else f", closed, genus {report['genus']}"
     sizes = ", ".join(f"{1000.0 * radius_m:.4g}" for radius_m in report["radii_m"])
     rows = {
@@ -64,7 +66,8 @@ def mesh_lines(report: dict[str, Any]) -> str:
         "radii": f"{sizes} mm",
         "mesh": f"{report['triangles']} triangles of {report['vertices']} points{closed}",
         "unused": f"{report['unused_points']} of {report['points']} points",
-        "boundary": f"{report['boundary_loops']} loops; holes of {report['hole_area_m2']:.4g} m2 in all",
+        "boundary": f"{report['boundary_loops']} loops, {report['boundary_length_m']:.4g} m in all; under "
+        f"{LONGEST_HOLE_M:g} m are holes, {report['hole_area_m2']:.4g} m2, longer ones rims",
         "connection": f"{report['components']} components, Euler number {report['euler']}, "
         f"{report['non_manifold_edges']} non-manifold edges",
         "time": f"{report['elapsed_s']:.1f} s",

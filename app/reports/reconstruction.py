@@ -51,7 +51,7 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
         f"<b>{after['no_hit_ray_share']:.1%}</b> after it.{_kept(metrics['measured'])}"
         f"{_agreeing(metrics['measured'])}</p>"
     )
-    yield from _places(metrics)
+    yield from _must_be_known(metrics)
     yield from _surfaces(result, before, after)
     yield from _truth(metrics)
     yield from _nodes(result, metrics)
@@ -84,9 +84,13 @@ def _agreeing(measured: dict[str, float]) -> str:
     return f" Of what two cameras both measured, <b>{share:.1%}</b> is within 2 %."
 
 
-def _places(metrics: dict[str, Any]) -> Iterator[str]:
-    """What must be known of nodes that found no place, or one that little speaks for."""
+def _must_be_known(metrics: dict[str, Any]) -> Iterator[str]:
+    """What is doubtful about the images, and of nodes that found no place, or one that little speaks for."""
+    for note in metrics["import"]["notes"] if metrics.get("import") else ():
+        yield f'<p class="lead">{escape(note)}.</p>'
     for node in metrics["nodes"]:
+        for note in node["notes"]:
+            yield f'<p class="lead"><b>{escape(node["name"])}: {escape(note)}.</b></p>'
         if node["place"]["sentence"]:
             yield f'<p class="lead"><b>{escape(node["place"]["sentence"])}.</b></p>'
 

@@ -39,6 +39,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "bench_registration": ("packetmesh", "bench", "--only", "registration"),
     "bench_depth": ("packetmesh", "bench", "--only", "depth"),
     "bench_network": ("packetmesh", "bench", "--only", "network"),
+    "real_frames": ("python", "-m", "lab.benchmarks.real_frames"),
     "ns3_saturation": ("python", "tests/benchmarks/ns3_saturation.py"),
 }
 """What is run for a record; the last one needs ns-3."""
@@ -69,7 +70,8 @@ def measure(name: str, runs: Path = Path("runs/results")) -> Record:
     words = COMMANDS[name]
     if words[0] == "packetmesh":
         words = (*words, "--out", f"{runs / name}")
-    words = (*words, "--json")
+    if "lab.benchmarks.real_frames" not in words:
+        words = (*words, "--json")
     answer = _run(words)
     if "reproduce" in words:
         answer = {claim: _verdict(verdict) for claim, verdict in answer.items()}

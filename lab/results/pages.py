@@ -8,25 +8,29 @@ from collections.abc import Callable, Iterator
 from lab.benchmarks.filling import FLAT, NETWORK, OURS, PIXELS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
-from lab.results import tables
+from lab.results import completion, tables
 from lab.results.markdown import Row, change, listed
 from lab.results.record import ROOT, Record, Records, read_records
 from packetmesh.files import atomic_path
 
 RESULTS = ROOT / "docs" / "results.md"
 README = ROOT / "README.md"
+DEPTH_README = ROOT / "assets" / "depth" / "README.md"
+WORTH = ROOT / "assets" / "depth" / "worth.md"
+"""What the Depth screen says of filling."""
 BEGIN, END = "<!-- results: written by `make results` -->", "<!-- end of results -->"
-"""Around the lines of the README that state results."""
+"""Around the lines of a page that state results."""
 
 SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "reconstruct": ("What comes out", tables.reconstructions),
+    "real_frames": ("What real frames keep", tables.real_frames),
     "bench_chain": ("Time and memory of the whole chain", tables.chain_speed),
     "calibration_claims": ("Calibration: the thesis's claims", tables.claims),
     "board_claims": ("Boxes and biased sensors: what a calibration is worth", tables.claims),
     "outlier_claims": ("Outlier filter: the thesis's claim", tables.claims),
-    "depth_claims": ("Inferred depth: the thesis's claims", tables.claims),
-    "bench_depth": ("Filling holes", tables.filling),
-    "fill_claims": ("Filling holes: how far its confidence can be trusted", tables.our_claims),
+    "depth_claims": ("Inferred depth: the thesis's claims", completion.depth_claims),
+    "bench_depth": ("Filling holes", completion.filling),
+    "fill_claims": ("Filling holes: how far its confidence can be trusted", completion.fill_claims),
     "registration_claims": ("Registration: the thesis's claims", tables.registration_claims),
     "bench_registration": ("Registration: speed", tables.registration_speed),
     "surface_claims": ("Ball pivoting: the thesis's claims", tables.claims),
@@ -50,9 +54,14 @@ claims run from 0 to 1, intervals are 95 %."""
 
 
 def write_pages() -> None:
-    """Write both pages from the committed records."""
+    """Write all pages from the committed records."""
     records = read_records()
-    pages = {RESULTS: results_page(records), README: readme(README.read_text("utf-8"), records)}
+    pages = {
+        RESULTS: results_page(records),
+        README: readme(README.read_text("utf-8"), records),
+        DEPTH_README: marked(DEPTH_README.read_text("utf-8"), worth(records)),
+        WORTH: f"{worth(records)}\n",
+    }
     for path, content in pages.items():
         with atomic_path(path) as temporary:
             temporary.write_text(content, "utf-8")
@@ -76,7 +85,16 @@ def _origin(record: Record) -> str:
 
 def readme(page: str, records: Records) -> str:
     """The README with the lines between its marks replaced."""
-    lines = "\n".join(f"- {line}" for line in readme_results(records))
+    return marked(page, "\n".join(f"- {line}" for line in readme_results(records)))
+
+
+def worth(records: Records) -> str:
+    """What completion is worth, for the networks' README and the Depth screen."""
+    return "\n\n".join(completion.standing(records))
+
+
+def marked(page: str, lines: str) -> str:
+    """A page with other lines between its marks."""
     pattern = f"({re.escape(BEGIN)}\n).*?({re.escape(END)})"
     return re.sub(pattern, lambda marks: f"{marks[1]}{lines}\n{marks[2]}", page, flags=re.DOTALL)
 

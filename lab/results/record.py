@@ -18,7 +18,10 @@ from packetmesh.errors import InputError
 from packetmesh.files import read_text, write_json
 
 FOLDER = ROOT / "docs" / "results"
-WRITTEN = ("docs/results", "docs/results.md", "README.md")
+WRITTEN = (
+    *("docs/results", "docs/results.md", "README.md"),
+    *("assets/depth/README.md", "assets/depth/worth.md"),
+)
 """What records and pages are written to: changes there are no changes of the code."""
 DIGITS = 6
 """Significant digits that a record keeps of a number."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,20 +11,24 @@ from typing import Any
 import numpy as np
 
 from packetmesh.errors import InputError
+from packetmesh.progress import Progress
 from pipeline.geometry import inverse
 from pipeline.importing.bag_messages import (
     camera_in,
     color_of,
-    depth_units_of,
+    depth_values_of,
     is_depth,
     stamp_s,
     transform_in,
 )
+from pipeline.importing.depth_units import depth_of
 from pipeline.importing.rig_folder import NodeImages
-from pipeline.io.images import FARTHEST_M, NO_VALUE
+from pipeline.io.depth_scale import known_in, usual_scale
 from pipeline.io.rigs import MAX_NODES
-from pipeline.types import CameraIntrinsics, DepthMap, FloatArray
+from pipeline.types import CameraIntrinsics, FloatArray
 
+PROGRESS_EVERY = 20
+"""Images that are looked at before progress is told."""
 LARGEST_GAP_S = 0.05
 """Between images that are taken as of one moment: more than a frame at 30 Hz."""
 _SUFFIXES = (".bag", ".db3", ".mcap")
@@ -66,17 +70,16 @@ def is_bag(path: Path) -> bool:
     return (path.is_file() and path.suffix in _SUFFIXES) or (path / "metadata.yaml").is_file()
 
 
-def read_bag(path: Path, frames: int, depth_scale: float | None) -> BagNodes:
+def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator[Progress, None, BagNodes]:
     """Of several cameras the images of one moment, of one camera ``frames`` moments spread over the bag.
 
     Raises:
         InputError: no bag, no colour, depth or camera_info, or clocks that disagree.
     """
     with _opened(path) as reader:
-        topics = _image_topics(reader)
-        pairs = _pairs(path, *topics)[:MAX_NODES]
+        topics = yield from _image_topics(reader)
+        pairs, notes = _pairs(path, *topics)
         transforms, parents = _static_transforms(reader)
-        notes: list[str] = []
         moments = _moments(path, pairs, frames)
         first = pairs[0][0]
         poses = [transforms.get(_root(first.frame, parents), {}).get(color.frame) for color, _ in pairs]
@@ -89,7 +92,9 @@ def read_bag(path: Path, frames: int, depth_scale: float | None) -> BagNodes:
                 messages = _message(reader, color, color_s), _message(reader, depth, depth_s)
                 node = _node(color, depth, *messages, depth_scale, T_world_color, transforms)
                 nodes.append((float(color_s), node))
-        scale = depth_units_of(messages[1], depth.name)[1] if depth_scale is None else depth_scale
+        values = depth_values_of(messages[1], depth.name)
+        scale = usual_scale(values) if depth_scale is None else depth_scale
+        notes += [f"{node.depth_name}: {note}" for _, node in nodes for note in node.notes]
         return BagNodes(tuple(nodes), len(first.times_s), scale, tuple(notes))
 
 
@@ -108,14 +113,17 @@ def _opened(path: Path) -> Iterator[Any]:
         raise InputError(f"The bag {path} cannot be read ({why}); try to record or copy it again") from None
 
 
-def _image_topics(reader: Any) -> tuple[list[_Topic], list[_Topic]]:
+def _image_topics(reader: Any) -> Generator[Progress, None, tuple[list[_Topic], list[_Topic]]]:
     """Colour and depth, in the order of their names."""
     found: tuple[list[_Topic], list[_Topic]] = ([], [])
-    for connection in sorted(reader.connections, key=lambda connection: connection.topic):
-        if connection.msgtype not in _IMAGES:
-            continue
+    connections = [own for own in reader.connections if own.msgtype in _IMAGES]
+    images, seen = max(1, sum(connection.msgcount for connection in connections)), 0
+    for connection in sorted(connections, key=lambda connection: connection.topic):
         first, times_s, recorded_ns = None, [], []
         for _, at_ns, raw in reader.messages([connection]):
+            if seen % PROGRESS_EVERY == 0:
+                yield Progress(f"images of {connection.topic}", min(1.0, seen / images))
+            seen += 1
             first = reader.deserialize(raw, connection.msgtype) if first is None else first
             times_s.append(stamp_s(raw, reader.is2))
             recorded_ns.append(at_ns)
@@ -136,8 +144,13 @@ def _camera_info(reader: Any, topic: str) -> CameraIntrinsics | None:
     return None
 
 
-def _pairs(path: Path, colors: list[_Topic], depths: list[_Topic]) -> list[tuple[_Topic, _Topic]]:
-    """Each depth topic with the colour topic of its frame, or else of the most similar name; one a colour."""
+def _pairs(
+    path: Path, colors: list[_Topic], depths: list[_Topic]
+) -> tuple[list[tuple[_Topic, _Topic]], list[str]]:
+    """Each depth topic with the colour topic of its frame, or else of the most similar name; one a colour.
+
+    With a sentence for each topic that is left out.
+    """
     for topics, what in ((colors, "colour"), (depths, "depth")):
         if not topics:
             known = ", ".join(topic.name for topic in [*colors, *depths]) or "no images at all"
@@ -151,7 +164,17 @@ def _pairs(path: Path, colors: list[_Topic], depths: list[_Topic]) -> list[tuple
         score, color = max(scored, key=lambda pair: pair[0])
         if color.name not in best or score > best[color.name][0]:
             best[color.name] = score, color, depth
-    return [best[name][1:] for name in sorted(best)]
+    pairs = [best[name][1:] for name in sorted(best)]
+    taken, used = pairs[:MAX_NODES], {depth.name for _, depth in pairs}
+    notes = [f"{color.name} is left out: it has no camera_info" for color in colors if color.camera is None]
+    notes += [f"{own.name} is left out: no depth belongs to it" for own in usable if own.name not in best]
+    notes += [
+        f"{own.name} is left out: it has no colour of its own" for own in depths if own.name not in used
+    ]
+    notes += [
+        f"{color.name} is left out: a rig has at most {MAX_NODES} nodes" for color, _ in pairs[MAX_NODES:]
+    ]
+    return taken, notes
 
 
 def _common(first: str, second: str) -> int:
@@ -239,12 +262,11 @@ def _node(
     transforms: dict[str, dict[str, FloatArray]],
 ) -> NodeImages:
     assert color.camera is not None
-    units, usual_scale = depth_units_of(depth_message, depth.name)
-    scale = usual_scale if depth_scale is None else depth_scale
-    z_m = (np.where(units == NO_VALUE, 0.0, units) / scale).astype(np.float32)
-    z_m[(z_m <= 0.0) | (z_m > FARTHEST_M)] = np.nan
-    if not np.isfinite(z_m).any():
+    values = depth_values_of(depth_message, depth.name)
+    if not known_in(values).any():
         raise InputError(f"A depth image of {depth.name} is empty; try another recording of the scene")
+    scale = usual_scale(values) if depth_scale is None else depth_scale
+    read = depth_of(f"of {depth.name}", values, scale, depth_scale is not None)
     depth_camera = T_color_depth = None
     if depth.frame != color.frame:
         T_color_depth = transforms.get(color.frame, {}).get(depth.frame)
@@ -255,5 +277,5 @@ def _node(
                 "camera_info or a static transform between both is missing; try to record them, too"
             )
     rgb = color_of(color_message, color.name)
-    images = color.name, depth.name, rgb, DepthMap(z_m), color.camera
-    return NodeImages(*images, T_world_color, depth_camera, T_color_depth)
+    images = color.name, depth.name, rgb, read.depth, color.camera
+    return NodeImages(*images, T_world_color, depth_camera, T_color_depth, read.notes)

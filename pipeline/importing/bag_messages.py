@@ -7,6 +7,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
@@ -63,8 +64,8 @@ def color_of(message: Any, topic: str) -> ByteArray:
     return np.ascontiguousarray(values.reshape(message.height, message.width, channels)[..., order])
 
 
-def depth_units_of(message: Any, topic: str) -> tuple[FloatArray, float]:
-    """(H, W) values, 0 where unknown, and how many make a metre: 1 of 32FC1, 1000 of 16UC1 (REP 118).
+def depth_values_of(message: Any, topic: str) -> NDArray[Any]:
+    """(H, W) values: whole millimetres of 16UC1, metres in floating point of 32FC1 (REP 118).
 
     Raises:
         InputError: an encoding that is not known, or a damaged image.
@@ -72,8 +73,7 @@ def depth_units_of(message: Any, topic: str) -> tuple[FloatArray, float]:
     if hasattr(message, "format"):
         return _compressed_depth(message, topic)
     type_ = _DEPTHS[message.encoding].newbyteorder(">" if message.is_bigendian else "<")
-    values = _rows(message, type_, 1, topic).astype(np.float64)
-    return np.where(np.isfinite(values), values, 0.0), 1.0 if message.encoding == "32FC1" else 1000.0
+    return _rows(message, type_, 1, topic)
 
 
 def camera_in(message: Any, topic: str) -> CameraIntrinsics:
@@ -101,7 +101,7 @@ def transform_in(message: Any) -> FloatArray:
     return rigid(rotation, np.array([t.x, t.y, t.z]))
 
 
-def _compressed_depth(message: Any, topic: str) -> tuple[FloatArray, float]:
+def _compressed_depth(message: Any, topic: str) -> NDArray[Any]:
     data = np.asarray(message.data)
     rvl = "rvl" in message.format.lower()
     values = _rvl(data.tobytes()) if rvl else cv2.imdecode(data[_CONFIG_BYTES:], cv2.IMREAD_UNCHANGED)
@@ -111,10 +111,10 @@ def _compressed_depth(message: Any, topic: str) -> tuple[FloatArray, float]:
             "record the topic without compression"
         )
     if not message.format.startswith("32FC1"):
-        return values.astype(np.float64), 1000.0
+        return values
     _, a, b = struct.unpack_from("<iff", data.tobytes())
     known = values > 0
-    return np.where(known, a / np.where(known, values - b, 1.0), 0.0), 1.0
+    return np.where(known, a / np.where(known, values - b, 1.0), 0.0)
 
 
 def _rvl(data: bytes) -> np.ndarray | None:

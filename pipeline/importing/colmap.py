@@ -17,11 +17,11 @@ from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes
 from pipeline.geometry import inverse, rigid, scaled
 from pipeline.importing.cameras import camera_of
-from pipeline.importing.sequence import Candidate, Sequence, named_inside
-from pipeline.io.images import read_depth_units
+from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, named_inside
+from pipeline.io.depth_scale import usual_scale
+from pipeline.io.images import read_depth_units, read_depth_values
 from pipeline.types import CameraIntrinsics, FloatArray
 
-MILLIMETRES = 1000.0
 CENTRE_PX = 0.5
 """Where COLMAP puts the middle of the first pixel; here it is 0 (SPEC 1.1)."""
 LEAST_POINTS = 20
@@ -79,7 +79,7 @@ def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
     if not found:
         raise InputError(
             f"{folder} has no image of images.txt with its depth; try colmap patch_match_stereo, which "
-            "writes stereo/depth_maps, or put the sensor's PNG images of the same names in depth/"
+            "writes stereo/depth_maps, or put the sensor's images of the same names in depth/"
         )
     most, _ = Counter(image.camera for image, _, _ in found).most_common(1)[0]
     ours = sorted((one for one in found if one[0].camera == most), key=lambda one: one[0].name)
@@ -97,7 +97,7 @@ def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
             "COLMAP knows no metres: its unit is taken as one; --depth-scale says how many units a metre has"
         )
     else:
-        units = MILLIMETRES
+        units = usual_scale(read_depth_values(ours[0][2]))
         metres = _metres_a_unit(model / "points3D.txt", [(image, depth) for image, _, depth in ours], units)
         notes.append(f"A unit of the model is {metres:.4g} m by the depth that was measured at its points")
     candidates = []
@@ -261,6 +261,5 @@ def _beside(folder: Path, places: tuple[str, ...], name: str) -> Path | None:
 def _depth(folder: Path, name: str) -> Path | None:
     dense = (f"{name}.{kind}.bin" for kind in ("geometric", "photometric"))
     maps = (_beside(folder, ("stereo/depth_maps",), file) for file in dense)
-    return next((path for path in maps if path), None) or _beside(
-        folder, _DEPTH_FOLDERS, str(Path(name).with_suffix(".png"))
-    )
+    measured = (_beside(folder, _DEPTH_FOLDERS, str(Path(name).with_suffix(kind))) for kind in DEPTH_SUFFIXES)
+    return next((path for path in (*maps, *measured) if path), None)

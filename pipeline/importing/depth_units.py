@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence as Values
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,22 +11,18 @@ from numpy.typing import NDArray
 from packetmesh.errors import InputError
 from pipeline.importing.colmap import read_depth_map
 from pipeline.importing.sequence import Sequence
-from pipeline.io.images import FARTHEST_M, likely_depth_scale, read_depth_units
+from pipeline.io.depth_scale import (
+    FARTHEST_M,
+    MILLIMETRES,
+    doubts,
+    known_in,
+    likely_depth_scale,
+    usual_scale,
+)
+from pipeline.io.images import ReadDepth, read_depth_values
 from pipeline.types import DepthMap
 
-ROOM_M = (0.2, 15.0)
-"""Median depths between which nothing is said."""
 _ROTATED_SHARE = 0.95
-
-
-@dataclass(frozen=True, slots=True)
-class ReadDepth:
-    """A depth image and how it was understood."""
-
-    depth: DepthMap
-    units_per_metre: float
-    median_m: float
-    notes: tuple[str, ...]
 
 
 def depth_in(path: Path, sequence: Sequence) -> ReadDepth:
@@ -37,43 +31,45 @@ def depth_in(path: Path, sequence: Sequence) -> ReadDepth:
     Raises:
         InputError: it cannot be read, or holds nothing within 65 m.
     """
-    scale, notes = sequence.units_per_metre, list[str]()
     if path.suffix == ".bin":
-        return _metres(path, read_depth_map(path), scale, notes)
-    units = read_depth_units(path)
-    if sequence.rotated_bits and has_rotated_bits(units):
-        units, scale, notes = unrotated(units), 1000.0, ["The bits of the depth were turned back by three"]
-    return _metres(path, units, scale, notes)
+        return depth_of(str(path), read_depth_map(path), sequence.units_per_metre, sequence.scale_stated)
+    values = read_depth_values(path)
+    if sequence.rotated_bits and has_rotated_bits(values):
+        read = depth_of(str(path), unrotated(values), MILLIMETRES, stated=True)
+        return ReadDepth(read.depth, MILLIMETRES, ("The bits of the depth were turned back by three",))
+    whole = values.dtype.kind in "iu"
+    scale = sequence.units_per_metre if whole or sequence.scale_stated else usual_scale(values)
+    return depth_of(str(path), values, scale, sequence.scale_stated)
 
 
-def _metres(path: Path, units: NDArray[Any], scale: float, notes: list[str]) -> ReadDepth:
-    z_m = (units / scale).astype(np.float32)
-    z_m[(units == 0) | (z_m > FARTHEST_M)] = np.nan
+def depth_of(name: str, values: NDArray[Any], units_per_metre: float, stated: bool) -> ReadDepth:
+    """(H, W) values at a scale, without what a rig's folder cannot hold.
+
+    Args:
+        name: of the image, for the error.
+        values: some of them known.
+        units_per_metre: the scale.
+        stated: whether a person gave it.
+
+    Raises:
+        InputError: nothing within 65 m.
+    """
+    known = known_in(values)
+    z_m = (values / units_per_metre).astype(np.float32)
+    z_m[~known | (z_m > FARTHEST_M)] = np.nan
     if not np.isfinite(z_m).any():
-        median = float(np.median(units[units > 0]))
         raise InputError(
-            f"The depth image {path} is farther than {FARTHEST_M:.0f} m everywhere at depth scale {scale:g}; "
-            f"try --depth-scale {likely_depth_scale(median):g}"
+            f"The depth image {name} is farther than {FARTHEST_M:.0f} m everywhere at depth scale "
+            f"{units_per_metre:g}; try --depth-scale {likely_depth_scale(float(np.median(values[known]))):g}"
         )
-    return ReadDepth(DepthMap(z_m), scale, float(np.nanmedian(z_m)), tuple(notes))
+    return ReadDepth(DepthMap(z_m), units_per_metre, doubts(values, units_per_metre, stated))
 
 
-def has_rotated_bits(units: NDArray[np.uint16]) -> bool:
+def has_rotated_bits(units: NDArray[Any]) -> bool:
     """Whether (H, W) values look like millimetres rotated by three bits: below 8.192 m multiples of eight."""
-    return bool((units[units > 0] % 8 == 0).mean() >= _ROTATED_SHARE)
+    return units.dtype == np.uint16 and bool((units[units > 0] % 8 == 0).mean() >= _ROTATED_SHARE)
 
 
-def unrotated(units: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """(H, W) millimetres of SUN RGB-D's values."""
+def unrotated(units: NDArray[Any]) -> NDArray[np.uint16]:
+    """(H, W) millimetres of SUN RGB-D's uint16 values."""
     return ((units >> 3) | (units << 13)).astype(np.uint16)
-
-
-def scale_note(medians_m: Values[float], units_per_metre: float) -> list[str]:
-    """The depth scale in words, with a doubt where it makes no room."""
-    median_m = float(np.median(medians_m))
-    said = f"Depth: {units_per_metre:g} units in a metre, which makes the median depth {median_m:.3g} m"
-    nearest_m, farthest_m = ROOM_M
-    if nearest_m <= median_m <= farthest_m:
-        return [said]
-    suggestion = likely_depth_scale(median_m * units_per_metre)
-    return [f"{said}; no room is like that: try --depth-scale {suggestion:g}"]

@@ -10,11 +10,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, part
 from pipeline.geometry import rigid
-from pipeline.importing.bag import is_bag, read_bag
+from pipeline.importing.bag import is_bag, iterate_bag
 from pipeline.importing.choosing import choose
-from pipeline.importing.depth_units import depth_in, scale_note
+from pipeline.importing.depth_units import depth_in
 from pipeline.importing.kinds import kind_of, recognise
 from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
 from pipeline.importing.sequence import Candidate, Sequence
@@ -100,7 +100,7 @@ def iterate_import(
         sequence = sequence.with_scale(depth_scale)
     yield Progress("choice of frames", 0.2)
     middle = depth_in(sequence.candidates[len(sequence.candidates) // 2].depth, sequence)
-    chosen = choose(sequence, frames, middle.median_m)
+    chosen = choose(sequence, frames, float(np.nanmedian(middle.depth.z_m)))
     written = []
     with new_folder(out) as folder_of_rig:
         T_up_world = _upright([sequence.candidates[index] for index in chosen])
@@ -115,7 +115,7 @@ def iterate_import(
         notes.append("The world was turned so that z is up")
     if len(chosen) < min(frames, len(sequence.candidates)):
         notes.append(f"No more than {len(chosen)} of the frames overlap by half")
-    notes += scale_note([frame.median_depth_m for frame in written], middle.units_per_metre)
+    notes.append(_scale_note(written, middle.units_per_metre))
     return ImportReport(
         kind.name,
         str(folder),
@@ -129,16 +129,21 @@ def iterate_import(
 def _from_bag(
     path: Path, out: Path, frames: int, depth_scale: float | None
 ) -> Generator[Progress, None, ImportReport]:
-    yield Progress("files", 0.0)
-    bag = read_bag(path, frames, depth_scale)
+    bag = yield from part(iterate_bag(path, frames, depth_scale), "files", 0.0, 0.7, detail=True)
     written = []
     with new_folder(out) as folder_of_rig:
         for done, (time_s, node) in enumerate(bag.nodes):
             yield Progress("images", 0.7 + 0.3 * done / len(bag.nodes))
             write_node(folder_of_rig / f"node_{done:02d}", node)
             written.append(ImportedFrame.of(node, done, time_s))
-    notes = [*bag.notes, *scale_note([frame.median_depth_m for frame in written], bag.units_per_metre)]
-    return ImportReport("bag", str(path), bag.candidates, bag.units_per_metre, tuple(written), tuple(notes))
+    notes = (*bag.notes, _scale_note(written, bag.units_per_metre))
+    return ImportReport("bag", str(path), bag.candidates, bag.units_per_metre, tuple(written), notes)
+
+
+def _scale_note(written: list[ImportedFrame], units_per_metre: float) -> str:
+    """The depth scale in words."""
+    median_m = float(np.median([frame.median_depth_m for frame in written]))
+    return f"Depth: {units_per_metre:g} units in a metre, which makes the median depth {median_m:.3g} m"
 
 
 def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | None) -> NodeImages:

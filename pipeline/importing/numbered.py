@@ -12,8 +12,8 @@ from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, read_bytes, read_text
 from pipeline.geometry import inverse
 from pipeline.importing.cameras import PRIMESENSE, camera_of
-from pipeline.importing.sequence import Candidate, Sequence, posed
-from pipeline.io.images import read_color, read_depth_units
+from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, posed
+from pipeline.io.images import read_color, read_depth_values
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.poses import read_pose, rigid_or_none
 from pipeline.types import CameraIntrinsics, FloatArray
@@ -33,16 +33,17 @@ def is_seven_scenes(folder: Path) -> bool:
 def read_seven_scenes(folder: Path, intrinsics: Path | None) -> Sequence:
     """Frames of 7-Scenes (Shotton et al., CVPR 2013), 3DMatch or BundleFusion; depth in millimetres."""
     found = []
-    for color in _thinned(sorted(folder.glob("frame-*.color.*"))):
+    colors, thinned = _thinned(sorted(folder.glob("frame-*.color.*")))
+    for color in colors:
         stem = color.name.split(".")[0]
-        depth = folder / f"{stem}.depth.png"
-        if depth.is_file():
+        depth = next(iter(_depths(folder, f"{stem}.depth.*")), None)
+        if depth is not None:
             found.append(Candidate(color, depth, _pose_or_none(folder / f"{stem}.pose.txt")))
     _some(found, folder, "frame-000000.depth.png beside frame-000000.color.png")
     candidates, notes = posed(found, "frame-000000.pose.txt")
     default = _SEVEN_SCENES, "those of 7-Scenes, whose depth is not quite registered to the colour"
     camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *default)
-    return Sequence(candidates, camera, notes=(*assumed, *notes))
+    return Sequence(candidates, camera, notes=(*thinned, *assumed, *notes))
 
 
 def is_scannet(folder: Path) -> bool:
@@ -52,22 +53,28 @@ def is_scannet(folder: Path) -> bool:
 
 def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
     """Frames of a ScanNet scene as its SensReader exports it (Dai et al., CVPR 2017); millimetres."""
+    pairs, thinned = _thinned(_paired(folder / "color", folder / "depth"))
     found = [
         Candidate(color, depth, _pose_or_none(folder / "pose" / f"{color.stem}.txt"))
-        for color, depth in _thinned(_paired(folder / "color", folder / "depth"))
+        for color, depth in pairs
     ]
-    candidates, notes = posed(found, "pose in pose/")
+    candidates, lost = posed(found, "pose in pose/")
+    notes = (*thinned, *lost)
     first, beside = candidates[0], folder / "intrinsic"
     height_px, width_px = read_color(first.color).shape[:2]
     if intrinsics is None:
         camera = read_intrinsics(beside / "intrinsic_color.txt", (width_px, height_px))
     else:
         camera, _ = camera_of(folder, first.color, intrinsics, None, "")
-    depth_height_px, depth_width_px = read_depth_units(first.depth).shape
+    depth_height_px, depth_width_px = read_depth_values(first.depth).shape
     if (depth_height_px, depth_width_px) == (height_px, width_px):
         return Sequence(candidates, camera, notes=notes)
     depth_camera = read_intrinsics(beside / "intrinsic_depth.txt", (depth_width_px, depth_height_px))
-    T_body_color, T_body_depth = (_matrix_or_identity(beside / f"extrinsic_{of}.txt") for of in FRAMES)
+    extrinsics = [beside / f"extrinsic_{of}.txt" for of in FRAMES]
+    T_body_color, T_body_depth = map(_matrix_or_identity, extrinsics)
+    missing = " and ".join(file.name for file in extrinsics if not file.is_file())
+    if missing:
+        notes += (f"No {missing}: taken as the identity, so that depth may be shifted against the colour",)
     T_color_depth = inverse(T_body_color) @ T_body_depth
     return Sequence(candidates, camera, depth_camera=depth_camera, T_color_depth=T_color_depth, notes=notes)
 
@@ -84,14 +91,14 @@ def read_open3d(folder: Path, intrinsics: Path | None) -> Sequence:
     """Frames of Redwood (Choi et al., CVPR 2015) or Open3D's recorder; millimetres, poses in a .log file."""
     color_folder = _color_folder(folder)
     assert color_folder is not None
-    pairs = list(enumerate(_paired(color_folder, folder / "depth")))
+    pairs, thinned = _thinned(list(enumerate(_paired(color_folder, folder / "depth"))))
     logs = [log for log in _logs(folder) if "traj" in log.name]
     poses = read_trajectory_log(logs[0]) if logs else {}
-    found = [Candidate(color, depth, poses.get(index)) for index, (color, depth) in _thinned(pairs)]
+    found = [Candidate(color, depth, poses.get(index)) for index, (color, depth) in pairs]
     candidates, notes = posed(found, "trajectory .log")
     default = PRIMESENSE, "a PrimeSense camera's from the factory"
     camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *default)
-    return Sequence(candidates, camera, notes=(*assumed, *notes))
+    return Sequence(candidates, camera, notes=(*thinned, *assumed, *notes))
 
 
 def read_trajectory_log(file: Path) -> dict[int, FloatArray]:
@@ -120,9 +127,9 @@ def is_sunrgbd(folder: Path) -> bool:
 def read_sunrgbd(folder: Path, intrinsics: Path | None) -> Sequence:
     """The one frame of a SUN RGB-D folder (Song et al., CVPR 2015); its depth merged if it is there."""
     colors = [path for path in sorted((folder / "image").iterdir()) if path.suffix.lower() in _COLOR_SUFFIXES]
-    depths = [path for name in ("depth_bfx", "depth") for path in sorted((folder / name).glob("*.png"))]
+    depths = [path for name in ("depth_bfx", "depth") for path in _depths(folder / name, "*")]
     _some(colors, folder, "an image in image/")
-    _some(depths, folder, "a PNG in depth_bfx/ or depth/")
+    _some(depths, folder, "an image in depth_bfx/ or depth/")
     camera, notes = camera_of(folder, colors[0], intrinsics, None, "")
     return Sequence((Candidate(colors[0], depths[0]),), camera, rotated_bits=True, notes=notes)
 
@@ -131,11 +138,16 @@ def _paired(colors: Path, depths: Path) -> list[tuple[Path, Path]]:
     """Images whose names have the same number, in its order."""
     by_number = [
         _by_number(path for path in folder.iterdir() if path.suffix.lower() in suffixes)
-        for folder, suffixes in ((colors, _COLOR_SUFFIXES), (depths, (".png",)))
+        for folder, suffixes in ((colors, _COLOR_SUFFIXES), (depths, DEPTH_SUFFIXES))
     ]
     both = sorted(by_number[0].keys() & by_number[1].keys())
-    _some(both, colors.parent, f"a PNG in {depths.name}/ with the number of an image in {colors.name}/")
+    _some(both, colors.parent, f"an image in {depths.name}/ with the number of an image in {colors.name}/")
     return [(by_number[0][number], by_number[1][number]) for number in both]
+
+
+def _depths(folder: Path, pattern: str) -> list[Path]:
+    """Depth images by name."""
+    return [path for path in sorted(folder.glob(pattern)) if path.suffix.lower() in DEPTH_SUFFIXES]
 
 
 def _by_number(paths: Iterable[Path]) -> dict[tuple[int, ...], Path]:
@@ -145,8 +157,11 @@ def _by_number(paths: Iterable[Path]) -> dict[tuple[int, ...], Path]:
     return by_first if len(by_first) == len(numbered) else dict(numbered)
 
 
-def _thinned(items: list) -> list:
-    return items[:: -(-len(items) // MOST_CANDIDATES) or 1]
+def _thinned(items: list) -> tuple[list, tuple[str, ...]]:
+    """Every so manieth of many, and a note that says so."""
+    every = -(-len(items) // MOST_CANDIDATES) or 1
+    note = f"Of {len(items)} frames one in {every} was looked at"
+    return items[::every], (note,) if every > 1 else ()
 
 
 def _some(items: list, folder: Path, missing: str) -> None:

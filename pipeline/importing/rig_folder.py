@@ -36,6 +36,8 @@ class NodeImages:
     """Of depth that is not registered to the colour image."""
     T_color_depth: FloatArray | None = None
     """(4, 4) where that camera stands, metres; with a depth camera."""
+    notes: tuple[str, ...] = ()
+    """What is doubtful about its depth, a sentence each."""
 
 
 @contextmanager

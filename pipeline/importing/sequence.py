@@ -9,6 +9,9 @@ from packetmesh.errors import InputError
 from pipeline.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
+DEPTH_SUFFIXES = (".png", ".tif", ".tiff", ".npy", ".pfm", ".exr", ".pgm")
+"""Of depth images."""
+
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
@@ -34,7 +37,9 @@ class Sequence:
     """All of them with poses or none."""
     camera: CameraIntrinsics
     units_per_metre: float = 1000.0
-    """Of the depth images."""
+    """Of depth images in whole numbers, or of all if it is stated."""
+    scale_stated: bool = False
+    """Whether a person gave it."""
     rotated_bits: bool = False
     """Whether the depth images may have their bits rotated as those of SUN RGB-D."""
     depth_camera: CameraIntrinsics | None = None
@@ -52,7 +57,13 @@ class Sequence:
         if self.poses_in_depth_units:
             factor = self.units_per_metre / units_per_metre
             candidates = tuple(candidate.enlarged(factor) for candidate in candidates)
-        return replace(self, candidates=candidates, units_per_metre=units_per_metre, rotated_bits=False)
+        return replace(
+            self,
+            rotated_bits=False,
+            candidates=candidates,
+            units_per_metre=units_per_metre,
+            scale_stated=True,
+        )
 
 
 def named_inside(folder: Path, name: str, file: str) -> Path:
@@ -70,7 +81,7 @@ def posed(candidates: list[Candidate], what: str) -> tuple[tuple[Candidate, ...]
     """Those with a pose and a note on what was left out; all of them if none has one."""
     known = [candidate for candidate in candidates if candidate.T_world_camera is not None]
     if not known:
-        note = f"No {what}: poses are not known; try reconstruct with --set node_registration.start=global"
+        note = f"No {what}: poses are not known; reconstruct looks for them"
         return tuple(candidates), (note,)
     lost = len(candidates) - len(known)
     note = f"{lost} of {len(candidates)} frames have no pose and were left out"

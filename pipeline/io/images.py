@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import zlib
+from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,19 +13,10 @@ from numpy.typing import NDArray
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, atomic_path, read_bytes
+from pipeline.io.depth_scale import NO_VALUE, check_median, doubts, known_in, usual_scale
 from pipeline.io.raw_images import SIGNATURES, raw_values
 from pipeline.types import AnyPath, ByteArray, DepthMap
 
-COMMON_DEPTH_SCALES = (1.0, 100.0, 256.0, 1000.0, 5000.0, 10000.0)
-"""Units per metre that RGB-D data sets use."""
-PLAUSIBLE_MEDIAN_M = (0.01, 100.0)
-NO_VALUE = 65535
-"""What some data sets (7-Scenes) write where the depth is unknown, beside 0."""
-FARTHEST_M = 65.534
-"""What is left for 16 bits of millimetres."""
-FARTHEST_FLOAT_M, MOST_FAR_SHARE = 1e6, 0.05
-"""Floating-point depths beyond are none; so many of them tell of a file that is understood wrongly."""
-_TYPICAL_DEPTH_M = 2.0
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _JPEG_SIGNATURE = b"\xff\xd8"
 _JPEG_END = b"\xff\xd9"
@@ -46,49 +39,70 @@ def read_color(path: AnyPath) -> ByteArray:
     return np.ascontiguousarray(bgr[..., ::-1])
 
 
-def read_depth(path: AnyPath, depth_scale: float = 1000.0) -> DepthMap:
-    """Metric depth of a PNG, PGM, TIFF, PFM, OpenEXR or NPY image; 0 and, in 16 bits, 65535 mean unknown.
+@dataclass(frozen=True, slots=True)
+class ReadDepth:
+    """A depth image and how it was understood."""
+
+    depth: DepthMap
+    units_per_metre: float
+    notes: tuple[str, ...]
+    """What is doubtful about it, a sentence each."""
+
+
+def read_depth(path: AnyPath, depth_scale: float | None = None) -> DepthMap:
+    """Metric depth of a PNG, PGM, TIFF, PFM, OpenEXR or NPY image, as ``read_depth_noted`` reads it."""
+    return read_depth_noted(path, depth_scale).depth
+
+
+def read_depth_noted(path: AnyPath, depth_scale: float | None = None) -> ReadDepth:
+    """Metric depth of a PNG, PGM, TIFF, PFM, OpenEXR or NPY image, with what is doubtful about its scale.
 
     Args:
-        path: the file.
-        depth_scale: image units per metre; 1000 when the image holds millimetres. Floating-point numbers
-            are metres, whatever it is.
+        path: the file; 0 and, in whole numbers, 65535 mean unknown.
+        depth_scale: image units per metre; without it whole numbers are millimetres and floating-point
+            numbers metres.
 
     Raises:
         InputError: missing, truncated, too large, not one channel of depth, without any depth, or with a
             median depth that no room has at this scale.
     """
-    if not (np.isfinite(depth_scale) and depth_scale > 0):
+    if depth_scale is not None and not (np.isfinite(depth_scale) and depth_scale > 0):
         raise InputError(f"The depth scale for {path} is {depth_scale}; try 1000 for an image in millimetres")
-    raw = _raw(path, "depth image")
-    if raw is not None and raw.dtype.kind == "f":
-        return _metres_of(path, raw)
-    units = read_depth_units(path)
-    known = units > 0
-    _check_scale(path, float(np.median(units[known])), depth_scale)
-    z_m = (units / depth_scale).astype(np.float32)
-    z_m[~known] = np.nan
-    return DepthMap(z_m)
+    values = read_depth_values(path)
+    scale = usual_scale(values) if depth_scale is None else depth_scale
+    check_median(path, values, scale)
+    z_m = (values / scale).astype(np.float32)
+    z_m[~known_in(values)] = np.nan
+    return ReadDepth(DepthMap(z_m), scale, doubts(values, scale, depth_scale is not None))
 
 
-def read_depth_units(path: AnyPath) -> NDArray[np.uint16]:
-    """(H, W) values of a 16-bit image, 0 where the depth is unknown; 65535 becomes 0, too.
+def read_depth_values(path: AnyPath) -> NDArray[Any]:
+    """(H, W) values of a depth image as they stand in the file, some of them known (``known_in``).
 
     Raises:
-        InputError: missing, truncated, too large, not 16-bit grey, or without any depth.
+        InputError: missing, truncated, too large, not one channel of 16 bits or more, or without any depth.
     """
     raw = _raw(path, "depth image")
-    units = _decode(path, cv2.IMREAD_UNCHANGED, "depth image") if raw is None else raw.copy()
-    if units.dtype != np.uint16 or units.ndim != 2:
-        channels = 1 if units.ndim == 2 else units.shape[2]
+    values = _decode(path, cv2.IMREAD_UNCHANGED, "depth image") if raw is None else raw
+    if values.ndim != 2 or values.itemsize < 2:
+        channels = 1 if values.ndim == 2 else values.shape[2]
         raise InputError(
-            f"The depth image {path} has {channels} channel(s) of {8 * units.itemsize} bits where one of 16 "
-            "is needed; try the file with the raw depth, not a preview of it"
+            f"The depth image {path} has {channels} channel(s) of {8 * values.itemsize} bits where one of 16 "
+            "or more is needed; try the file with the raw depth, not a preview of it"
         )
-    units[units == NO_VALUE] = 0
-    if not units.any():
-        raise InputError(f"The depth image {path} is zero everywhere; try another exposure of the scene")
-    return units
+    if not known_in(values).any():
+        raise InputError(f"The depth image {path} has no depth anywhere; try another exposure of the scene")
+    return values
+
+
+def read_depth_units(path: AnyPath) -> NDArray[Any]:
+    """(H, W) values of a depth image, 0 where the depth is unknown.
+
+    Raises:
+        InputError: as ``read_depth_values``.
+    """
+    values = read_depth_values(path)
+    return np.where(known_in(values), values, values.dtype.type(0))
 
 
 def write_color(path: AnyPath, rgb: ByteArray) -> None:
@@ -137,27 +151,6 @@ def _rgb_of(path: AnyPath, values: np.ndarray) -> ByteArray:
             f"The colour image {path} is {values.dtype} of shape {values.shape}; try 8 bits in three channels"
         )
     return np.ascontiguousarray(values[..., :3])
-
-
-def _metres_of(path: AnyPath, values: np.ndarray) -> DepthMap:
-    """Depth in floating point."""
-    if values.ndim != 2:
-        raise InputError(f"The depth image {path} has {values.shape[2]} channels where one is needed")
-    known = np.isfinite(values) & (values > 0)
-    if not known.any():
-        raise InputError(f"The depth image {path} has no depth anywhere; try another exposure of the scene")
-    median_m = float(np.median(values[known]))
-    if not PLAUSIBLE_MEDIAN_M[0] <= median_m <= PLAUSIBLE_MEDIAN_M[1]:
-        raise InputError(
-            f"The depth image {path} has a median depth of {median_m:.3g}; floating-point depth is in "
-            "metres, so try to divide it by 1000 if it is millimetres"
-        )
-    if (values[known] > FARTHEST_FLOAT_M).mean() > MOST_FAR_SHARE:
-        raise InputError(
-            f"The numbers in the depth image {path} are no depths, as if their bytes were in another order; "
-            "try to export it again"
-        )
-    return DepthMap(np.where(known, values, np.nan).astype(np.float32))
 
 
 def _decode(path: AnyPath, flags: int, what: str) -> np.ndarray:
@@ -223,21 +216,3 @@ def _size_px(data: bytes) -> tuple[int, int]:
             return int.from_bytes(width, "big"), int.from_bytes(height, "big")
         position += 2 + int.from_bytes(data[position + 2 : position + 4], "big")
     return 0, 0
-
-
-def _check_scale(path: AnyPath, median_units: float, depth_scale: float) -> None:
-    nearest_m, farthest_m = PLAUSIBLE_MEDIAN_M
-    median_m = median_units / depth_scale
-    if nearest_m <= median_m <= farthest_m:
-        return
-    suggestion = likely_depth_scale(median_units)
-    raise InputError(
-        f"The depth image {path} has a median depth of {median_m:.3g} m at depth scale {depth_scale:g}; "
-        f"try depth scale {suggestion:g}, which makes it {median_units / suggestion:.3g} m"
-    )
-
-
-def likely_depth_scale(median_units: float) -> float:
-    """The usual depth scale at which this median comes nearest to 2 m."""
-    typical_scale = median_units / _TYPICAL_DEPTH_M
-    return min(COMMON_DEPTH_SCALES, key=lambda scale: abs(np.log(scale / typical_scale)))

@@ -16,6 +16,9 @@ from pipeline.types import AnyPath, CameraIntrinsics, FloatArray
 
 _BROWN_CONRADY = {"", "plumb_bob", "rational_polynomial"}
 """Distortion models whose first five coefficients are k1, k2, p1, p2, k3."""
+FOCAL_LENGTHS = (0.05, 100.0)
+"""In widths or heights of the image: angles of view of 169 and of half a degree."""
+MOST_DISTORTION = 1e4
 _YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTILINE)
 _LIST = re.compile(r"\[[^\]]*\]")
 _WORDS = re.compile(r"\s*[^\s#%.-]")
@@ -83,7 +86,9 @@ def _in_matrix(path: AnyPath, numbers: FloatArray, size_px: tuple[int, int] | No
             "width, height, fx, fy, cx and cy"
         )
     fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
-    return CameraIntrinsics.pinhole(fx, fy, cx, cy, *size_px)
+    camera = CameraIntrinsics.pinhole(fx, fy, cx, cy, *size_px)
+    _check(path, camera, "")
+    return camera
 
 
 def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics) -> None:
@@ -188,6 +193,15 @@ def _check(path: AnyPath, camera: CameraIntrinsics, distortion_model: str) -> No
         raise wrong(f"focal lengths {camera.fx_px:g} and {camera.fy_px:g} px", "positive ones")
     if matrix[0, 1] or matrix[1, 0] or not np.array_equal(matrix[2], (0.0, 0.0, 1.0)):
         raise wrong("a matrix with skew or in the wrong order", "fx 0 cx, 0 fy cy, 0 0 1")
+    narrowest, widest = FOCAL_LENGTHS
+    for focal_px, size_px in ((camera.fx_px, camera.width_px), (camera.fy_px, camera.height_px)):
+        if not narrowest * size_px <= focal_px <= widest * size_px:
+            raise wrong(
+                f"a focal length of {focal_px:g} px for {size_px} px, which no lens has",
+                "the camera's own, in pixels",
+            )
+    if np.abs(camera.distortion).max() > MOST_DISTORTION:
+        raise wrong(f"distortion of {np.abs(camera.distortion).max():g}", "to calibrate again")
     if not (0 <= camera.cx_px < camera.width_px and 0 <= camera.cy_px < camera.height_px):
         raise wrong(
             f"a principal point ({camera.cx_px:g}, {camera.cy_px:g}) outside the "

@@ -19,7 +19,7 @@ from pipeline.io.depth_correction import (
     write_depth_correction,
 )
 from pipeline.io.extrinsics import read_extrinsics
-from pipeline.io.images import read_color, read_depth, write_color, write_depth_mm
+from pipeline.io.images import read_color, read_depth_noted, write_color, write_depth_mm
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.io.poses import read_pose, write_pose
 from pipeline.io.truth import read_truth, write_truth
@@ -33,7 +33,7 @@ def load_frame(
     color: AnyPath,
     depth: AnyPath,
     intrinsics: AnyPath,
-    depth_scale: float = 1000.0,
+    depth_scale: float | None = None,
     name: str = "node_00",
     *,
     pose: AnyPath | None = None,
@@ -45,9 +45,10 @@ def load_frame(
 
     Args:
         color: (H, W) image.
-        depth: (H, W) 16-bit image, 0 where the depth is unknown; of another size if it is not registered.
+        depth: (H, W) image, 0 where the depth is unknown; of another size if it is not registered.
         intrinsics: JSON with fx, fy, cx and cy, Open3D JSON, ROS camera_info or a bare matrix, pixels.
-        depth_scale: depth units in a metre.
+        depth_scale: depth units in a metre; without it whole numbers are millimetres and floating-point
+            numbers metres.
         name: what the node is called.
         pose: 4 x 4 T_world_camera, metres.
         depth_intrinsics: of the depth camera, if the depth image is not registered to the colour image.
@@ -66,7 +67,8 @@ def load_frame(
     """
     rgb = read_color(color)
     camera = read_intrinsics(intrinsics, rgb.shape[1::-1])
-    sensed, noise = read_depth(depth, depth_scale), None
+    read = read_depth_noted(depth, depth_scale)
+    sensed, noise = read.depth, None
     if depth_correction is not None:
         correction = read_depth_correction(depth_correction)
         sensed, noise = correction.apply(sensed), correction.noise
@@ -77,7 +79,9 @@ def load_frame(
     shape = (camera.height_px, camera.width_px)
     _check_size("intrinsics file", intrinsics, shape, "colour image", color, rgb.shape)
     T_world_camera = LEVEL_POSE.copy() if pose is None else read_pose(pose)
-    return RgbdFrame(name, rgb, sensed, camera, T_world_camera, noise=noise, pose_known=pose is not None)
+    return RgbdFrame(
+        name, rgb, sensed, camera, T_world_camera, noise=noise, pose_known=pose is not None, notes=read.notes
+    )
 
 
 def _registered(
@@ -123,7 +127,7 @@ def _check_size(
         )
 
 
-def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale: float = 1000.0) -> Rig:
+def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale: float | None = None) -> Rig:
     """The nodes below ``directory`` in the order of their folders' names.
 
     Args:
@@ -131,7 +135,7 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale
             are known, node_NN/pose.txt with a 4 x 4 T_world_camera, metres.
         calibration: a folder whose node_NN/intrinsics.json, pose.txt and so on take the place of the rig's
             own; what is true of a rendered rig stays.
-        depth_scale: depth units in a metre, of every node.
+        depth_scale: depth units in a metre, of every node; as ``load_frame``.
 
     Raises:
         InputError: no folder, no node or more than six, a file of a node that cannot be used, or the
@@ -143,6 +147,8 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale
     ['node_00', 'node_01', 'node_02']
     """
     directory = Path(directory)
+    if directory.is_file():
+        raise InputError(f"The rig {directory} is a file; packetmesh import makes a rig of a recording")
     if not directory.is_dir():
         raise InputError(f"The rig folder {directory} does not exist; check the path")
     folders = _node_folders(directory)
@@ -159,6 +165,17 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale
     over = {} if calibration is None else calibration_files(calibration, [folder.name for folder in folders])
     frames = tuple(_load_node(folder, over.get(folder.name, NodeFiles()), depth_scale) for folder in folders)
     return Rig(directory.resolve().name, frames, read_truth(directory, [frame.name for frame in frames]))
+
+
+def is_rig(path: Path) -> bool:
+    """Whether it is a folder of nodes."""
+    return any(node.is_dir() for node in path.glob("node_*"))
+
+
+def is_pair(path: Path) -> bool:
+    """Whether it is the folder of one node: a colour image, a depth image and intrinsics."""
+    images = (_image_in(path, stem).is_file() for stem in ("color", "depth"))
+    return path.is_dir() and _intrinsics_in(path).is_file() and all(images)
 
 
 def save_rig(directory: AnyPath, rig: Rig) -> None:
@@ -204,13 +221,17 @@ def _node_folders(directory: Path) -> list[Path]:
     return sorted(folder for folder in directory.glob("node_*") if folder.is_dir())
 
 
-def _load_node(folder: Path, over: NodeFiles, depth_scale: float) -> RgbdFrame:
-    intrinsics = folder / "intrinsics.json"
-    if not intrinsics.exists() and intrinsics.with_suffix(".txt").exists():
-        intrinsics = intrinsics.with_suffix(".txt")
-    files: NodeFiles = {"intrinsics": intrinsics, **node_files(folder), **over}
+def _load_node(folder: Path, over: NodeFiles, depth_scale: float | None) -> RgbdFrame:
+    files: NodeFiles = {"intrinsics": _intrinsics_in(folder), **node_files(folder), **over}
     color, depth = (_image_in(folder, stem) for stem in ("color", "depth"))
     return load_frame(color, depth, depth_scale=depth_scale, name=folder.name, **files)
+
+
+def _intrinsics_in(folder: Path) -> Path:
+    """JSON, or where there is none text."""
+    intrinsics = folder / "intrinsics.json"
+    text = intrinsics.with_suffix(".txt")
+    return text if text.exists() and not intrinsics.exists() else intrinsics
 
 
 def _image_in(folder: Path, stem: str) -> Path:

@@ -3,13 +3,14 @@
 import csv
 import json
 import shutil
+from dataclasses import replace
 
 import pytest
 
-from app.runs import is_rig, rigs_in
+from app.runs import rigs_in
 from packetmesh.errors import InputError
 from pipeline.io.demos import load_demo
-from pipeline.io.rigs import save_rig
+from pipeline.io.rigs import is_rig, save_rig
 from pipeline.types import Rig
 from tests.app.commands import check_one_sentence, run
 
@@ -54,7 +55,7 @@ def test_every_good_one_is_done_and_a_bad_one_gets_a_sentence(capsys, rigs, tmp_
         metrics = json.loads((out / name / "metrics.json").read_text())
         assert float(rows[name]["no_hit_after"]) == metrics["surface_after"]["no_hit_ray_share"]
         assert (out / name / "report.html").exists()
-    assert is_rig(out / "b-recording" / "rig")
+    assert is_rig(out / "b-recording" / "imported")
     page = (out / "rigs.html").read_text()
     assert page.count("data:image/jpeg;base64") == 2
     assert 'href="a-rig/report.html"' in page
@@ -90,6 +91,41 @@ def test_a_cluster_of_two_workers_gives_the_same_surfaces(capsys, rigs, tmp_path
     assert [row["state"] for row in rows] == ["done", "done", "failed"]
     for row, own in zip(rows, json.loads(local), strict=True):
         assert row | {"elapsed_s": 0.0} == own | {"elapsed_s": 0.0}
+
+
+def test_an_error_of_the_program_and_a_rig_that_failed_are_rows_and_the_table_is_written(
+    capsys, rigs, tmp_path, monkeypatch
+):
+    """Two rooms are no rig; an exception that nobody foresaw leaves a log; both are not done twice."""
+    two = (replace(load_demo(scene).frames[0], pose_known=False) for scene in ("office", "living-room"))
+    folder = tmp_path / "rigs"
+    shutil.copytree(rigs / "a-rig", folder / "a-rig")
+    save_rig(folder / "b-strangers", Rig("b", tuple(two)))
+    out = tmp_path / "out"
+    monkeypatch.setattr("app.runs.run_batch", lambda do, tasks, *_, **__: enumerate(map(do, tasks)))
+    words = ["reconstruct", "--rigs", folder, "--out", out, *QUICK]
+    with monkeypatch.context() as broken:
+        broken.setattr("pipeline.stages.acquire", nothing)
+        code, _, err = run(capsys, *words)
+    assert code == 1
+    assert "Traceback" not in err
+    rows = table(out)
+    assert {row["state"] for row in rows.values()} == {"failed"}
+    assert "ZeroDivisionError" in rows["a-rig"]["sentence"]
+    assert "ZeroDivisionError" in (out / "a-rig.log").read_text()
+    run(capsys, *words)
+    rows = table(out)
+    assert [row["state"] for row in rows.values()] == ["done", "failed"]
+    assert "No two nodes stand beside each other" in rows["b-strangers"]["sentence"]
+    assert not (out / "a-rig.log").exists()
+    written = (out / "b-strangers" / "metrics.json").stat().st_mtime_ns
+    _, printed, _ = run(capsys, *words, "--json")
+    assert [row["state"] for row in json.loads(printed)] == ["kept", "failed"]
+    assert (out / "b-strangers" / "metrics.json").stat().st_mtime_ns == written
+
+
+def nothing(frame, config):
+    return 1 / 0
 
 
 def test_what_is_taken_for_a_rig(rigs, tmp_path):

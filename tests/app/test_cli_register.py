@@ -192,9 +192,21 @@ def test_planes_alone_are_refused_with_the_motion_they_leave_open(capsys, tmp_pa
     commands.check_one_sentence(got, 1, "sliding across z and turning about z changes nothing")
 
 
+def test_each_cloud_may_have_a_unit_of_its_own(capsys, tmp_path, files):
+    moving = read_cloud(files / "source.ply")
+    write_cloud(tmp_path / "mm.ply", PointCloud(1000.0 * moving.points_m))
+    command = (tmp_path / "mm.ply", files / "target.ply", "--truth", files / "truth.txt", "--json")
+    check = commands.check_one_sentence
+    check(run(capsys, *command, "--out", tmp_path / "out"), 1, "try --metres-per-unit 0.001 1")
+    code, out, _ = run(capsys, *command, "--metres-per-unit", 0.001, 1, "--out", tmp_path / "out")
+    assert code == 0
+    assert json.loads(out)["ceicp-a"]["point_error_m"] < 0.003
+
+
 @pytest.mark.parametrize(
     ("argv", "code", "says"),
     [
+        (["source.ply", "target.ply", "--metres-per-unit", "0", "1"], 1, "cannot be 0 metres in a unit"),
         (["source.ply", "missing.ply"], 1, "missing.ply does not exist"),
         (["source.ply", "cut.ply"], 1, "of its 4000 points"),
         (["source.ply", "target.ply", "--method", "magic"], 2, "ceicp-a, ceicp-r"),

@@ -41,6 +41,11 @@ def test_a_depth_camera_needs_its_lens_and_its_place(capsys):
     check_one_sentence(got, 2, "needs both --depth-intrinsics and --extrinsics")
 
 
+def test_a_demo_has_its_own_depth_scale(capsys):
+    got = run(capsys, "reconstruct", "--scene", "office", "--depth-scale", 5000, "--out", "out")
+    check_one_sentence(got, 2, "a demo scene has its own depth scale")
+
+
 def test_a_calibration_of_another_rig_leaves_no_folder(capsys, tmp_path):
     camera = CameraIntrinsics.pinhole(600.0, 600.0, 320.0, 240.0, 640, 480)
     write_calibration(tmp_path / "cal", {"node_07": CalibratedNode(camera)})

@@ -57,6 +57,37 @@ def test_a_rig_in_a_zip_is_taken_as_it_is_and_may_come_twice(session, tmp_path):
     assert sorted(path.suffix for path in session.folder.iterdir()) == ["", "", ".zip", ".zip"]
 
 
+def test_a_scale_and_a_number_of_frames_hold_for_a_recording_and_a_rig(session, tmp_path):
+    write_tum(tmp_path / "desk", orbit(5))
+    save_rig(tmp_path / "rig", orbit(2))
+    session.gui.set("Units per m", 2500.0)
+    session.gui.set("Frames", 2)
+    session.gui.upload("Recording …", "desk.zip", zipped(tmp_path / "desk"))
+    assert "2 of 5 frames became nodes" in session.gui.text(FOLDER)
+    assert "2500 units in a metre" in session.gui.text(FOLDER)
+    session.gui.upload("Recording …", "rig.zip", zipped(tmp_path / "rig"))
+    assert session.spec.source.depth_scale == 2500.0
+    assert session.results.view("scene").nodes[0].farthest_m < 1.1
+
+
+def test_a_pair_or_nodes_from_another_number_on_may_come_in_a_zip(session, tmp_path):
+    save_rig(tmp_path / "rig", orbit(2))
+    (tmp_path / "rig" / "node_00").rename(tmp_path / "pair")
+    for folder in ("rig", "pair"):
+        session.gui.upload("Recording …", f"{folder}.zip", zipped(tmp_path / folder))
+        (node,) = session.results.view("scene").nodes
+        assert node.name == {"rig": "node_01", "pair": "node_00"}[folder]
+        assert f"A rig of {node.name}" in session.gui.text(FOLDER)
+
+
+def test_a_zip_of_several_names_them_and_takes_none(session, tmp_path):
+    save_rig(tmp_path / "both" / "first", orbit(1))
+    write_tum(tmp_path / "both" / "second", orbit(2))
+    session.gui.upload("Recording …", "both.zip", zipped(tmp_path / "both"))
+    assert "holds 2 rigs or recordings (both/first, both/second); pack one" in session.notices.pop()
+    assert isinstance(session.spec.source, Demo)
+
+
 def test_a_pair_may_be_metres_in_floating_point_with_a_bare_matrix(session, tmp_path):
     (frame,) = orbit(1).frames
     for label, name, content in (
@@ -69,6 +100,10 @@ def test_a_pair_may_be_metres_in_floating_point_with_a_bare_matrix(session, tmp_
     (node,) = session.results.view("scene").nodes
     np.testing.assert_array_equal(node.color.rgb, frame.rgb)
     assert node.coverage == pytest.approx(frame.depth.coverage)
+    assert "no room is like that" not in session.gui.text()
+    session.gui.set("Units per m", 20.0)
+    session.gui.press("Reconstruct this pair")
+    assert "no room is like that: try --depth-scale 1" in session.gui.text()
 
 
 @pytest.mark.parametrize(

@@ -107,7 +107,7 @@ def test_the_command_parses_back_to_the_same(spec, monkeypatch):
         color: Path | None = None,
         depth: Path | None = None,
         intrinsics: Path | None = None,
-        depth_scale: float = 1000.0,
+        depth_scale: float | None = None,
         preset: options.PresetName = "packetmesh",
         set: options.Settings = (),
     ) -> None:
@@ -117,10 +117,10 @@ def test_the_command_parses_back_to_the_same(spec, monkeypatch):
     assert words[:2] == ["packetmesh", "reconstruct"]
     tyro.cli(reconstruct, args=words[2:])
     assert with_settings(config_named(seen["preset"], PRESETS), seen["set"]) == spec.config
-    default, wanted = {"depth_scale": 1000.0}, wanted_options(spec.source)
+    wanted = wanted_options(spec.source)
     for name in ("scene", "rig", "color", "depth", "intrinsics", "depth_scale"):
         value = seen[name]
-        assert (str(value) if isinstance(value, Path) else value) == wanted.get(name, default.get(name))
+        assert (str(value) if isinstance(value, Path) else value) == wanted.get(name)
 
 
 def test_presets_are_the_pipelines():

@@ -83,6 +83,16 @@ def test_a_killed_process_is_one_sentence():
         list(run_batch(eval, [KILLED] * 2, processes=2))
 
 
+def killed(task):
+    return "killed"
+
+
+def test_a_killed_process_fails_only_the_task_that_killed_it():
+    tasks = [KILLED if index in (1, 5) else str(index) for index in range(9)]
+    answers = dict(run_batch(eval, tasks, processes=2, killed=killed))
+    assert answers == {index: "killed" if index in (1, 5) else index for index in range(9)}
+
+
 def test_stopping_early_drops_what_has_not_begun(tmp_path):
     """Of fifty tasks that leave a file each, those that were not handed out leave none."""
     answers = run_batch(os.mkdir, [str(tmp_path / str(index)) for index in range(50)], processes=2)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.io.depth_scale import doubts
 from pipeline.io.rigs import load_frame, load_rig, save_rig
 from pipeline.types import RgbdFrame, Rig
 
@@ -12,6 +13,18 @@ def frame(shared_data, name) -> RgbdFrame:
     if not folder.is_dir():
         pytest.skip(f"no {name} in {shared_data}")
     return load_frame(folder / "color.png", folder / "depth.png", folder / "intrinsics.json", name=name)
+
+
+@pytest.mark.parametrize("name", ["kinect_basket", "kinect_desk"])
+@pytest.mark.parametrize(
+    ("factor", "says"),
+    [(1, None), (5, "scale 5000"), (8, "scale 8000"), (20, "scale 10000"), (0.02, "no room")],
+)
+def test_a_wrong_scale_of_a_real_frame_is_doubted_and_the_right_one_is_not(shared_data, name, factor, says):
+    depth = frame(shared_data, name).depth
+    values = np.rint(np.where(depth.valid, 1000.0 * factor * depth.z_m, 0.0)).astype(np.int32)
+    notes = doubts(values, 1000.0, stated=False)
+    assert notes == () if says is None else says in notes[0]
 
 
 @pytest.mark.parametrize(

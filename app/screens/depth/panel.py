@@ -22,6 +22,7 @@ from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, wit
 from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
 from app.state import Spec, Step
 from app.ui import Panel
+from pipeline.depth.completion import SHIPPED_COMPLETION
 
 TEXT = """**What you see.** Blue: points the sensor measured. Violet: points that are inferred: from the
 colour image, made metric where the sensor knows a depth too; in its holes from colours and measured depth
@@ -30,6 +31,9 @@ nothing. Go on with **Fuse**."""
 CONFIDENCE_TEXT = (
     "Inferred depth that flies, lies too far from anything measured or is hardly believed is left out."
 )
+
+WORTH = SHIPPED_COMPLETION.with_name("worth.md")
+"""What filling and its confidence are worth; `make results` writes it from the records."""
 
 
 class DepthPanel(Panel):
@@ -66,6 +70,7 @@ class DepthPanel(Panel):
             )
         with gui.add_folder("How far to believe it", expand_by_default=False):
             gui.add_markdown(CONFIDENCE_TEXT)
+            gui.add_markdown(WORTH.read_text("utf-8"))
             self._controls.append(self._fields(CONFIDENCE_CONTROLS))
             self._confidence_table = gui.add_html("")
         self._hide = HideFolder(self.ui, self._ask_to_hide)

@@ -20,7 +20,7 @@ def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
     rig = yield from store.stage(spec, "rig")
     most = SCREEN_POINTS // len(rig.frames)
     nodes = tuple(_scene_node(frame, most) for frame in rig.frames)
-    return SceneView(spec.source.title, nodes, rig.truth is not None)
+    return SceneView(spec.source.title, nodes, rig.truth is not None, rig.notes)
 
 
 def _scene_node(frame: RgbdFrame, most: int) -> SceneNode:

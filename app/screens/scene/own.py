@@ -10,6 +10,7 @@ import viser
 
 from app.ui import Ui, keep_upload
 from packetmesh.errors import InputError
+from pipeline.io.rigs import MAX_NODES
 from pipeline.sources import ImagePair
 
 PAIR_LIMIT_BYTES = 64 << 20
@@ -24,7 +25,8 @@ RECORDINGS = ".zip,.bag,.mcap,.db3,application/zip"
 PAIR_TEXT = """**A pair**: colour, depth (16 bits, or metres in floating point) and the camera's
 intrinsics (JSON, YAML or a 3 × 3 matrix)."""
 RECORDING_TEXT = """**A recording**: a bag of ROS, or a ZIP of a rig (node_00, node_01 …) or of a folder of
-TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood, Open3D or COLMAP. Up to three frames of it become nodes."""
+TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood, Open3D or COLMAP, or of a pair (color.png, depth.png,
+intrinsics.json)."""
 INSTEAD = "use packetmesh import and reconstruct for larger files"
 
 
@@ -36,7 +38,7 @@ class OwnFolder:
         ui: Ui,
         below: Path,
         on_pair: Callable[[ImagePair], None],
-        on_recording: Callable[[Path, str], None],
+        on_recording: Callable[[Path, str, float | None, int], None],
     ) -> None:
         """Add the folder.
 
@@ -44,29 +46,34 @@ class OwnFolder:
             ui: where to add it.
             below: folder of the session.
             on_pair: called with a pair that is to be reconstructed.
-            on_recording: called with the file of a recording and a name for its rig.
+            on_recording: called with the file of a recording, a name for its rig, depth units in a metre if
+                they are given, and how many frames become nodes.
         """
         self._ui, self._below = ui, below
         self._on_pair, self._on_recording = on_pair, on_recording
         self._files: dict[str, Path] = {}
         gui = ui.gui
         with gui.add_folder("Use your own images", expand_by_default=False):
+            self._scale = gui.add_number(
+                "Units per m",
+                0.0,
+                min=0.0,
+                max=100_000.0,
+                step=1.0,
+                hint="Depth units in one metre (--depth-scale): 5000 for TUM's images. 0 takes whole numbers "
+                "as millimetres and metres in floating point, or what the kind of recording uses.",
+            )
             gui.add_markdown(PAIR_TEXT)
             for kind, (label, mime) in FILES.items():
                 self._add_button(label, mime, self._keep_file, kind)
-            self._scale = gui.add_number(
-                "Units per m",
-                1000.0,
-                min=1.0,
-                max=100_000.0,
-                step=1.0,
-                hint="Depth units in one metre: 1000 for millimetres; floating-point images have metres.",
-            )
             self._have = gui.add_markdown("Add all three files, then press the button.")
             gui.add_button("Reconstruct this pair", icon=viser.Icon.PLAYER_PLAY).on_click(
                 lambda _: ui.post(self._use_files)
             )
             gui.add_markdown(RECORDING_TEXT)
+            self._frames = gui.add_number(
+                "Frames", 3, min=1, max=MAX_NODES, step=1, hint="Of a recording; each becomes a node."
+            )
             self._add_button("Recording …", RECORDINGS, self._keep_recording)
             self._notes = gui.add_markdown("")
 
@@ -89,10 +96,15 @@ class OwnFolder:
         if len(self._files) < len(FILES):
             raise InputError("A pair needs a colour image, a depth image and intrinsics; add all three.")
         files = {kind: str(path) for kind, path in self._files.items()}
-        self._on_pair(ImagePair(**files, depth_scale=float(self._scale.value)))
+        self._on_pair(ImagePair(**files, depth_scale=self._depth_scale))
 
     def _keep_recording(self, file: viser.UploadedFile) -> None:
         path = keep_upload(file, self._below, "recording", RECORDING_LIMIT_BYTES, INSTEAD)
         self.tell(("Reading the recording …",))
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", Path(file.name).stem).strip(".-")[:40]
-        self._on_recording(path, f"{stem or 'rig'}-{path.stem[-3:]}")
+        name = f"{stem or 'rig'}-{path.stem[-3:]}"
+        self._on_recording(path, name, self._depth_scale, int(self._frames.value))
+
+    @property
+    def _depth_scale(self) -> float | None:
+        return float(self._scale.value) or None

@@ -58,6 +58,7 @@ class ScenePanel(Panel):
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images are shown below.")
         self.ui.when_changed(self._node, self._show_node)
         self._own = OwnFolder(self.ui, self.session.folder, self._use_pair, self._read_recording)
+        self._notes = gui.add_markdown("")
         self._color = gui.add_image(EMPTY, label="Colour image")
         self._depth = gui.add_image(EMPTY, label="Sensor depth", format="png")
         self._numbers = gui.add_html("")
@@ -80,6 +81,7 @@ class ScenePanel(Panel):
             for node in view.nodes:
                 add_cloud(self.scene, f"/scene/{node.name}/cloud", node.sensor, node.T_world_camera)
                 add_camera(self.scene, f"/scene/{node.name}/camera", node, node.T_world_camera)
+            self._notes.content = "\n\n".join(f"**{note}.**" for note in view.notes)
             names = tuple(node.name for node in view.nodes)
             if names != self._node.options:
                 self._node.options = names
@@ -132,8 +134,9 @@ class ScenePanel(Panel):
     def _use_pair(self, source: ImagePair) -> None:
         self.session.want(dataclasses.replace(self.session.spec, source=source))
 
-    def _read_recording(self, path: Path, name: str) -> None:
-        self.session.side_job("scene.recording_job:recording_job", path, name, on_end=self._use_recording)
+    def _read_recording(self, path: Path, name: str, depth_scale: float | None, frames: int) -> None:
+        words = path, name, depth_scale, frames
+        self.session.side_job("scene.recording_job:recording_job", *words, on_end=self._use_recording)
 
     def _use_recording(self, read: ReadRecording | None) -> None:
         if read is None:

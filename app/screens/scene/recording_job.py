@@ -13,8 +13,9 @@ from app.zips import opened_zip
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.importing import is_recording, iterate_import
-from pipeline.io.rigs import load_rig
+from pipeline.io.rigs import is_pair, is_rig, load_rig
 from pipeline.sources import RigFolder
+from pipeline.types import Rig
 
 UNPACKED_LIMIT_BYTES = 1 << 30
 MOST_FILES = 20_000
@@ -22,7 +23,7 @@ INSTEAD = "use packetmesh import and reconstruct for larger ones"
 
 
 def recording_job(
-    store: Store, spec: Spec, path: Path, name: str
+    store: Store, spec: Spec, path: Path, name: str, depth_scale: float | None, frames: int
 ) -> Generator[Progress, None, ReadRecording]:
     """Unpack a ZIP and make a rig of what is in it; needs nothing of the chain.
 
@@ -31,28 +32,51 @@ def recording_job(
         spec: not used.
         path: a bag or a ZIP, in the folder of the session.
         name: of the rig, which will lie beside it.
+        depth_scale: depth units in a metre; None takes what the images or the kind of recording use.
+        frames: how many frames of a recording become nodes.
 
     Raises:
-        InputError: a file that cannot be read, that is too large, or that holds no recording.
+        InputError: a file that cannot be read, that is too large, or that holds no recording or several.
     """
     yield Progress("reading the recording", 0.0)
     rig = path.with_name(name)
     if path.suffix != ".zip":
-        return (yield from _imported(path, rig))
+        return (yield from _imported(path, rig, frames, depth_scale))
     unpacked = path.with_suffix("")
     try:
-        unpack(path, unpacked)
-        places = [unpacked, *(folder for folder in sorted(unpacked.rglob("*")) if folder.is_dir())]
-        nodes = next((place for place in places if (place / "node_00").is_dir()), None)
-        if nodes is not None:
-            load_rig(nodes)  # says now what is wrong with it
-            nodes.rename(rig)
-            return ReadRecording(RigFolder(str(rig)), (f"A rig of {len(list(rig.glob('node_*')))} nodes",))
-        files = (file for file in sorted(unpacked.rglob("*")) if file.is_file())
-        found = next((place for place in [*places, *files] if is_recording(place)), unpacked)
-        return (yield from _imported(found, rig))
+        unpack(path, unpacked / "files")
+        found = _the_only(unpacked / "files")
+        if is_pair(found):
+            (unpacked / "rig").mkdir()
+            found = found.rename(unpacked / "rig" / "node_00").parent
+        if is_rig(found):
+            read = load_rig(found, depth_scale=depth_scale)  # says now what is wrong with it
+            found.rename(rig)
+            return ReadRecording(RigFolder(str(rig), depth_scale), (_rig_note(read),))
+        return (yield from _imported(found, rig, frames, depth_scale))
     finally:
         shutil.rmtree(unpacked, ignore_errors=True)
+
+
+def _rig_note(rig: Rig) -> str:
+    return f"A rig of {', '.join(frame.name for frame in rig.frames)}"
+
+
+def _the_only(unpacked: Path) -> Path:
+    """The rig, pair or recording in a folder; the folder itself if there is none.
+
+    Raises:
+        InputError: there are several.
+    """
+    found: list[Path] = []
+    for place in [unpacked, *sorted(unpacked.rglob("*"))]:
+        inside = any(outer in place.parents for outer in found)
+        if not inside and (is_rig(place) or is_pair(place) or is_recording(place)):
+            found.append(place)
+    if len(found) > 1:
+        names = ", ".join(str(place.relative_to(unpacked)) for place in found[:6])
+        raise InputError(f"The ZIP holds {len(found)} rigs or recordings ({names}); pack one of them.")
+    return found[0] if found else unpacked
 
 
 def unpack(path: Path, folder: Path) -> None:
@@ -72,7 +96,9 @@ def unpack(path: Path, folder: Path) -> None:
         archive.extractall(folder)
 
 
-def _imported(path: Path, rig: Path) -> Generator[Progress, None, ReadRecording]:
-    report = yield from iterate_import(path, rig)
+def _imported(
+    path: Path, rig: Path, frames: int, depth_scale: float | None
+) -> Generator[Progress, None, ReadRecording]:
+    report = yield from iterate_import(path, rig, frames, depth_scale)
     found = f"{report.kind}: {len(report.frames)} of {report.candidates} frames became nodes"
     return ReadRecording(RigFolder(str(rig)), (found, *report.notes))

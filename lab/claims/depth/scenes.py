@@ -92,7 +92,7 @@ def real_frame(folder: Path) -> Iterator[Example]:
 
 def user_sets() -> tuple[Site, ...]:
     """The sets that ``PACKETMESH_DEPTH_SETS`` names, all their images."""
-    named = [text for text in os.environ.get(SETS_VARIABLE, "").split(os.pathsep) if text]
+    named = named_sets()
     kinds = [text.partition("=")[0].strip().lower() for text in named]
     return tuple(
         Site(
@@ -104,6 +104,11 @@ def user_sets() -> tuple[Site, ...]:
         )
         for text, kind in zip(named, kinds, strict=True)
     )
+
+
+def named_sets() -> list[str]:
+    """``kind=path`` of each set that ``PACKETMESH_DEPTH_SETS`` names."""
+    return [text for text in os.environ.get(SETS_VARIABLE, "").split(os.pathsep) if text]
 
 
 def pairs(text: str) -> Iterator[Example]:

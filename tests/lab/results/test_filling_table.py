@@ -1,5 +1,6 @@
 """The section about filling says what its record says, programs and sizes side by side."""
 
+from lab.results.completion import target, trust, whole_holes
 from lab.results.pages import readme_results
 from lab.results.record import Record
 from lab.results.tables import filling
@@ -68,3 +69,30 @@ def test_the_readme_has_ours_the_flat_guess_and_the_best_of_the_rest():
         "a flat guess 0.0200 [0.0100, 0.0400], "
         "nearest 0.0600 [0.0300, 0.1200]."
     )
+
+
+def test_what_completion_is_worth_is_said_of_the_target_the_hidden_and_the_own_holes():
+    runs = [
+        run("packetmesh", "rooms, disc of 75 px", 0.066),
+        run("nearest", "rooms, disc of 75 px", 0.1),
+        run("packetmesh", "rooms, disc of 40 px", 0.104),
+        run("nearest", "rooms, disc of 40 px", 0.1),
+        run("packetmesh", "rooms, disc of 10 px", 0.5),
+        run("nearest", "rooms, disc of 10 px", 0.1),
+        run("packetmesh", "rooms, hidden", 0.0105),
+        run("colour network", "rooms, hidden", 0.01),
+        run("packetmesh", "rooms, own holes", 0.091),
+        run("colour network", "rooms, own holes", 0.1),
+    ]
+    assert "It has at 75 px in rooms (0.66); elsewhere it has 1.04 to 1.04 times" in target(runs)
+    said = whole_holes(runs)
+    assert "rooms +5 %, which is not certain" in said
+    assert "own holes, which is where it is used and why it ships: rooms -9 %" in said
+
+
+def test_confidence_is_too_modest_above_what_it_says_and_too_sure_below():
+    rows = [[group, "80% to 90%", 9, "85.0%", f"{true}% [1%, 2%]"] for group, true in (("a", 93), ("b", 71))]
+    said = trust(
+        {"tables": [{"title": "Confidence in bins", "rows": [*rows, ["a", "0% to 10%", 1, "", ""]]}]}
+    )
+    assert "a: 93.0 %; b: 71.0 %. Too modest: a. Too sure: b." in said

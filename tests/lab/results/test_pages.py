@@ -6,7 +6,17 @@ from dataclasses import replace
 import pytest
 
 from lab.results.markdown import change, listed, pivot, table, text
-from lab.results.pages import README, RESULTS, readme, readme_results, results_page
+from lab.results.pages import (
+    DEPTH_README,
+    README,
+    RESULTS,
+    WORTH,
+    marked,
+    readme,
+    readme_results,
+    results_page,
+    worth,
+)
 from lab.results.record import read_records
 from lab.results.tables import losses
 
@@ -36,6 +46,12 @@ def test_the_page_of_results_is_what_the_records_say():
 def test_the_results_in_the_readme_are_what_the_records_say():
     page = README.read_text("utf-8")
     assert readme(page, RECORDS) == page, "run `make results`"
+
+
+def test_what_the_networks_readme_says_of_completion_is_what_the_records_say():
+    page = DEPTH_README.read_text("utf-8")
+    assert marked(page, worth(RECORDS)) == page, "run `make results`"
+    assert WORTH.read_text("utf-8") == f"{worth(RECORDS)}\n", "run `make results`"
 
 
 @pytest.mark.parametrize("name", RECORDS)

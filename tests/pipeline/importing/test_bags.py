@@ -5,18 +5,11 @@ import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
-from packetmesh.settings import with_settings
-from pipeline.config import PRESETS
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.importing import iterate_import
-from pipeline.io.demos import load_demo
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import read_depth
 from pipeline.io.rigs import load_rig
-from pipeline.reconstruct import iterate_reconstruction
-from pipeline.run_folder import metrics_of
-from pipeline.sources import RigFolder
-from pipeline.spec import Spec
 from tests.pipeline.importing.bags import DEPTHS, write_bag
 from tests.pipeline.importing.recordings import orbit
 
@@ -64,15 +57,38 @@ def test_one_camera_gives_moments_spread_over_the_bag(tmp_path):
     assert any("reconstruct looks for their poses" in note for note in report.notes)
 
 
-def test_a_demo_that_went_through_a_bag_is_reconstructed(tmp_path):
-    demo = load_demo("living-room")
-    write_bag(tmp_path / "recording", demo, moments=1)
-    imported(tmp_path)
-    config = with_settings(PRESETS["packetmesh"], ["surface.max_points=5000"])
-    spec = Spec(RigFolder(str(tmp_path / "rig")), "packetmesh", config)
-    after = metrics_of(drain(iterate_reconstruction(spec)))["surface_after"]
-    assert after["triangles"] > 1000
-    assert after["within_2pct_share"] > 0.8
+@pytest.mark.parametrize(
+    ("cameras", "leave_out", "nodes", "says"),
+    [
+        (3, "cam1/depth", 2, ["/cam1/color/image is left out: no depth belongs to it"]),
+        (
+            3,
+            "cam2/color/camera_info",
+            2,
+            [
+                "/cam2/color/image is left out: it has no camera_info",
+                "/cam2/depth/image is left out: it has no colour of its own",
+            ],
+        ),
+        (3, "cam0/color/image", 2, ["/cam0/depth/image is left out: it has no colour of its own"]),
+        (8, "nothing", 6, [f"/cam{n}/color/image is left out: a rig has at most 6 nodes" for n in (6, 7)]),
+        (2, "nothing", 2, []),
+    ],
+)
+def test_every_camera_that_is_left_out_is_named_with_the_reason(tmp_path, cameras, leave_out, nodes, says):
+    write_bag(tmp_path / "recording", orbit(cameras), leave_out=leave_out)
+    report, rig = imported(tmp_path)
+    assert len(rig.frames) == nodes
+    assert [note for note in report.notes if "left out" in note] == says
+
+
+def test_a_scan_tells_how_far_it_is_and_can_be_stopped(tmp_path):
+    write_bag(tmp_path / "recording", orbit(2), moments=30)
+    steps = iterate_import(tmp_path / "recording", tmp_path / "rig")
+    told = [next(steps).fraction for _ in range(4)]
+    assert told == sorted(set(told))
+    steps.close()
+    assert not (tmp_path / "rig").exists()
 
 
 @pytest.mark.parametrize(

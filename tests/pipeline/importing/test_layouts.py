@@ -1,5 +1,7 @@
 """Recordings in other people's layouts become the rig they were written from."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from pipeline.geometry import LEVEL_POSE, look_at, rigid
 from pipeline.importing import iterate_import
 from pipeline.io.images import read_depth
 from pipeline.io.rigs import load_rig
-from pipeline.types import RgbdFrame, Rig
+from pipeline.types import DepthMap, RgbdFrame, Rig
 from tests.pipeline.importing.recordings import (
     CAMERA,
     LAYOUTS,
@@ -193,7 +195,7 @@ def all_unknown(folder):
         (damaged_trajectory, "Redwood's format"),
         (bad_list, "noon"),
         (two_recordings, "seq-01, seq-02"),
-        (all_unknown, "zero everywhere"),
+        (all_unknown, "no depth anywhere"),
     ],
 )
 def test_what_cannot_be_used_gets_one_sentence_and_leaves_nothing(tmp_path, spoil, says):
@@ -233,3 +235,39 @@ def test_cancelling_leaves_nothing(tmp_path):
 def test_a_mean_pose_of_look_at_has_z_up():
     """What the test above takes as upright is so by the rig's own convention."""
     assert -look_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0))[2, 1] > 0.9
+
+
+def test_frames_that_were_not_looked_at_and_extrinsics_that_are_missing_are_said(tmp_path, monkeypatch):
+    monkeypatch.setattr("pipeline.importing.numbered.MOST_CANDIDATES", 4)
+    written = orbit(10)
+    write_scannet(tmp_path / "recording", written)
+    report, _ = imported(tmp_path)
+    assert report.candidates == 4
+    assert "Of 10 frames one in 3 was looked at" in report.notes
+    assert not any("extrinsic" in note for note in report.notes)
+
+
+@pytest.mark.parametrize("suffix", [".tif", ".npy", ".pgm"])
+def test_depth_may_come_in_other_suffixes(tmp_path, suffix):
+    """And in floating point it is in metres, unless a scale is given."""
+    written = orbit(3)
+    write_redwood(tmp_path / "recording", written)
+    for path in sorted((tmp_path / "recording" / "depth").glob("*.png")):
+        units = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        path.unlink()
+        other = path.with_suffix(suffix)
+        if suffix == ".npy":
+            np.save(other, units / np.float32(1000.0))
+        else:
+            cv2.imwrite(str(other), units)
+    _, rig = imported(tmp_path)
+    for frame, expected in zip(rig.frames, written.frames, strict=True):
+        assert_same(frame, expected)
+
+
+def test_a_wrong_scale_of_a_recording_is_said_by_its_values(tmp_path):
+    """Millimetres times five where the kind has millimetres."""
+    frames = tuple(replace(frame, depth=DepthMap(5.0 * frame.depth.z_m)) for frame in orbit(2).frames)
+    write_redwood(tmp_path / "recording", Rig("five", frames))
+    report, _ = imported(tmp_path)
+    assert sum("try --depth-scale 5000" in note for note in report.notes) == 1

@@ -81,11 +81,16 @@ def test_colours_come_back(tmp_path, name, data, expected):
     np.testing.assert_array_equal(read_color(tmp_path / name), expected)
 
 
-def test_units_heed_the_scale_and_metres_do_not(tmp_path):
-    (tmp_path / "a.npy").write_bytes(npy(MM))
-    (tmp_path / "b.npy").write_bytes(npy(METRES))
+@pytest.mark.parametrize("type_", [np.uint16, np.int32, np.int64, np.float32])
+def test_a_scale_that_is_given_holds_for_every_type(tmp_path, type_):
+    values = MM.astype(type_)
+    (tmp_path / "a.npy").write_bytes(npy(values))
     np.testing.assert_allclose(read_depth(tmp_path / "a.npy", 5000.0).z_m, METRES / 5.0, rtol=1e-6)
-    np.testing.assert_array_equal(read_depth(tmp_path / "b.npy", 5000.0).z_m, METRES)
+    if type_ != np.float32:
+        np.testing.assert_allclose(read_depth(tmp_path / "a.npy").z_m, METRES, rtol=1e-6)
+    else:
+        (tmp_path / "mm.tif").write_bytes(tiff(values))
+        np.testing.assert_allclose(read_depth(tmp_path / "mm.tif", 1000.0).z_m, METRES, rtol=1e-6)
 
 
 def test_a_rig_takes_the_only_image_of_a_name(tmp_path):
@@ -114,15 +119,15 @@ BAD = {
     "cut.pfm": (opencv(METRES, ".pfm")[:-9], "truncated"),
     "cut.exr": (exr(Z=METRES)[:-90], "truncated or damaged"),
     "nameless.exr": (exr(a=METRES, b=METRES), "truncated or damaged"),
-    "colours.exr": (exr(R=METRES, G=METRES, B=METRES), "3 channels"),
+    "colours.exr": (exr(R=METRES, G=METRES, B=METRES), r"3 channel\(s\)"),
     "bomb.npy": (header_only((200_000, 200_000)), "truncated or damaged"),
     "bomb.pfm": (b"Pf\n200000 200000\n-1.0\n", "200000 x 200000 pixels"),
     "pickle.npy": (npy(np.array([{}], object)), "truncated or damaged"),
     "text.npy": (npy(np.array([["a"]])), "no image"),
-    "line.npy": (npy(METRES[0]), "no image"),
-    "three.npy": (npy(np.dstack([METRES] * 3)), "3 channels"),
-    "bytes.npy": (npy(RGB[..., 0]), "one of 16 is needed"),
-    "millimetres.npy": (npy(1000.0 * METRES), "divide it by 1000"),
+    "line.npy": (npy(METRES[0]), "truncated or damaged"),
+    "three.npy": (npy(np.dstack([METRES] * 3)), r"3 channel\(s\)"),
+    "bytes.npy": (npy(RGB[..., 0]), "one of 16 or more is needed"),
+    "millimetres.npy": (npy(1000.0 * METRES), "try --depth-scale 1000, which"),
     "nothing.npy": (npy(np.zeros((4, 4))), "no depth anywhere"),
     "words.pfm": (b"Pf\nwide high\n-1.0\n", "truncated or damaged"),
 }

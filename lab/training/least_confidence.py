@@ -1,6 +1,6 @@
 """What a surface gains and loses with the confidence below which nothing is filled.
 
-``python tests/benchmarks/least_confidence.py [ROOMS]`` reconstructs one view of each of 24 rooms of the
+``python -m lab.training.least_confidence [ROOMS]`` reconstructs one view of each of 24 rooms of the
 validation split with ``depth.least_confidence`` from 0 to 0.8 and prints medians over them: rays without
 a surface, the F-score at 5 cm, and the share of the area more than 5 cm off the truth, much of which
 are skirts from objects to what stands behind them. Test rooms, demo scenes and real frames take no part.
@@ -10,11 +10,8 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from lab.training.dataset import FIRST_SEED, viewed_room
 from lab.worlds.raycast import world_mesh
@@ -29,6 +26,7 @@ WIDTH_PX = 640
 
 
 def rig_of(seed: int) -> Rig:
+    """One view of a room, sensed, with its truth."""
     room = viewed_room(seed, None, threads=0, views=1)
     ((small, T_world_camera),) = room.cameras
     camera = scaled(small, WIDTH_PX / small.width_px)
@@ -39,6 +37,7 @@ def rig_of(seed: int) -> Rig:
 
 
 def measured(rig: Rig, level: float) -> tuple[float, ...]:
+    """Rays without a surface, F-score and share of the area that is off, at a least confidence."""
     preset = PRESETS["packetmesh"]
     result = reconstruct(rig, replace(preset, depth=replace(preset.depth, least_confidence=level)))
     truth = result.truth_after
@@ -47,6 +46,7 @@ def measured(rig: Rig, level: float) -> tuple[float, ...]:
 
 
 def main() -> None:
+    """Print a table, a line for each level."""
     rooms = int(sys.argv[1]) if len(sys.argv) > 1 else 24
     shares = np.array(
         [

@@ -1,0 +1,145 @@
+"""What completion and its confidence are worth, in plain words, from their records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+from lab.benchmarks.filling import NETWORK, OURS
+from lab.results import tables
+from lab.results.markdown import Row, listed
+from lab.results.record import Records
+from pipeline.depth.completion import SHIPPED_COMPLETION
+from pipeline.depth.slopes import GRID_WIDTH_PX
+
+TARGET, TARGET_PX = 0.75, 40
+"""Times the error of the best of the others, at discs of so many pixels and more."""
+SAID = "80% to 90%"
+"""The bin of confidence that is told of."""
+SAID_SHARES = (80.0, 90.0)
+TUNING = (
+    "Which sets had a part in tuning: the validation rooms had; held-out rooms, demo scenes and real frames "
+    "had none."
+)
+
+
+def standing(records: Records) -> list[str]:
+    """All there is to say, a paragraph each; none without the records."""
+    found = []
+    if "bench_depth" in records:
+        runs = [run for run in records["bench_depth"].numbers["depth"]["runs"] if "group" in run]
+        found += [target(runs), whole_holes(runs), reasons()]
+    if "fill_claims" in records:
+        found.append(trust(records["fill_claims"].numbers["D10"]))
+    return found
+
+
+def filling(numbers: Row) -> str:
+    """The tables of hidden holes, what they come to, and what had a part in tuning."""
+    runs = [run for run in numbers["depth"]["runs"] if "group" in run]
+    return "\n\n".join((tables.filling(numbers), target(runs), whole_holes(runs), reasons(), TUNING))
+
+
+def fill_claims(numbers: Row) -> str:
+    """D10 with what it comes to."""
+    return "\n\n".join((tables.our_claims(numbers), trust(numbers["D10"]), TUNING))
+
+
+def depth_claims(numbers: Row) -> str:
+    """C12 to C14, and what had a part in tuning."""
+    return tables.claims(numbers, TUNING)
+
+
+def target(runs: Sequence[Row]) -> str:
+    """Where the target is reached, and what is reached elsewhere."""
+    ratios = {}
+    for group in _groups(runs, ", disc of "):
+        kind, _, size = group.partition(", disc of ")
+        if int(size.split()[0]) >= TARGET_PX:
+            ours, _, other = _best(runs, group)
+            ratios[f"{size} in {kind}"] = ours / other
+    reached = [f"{place} ({ratio:.2f})" for place, ratio in ratios.items() if ratio <= TARGET]
+    missed = [ratio for ratio in ratios.values() if ratio > TARGET]
+    rest = f"; elsewhere it has {min(missed):.2f} to {max(missed):.2f} times that error" if missed else ""
+    return (
+        f"**The target.** Completion was to have at most {TARGET} times the error of the best of the others "
+        f"at discs of {TARGET_PX} px and more. It has at {listed(reached)}{rest}."
+    )
+
+
+def whole_holes(runs: Sequence[Row]) -> str:
+    """Hidden shapes of real holes, and the sensors' own holes."""
+    hidden, own = [], []
+    for group in _groups(runs, ", hidden"):
+        ours, other = (_run(runs, group, name) for name in (OURS, NETWORK))
+        low, high = other["excess_ci95"]
+        sure = "" if low > 0.0 or high < 0.0 else ", which is not certain"
+        more = 100.0 * (ours["abs_rel"] / other["abs_rel"] - 1.0)
+        hidden.append(f"{group.removesuffix(', hidden')} {more:+.0f} %{sure}")
+    for group in _groups(runs, ", own holes"):
+        ours_error, best, other_error = _best(runs, group)
+        network = _run(runs, group, NETWORK)["abs_rel"]
+        less, than_best = (100.0 * (ours_error / error - 1.0) for error in (network, other_error))
+        named = "the best of the others" if best == NETWORK else f"{than_best:+.0f} % to {best}, the best"
+        own.append(f"{group.removesuffix(', own holes')} {less:+.0f} % ({named})")
+    return (
+        "**Where it earns its place.** Error of completion against that of the colour network alone. Over "
+        f"all hidden pixels of shapes of real holes: {'; '.join(hidden)}. In the sensors' own holes, which "
+        f"is where it is used and why it ships: {'; '.join(own)}."
+    )
+
+
+def reasons() -> str:
+    """Why it is no better, with the numbers of its training."""
+    images, minutes = _training()
+    return (
+        f"**Why no better.** It was trained on {images:,} frames in {minutes} minutes of two cores, and "
+        f"its loss was still falling. Its grid has {GRID_WIDTH_PX} cells across, and what is smaller "
+        "is blurred. And near a rim the measurements around it say nearly all there is to know: whoever "
+        "continues them does well."
+    )
+
+
+def trust(claim: Row) -> str:
+    """Said against true, of the pixels said to be right with 80 to 90 %."""
+    (bins,) = (found for found in claim["tables"] if found["title"] == "Confidence in bins")
+    shares = {group: true for group, span, _, _, true in bins["rows"] if span == SAID}
+    low, high = SAID_SHARES
+    modest = [group for group, true in shares.items() if _share(true) > high]
+    sure = [group for group, true in shares.items() if _share(true) < low]
+    measured = "; ".join(f"{group}: {_share(true):.1f} %" for group, true in shares.items())
+    return (
+        f"**Its confidence.** Of pixels said to be right with {low:.0f} to {high:.0f} %, so many are: "
+        f"{measured}. Too modest: {'; '.join(modest) or 'none'}. Too sure: {'; '.join(sure) or 'none'}. A "
+        "sensor's own holes are where it fails: dark, shiny and far things, unlike what surrounds them. "
+        "Hidden shapes lie where it measured, on things that are easier to continue."
+    )
+
+
+def _groups(runs: Sequence[Row], ending: str) -> list[str]:
+    return [group for group in dict.fromkeys(run["group"] for run in runs) if ending in group]
+
+
+def _run(runs: Sequence[Row], group: str, program: str) -> Row:
+    return next(run for run in runs if run["group"] == group and run["program"] == program)
+
+
+def _best(runs: Sequence[Row], group: str) -> tuple[float, str, float]:
+    """Our error, and the best of the others with its own."""
+    others = [run for run in runs if run["group"] == group and run["program"] != OURS]
+    best = min(others, key=lambda run: run["abs_rel"])
+    return _run(runs, group, OURS)["abs_rel"], best["program"], best["abs_rel"]
+
+
+def _share(cell: str) -> float:
+    return float(cell.split("%")[0])
+
+
+@cache
+def _training() -> tuple[int, int]:
+    """Frames and minutes, as the network's file says."""
+    import onnxruntime
+
+    session = onnxruntime.InferenceSession(SHIPPED_COMPLETION, providers=["CPUExecutionProvider"])
+    told = session.get_modelmeta().custom_metadata_map
+    return int(told["images_seen"]), int(told["minutes"])

@@ -1,0 +1,118 @@
+"""What the numbers of a depth image mean: units in a metre, unknown values, and what is doubtful."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from packetmesh.errors import InputError
+from pipeline.types import AnyPath, BoolArray
+
+MILLIMETRES = 1000.0
+"""Depth units in one metre where nothing else is said."""
+COMMON_DEPTH_SCALES = (1.0, 100.0, 256.0, 1000.0, 5000.0, 10000.0)
+"""Units per metre that RGB-D data sets use."""
+NO_VALUE = 65535
+"""What some data sets (7-Scenes) write where the depth is unknown, beside 0."""
+FARTHEST_M = 65.534
+"""What is left for 16 bits of millimetres."""
+FARTHEST_FLOAT_M, MOST_FAR_SHARE = 1e6, 0.05
+"""Floating-point depths beyond are none; so many of them tell of a file that is understood wrongly."""
+PLAUSIBLE_MEDIAN_M = (0.01, 100.0)
+"""Beyond these an image is refused."""
+ROOM_M = (0.2, 15.0)
+"""Median depths between which nothing is said."""
+STEPS = {5: "as TUM stores 5000 to the metre", 8: "as SUN RGB-D stores them with rotated bits"}
+"""Of depth that was measured in millimetres and stored as multiples of them, by whom."""
+_STEP_SHARE = 0.95
+"""Of the values: rotated bits are multiples of eight only up to 8.191 m."""
+_TYPICAL_DEPTH_M = 2.0
+
+
+def known_in(values: NDArray[Any]) -> BoolArray:
+    """(H, W) where the values of a depth image are depths."""
+    if values.dtype.kind == "f":
+        return np.isfinite(values) & (values > 0)
+    return (values > 0) & (values != NO_VALUE)
+
+
+def usual_scale(values: NDArray[Any]) -> float:
+    """Units per metre where nobody says more: floating-point depth is in metres, whole numbers are
+    millimetres."""
+    return 1.0 if values.dtype.kind == "f" else MILLIMETRES
+
+
+def doubts(values: NDArray[Any], depth_scale: float, stated: bool) -> tuple[str, ...]:
+    """What is doubtful about a depth image read at a scale, a sentence each, with what to try.
+
+    Args:
+        values: (H, W) as they stand in the file; some are known.
+        depth_scale: units per metre at which they are read.
+        stated: whether a person gave the scale, so that the values' steps say nothing against it.
+    """
+    known = values[known_in(values)]
+    median_m = float(np.median(known)) / depth_scale
+    step = None if stated or depth_scale != MILLIMETRES else step_of(known)
+    found = []
+    if step is not None:
+        found.append(
+            f"All depth values are multiples of {step}, {STEPS[step]}, but were read as millimetres: their "
+            f"median is {median_m:.3g} m; try --depth-scale {step * MILLIMETRES:g}, which makes it "
+            f"{median_m / step:.3g} m, or --depth-scale {MILLIMETRES:g} if they are millimetres"
+        )
+    elif not ROOM_M[0] <= median_m <= ROOM_M[1]:
+        found.append(
+            f"The median depth is {median_m:.3g} m at {depth_scale:g} units in a metre; no room is like "
+            f"that: {_try(median_m * depth_scale)}"
+        )
+    empty = float(np.mean(values == NO_VALUE)) if values.dtype.kind in "iu" else 0.0
+    if empty:
+        found.append(f"{empty:.1%} of the depth values are {NO_VALUE}, which is read as unknown")
+    return tuple(found)
+
+
+def step_of(known: NDArray[Any]) -> int | None:
+    """The one of ``STEPS`` of which nearly all (N,) values are multiples, odd and even ones; else None."""
+    if known.dtype.kind == "f":
+        return None
+    for step in STEPS:
+        odd = float(np.mean(known % (2 * step) == step))
+        if 0.1 <= odd <= 0.9 and np.mean(known % step == 0) >= _STEP_SHARE:
+            return step
+    return None
+
+
+def check_median(path: AnyPath, values: NDArray[Any], depth_scale: float) -> None:
+    """Refuse a scale at which the values are no distances at all.
+
+    Raises:
+        InputError: with the scale to try.
+    """
+    known = values[known_in(values)]
+    median_units = float(np.median(known))
+    nearest_m, farthest_m = PLAUSIBLE_MEDIAN_M
+    if not nearest_m <= median_units / depth_scale <= farthest_m:
+        raise InputError(
+            f"The depth image {path} has a median depth of {median_units / depth_scale:.3g} m at "
+            f"{depth_scale:g} units in a metre; {_try(median_units)}"
+        )
+    if np.mean(known / depth_scale > FARTHEST_FLOAT_M) > MOST_FAR_SHARE:
+        raise InputError(
+            f"The numbers in the depth image {path} are no depths, as if their bytes were in another order; "
+            "try to export it again"
+        )
+
+
+def likely_depth_scale(median_units: float) -> float:
+    """The usual depth scale at which this median comes nearest to 2 m, if possible within a room."""
+    nearest_m, farthest_m = ROOM_M
+    rooms = [scale for scale in COMMON_DEPTH_SCALES if nearest_m <= median_units / scale <= farthest_m]
+    typical_scale = median_units / _TYPICAL_DEPTH_M
+    return min(rooms or COMMON_DEPTH_SCALES, key=lambda scale: abs(np.log(scale / typical_scale)))
+
+
+def _try(median_units: float) -> str:
+    scale = likely_depth_scale(median_units)
+    return f"try --depth-scale {scale:g}, which makes it {median_units / scale:.3g} m"
