@@ -226,6 +226,8 @@ class Curve:
     low: float = 0.0
     high: float = 1.0
     """Values at the lower and upper edge of the lane."""
+    digits: int | None = None
+    """Behind the point, so that a number that runs does not jump; None: three in all."""
 
     def at(self, t_ns: NDArray[np.int64]) -> FloatArray:
         """The value at each time; NaN before the first."""
@@ -237,7 +239,7 @@ class Curve:
         value = float(self.at(np.array(now_ns)))
         if not np.isfinite(value):
             return f"{self.name} –"
-        number = f"{value:.0f}" if self.unit == "%" else f"{value:.3g}"
+        number = f"{value:.3g}" if self.digits is None else f"{value:.{self.digits}f}"
         return f"{self.name} {number} {self.unit}".rstrip()
 
 

@@ -2,6 +2,7 @@
 
 import re
 from itertools import combinations
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from app.screens.fuse.board import scale, score
 from app.screens.fuse.distances import REACH_M, Distances, shades_of
 from app.screens.fuse.labels import COMPARISONS, RIVALS
 from app.screens.fuse.methods import METHODS, color_of
-from app.screens.fuse.view import SUCCESS_M, Race
+from app.screens.fuse.view import SUCCESS_M, Race, Reference
 from pipeline import config
 from pipeline.geometry import rigid, rotation_exp
 from tests.app.test_fuse_numbers import lane
@@ -40,7 +41,7 @@ def test_the_default_race_differs_in_the_weights_only_and_the_next_in_the_metric
 
 @pytest.mark.parametrize(
     ("error_m", "number", "state"),
-    [(0.104, "10.4", "missed"), (0.0012, "0.12", "arrived"), (SUCCESS_M, "2.0", "missed")],
+    [(0.104, "10.40", "missed"), (0.000328, "0.03", "arrived"), (SUCCESS_M, "2.00", "missed")],
 )
 def test_the_number_over_a_lane_is_its_distance_from_the_truth(error_m, number, state):
     said = score(lane("ICP point", error_m), 0)
@@ -49,9 +50,14 @@ def test_the_number_over_a_lane_is_its_distance_from_the_truth(error_m, number, 
 
 def test_without_truth_it_is_the_distance_to_the_other_cloud_and_nobody_arrives():
     said = score(lane("ICP point", None), 0)
-    assert (said["number"], said["unit"]) == ("3.0", "cm to the nearest point")
+    assert (said["number"], said["unit"]) == ("3.00", "cm to the nearest point")
     assert said["state"] == "running"
-    assert scale(False)["text"] != scale(True)["text"]
+
+
+def test_the_scale_names_the_truth_only_where_it_is_known():
+    texts = {reference: scale(reference)["text"] for reference in get_args(Reference)}
+    assert len(set(texts.values())) == 3
+    assert [reference for reference, text in texts.items() if "truth" in text] == ["truth"]
 
 
 def cloud():

@@ -31,7 +31,7 @@ from app.ui import Panel
 from pipeline.config import Method
 
 TEXT = """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
-are how far every point is from where it belongs. **Play** below (space), then compare what made the
+are how far off every point is. **Play** below (space), then compare what made the
 difference."""
 SINGLE = """This scene has a single node: no other node to find its place beside. What races here is its
 inferred cloud, onto what its sensor measured."""
@@ -234,7 +234,7 @@ class FusePanel(Panel):
             self._place_gizmo()
             self._board.load(view)
             self._verdict.content, self._table.content = RUNNING, ""
-            self._player.load(view.lanes)
+            self._player.load(view.lanes, view.reference)
             self._player.seek_at(self._seek_at)
             self._seek_at = 0
             self._arrange()
@@ -258,8 +258,8 @@ class FusePanel(Panel):
             self._board.mark(self._seen)
             self._charts.mark(float(clock.shown(np.array(now_ns))), self._seen)
             if now_ns >= clock.end_ns and self._view is not None:
-                self._verdict.content = verdict(self._view.lanes)
-                self._table.content = race_table(self._view.lanes)
+                self._verdict.content = verdict(self._view.reference, self._view.lanes)
+                self._table.content = race_table(self._view.reference, self._view.lanes)
 
     # The gizmo.
 

@@ -73,7 +73,7 @@ class RaceSetup:
             [*STARTS, BY_HAND],
             initial_value=SLIGHTLY,
             hint="How far from aligned the moving cloud starts. Aligned is the truth where it is known, "
-            "otherwise what the nodes believe.",
+            "otherwise what the nodes believe; an inferred cloud is aligned where its own pixels are.",
         )
         self._ui.when_changed(self._preset, self._picked_preset)
 
