@@ -274,8 +274,8 @@ class Session:
         actions = self.gui.add_button_group(
             "All steps",
             ("Cancel", "Retry", "Reset", "Copy as command"),
-            hint="Cancel stops what is computing; Retry runs a cancelled or failed step again; Reset goes "
-            "back to the settings of the start; Copy as command shows the command that computes the same.",
+            hint="Cancel stops what is computing; Retry runs a cancelled or failed step again; Reset takes "
+            "settings, race, network and lessons back to the start; Copy as command shows the command line.",
         )
         actions.on_click(lambda event: self.post(self._act, event.target.value))
         self._address: Address | None = None
@@ -356,6 +356,8 @@ class Session:
             self.results.retry_failed()
             self.advance()
         elif action == "Reset":
+            for reset in self.ui.resets:
+                reset()
             self.want(self._start)
         else:
             self.ui.show_command(self._current.command)

@@ -145,6 +145,11 @@ class FusePanel(Panel):
         self._show_parts()
         self._widen()
 
+    def on_action(self, action: str) -> None:
+        """Go back to the race of the start, once the session has gone back to its settings."""
+        if action == "Reset":
+            self.ui.post(self._reset)
+
     # What races.
 
     def _choose_nodes(self, names: list[str]) -> None:
@@ -182,6 +187,20 @@ class FusePanel(Panel):
         if not self._start() and self._view is not None:
             self._take_race(self._view)
         self._charts.choose_lane(stop.lane)
+
+    def _reset(self) -> None:
+        with self.ui.atomic():
+            self._shown.value = self._shown.options[0]
+            self._setup.reset(RACES[self._shown.value])
+            self._player.choose(in_ms=False)
+            self._dragging.value = False
+            self._place_gizmo()
+            self._capture.forget()
+            self._mapped = None
+        if not self._start() and self._view is not None:
+            self._player.load(self._view.lanes, self._view.reference)
+        self._charts.choose_lane(0)
+        self._arrange()
 
     def _picked_cell(self, turn_deg: float, shift_m: float) -> None:
         with self.ui.atomic():
