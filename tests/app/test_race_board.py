@@ -4,6 +4,7 @@ import re
 from itertools import combinations
 from typing import get_args
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -29,6 +30,24 @@ def test_every_method_says_what_it_does_in_two_sentences_and_where_it_is_from():
 def test_every_method_and_metric_has_a_colour_of_its_own():
     colors = np.array([color_of(rival) for rival in RIVALS.values()], float)
     assert min(np.abs(one - other).max() for one, other in combinations(colors, 2)) >= 12
+
+
+SEEN = {  # linear RGB as a person sees it, from Machado, Oliveira, Fernandes (2009), severity 1
+    "normal": np.eye(3),
+    "protanopia": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+    "deuteranopia": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+    "tritanopia": [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
+}
+
+
+@pytest.mark.parametrize("eyes", SEEN)
+def test_four_lanes_are_told_apart_whatever_colours_one_sees(eyes):
+    colors = np.array([[color_of(rival) for rival in COMPARISONS["All four"]]]) / 255.0
+    linear = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(linear @ np.transpose(SEEN[eyes]), 0.0, 1.0)
+    shown = np.where(seen <= 0.0031308, 12.92 * seen, 1.055 * seen ** (1 / 2.4) - 0.055)
+    lab = cv2.cvtColor(shown.astype(np.float32), cv2.COLOR_RGB2LAB)[0]
+    assert min(np.linalg.norm(one - other) for one, other in combinations(lab, 2)) > 18
 
 
 def test_the_default_race_differs_in_the_weights_only_and_the_next_in_the_metric_only():

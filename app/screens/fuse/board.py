@@ -16,7 +16,7 @@ from typing import Any
 from app.dock_row import add_hidden
 from app.drawing.colors import DISTANCE_STOPS, MOST_DISTANCE_M, css
 from app.page import running
-from app.screens.fuse.draw import BAND
+from app.screens.fuse.draw import FOOT
 from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import METHODS, METRICS, color_of
 from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, LensView, RaceLane, RaceStep, RaceView, Reference
@@ -66,7 +66,7 @@ class Board:
             kind="setup",
             visible=self._visible and bool(lanes),
             lens=None if self._view is None or self._view.lens is None else _lens(self._view.lens),
-            bottom=BAND[1],
+            bottom=FOOT,
             lanes=[_head(mark, lane) for mark, lane in zip(MARKS, lanes, strict=False)],
             scale=scale("truth" if self._view is None else self._view.reference),
         )
@@ -104,6 +104,7 @@ def scale(reference: Reference) -> dict[str, Any]:
         "stops": [css(stop) for stop in DISTANCE_STOPS],
         "ends": ("0", f"{100.0 * MOST_DISTANCE_M:.0f} cm and more"),
         "target": "the cloud that stays",
+        "pairs": "pairs; dark ones count most",
     }
 
 

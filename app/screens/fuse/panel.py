@@ -76,7 +76,7 @@ class FusePanel(Panel):
         self._drawn: Start = Start()
         self._gizmo: Any = None
         self._seek_at: int | None = 0
-        self._framed: tuple[tuple[int, float], ...] = ()
+        self._framed: tuple[tuple[int, float, int], ...] = ()
         self._fov_rad: float | None = None
         self._here = False
         self._seen: tuple[int, ...] = ()
@@ -92,9 +92,9 @@ class FusePanel(Panel):
         self._setup.add_preset()
         self._player = RacePlayer(self.ui, self._moved, self._clocked)
         self._board = Board(self.ui)
-        self._charts = RaceCharts(self.ui)
         self._verdict = gui.add_markdown("")
         self._table = gui.add_html("")
+        self._charts = RaceCharts(self.ui)
         self._build_folders()
         self._rows = gui.add_html("")
 
@@ -331,7 +331,10 @@ class FusePanel(Panel):
             self._widen()
             return False
         clients = list(self.session.clients())
-        shape = tuple((client.client_id, round(client.camera.aspect, 2)) for client in clients)
+        shape = tuple(
+            (client.client_id, round(client.camera.aspect, 2), client.camera.image_height)
+            for client in clients
+        )
         if shape != self._framed and clients:
             if self._fov_rad is None:
                 self._fov_rad = clients[0].camera.fov

@@ -11,7 +11,7 @@ from app.screens.fuse.clock import CLOCKS, RaceClock
 from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.view import OFF_DIGITS, RaceLane, Reference
-from app.timeline import Curve, CurvesLane
+from app.timeline import Curve, CurvesLane, round_up
 from app.ui import Ui
 
 RUN_S = 12.0
@@ -71,9 +71,19 @@ class RacePlayer:
 def error_lane(reference: Reference, lanes: Sequence[RaceLane], clock: RaceClock) -> CurvesLane:
     """How far off every method is, all on one scale, and nothing of what is still to come."""
     offs_cm = [np.array([100.0 * step.off_m for step in lane.steps]) for lane in lanes]
-    most_cm = max(1.0, *(float(np.nanmax(off_cm, initial=0.0)) for off_cm in offs_cm))
+    high_cm = round_up(max(1.0, *(float(np.nanmax(off_cm, initial=0.0)) for off_cm in offs_cm)))
     curves = [
-        Curve(mark, "cm", color_of(lane.rival), steps_ns, off_cm, 0.0, 1.05 * most_cm, OFF_DIGITS)
+        Curve(
+            mark,
+            "cm",
+            color_of(lane.rival),
+            steps_ns,
+            off_cm,
+            0.0,
+            high_cm,
+            OFF_DIGITS,
+            lane.rival[1] == "plane",
+        )
         for mark, lane, steps_ns, off_cm in zip(MARKS, lanes, clock.steps_ns, offs_cm, strict=False)
     ]
     return CurvesLane(OFF_FROM[reference], curves, LANE_PX, veil=1.0, titled=True)
