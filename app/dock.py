@@ -327,7 +327,14 @@ class Dock:
 def _looks(lane: Lane) -> dict[str, Any]:
     """What the page knows of a lane from the start."""
     legend = list(lane.legend)
-    return {"title": lane.title, "height": lane.height_px, "veil": lane.veil, "legend": legend}
+    ticks = [(tick.y_px, tick.text) for tick in lane.ticks]
+    return {
+        "title": lane.title,
+        "height": lane.height_px,
+        "veil": lane.veil,
+        "legend": legend,
+        "ticks": ticks,
+    }
 
 
 ACTIONS: dict[str, Callable[..., None]] = {

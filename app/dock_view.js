@@ -43,7 +43,7 @@ window.packetmeshDockView ??= (() => {
 
     setLanes(lanes) {
       for (const lane of this.lanes)
-        for (const part of [lane.image, lane.words, lane.veil, lane.names]) part.remove();
+        for (const part of [lane.image, lane.words, lane.veil, lane.scale, lane.names]) part.remove();
       let top = 0;
       this.lanes = lanes.map(lane => {
         const part = (tag, className, parent) => {
@@ -56,7 +56,9 @@ window.packetmeshDockView ??= (() => {
         const words = part("div", "words", this.field);
         const veil = part("div", "veil", this.field);
         veil.style.opacity = lane.veil;
-        const made = {...lane, top, image, words, veil, names: part("div", "", this.names), wordsSaid: []};
+        const scale = part("div", "scale", this.field);
+        for (const [y, text] of lane.ticks) make("span", "", scale, {textContent: text}).style.top = `${y - 7}px`;
+        const made = {...lane, top, image, words, veil, scale, names: part("div", "", this.names), wordsSaid: []};
         top += lane.height + LANES_GAP_PX;
         return made;
       });
@@ -80,7 +82,7 @@ window.packetmeshDockView ??= (() => {
         lane.said = said;
         lane.names.replaceChildren(...(labels[index] ?? []).map(([y, text, color]) => {
           const word = make("div", "", null, {textContent: text});
-          Object.assign(word.style, {top: `${y - 8}px`, color: css(color)});
+          Object.assign(word.style, {top: `${Math.max(y - 8, -2)}px`, color: css(color)});
           return word;
         }));
       });
@@ -99,8 +101,9 @@ window.packetmeshDockView ??= (() => {
       }
       this.cursor.style.left = `${cursor}px`;
       const step = (this.window[1] - this.window[0]) / width;
-      const now = this.text(this.now, Math.max(10 ** Math.floor(Math.log10(2 * step)), 1), this.end);
-      this.time.textContent = `${this.counts} ${now} of ${this.text(this.end)}`.trim();
+      const fine = Math.max(10 ** Math.ceil(Math.log10(step)), 1);
+      const [now, end] = [this.now, this.end].map(ns => this.text(ns, fine, this.end));
+      this.time.textContent = `${this.counts} ${now} of ${end}`.trim();
       this.drawBox(scale);
       this.drawAxis(width);
     }

@@ -29,8 +29,8 @@ class Header:
         actions = gui.add_button_group(
             "All steps",
             ("Cancel", "Retry", "Reset", "Copy as command"),
-            hint="Cancel stops what is computing; Retry runs a cancelled or failed step again; Reset goes "
-            "back to the settings of the start; Copy as command shows the command that computes the same.",
+            hint="Cancel stops what is computing; Retry runs a cancelled or failed step again; Reset takes "
+            "settings, race, network and lessons back to the start; Copy as command shows the command line.",
         )
         actions.on_click(lambda event: on_action(event.target.value))
 

@@ -94,6 +94,8 @@ class Lesson(Generic[Look]):
 
     title: str
     stops: tuple[Stop[Look], ...]
+    default: Look
+    """What is shown where a section sets nothing."""
 
 
 def read_lesson(path: Path, settings: Mapping[str, Setting[Look]], default: Look) -> Lesson[Look]:
@@ -119,7 +121,7 @@ def read_lesson(path: Path, settings: Mapping[str, Setting[Look]], default: Look
     if not sections:
         raise InputError(f"The lesson {path.name} has no sections; begin each with a line '## title'.")
     stops = (_stop(section, path.name, settings, default) for section in sections)
-    return Lesson(title[1].strip(), tuple(stops))
+    return Lesson(title[1].strip(), tuple(stops), default)
 
 
 def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: Look) -> Stop[Look]:
@@ -239,6 +241,14 @@ class LessonFolder(Generic[Look]):
             )
             self._mark = ui.gui.add_html("")
         self._marked = 0
+        ui.resets.append(self.reset)
+
+    def reset(self) -> None:
+        """Leave the lesson and what its stop has set; nothing of it was guessed."""
+        if self._stop.value != OFF:
+            self._stop.value = OFF
+            self._picked()
+            self._on_stop(self._lesson.default)
 
     def _go(self, count: int) -> None:
         index = self._index() + count

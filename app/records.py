@@ -124,9 +124,14 @@ class DepthNode:
     judged: JudgedView
     truth_error_m: float | None
     """Median absolute depth error of the filled pixels, where the truth is known."""
+    network: str
+    """File of the depth network, which sees the colours alone."""
+    completion: str
+    """File of the network that fills the holes from colours and depth; empty where the other one does."""
     provider: str
+    """The execution provider that ran the depth network."""
     inference_s: float | None
-    """Time of the network on this node's image; None if it had run before."""
+    """Time of that network on this node's image; None if it had run before."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -363,6 +363,8 @@ class Session:
             self.results.retry_failed()
             self.advance()
         elif action == "Reset":
+            for reset in self.ui.resets:
+                reset()
             self.want(self._start)
         else:
             self.ui.show_command(self._current.command)

@@ -24,8 +24,12 @@ NEAR_PX = 4.0
 """Frames at least so far apart on average are shown one by one, others as rates."""
 AROUND_PX = 9
 """Neighbouring pixels over which frames and losses are averaged, so that a rate can be read."""
-ROWS_PX, ROW_PX = 180, (3, 24)
+ROWS_PX, ROW_PX = 120, (2, 24)
 """Height of all rows if they fit, and of the lowest and the highest row."""
+DASH_PX = 12
+"""Half the way from one dash of a curve to the next."""
+TICK_PX = 14
+"""Height of a value at the left edge."""
 NAME_PX = 13
 """Height of a row's name."""
 WORD_PX, WORDS = 56.0, 60
@@ -65,6 +69,8 @@ class Lane(Protocol):
     """How much of what lies after the clock is veiled: from 0, not at all, to 1, not to be seen."""
     legend: Sequence[tuple[str, Color]]
     """What its colours mean."""
+    ticks: Sequence[Label]
+    """Values of its height, written at its left edge."""
 
     def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
         """Paint (height, width, 3) RGB of the window."""
@@ -94,6 +100,7 @@ class FramesLane:
         ("frames on the air", TARGET),
         ("lost; from afar, the share lost", LOSS),
     )
+    ticks: Sequence[Label] = ()
 
     def __init__(
         self, levels: Levels, names: Sequence[str], about: Callable[[int], str], causes: Sequence[str]
@@ -226,6 +233,9 @@ class Curve:
     low: float = 0.0
     high: float = 1.0
     """Values at the lower and upper edge of the lane."""
+    digits: int | None = None
+    """Behind the point, so that a number that runs does not jump; None: three in all."""
+    dashed: bool = False
 
     def at(self, t_ns: NDArray[np.int64]) -> FloatArray:
         """The value at each time; NaN before the first."""
@@ -237,7 +247,7 @@ class Curve:
         value = float(self.at(np.array(now_ns)))
         if not np.isfinite(value):
             return f"{self.name} –"
-        number = f"{value:.0f}" if self.unit == "%" else f"{value:.3g}"
+        number = f"{value:.3g}" if self.digits is None else f"{value:.{self.digits}f}"
         return f"{self.name} {number} {self.unit}".rstrip()
 
 
@@ -256,6 +266,20 @@ class CurvesLane:
         self.title, self.height_px, self.veil, self._curves = title, height_px, veil, tuple(curves)
         self._titled = titled
         self.legend: Sequence[tuple[str, Color]] = tuple((curve.name, curve.color) for curve in curves)
+        self.ticks: Sequence[Label] = self._scale()
+
+    def _scale(self) -> list[Label]:
+        """The values at both edges and in the middle, if they are those of all curves."""
+        scales = {(curve.low, curve.high, curve.unit) for curve in self._curves}
+        if len(scales) != 1:
+            return []
+        ((low, high, unit),) = scales
+        places = (
+            (0.5 * TICK_PX, high),
+            (0.5 * self.height_px, 0.5 * (low + high)),
+            (self.height_px - 0.5 * TICK_PX, low),
+        )
+        return [Label(y_px, f"{value:g} {unit}".rstrip()) for y_px, value in places]
 
     def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
         """Paint the curves in the window."""
@@ -265,6 +289,8 @@ class CurvesLane:
         middles_ns = start_ns + pixels * (end_ns - start_ns) // (2 * len(pixels))
         for curve in self._curves:
             share = (curve.at(middles_ns) - curve.low) / (curve.high - curve.low)
+            if curve.dashed:
+                share[np.arange(len(share)) % (2 * DASH_PX) >= 1.3 * DASH_PX] = np.nan
             _draw_curve(picture, np.clip(share, 0.0, 1.0), curve.color)
 
     def labels(self, now_ns: int) -> Sequence[Label]:
@@ -292,6 +318,12 @@ class CurvesLane:
     def place(self, item: int) -> tuple[int, int, int, int]:
         """Curves have no items."""
         raise IndexError(item)
+
+
+def round_up(value: float) -> float:
+    """The next number whose half is round, too: 1, 2, 4, 6, 8 or 10 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(times * power for times in (1.0, 2.0, 4.0, 6.0, 8.0, 10.0) if times * power >= value))
 
 
 def _draw_curve(picture: ByteArray, share: FloatArray, color: Color) -> None:

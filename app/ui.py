@@ -40,6 +40,8 @@ class Ui:
     """Sends it now."""
     closers: list[Callable[[], None]] = field(default_factory=list)
     """What ends the timers and threads of the screens."""
+    resets: list[Callable[[], None]] = field(default_factory=list)
+    """What *Reset* takes back beside the settings and the screens."""
     lecture: Lecture | None = None
     """Whose browsers all see the same."""
 

@@ -194,7 +194,7 @@ class Bench:
         self.results, self.notices = Results(), []
         self.refuse = ""
         """Why nothing can be computed now."""
-        camera = SimpleNamespace(aspect=1.5, fov=0.9, position=None, look_at=None)
+        camera = SimpleNamespace(aspect=1.5, image_height=600, fov=0.9, position=None, look_at=None)
         self.client = SimpleNamespace(client_id=0, camera=camera, atomic=contextlib.nullcontext)
         self.panel = panel(self)
         self.ui.scene.add_frame(panel.drawn_below, show_axes=False)

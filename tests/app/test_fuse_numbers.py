@@ -41,33 +41,46 @@ def lane(label, error_m, reason="converged", sigma_m=float("nan"), kernel=False)
     ("errors_m", "sentence"),
     [
         ({"ICP point": 0.118, "CEICP-A plane": 0.001}, "**CEICP-A plane** ends 0.10 cm from the truth, "),
-        ({"ICP point": 0.010, "CEICP-A plane": 0.015}, "**CEICP-A plane** 1.5 cm. So CEICP loses here."),
+        ({"ICP point": 0.010, "CEICP-A plane": 0.015}, "**CEICP-A plane** 1.50 cm. So CEICP loses here."),
         ({"ICP point": 0.05, "FICP plane": 0.09}, "Nobody arrives within 2 cm."),
         (
             {"ICP point": 0.0100, "CEICP-A plane": 0.0101},
-            "Here both end equally close to the truth (1.0 cm).",
+            "Here both end equally far, 1.00 cm, from the truth.",
         ),
-        ({"A": 0.01, "B": 0.01, "C": 0.01}, "Here all end equally close"),
-        ({"ICP point": 0.03}, "**ICP point** ends 3.0 cm from the truth. Nobody arrives"),
+        ({"A": 0.01, "B": 0.01, "C": 0.01}, "Here all end equally far"),
+        ({"ICP point": 0.03}, "**ICP point** ends 3.00 cm from the truth. Nobody arrives"),
         ({"ICP point": None, "CEICP-A plane": None}, "The truth of this scene is not known."),
     ],
 )
 def test_the_verdict_says_who_wins(errors_m, sentence):
-    assert sentence in verdict(tuple(lane(label, error_m) for label, error_m in errors_m.items()))
+    lanes = tuple(lane(label, error_m) for label, error_m in errors_m.items())
+    assert sentence in verdict("cloud" if None in errors_m.values() else "truth", lanes)
+
+
+def test_where_nobody_knows_the_truth_nothing_speaks_of_it():
+    lanes = (lane("ICP point", 0.03), lane("CEICP-A point", 0.01))
+    said = verdict("pixels", lanes)
+    assert said.startswith("**CEICP-A point** ends 1.00 cm from where its own pixels are, **ICP point** 3.00")
+    unknown = race_table("cloud", tuple(lane(label, None) for label in ("ICP point", "CEICP-A point")))
+    for html in (said, race_table("pixels", lanes), unknown):
+        assert "tru" not in html
+    assert unknown.count(">3.00 cm<") == 4
 
 
 def test_a_ceicp_that_ties_with_the_winner_has_not_lost():
     lanes = (lane("FICP plane", 0.00100), lane("CEICP-A plane", 0.00102), lane("ICP point", 0.1))
-    assert "loses" not in verdict(lanes)
+    assert "loses" not in verdict("truth", lanes)
 
 
 def test_one_ceicp_that_loses_to_another_is_no_loss_of_ceicp():
     lanes = (lane("CEICP-A plane", 0.001), lane("ICP point", 0.01), lane("CEICP-N plane", 0.1))
-    assert "loses" not in verdict(lanes)
+    assert "loses" not in verdict("truth", lanes)
 
 
 def test_the_table_has_a_column_for_each_lane_and_explains_every_row():
-    html = race_table(tuple(lane(str(i), 0.01, "No point of the source lies within") for i in range(4)))
+    html = race_table(
+        "truth", tuple(lane(str(i), 0.01, "No point of the source lies within") for i in range(4))
+    )
     assert re.findall("[①②③④]", html) == list("①②③④")
     assert html.count("title=") == 8
     assert html.count(">lost<") == 4

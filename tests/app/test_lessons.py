@@ -107,6 +107,20 @@ def test_a_stop_unfolds_what_it_speaks_of(tmp_path):
     assert again != once
 
 
+def test_reset_leaves_the_lesson_and_takes_back_what_its_stop_had_set(tmp_path):
+    ui, looks = ui_of(), []
+    LessonFolder(ui, lesson(tmp_path, ASKED.replace("The sky", "set: lane = 2\n\nThe sky")), looks.append)
+    ui.resets[0]()
+    assert looks == []  # it was at no stop
+    ui.gui.press("Go", "Next")
+    ui.gui.press("Your guess", SKIP)
+    ui.resets[0]()
+    assert [look.lane for look in looks] == [1, 0]
+    assert ui.gui.find("Stop").value == OFF
+    ui.gui.press("Go", "Next")
+    assert "Air scatters blue" not in ui.gui.text()
+
+
 @pytest.mark.parametrize(
     ("path", "screen"),
     [

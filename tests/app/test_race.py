@@ -71,6 +71,7 @@ def test_without_truth_the_number_is_the_distance_between_the_clouds(tmp_path, r
     spec = replace(SPEC, source=RigFolder(str(tmp_path / "rig")))
     view = end(race_job(Store(str(tmp_path)), spec, replace(SLIGHT, rivals=(("ceicp-a", "plane"),))))
     first, last = view.lanes[0].steps[0], view.lanes[0].steps[-1]
+    assert view.reference == "cloud"
     assert first.point_error_m is None
     assert 0.0 < last.off_m < first.off_m
     assert last.shades.mean() < first.shades.mean()
@@ -134,7 +135,8 @@ def test_degrading_changes_the_source_only(rig, nodes):
 
 def test_an_inferred_cloud_belongs_where_it_is(rig, nodes):
     contest = contest_of(rig, nodes, Race(mode="inferred", source=2, target=2))
-    np.testing.assert_array_equal(contest.T_true, np.eye(4))
+    np.testing.assert_array_equal(contest.T_home, np.eye(4))
+    assert contest.reference == "pixels"
     assert contest.source is nodes[2].inferred
     assert contest.target is nodes[2].sensor
 

@@ -2,7 +2,9 @@
 
 import re
 from itertools import combinations
+from typing import get_args
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -12,7 +14,7 @@ from app.screens.fuse.board import scale, score
 from app.screens.fuse.distances import REACH_M, Distances, shades_of
 from app.screens.fuse.labels import COMPARISONS, RIVALS
 from app.screens.fuse.methods import METHODS, color_of
-from app.screens.fuse.view import SUCCESS_M, Race
+from app.screens.fuse.view import SUCCESS_M, Race, Reference
 from pipeline import config
 from pipeline.geometry import rigid, rotation_exp
 from tests.app.test_fuse_numbers import lane
@@ -30,6 +32,24 @@ def test_every_method_and_metric_has_a_colour_of_its_own():
     assert min(np.abs(one - other).max() for one, other in combinations(colors, 2)) >= 12
 
 
+SEEN = {  # linear RGB as a person sees it, from Machado, Oliveira, Fernandes (2009), severity 1
+    "normal": np.eye(3),
+    "protanopia": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+    "deuteranopia": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+    "tritanopia": [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
+}
+
+
+@pytest.mark.parametrize("eyes", SEEN)
+def test_four_lanes_are_told_apart_whatever_colours_one_sees(eyes):
+    colors = np.array([[color_of(rival) for rival in COMPARISONS["All four"]]]) / 255.0
+    linear = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(linear @ np.transpose(SEEN[eyes]), 0.0, 1.0)
+    shown = np.where(seen <= 0.0031308, 12.92 * seen, 1.055 * seen ** (1 / 2.4) - 0.055)
+    lab = cv2.cvtColor(shown.astype(np.float32), cv2.COLOR_RGB2LAB)[0]
+    assert min(np.linalg.norm(one - other) for one, other in combinations(lab, 2)) > 18
+
+
 def test_the_default_race_differs_in_the_weights_only_and_the_next_in_the_metric_only():
     weights, metric, everything = COMPARISONS.values()
     assert Race().rivals == weights
@@ -40,7 +60,7 @@ def test_the_default_race_differs_in_the_weights_only_and_the_next_in_the_metric
 
 @pytest.mark.parametrize(
     ("error_m", "number", "state"),
-    [(0.104, "10.4", "missed"), (0.0012, "0.12", "arrived"), (SUCCESS_M, "2.0", "missed")],
+    [(0.104, "10.40", "missed"), (0.000328, "0.03", "arrived"), (SUCCESS_M, "2.00", "missed")],
 )
 def test_the_number_over_a_lane_is_its_distance_from_the_truth(error_m, number, state):
     said = score(lane("ICP point", error_m), 0)
@@ -49,9 +69,14 @@ def test_the_number_over_a_lane_is_its_distance_from_the_truth(error_m, number, 
 
 def test_without_truth_it_is_the_distance_to_the_other_cloud_and_nobody_arrives():
     said = score(lane("ICP point", None), 0)
-    assert (said["number"], said["unit"]) == ("3.0", "cm to the nearest point")
+    assert (said["number"], said["unit"]) == ("3.00", "cm to the nearest point")
     assert said["state"] == "running"
-    assert scale(False)["text"] != scale(True)["text"]
+
+
+def test_the_scale_names_the_truth_only_where_it_is_known():
+    texts = {reference: scale(reference)["text"] for reference in get_args(Reference)}
+    assert len(set(texts.values())) == 3
+    assert [reference for reference, text in texts.items() if "truth" in text] == ["truth"]
 
 
 def cloud():

@@ -50,7 +50,7 @@ def test_a_place_in_a_lesson_counts_iterations_or_milliseconds(in_ms, unit_ns):
 
 def test_the_curves_tell_the_distance_at_the_clock_and_hide_what_is_to_come():
     clock = RaceClock.of([SHORT, LONG], in_ms=False)
-    curves = error_lane([SHORT, LONG], clock)
+    curves = error_lane("truth", [SHORT, LONG], clock)
     assert curves.veil == 1.0
     said = [label.text for label in curves.labels(3 * COUNT_NS)]
-    assert said == ["distance from the truth", "① 6 cm", "② 1 cm"]
+    assert said == ["from the truth", "① 6.00 cm", "② 1.00 cm"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from app.drawing.colors import LOSS, TARGET
 from app.levels import counts_of, levels_of
-from app.timeline import Curve, CurvesLane, FramesLane
+from app.timeline import Curve, CurvesLane, FramesLane, round_up
 
 ROWS = 3
 CAUSES = ("", "collision", "bit errors")
@@ -205,3 +207,34 @@ def test_a_curve_has_a_gap_where_it_has_no_value():
     assert drawn[:98].all()
     assert not drawn[103:197].any()
     assert drawn[203:].all()
+
+
+def test_curves_on_one_scale_have_its_values_at_their_edge_and_others_have_none():
+    lane = CurvesLane("Weather", [TEMPERATURE, TEMPERATURE], height_px=81)
+    assert [(tick.y_px, tick.text) for tick in lane.ticks] == [(7.0, "4 °C"), (40.5, "2 °C"), (74.0, "0 °C")]
+    assert CurvesLane("Weather", [TEMPERATURE, replace(TEMPERATURE, high=9.0)]).ticks == []
+
+
+def test_a_dashed_curve_is_drawn_here_and_there_along_its_whole_way():
+    whole, dashed = (
+        like(painted(CurvesLane("W", [curve]), 100, 500), curve.color).any(axis=0)
+        for curve in (TEMPERATURE, replace(TEMPERATURE, dashed=True))
+    )
+    assert whole.all()
+    assert 0.4 < dashed.mean() < 0.9
+    assert dashed[:100].any()
+    assert dashed[-100:].any()
+
+
+@pytest.mark.parametrize(("value", "high"), [(8.6, 10), (0.3, 0.4), (10, 10), (101, 200), (2.0, 2), (5.5, 6)])
+def test_a_scale_ends_at_the_next_number_that_can_be_halved(value, high):
+    assert round_up(value) == pytest.approx(high)
+
+
+def test_a_number_that_runs_keeps_its_digits():
+    curve = replace(TEMPERATURE, values=np.array([0.0328, 10.4, 2.0]), digits=2)
+    assert [curve.text(now) for now in (100, 200, 300)] == [
+        "warmth 0.03 °C",
+        "warmth 10.40 °C",
+        "warmth 2.00 °C",
+    ]

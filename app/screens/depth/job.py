@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +20,10 @@ from app.screens.depth.view import SeenSample
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
+from pipeline.config import DepthConfig
+from pipeline.depth.completion import SHIPPED_COMPLETION
 from pipeline.depth.confidence import JudgedDepth
+from pipeline.depth.inference import SHIPPED_MODEL
 from pipeline.nodes import NodeClouds
 from pipeline.types import BoolArray, DepthMap, PointCloud, PointSource, RgbdFrame, Rig
 
@@ -35,11 +39,11 @@ def depth_job(store: Store, spec: Spec) -> Generator[Progress, None, DepthView]:
     views = []
     for index, clouds in enumerate(nodes):
         yield Progress(f"pictures of {clouds.name}", 0.9 + 0.1 * index / len(nodes))
-        views.append(_depth_node(rig, index, clouds))
+        views.append(_depth_node(rig, index, clouds, spec.config.depth))
     return DepthView(tuple(views))
 
 
-def _depth_node(rig: Rig, index: int, clouds: NodeClouds) -> DepthNode:
+def _depth_node(rig: Rig, index: int, clouds: NodeClouds, config: DepthConfig) -> DepthNode:
     drawn = SCREEN_POINTS / len(rig.frames) / max(1, len(clouds.fused))
     frame, alignment, judged = rig.frames[index], clouds.alignment, clouds.judged
     filled = clouds.fused.select(_inferred_rows(clouds.fused))
@@ -60,6 +64,8 @@ def _depth_node(rig: Rig, index: int, clouds: NodeClouds) -> DepthNode:
         inlier_share=alignment.inliers,
         judged=judged_view(judged, alignment.depth.valid & ~frame.depth.valid),
         truth_error_m=_filled_error_m(rig, index, judged),
+        network=(SHIPPED_MODEL if config.model is None else Path(config.model)).name,
+        completion=SHIPPED_COMPLETION.name if config.completes and frame.depth.valid.any() else "",
         provider=clouds.network.provider,
         inference_s=clouds.network.elapsed_s,
     )

@@ -22,6 +22,14 @@ COLORINGS: dict[str, PointColoring] = {
     "confidence of inferred points": "confidence",
 }
 """What the colours of the points mean."""
+ALIGNMENTS: dict[str, str] = {
+    "none": "none (as the network says)",
+    "median": "one scale",
+    "affine_depth": "scale and shift",
+    "affine_inverse": "scale and shift of 1/depth",
+    "local": "scale, shift, smooth correction",
+}
+"""How inferred depth is made metric."""
 HOLES, EVERYWHERE, UNSEEN = "only in the holes", "everywhere", "hidden"
 DRAWN = (HOLES, EVERYWHERE, UNSEEN)
 """Which of the inferred points are drawn."""

@@ -20,7 +20,7 @@ TEXT = """Any ONNX network that makes depth of one picture will do. What it expe
 ADVICE: dict[ModelKind, str] = {
     "metric": "It gives metres: the alignments *none* and *one scale* are worth a look.",
     "relative": "",
-    "inverse": "It gives 1/depth: the alignment *scale, shift, local* starts from a line of 1/depth then.",
+    "inverse": "It gives 1/depth: the smooth correction starts from a line of 1/depth then.",
 }
 TRYING = "Trying the network …"
 KEPT = "The network before is kept. Say what this one expects, or choose another."

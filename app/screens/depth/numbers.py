@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.records import DepthNode
+from app.screens.depth.labels import ALIGNMENTS
 from app.tables import number, table
 
 LINES = {
@@ -30,12 +31,18 @@ def depth_table(node: DepthNode) -> str:
     share = rejected / max(1, kept + rejected)
     return table(
         [
+            ("Network", "The depth network's file. It sees the colours alone.", node.network),
             (
                 "Network ran on",
-                "The execution provider that onnxruntime really used, and its time.",
+                "The execution provider that onnxruntime really used, and its time for this image.",
                 f"{node.provider}, {duration}",
             ),
-            ("Alignment", "How inferred depth was made metric.", node.alignment_mode),
+            (
+                "Holes filled by",
+                "The file of the network whose depth is taken where the sensor is blind.",
+                f"{node.completion} (colours and depth)" if node.completion else f"{node.network} (aligned)",
+            ),
+            ("Alignment", "How inferred depth was made metric.", ALIGNMENTS[node.alignment_mode]),
             (
                 "Residual",
                 "RMS difference of aligned and sensed depth where both are known.",

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from app.controls import Choice, Number, Toggle
+from app.screens.depth.labels import ALIGNMENTS
 from app.screens.depth.view import ModelChoice
 from pipeline.config import PipelineConfig
 
@@ -13,13 +14,9 @@ FIRST = (
     Choice(
         "Alignment",
         "depth.alignment",
-        {
-            "none": "none (as the network says)",
-            "median": "one scale",
-            "affine_depth": "scale and shift",
-            "affine_inverse": "scale and shift of 1/depth",
-            "local": "scale, shift, local",
-        },
+        ALIGNMENTS,
+        hint="How inferred depth is made metric, by what the sensor measured: one factor; a factor "
+        "and an offset; or these and a correction C of the rest that changes smoothly over the picture.",
     ),
     Choice(
         "Holes filled by",

@@ -37,7 +37,6 @@
     setup({visible, lens, bottom, lanes, scale}) {
       this.wanted = visible;
       this.row.replaceChildren();
-      this.row.style.setProperty("--lanes", Math.max(lanes.length, 1));
       this.row.style.setProperty("--lens", `${100 * (1 - bottom)}%`);
       this.lens = lens && {...lens, target: bytes(lens.target)};
       this.colors = palette(scale.stops);
@@ -47,8 +46,8 @@
       make("span", "", legend, {textContent: scale.ends[0]});
       make("i", "", legend).style.background = `linear-gradient(to right, ${scale.stops.join(", ")})`;
       make("span", "", legend, {textContent: scale.ends[1]});
-      make("b", "", legend);
-      make("span", "", legend, {textContent: scale.target});
+      for (const [sign, text] of [["b", scale.target], ["u", scale.pairs]])
+        make("span", "", legend, {textContent: text}).prepend(make(sign, ""));
       this.state({lanes: this.scores});
     }
 
@@ -67,14 +66,21 @@
       make("p", "", answer, {textContent: about});
       make("p", "source", answer, {textContent: source});
       ask.addEventListener("click", () => { answer.hidden = !answer.hidden; });
-      const glass = this.lens ? make("canvas", "lens", lane) : null;
-      const made = {head, value, unit, note, glass, seen: new Uint8Array()};
+      const made = {head, value, unit, note, seen: new Uint8Array()};
+      if (this.lens) {
+        const lens = make("div", "lens", lane);
+        const caption = make("div", "caption", lens);
+        made.seeing = make("span", "", caption);
+        made.ruler = make("b", "", caption, {textContent: `${RULER_CM} cm`});
+        made.glass = make("canvas", "", lens);
+      }
+      const {glass} = made;
       if (glass) new ResizeObserver(() => this.drawLens(made)).observe(glass);
       return made;
     }
 
     // The corner that the ring marks, cut across: what stays in grey, what moves in the colours of the scale.
-    drawLens({glass, seen}) {
+    drawLens({glass, ruler, seeing, seen}) {
       const sharp = window.devicePixelRatio;
       const [width, height] = [glass.clientWidth, glass.clientHeight];
       Object.assign(glass, {width: width * sharp, height: height * sharp});
@@ -90,18 +96,8 @@
       const {target} = this.lens;
       for (let at = 0; at < target.length; at += 2) dot(target[at], target[at + 1], "#78828c");
       for (let at = 0; at < seen.length; at += 3) dot(seen[at], seen[at + 1], this.colors[seen[at + 2]]);
-      pen.fillStyle = "rgba(255, 255, 255, 0.85)";
-      pen.fillRect(0, height - 44, RULER_CM * cm + 24, 44);
-      pen.fillRect(0, 0, width, seen.length ? 24 : 48);
-      pen.fillStyle = "#111";
-      pen.font = "13px system-ui, sans-serif";
-      pen.fillText("the ringed edge, cut across", 10, 17, width - 20);
-      if (!seen.length) pen.fillText("the moving cloud is out of sight", 10, 40, width - 20);
-      const [left, base, long] = [12, height - 12, RULER_CM * cm];
-      for (const [x, y, wide, high] of [[left, base - 2, long, 4], [left, base - 7, 3, 14], [left + long - 3, base - 7, 3, 14]])
-        pen.fillRect(x, y, wide, high);
-      pen.font = "700 16px system-ui, sans-serif";
-      pen.fillText(`${RULER_CM} cm`, left + 8, base - 8);
+      ruler.style.width = `${RULER_CM * cm}px`;
+      seeing.textContent = seen.length ? "the ringed edge, cut across" : "the moving cloud is out of sight";
     }
 
     state({lanes}) {

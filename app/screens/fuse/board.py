@@ -16,11 +16,11 @@ from typing import Any
 from app.dock_row import add_hidden
 from app.drawing.colors import DISTANCE_STOPS, MOST_DISTANCE_M, css
 from app.page import running
-from app.screens.fuse.draw import BAND
-from app.screens.fuse.labels import MARKS
+from app.screens.fuse.draw import FOOT
+from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import METHODS, METRICS, color_of
-from app.screens.fuse.view import SUCCESS_M, LensView, RaceLane, RaceStep, RaceView
-from app.tables import UNKNOWN
+from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, LensView, RaceLane, RaceStep, RaceView, Reference
+from app.tables import UNKNOWN, number
 from app.ui import Ui
 from pipeline.types import ByteArray
 
@@ -66,9 +66,9 @@ class Board:
             kind="setup",
             visible=self._visible and bool(lanes),
             lens=None if self._view is None or self._view.lens is None else _lens(self._view.lens),
-            bottom=BAND[1],
+            bottom=FOOT,
             lanes=[_head(mark, lane) for mark, lane in zip(MARKS, lanes, strict=False)],
-            scale=scale(self._view is not None and self._view.has_truth),
+            scale=scale("truth" if self._view is None else self._view.reference),
         )
 
     def _tell(self, handle: Any, **what: Any) -> None:
@@ -97,13 +97,14 @@ def _bytes(rows: ByteArray) -> str:
     return base64.b64encode(rows.tobytes()).decode()
 
 
-def scale(has_truth: bool) -> dict[str, Any]:
+def scale(reference: Reference) -> dict[str, Any]:
     """What the colours of the moving cloud mean."""
     return {
-        "text": "Distance from its true place" if has_truth else "Distance to the nearest point",
+        "text": f"Distance {OFF_FROM[reference]}",
         "stops": [css(stop) for stop in DISTANCE_STOPS],
         "ends": ("0", f"{100.0 * MOST_DISTANCE_M:.0f} cm and more"),
         "target": "the cloud that stays",
+        "pairs": "pairs; dark ones count most",
     }
 
 
@@ -123,7 +124,8 @@ def score(lane: RaceLane, row: int) -> dict[str, str]:
 
 
 def distance_text(step: RaceStep) -> tuple[str, str]:
-    """How far off a step is, and the unit: from the truth (RMS), or else from the nearest points (median)."""
+    """How far off a step is, and the unit: from where it belongs (RMS), or else from the nearest points
+    (median)."""
     if step.off_m != step.off_m:
         return UNKNOWN, ""
-    return f"{100.0 * step.off_m:.{2 if step.off_m < 0.01 else 1}f}", "cm"
+    return number(step.off_m, OFF_DIGITS, scale=100.0), "cm"

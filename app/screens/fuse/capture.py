@@ -85,7 +85,7 @@ def cell_name(turn_deg: float, shift_m: float) -> str:
 
 
 def capture_html(view: CaptureView, lane: int) -> str:
-    """Rows of rotations, columns of translations; each cell holds its distance from the truth at the end."""
+    """Rows of rotations, columns of translations; each cell holds how far off it ends."""
     heads = "".join(f"<th>{100 * shift_m:.0f} cm</th>" for shift_m in CAPTURE_SHIFTS_M)
     lines = [f"<tr><th></th>{heads}</tr>"]
     for row, turn_deg in enumerate(CAPTURE_TURNS_DEG):

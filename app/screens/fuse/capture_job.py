@@ -1,4 +1,4 @@
-"""The capture range: from which starts the methods of a race arrive at the truth (SPEC 4.7)."""
+"""The capture range: from which starts the methods of a race arrive (SPEC 4.7)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def capture_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, Non
 
     def run() -> Generator[Progress, None, CaptureView]:
         contest = contest_of(rig, nodes, race)
-        if contest.T_true is None:
+        if contest.T_home is None:
             raise InputError(
                 "The truth of this scene is not known, so nothing tells which starts arrive; "
                 "show the race inferred on sensor instead."
@@ -48,7 +48,7 @@ def capture_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, Non
 
 
 def _end_error_m(contest: Contest, config: RegistrationConfig, T_start: FloatArray) -> float:
-    """Distance from the truth at the end; that of the start where no pair is found."""
+    """Distance from where it belongs at the end; that of the start where no pair is found."""
     try:
         T = register(contest.source, contest.target, config, T_start).T_target_source
     except ReconstructionError:

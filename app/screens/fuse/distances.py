@@ -17,19 +17,19 @@ REACH_M = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Distances:
-    """From the true place of each point, or from the nearest point of the target where no truth is known."""
+    """From where each point belongs, or from the nearest point of the target where that is not known."""
 
     points_m: FloatArray
     """(N, 3) source frame."""
-    T_true: FloatArray | None
+    T_home: FloatArray | None
     tree: cKDTree
     """Of the target."""
 
     def at(self, T_target_source: FloatArray) -> tuple[FloatArray, float]:
         """(N,) distances in metres at a pose, and their median if they are those from partners, else NaN."""
         places_m = apply(T_target_source, self.points_m)
-        if self.T_true is not None:
-            return np.linalg.norm(places_m - apply(self.T_true, self.points_m), axis=1), float("nan")
+        if self.T_home is not None:
+            return np.linalg.norm(places_m - apply(self.T_home, self.points_m), axis=1), float("nan")
         distances_m = self.tree.query(places_m, distance_upper_bound=REACH_M)[0]
         distances_m = np.minimum(distances_m, REACH_M)
         return distances_m, float(np.median(distances_m))

@@ -24,14 +24,18 @@ PALETTE = ramp(np.arange(256.0), 255.0, DISTANCE_STOPS)
 """RGB of every shade of a distance."""
 FOV_RAD = np.radians(25.0)
 """Of the view of a race: from afar all lanes are seen from the same side."""
-BAND, WHOLE_BAND = (0.2, 0.58), (0.2, 0.95)
-"""Where in the picture the clouds are, in its height from the top: above the magnified corner, or without."""
+HEAD, HEAD_PX = 0.2, 78.0
+"""What the names and numbers take of the picture's height, and at least (``board.css``)."""
+FOOT, WHOLE_FOOT = 0.58, 0.95
+"""Where the clouds end in the picture, in its height from the top: above the magnified corner, or without."""
 RING, RING_PARTS = (20, 20, 20), 48
 """Colour of the ring about what is magnified, and its parts."""
-ASPECT = 1.5
+ASPECT, HEIGHT_PX = 1.5, 600.0
 """Of the picture, while nobody looks."""
-ROOM = 1.2
-"""Width of a lane over that of its clouds, and height of the band over theirs."""
+MARGIN = 0.04
+"""Of a lane's width, and of the picture's height, that stays free on each side."""
+FITTED = 2_000
+"""Points of the clouds that are made to fit."""
 
 
 class RaceDrawing:
@@ -41,7 +45,7 @@ class RaceDrawing:
         clear(scene, below)
         self._scene, self._below, self._view = scene, below, view
         self._extent = _extent_of(view, stage)
-        self._band = WHOLE_BAND if view.lens is None else BAND
+        self._foot = WHOLE_FOOT if view.lens is None else FOOT
         self._lanes: list[viser.FrameHandle] = []
         self._sources: list[viser.PointCloudHandle] = []
         self._pairs: list[viser.LineSegmentsHandle] = []
@@ -61,7 +65,7 @@ class RaceDrawing:
                     f"{name}/pairs", points, colors, thickness=2.0, thickness_units="screen"
                 )
             )
-        self._spread(ASPECT)
+        self._spread(ASPECT, HEIGHT_PX)
 
     def _add_ring(self, name: str, lens: LensView) -> None:
         """A circle about what is magnified, facing the viewer."""
@@ -73,18 +77,23 @@ class RaceDrawing:
 
     def look(self, clients: Iterable[viser.ClientHandle]) -> None:
         """Have all lanes side by side in the picture, each in the middle of its share of the width."""
-        extent, (top, bottom) = self._extent, self._band
+        extent = self._extent
         for client in clients:
-            height_m = len(self._lanes) * self._spread(client.camera.aspect) / client.camera.aspect
-            at_m = extent.middle_m - (0.5 - 0.5 * (top + bottom)) * height_m * extent.up
+            aspect, height_px = client.camera.aspect, client.camera.image_height
+            height_m = len(self._lanes) * self._spread(aspect, height_px) / aspect
+            at_m = extent.middle_m - _lift(self._band(height_px)) * height_m * extent.up
             with client.atomic():
                 client.camera.fov = FOV_RAD
                 turn(client, at_m, at_m - 0.5 * height_m / np.tan(0.5 * FOV_RAD) * extent.forward)
 
-    def _spread(self, aspect: float) -> float:
+    def _band(self, height_px: float) -> tuple[float, float]:
+        """Where the clouds are in the picture's height from the top."""
+        return max(HEAD, HEAD_PX / max(height_px, 1.0)), self._foot
+
+    def _spread(self, aspect: float, height_px: float) -> float:
         """Place the lanes for a picture so much wider than high; how far they are apart in metres."""
-        extent, count, (top, bottom) = self._extent, len(self._lanes), self._band
-        apart_m = ROOM * max(extent.width_m, aspect * extent.height_m / (count * (bottom - top)))
+        extent, count = self._extent, len(self._lanes)
+        apart_m = apart(extent.points_m, count, aspect, self._band(height_px))
         for frame, away in zip(self._lanes, _places(count), strict=True):
             place(frame, rigid(np.eye(3), away * apart_m * extent.right) @ self._view.T_world_target)
         return apart_m
@@ -145,8 +154,8 @@ class _Extent:
     forward: FloatArray
     middle_m: FloatArray
     """(3,)."""
-    width_m: float
-    height_m: float
+    points_m: FloatArray
+    """(N, 3) some of them from there, along these directions."""
 
 
 def _extent_of(view: RaceView, stage: Stage) -> _Extent:
@@ -156,9 +165,64 @@ def _extent_of(view: RaceView, stage: Stage) -> _Extent:
     start = apply(view.lanes[0].steps[0].T_target_source, view.source.points_m.astype(float))
     points_m = np.concatenate([view.target.points_m.astype(float), start])
     low_m, high_m = np.percentile(apply(view.T_world_target, points_m) @ axes.T, [0.5, 99.5], axis=0)
-    width_m, height_m, _ = (high_m - low_m).tolist()
-    middle_m = 0.5 * (low_m + high_m) @ axes
-    return _Extent(axes[0], axes[1], axes[2], middle_m, width_m, height_m)
+    seen_m = apply(view.T_world_target, points_m[:: -(-len(points_m) // FITTED)]) @ axes.T
+    seen_m = np.clip(seen_m, low_m, high_m)
+    if view.lens is not None:
+        ring = 0.5 * view.lens.window_m * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+        seen_m = np.concatenate(
+            [seen_m, apply(view.T_world_target, view.lens.center_m[None]) @ axes.T + ring]
+        )
+    middle_m = 0.5 * (low_m + high_m)
+    return _Extent(axes[0], axes[1], axes[2], middle_m @ axes, seen_m - middle_m)
+
+
+def apart(points_m: FloatArray, count: int, aspect: float, band: tuple[float, float]) -> float:
+    """The least distance between lanes, in metres, at which each is seen whole within its share of the width.
+
+    What is nearer than the middle looks larger, and in the outer lanes farther out.
+
+    Args:
+        points_m: (N, 3) from the middle of a lane: to the right, up and away from the viewer.
+        count: of the lanes.
+        aspect: width over height of the picture, whose width is that of all lanes at their middle.
+        band: where the lanes are in the picture's height from the top.
+    """
+    low_m, high_m = 1e-3, 20.0 * max(1.0, float(np.abs(points_m).max()))
+    for _ in range(30):
+        tried_m = 0.5 * (low_m + high_m)
+        across, down = in_picture(points_m, count, aspect, band, tried_m)
+        first, last = across.min(), across.max()
+        fits = min(first, 1.0 - last) >= MARGIN and down.min() >= band[0] and down.max() <= band[1]
+        low_m, high_m = (low_m, tried_m) if fits else (tried_m, high_m)
+    return high_m
+
+
+def in_picture(
+    points_m: FloatArray, count: int, aspect: float, band: tuple[float, float], apart_m: float
+) -> tuple[FloatArray, FloatArray]:
+    """Where points are seen in the outer lanes.
+
+    Args:
+        points_m, count, aspect, band: as for ``apart``.
+        apart_m: distance between lanes.
+
+    Returns:
+        (2, N) in the first and the last lane, as a part of its width from the left, and (N,) as a part of the
+        picture's height from the top; far out if a point is behind the viewer.
+    """
+    right_m, up_m, away_m = points_m.T
+    half_m = 0.5 * count * apart_m / aspect
+    nearer = 1.0 + away_m * np.tan(0.5 * FOV_RAD) / half_m
+    nearer = np.where(nearer > 0.1, nearer, np.nan)
+    outer_m = np.array([[-0.5], [0.5]]) * (count - 1) * apart_m
+    across = count * (0.5 + 0.5 * (right_m + outer_m) / (nearer * half_m * aspect)) - [[0.0], [count - 1.0]]
+    down = 0.5 - 0.5 * (up_m + 2.0 * _lift(band) * half_m) / (nearer * half_m)
+    return np.nan_to_num(across, nan=1e9), np.nan_to_num(down, nan=1e9)
+
+
+def _lift(band: tuple[float, float]) -> float:
+    """How far the middle of the band is above that of the picture, in its height."""
+    return 0.5 - 0.5 * sum(band)
 
 
 def _places(count: int) -> FloatArray:

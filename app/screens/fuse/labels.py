@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
-from app.screens.fuse.view import RaceMode, Rival
+from app.screens.fuse.view import RaceMode, Reference, Rival
 from pipeline.config import Direction, Method, Metric
 
 MODES: dict[str, RaceMode] = {"node on node": "nodes", "inferred on sensor": "inferred"}
@@ -13,6 +13,12 @@ DIRECTIONS: dict[str, Direction] = {
     "target asks source": "p2q",
     "both": "both",
 }
+OFF_FROM: dict[Reference, str] = {
+    "truth": "from the truth",
+    "pixels": "from where its own pixels are",
+    "cloud": "to the nearest point",
+}
+"""What the distance is that a race shows."""
 STARTS: dict[str, tuple[float, float]] = {
     "aligned": (0.0, 0.0),
     "slightly off (3°, 6 cm)": (3.0, 6.0),

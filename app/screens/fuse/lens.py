@@ -58,7 +58,7 @@ def lens_of(
         source_m: (N, 3) the moving cloud in its own frame.
         target_m: (M, 3) the cloud that stays, in the frame of its camera.
         T_aligned: (4, 4) where the one belongs on the other.
-        distances: of the drawn points, from whose truth or partners the colours come.
+        distances: of the drawn points, from whose places or partners the colours come.
     """
     aligned_m = apply(T_aligned, source_m)
     found = _edge(_thinned(aligned_m), _thinned(target_m))
@@ -70,7 +70,7 @@ def lens_of(
     pixels, inside = _pixels(target_m[here], center_m, axes)
     view = LensView(center_m, WINDOW_M, _some(pixels[inside]).astype(np.uint8))
     points_m = _some(source_m[near.all(axis=1)])
-    return Lens(view, axes, Distances(points_m, distances.T_true, distances.tree))
+    return Lens(view, axes, Distances(points_m, distances.T_home, distances.tree))
 
 
 def _edge(aligned_m: FloatArray, target_m: FloatArray) -> tuple[FloatArray, FloatArray] | None:

@@ -32,7 +32,7 @@ class About:
 _THESIS = "the thesis, eqs. 3.10-3.17"
 METHODS: dict[str, About] = {
     "icp": About(
-        (120, 132, 144),
+        (104, 112, 168),
         "Every point is paired with its nearest counterpart, and every pair counts the same. Pairs of points "
         "that have no counterpart pull the cloud aside.",
         "Besl, McKay, TPAMI 1992",
@@ -85,7 +85,7 @@ METHODS: dict[str, About] = {
         f"{_THESIS}, made free of units (SPEC 4.4)",
     ),
     "ceicp-a": About(
-        (0, 140, 90),
+        (0, 158, 100),
         "Pairs weigh −p log p, with p falling with their distance. The scale shrinks at every iteration, so "
         "far pairs soon cease to count.",
         f"{_THESIS}, made free of units; the shrinking scale is ours (SPEC 4.4)",

@@ -7,17 +7,22 @@ from html import escape
 
 import numpy as np
 
-from app.screens.fuse.labels import MARKS
+from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import color_of
-from app.screens.fuse.view import SUCCESS_M, FuseView, RaceLane, RegistrationRow
+from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, FuseView, RaceLane, Reference, RegistrationRow
 from app.tables import Row, number, table
 
 STOPS = {"max_iterations": "limit"}
+_OFF: dict[Reference, tuple[str, str]] = {
+    "truth": ("error", "RMS distance of the moved points from where they truly are"),
+    "pixels": ("error", "RMS distance of the moved points from where the pixels are that they belong to"),
+    "cloud": ("gap", "Median distance of the drawn points to the nearest of the other cloud"),
+}
 
 
-def verdict(lanes: tuple[RaceLane, ...]) -> str:
-    """A sentence on which method ends nearest to the truth, whichever that is."""
-    if lanes[0].steps[-1].point_error_m is None:
+def verdict(reference: Reference, lanes: tuple[RaceLane, ...]) -> str:
+    """A sentence on which method ends nearest to where it belongs, whichever that is."""
+    if reference == "cloud":
         return (
             "The truth of this scene is not known. RMSE alone does not tell which is better: each method "
             "pairs and weighs other points."
@@ -26,16 +31,16 @@ def verdict(lanes: tuple[RaceLane, ...]) -> str:
     (best_m, best), worst_m = ranking[0], ranking[-1][0]
     missed = f" Nobody arrives within {100 * SUCCESS_M:.0f} cm." if best_m >= SUCCESS_M else ""
     if len(ranking) == 1:
-        return f"**{best}** ends {_cm(best_m)} from the truth.{missed}"
+        return f"**{best}** ends {_cm(best_m)} {OFF_FROM[reference]}.{missed}"
     if _alike(best_m, worst_m):
         everyone = "both end" if len(ranking) == 2 else "all end"
-        return f"Here {everyone} equally close to the truth ({_cm(best_m)}).{missed}"
+        return f"Here {everyone} equally far, {_cm(best_m)}, {OFF_FROM[reference]}.{missed}"
     places = ", ".join(f"**{label}** {_cm(error_m)}" for error_m, label in ranking[1:])
-    return f"**{best}** ends {_cm(best_m)} from the truth, {places}.{_loss(ranking)}{missed}"
+    return f"**{best}** ends {_cm(best_m)} {OFF_FROM[reference]}, {places}.{_loss(ranking)}{missed}"
 
 
 def _cm(error_m: float) -> str:
-    return number(error_m, 2 if error_m < 0.01 else 1, "cm", 100.0)
+    return number(error_m, OFF_DIGITS, "cm", 100.0)
 
 
 def _alike(one_m: float, other_m: float) -> bool:
@@ -49,12 +54,13 @@ def _loss(ranking: list[tuple[float, str]]) -> str:
     return " So CEICP loses here." if ours_m and "CEICP" not in best and not _alike(best_m, ours_m[0]) else ""
 
 
-def race_table(lanes: tuple[RaceLane, ...]) -> str:
+def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> str:
     """A column for each lane; every row's name explains itself."""
 
     def row(name: str, hint: str, value: Callable[[RaceLane], str]) -> Row:
         return (name, hint, *(value(lane) for lane in lanes))
 
+    word, hint = _OFF[reference]
     rows = [
         row("Iterations", "Matchings and pose updates until it stopped.", lambda x: str(x.iterations)),
         row(
@@ -64,14 +70,14 @@ def race_table(lanes: tuple[RaceLane, ...]) -> str:
             lambda x: _stopped(x.stop_reason),
         ),
         row(
-            "Start error",
-            "RMS distance of the moved points from where they truly are, at the start.",
-            lambda x: number(x.steps[0].point_error_m, 1, "cm", 100),
+            f"Start {word}",
+            f"{hint}, at the start.",
+            lambda x: number(x.steps[0].off_m, OFF_DIGITS, "cm", 100),
         ),
         row(
-            "End error",
-            "The same at the end; below 2 cm counts as success.",
-            lambda x: number(x.steps[-1].point_error_m, 2, "cm", 100),
+            f"End {word}",
+            "The same at the end." + (" Below 2 cm counts as success." if word == "error" else ""),
+            lambda x: number(x.steps[-1].off_m, OFF_DIGITS, "cm", 100),
         ),
         row(
             "AHD",

@@ -31,7 +31,7 @@ from app.ui import Panel
 from pipeline.config import Method
 
 TEXT = """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
-are how far every point is from where it belongs. **Play** below (space), then compare what made the
+are how far off every point is. **Play** below (space), then compare what made the
 difference."""
 SINGLE = """This scene has a single node: no other node to find its place beside. What races here is its
 inferred cloud, onto what its sensor measured."""
@@ -76,7 +76,7 @@ class FusePanel(Panel):
         self._drawn: Start = Start()
         self._gizmo: Any = None
         self._seek_at: int | None = 0
-        self._framed: tuple[tuple[int, float], ...] = ()
+        self._framed: tuple[tuple[int, float, int], ...] = ()
         self._fov_rad: float | None = None
         self._here = False
         self._seen: tuple[int, ...] = ()
@@ -92,9 +92,9 @@ class FusePanel(Panel):
         self._setup.add_preset()
         self._player = RacePlayer(self.ui, self._moved, self._clocked)
         self._board = Board(self.ui)
-        self._charts = RaceCharts(self.ui)
         self._verdict = gui.add_markdown("")
         self._table = gui.add_html("")
+        self._charts = RaceCharts(self.ui)
         self._build_folders()
         self._rows = gui.add_html("")
 
@@ -145,6 +145,11 @@ class FusePanel(Panel):
         self._show_parts()
         self._widen()
 
+    def on_action(self, action: str) -> None:
+        """Go back to the race of the start, once the session has gone back to its settings."""
+        if action == "Reset":
+            self.ui.post(self._reset)
+
     # What races.
 
     def _choose_nodes(self, names: list[str]) -> None:
@@ -182,6 +187,20 @@ class FusePanel(Panel):
         if not self._start() and self._view is not None:
             self._take_race(self._view)
         self._charts.choose_lane(stop.lane)
+
+    def _reset(self) -> None:
+        with self.ui.atomic():
+            self._shown.value = self._shown.options[0]
+            self._setup.reset(RACES[self._shown.value])
+            self._player.choose(in_ms=False)
+            self._dragging.value = False
+            self._place_gizmo()
+            self._capture.forget()
+            self._mapped = None
+        if not self._start() and self._view is not None:
+            self._player.load(self._view.lanes, self._view.reference)
+        self._charts.choose_lane(0)
+        self._arrange()
 
     def _picked_cell(self, turn_deg: float, shift_m: float) -> None:
         with self.ui.atomic():
@@ -234,7 +253,7 @@ class FusePanel(Panel):
             self._place_gizmo()
             self._board.load(view)
             self._verdict.content, self._table.content = RUNNING, ""
-            self._player.load(view.lanes)
+            self._player.load(view.lanes, view.reference)
             self._player.seek_at(self._seek_at)
             self._seek_at = 0
             self._arrange()
@@ -258,8 +277,8 @@ class FusePanel(Panel):
             self._board.mark(self._seen)
             self._charts.mark(float(clock.shown(np.array(now_ns))), self._seen)
             if now_ns >= clock.end_ns and self._view is not None:
-                self._verdict.content = verdict(self._view.lanes)
-                self._table.content = race_table(self._view.lanes)
+                self._verdict.content = verdict(self._view.reference, self._view.lanes)
+                self._table.content = race_table(self._view.reference, self._view.lanes)
 
     # The gizmo.
 
@@ -312,7 +331,10 @@ class FusePanel(Panel):
             self._widen()
             return False
         clients = list(self.session.clients())
-        shape = tuple((client.client_id, round(client.camera.aspect, 2)) for client in clients)
+        shape = tuple(
+            (client.client_id, round(client.camera.aspect, 2), client.camera.image_height)
+            for client in clients
+        )
         if shape != self._framed and clients:
             if self._fov_rad is None:
                 self._fov_rad = clients[0].camera.fov

@@ -1,4 +1,4 @@
-"""The player of a race: the dock with the curve of every method's distance from the truth."""
+"""The player of a race: the dock with the curve of how far off every method is."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from app.dock import Dock
 from app.screens.fuse.clock import CLOCKS, RaceClock
-from app.screens.fuse.labels import MARKS
+from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import color_of
-from app.screens.fuse.view import RaceLane
-from app.timeline import Curve, CurvesLane
+from app.screens.fuse.view import OFF_DIGITS, RaceLane, Reference
+from app.timeline import Curve, CurvesLane, round_up
 from app.ui import Ui
 
 RUN_S = 12.0
@@ -26,6 +26,7 @@ class RacePlayer:
         """Add the dock; ``on_move`` gets every new time, ``on_clock`` is called with another clock."""
         self._ui, self._on_clock = ui, on_clock
         self._lanes: Sequence[RaceLane] = ()
+        self._reference: Reference = "truth"
         self.clock: RaceClock | None = None
         self._dock = Dock(ui, on_move, lambda lane, item: None)
         self.show = self._dock.show
@@ -38,22 +39,24 @@ class RacePlayer:
             hint="Whether the clock and the curves count iterations, or the milliseconds each method took "
             "in this app's computing process, its preparation included.",
         )
-        self._ui.when_changed(self._axis, lambda: self.load(self._lanes))
+        self._ui.when_changed(self._axis, lambda: self.load(self._lanes, self._reference))
 
     @property
     def now_ns(self) -> int:
         """Where it is."""
         return self._dock.now_ns
 
-    def load(self, lanes: Sequence[RaceLane]) -> None:
+    def load(self, lanes: Sequence[RaceLane], reference: Reference) -> None:
         """Take another race, at its start; none without lanes."""
-        self._lanes = lanes
+        self._lanes, self._reference = lanes, reference
         if not lanes:
             return
         clock = self.clock = RaceClock.of(lanes, CLOCKS[self._axis.value])
         self._on_clock()
         counts = "" if clock.in_ms else "iteration"
-        self._dock.load(0, clock.end_ns, clock.stops_ns, [error_lane(lanes, clock)], counts, RUN_S)
+        self._dock.load(
+            0, clock.end_ns, clock.stops_ns, [error_lane(self._reference, lanes, clock)], counts, RUN_S
+        )
 
     def choose(self, in_ms: bool) -> None:
         """Count milliseconds or iterations from the next race on."""
@@ -65,14 +68,22 @@ class RacePlayer:
             self._dock.seek(self.clock.at(place))
 
 
-def error_lane(lanes: Sequence[RaceLane], clock: RaceClock) -> CurvesLane:
+def error_lane(reference: Reference, lanes: Sequence[RaceLane], clock: RaceClock) -> CurvesLane:
     """How far off every method is, all on one scale, and nothing of what is still to come."""
     offs_cm = [np.array([100.0 * step.off_m for step in lane.steps]) for lane in lanes]
-    most_cm = max(1.0, *(float(np.nanmax(off_cm, initial=0.0)) for off_cm in offs_cm))
+    high_cm = round_up(max(1.0, *(float(np.nanmax(off_cm, initial=0.0)) for off_cm in offs_cm)))
     curves = [
-        Curve(mark, "cm", color_of(lane.rival), steps_ns, off_cm, 0.0, 1.05 * most_cm)
+        Curve(
+            mark,
+            "cm",
+            color_of(lane.rival),
+            steps_ns,
+            off_cm,
+            0.0,
+            high_cm,
+            OFF_DIGITS,
+            lane.rival[1] == "plane",
+        )
         for mark, lane, steps_ns, off_cm in zip(MARKS, lanes, clock.steps_ns, offs_cm, strict=False)
     ]
-    known = lanes[0].steps[0].point_error_m is not None
-    title = "distance from the truth" if known else "to the nearest point"
-    return CurvesLane(title, curves, LANE_PX, veil=1.0, titled=True)
+    return CurvesLane(OFF_FROM[reference], curves, LANE_PX, veil=1.0, titled=True)

@@ -14,7 +14,16 @@ from app.screens.fuse.distances import Distances, shades_of
 from app.screens.fuse.job import true_pose
 from app.screens.fuse.lens import Lens, lens_of
 from app.screens.fuse.methods import label_of
-from app.screens.fuse.view import PairHistogram, Race, RaceLane, RaceStep, RaceView, Rival, Start
+from app.screens.fuse.view import (
+    PairHistogram,
+    Race,
+    RaceLane,
+    RaceStep,
+    RaceView,
+    Reference,
+    Rival,
+    Start,
+)
 from app.state import Spec
 from app.store import Store
 from packetmesh.errors import InputError, ReconstructionError
@@ -45,12 +54,14 @@ class Contest:
     """As the race asks for it, degraded."""
     target: PointCloud
     T_aligned: FloatArray
-    """T_target_source: the truth, or what the nodes believe where it is not known."""
-    T_true: FloatArray | None
+    """T_target_source: where it belongs, or what the nodes believe where that is not known."""
+    T_home: FloatArray | None
+    """Where it belongs; None if nobody knows."""
+    reference: Reference
     center_m: FloatArray
     """(3,) centre of the aligned source before it was degraded, target frame."""
     error_points_m: FloatArray
-    """(N, 3) points before degradation whose distance from the truth is the error."""
+    """(N, 3) points before degradation whose distance from where they belong is the error."""
 
     def start_pose(self, start: Start) -> FloatArray:
         """T_target_source so far from aligned."""
@@ -59,8 +70,8 @@ class Contest:
         return geometry.rigid(rotation, shift_m) @ self.T_aligned
 
     def error_m(self, T: FloatArray) -> float | None:
-        """RMS distance of the points from where they truly are; None if the truth is not known."""
-        return None if self.T_true is None else point_error_m(T, self.T_true, self.error_points_m)
+        """RMS distance of the points from where they belong; None if that is not known."""
+        return None if self.T_home is None else point_error_m(T, self.T_home, self.error_points_m)
 
 
 def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, RaceView]:
@@ -76,7 +87,7 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
         edges_m = _edges_m([run.records for run in runs])
         staying = race.source if race.mode == "inferred" else race.target
         source = sample(contest.source.points_m, contest.source.colors, LANE_POINTS)
-        distances = Distances(source.points_m, contest.T_true, cKDTree(contest.target.points_m))
+        distances = Distances(source.points_m, contest.T_home, cKDTree(contest.target.points_m))
         yield Progress("race: a corner to magnify", 0.9)
         lens = lens_of(contest.source.points_m, contest.target.points_m, contest.T_aligned, distances)
         return RaceView(
@@ -86,6 +97,7 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
             center_m=contest.center_m,
             edges_m=edges_m,
             lens=None if lens is None else lens.view,
+            reference=contest.reference,
             lanes=tuple(_lane(contest, run, Watch(edges_m, distances, lens)) for run in runs),
         )
 
@@ -106,14 +118,16 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
     moving = nodes[race.source]
     if race.mode == "inferred":
         source, target = moving.inferred, moving.sensor
-        T_true: FloatArray | None = np.eye(4)
+        T_home: FloatArray | None = np.eye(4)
+        reference: Reference = "pixels"
     else:
         if race.source == race.target:
             raise InputError(f"{moving.name} cannot be moved onto itself; choose another node.")
         source, target = moving.sensor, nodes[race.target].sensor
-        T_true = true_pose(rig, race.source, race.target)
+        T_home = true_pose(rig, race.source, race.target)
+        reference = "cloud" if T_home is None else "truth"
     poses = [frame.T_world_camera for frame in rig.frames]
-    T_aligned = geometry.inverse(poses[race.target]) @ poses[race.source] if T_true is None else T_true
+    T_aligned = geometry.inverse(poses[race.target]) @ poses[race.source] if T_home is None else T_home
     how = Degradation(
         noise_m=race.noise_m,
         outlier_share=race.outlier_share,
@@ -125,7 +139,8 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
         source=source if how == Degradation() else degrade(source, how, race.seed),
         target=target,
         T_aligned=T_aligned,
-        T_true=T_true,
+        T_home=T_home,
+        reference=reference,
         center_m=geometry.apply(T_aligned, source.points_m.mean(axis=0, keepdims=True))[0],
         error_points_m=_every(source.points_m, ERROR_POINTS),
     )

@@ -22,6 +22,7 @@ from app.screens.fuse.view import Race, RaceMode, Rival, Start
 from app.ui import Ui
 
 SLIGHTLY = list(STARTS)[1]
+SLIGHT = Start.towards(*STARTS[SLIGHTLY], seed=0)
 METHOD_HINT = "Method and what it minimises: distance to the paired point, or to the plane at it."
 DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
     "noise_m": ("Noise (cm)", 10.0, 0.5, 100.0, "More noise along the view rays: its standard deviation."),
@@ -39,7 +40,7 @@ class RaceSetup:
     def __init__(self, ui: Ui, on_change: Callable[[], object]) -> None:
         """Set up without controls, which the panel adds where it wants them."""
         self._ui, self._on_change = ui, on_change
-        self._race = Race(start=Start.towards(*STARTS[SLIGHTLY], seed=0))
+        self._race = Race(start=SLIGHT)
         self._slots: list[viser.GuiDropdownHandle[str]] = []
 
     def add_comparisons(self) -> None:
@@ -73,7 +74,7 @@ class RaceSetup:
             [*STARTS, BY_HAND],
             initial_value=SLIGHTLY,
             hint="How far from aligned the moving cloud starts. Aligned is the truth where it is known, "
-            "otherwise what the nodes believe.",
+            "otherwise what the nodes believe; an inferred cloud is aligned where its own pixels are.",
         )
         self._ui.when_changed(self._preset, self._picked_preset)
 
@@ -122,6 +123,13 @@ class RaceSetup:
     def race(self) -> Race:
         """The race that the controls show."""
         return self._race
+
+    def reset(self, mode: RaceMode) -> None:
+        """Go back to the race of the start."""
+        names = self._source.options
+        self._source.value, self._target.value = names[min(1, len(names) - 1)], names[0]
+        self.write(Race(mode=mode, start=SLIGHT))
+        self._race = self._read(self._race)
 
     def choose_nodes(self, names: Sequence[str]) -> None:
         """Offer the nodes of another scene."""

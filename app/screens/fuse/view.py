@@ -14,6 +14,10 @@ from pipeline.types import ByteArray, FloatArray, IntArray
 RaceMode = Literal["nodes", "inferred"]
 """nodes: one node's sensor cloud onto another's; inferred: a node's inferred cloud onto its sensor cloud."""
 
+Reference: TypeAlias = Literal["truth", "pixels", "cloud"]
+"""From what a race measures how far off it is: where the points truly are; where the pixels are that they
+were inferred at, which needs no truth; or, where neither is known, the nearest points of the other cloud."""
+
 Rival: TypeAlias = tuple[Method, Metric]
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -124,11 +128,11 @@ class RaceStep:
     entropy_nat: float
     """NaN for methods without one."""
     point_error_m: float | None
-    """Against the truth, at the same pose."""
+    """RMS distance of the points from where they belong, at the same pose; None if no place is known."""
     gap_m: float
-    """Median distance of the drawn points from the nearest of the target; NaN where the truth is known."""
+    """Median distance of the drawn points from the nearest of the target; NaN where their place is known."""
     shades: ByteArray
-    """(N,) distance of each drawn point from its true place, or from the nearest point of the target where
+    """(N,) distance of each drawn point from where it belongs, or from the nearest point of the target where
     that is not known: 0 to 255 for none to ``MOST_DISTANCE_M`` and beyond."""
     lens: ByteArray
     """(M, 3) column, row and shade of the points in the magnified corner, placed as in ``LensView``."""
@@ -136,7 +140,7 @@ class RaceStep:
 
     @property
     def off_m(self) -> float:
-        """How far off it is: from the truth, or else from the other cloud."""
+        """How far off it is: from where it belongs, or else from the other cloud."""
         return self.gap_m if self.point_error_m is None else self.point_error_m
 
 
@@ -186,12 +190,8 @@ class RaceView:
     """(B + 1,) bins of all histograms."""
     lens: LensView | None
     """None where the clouds share no corner."""
+    reference: Reference
     lanes: tuple[RaceLane, ...]
-
-    @property
-    def has_truth(self) -> bool:
-        """Whether the distance from the truth is known."""
-        return self.lanes[0].steps[0].point_error_m is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +200,7 @@ class CaptureView:
 
     labels: tuple[str, ...]
     errors_m: FloatArray
-    """(lanes, rotations, translations) distance from the truth at the end."""
+    """(lanes, rotations, translations) distance from where the cloud belongs, at the end."""
 
 
 CAPTURE_TURNS_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
@@ -208,5 +208,8 @@ CAPTURE_TURNS_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
 CAPTURE_SHIFTS_M = (0.1, 0.2, 0.3, 0.4, 0.6)
 """Start errors of a capture-range map (SPEC 4.7)."""
 
+OFF_DIGITS = 2
+"""Behind the point of a distance in centimetres: tenths of a millimetre, wherever it stands."""
+
 SUCCESS_M = 0.02
-"""A registration that ends closer to the truth than this has succeeded (SPEC 4.7)."""
+"""A registration that ends closer to where it belongs than this has succeeded (SPEC 4.7)."""

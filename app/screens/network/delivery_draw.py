@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import viser
 
@@ -13,11 +11,12 @@ from app.drawing.poses import place
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import MOST_PACKETS, ON_THE_WAY, Flights
 from app.screens.network.labels import CAUSES
+from app.screens.network.name_lifts import lifts
 from app.screens.network.view import What
 from network_sim.types import Cause
 from pipeline.types import FloatArray
 
-FRUSTUM = 0.16
+FRUSTUM = 0.08
 """Depth of a frustum over the distance from the cameras to what they see."""
 BESIDE = 0.5
 """How far beside the cameras the sink is drawn, over the same distance: it may stand far outside."""
@@ -28,6 +27,8 @@ PACKET_M, POINT_M = 0.011, 0.008
 """Sizes over the same distance, and of a point."""
 NAME_ABOVE = 0.07
 """Of a camera, over the same distance."""
+LONGEST = 8
+"""Letters that may still come behind a node's name and share: its energy."""
 LIT = (255, 230, 0)
 BUSY, DOWN = BRAND, LOSS
 FULL, EMPTY = DELIVERED, SOURCE
@@ -50,6 +51,10 @@ class DeliveryDrawing:
         self._flights = Flights.of(view.run.pieces)
         self._frusta: list[viser.CameraFrustumHandle] = []
         self._names: list[viser.LabelHandle] = []
+        self._marks: dict[str, viser.LabelHandle] = {}
+        """Names of the sink, the cloud and the client."""
+        self._lifts_m: list[FloatArray] = [np.zeros(3)] * len(view.nodes)
+        """(3,) how much higher the name of each node stands, so that it covers no other."""
         self._batteries: list[viser.IcosphereHandle] = []
         self._clouds: list[viser.PointCloudHandle | None] = [None] * len(view.nodes)
         self._meshes: list[viser.GlbHandle] = []
@@ -90,6 +95,28 @@ class DeliveryDrawing:
         along = np.abs(from_middle_m @ up) / slope
         distance_m = float((np.maximum(across, along) / FILLED + from_middle_m @ away).max())
         return middle_m, middle_m + distance_m * away
+
+    def spread_names(self, fov_rad: float, aspect: float, height_px: float) -> None:
+        """Have no name cover another one, as a window so wide and high shows them."""
+        middle_m, stand_m = self.viewpoint(fov_rad, aspect)
+        forward = (middle_m - stand_m) / np.linalg.norm(middle_m - stand_m)
+        right = self._view.stage.right
+        up = np.cross(right, forward)
+        self._lifts_m = [np.zeros(3)] * len(self._names)
+        for row in range(len(self._names)):
+            self._stand(row, self._pose(row, self._shown))
+        labels = [*self._marks.values(), *self._names]
+        from_m = np.array([label.position for label in labels]) - stand_m
+        px_m = 2.0 * np.tan(0.5 * fov_rad) * (from_m @ forward) / max(height_px, 1.0)
+        letters = [len(label.text) for label in self._marks.values()]
+        letters += [len(node.name) + len(" · 100 %") + LONGEST for node in self._view.nodes]
+        at_px = np.column_stack([from_m @ right, from_m @ up]) / px_m[:, None]
+        lifts_px = lifts(at_px, np.array(letters), len(self._marks))
+        self._lifts_m = [
+            lift_px * one_m * up for lift_px, one_m in zip(lifts_px, px_m[len(self._marks) :], strict=True)
+        ]
+        for row in range(len(self._names)):
+            self._stand(row, self._pose(row, self._shown))
 
     def place_m(self, name: str) -> FloatArray:
         """(3,) where a node's radio is drawn, or the sink."""
@@ -142,7 +169,8 @@ class DeliveryDrawing:
     def _stand(self, row: int, T_world_camera: FloatArray) -> None:
         """The camera where its cloud is: a rig may not know its poses before they are found."""
         place(self._frusta[row], T_world_camera)
-        self._names[row].position = T_world_camera[:3, 3] + (0.0, 0.0, NAME_ABOVE * self._size_m)
+        above_m = np.array((0.0, 0.0, NAME_ABOVE * self._size_m))
+        self._names[row].position = T_world_camera[:3, 3] + above_m + self._lifts_m[row]
 
     def _show_picture(self, row: int) -> None:
         """What has arrived of a node's picture."""
@@ -294,13 +322,15 @@ class DeliveryDrawing:
             if role == "sink":
                 away_m = float(np.linalg.norm(positions_m[row] - cameras_m.mean(axis=0)))
                 text = f"sink, {away_m:.0f} m away" if away_m >= 0.5 else "sink, amid the nodes"
-            self._label(f"name-{role}", text, self._places_m[row] + (0.0, 0.0, 0.05 * self._size_m), 0.9)
+            self._marks[role] = self._label(
+                f"name-{role}", text, self._places_m[row] + (0.0, 0.0, 0.05 * self._size_m), 0.9
+            )
         if "cloud" in roles:
             cloud_m = self._places_m[roles.index("cloud")]
             client_m = self._client_m
             self._mark("client", client_m, NEUTRAL)
             above_m = client_m + np.array([0.0, 0.0, 0.05 * self._size_m])
-            self._label("name-client", "client: you", above_m, 0.9)
+            self._marks["client"] = self._label("name-client", "client: you", above_m, 0.9)
             sink_m = self._places_m[roles.index("sink")]
             self._lines("to-client", np.array([[sink_m, cloud_m], [cloud_m, client_m]]))
 
@@ -350,19 +380,3 @@ def _between(first: Number, second: Number, share: float) -> Number:
     start, end = np.array(first, float), np.array(second, float)
     red, green, blue = np.rint(start + share * (end - start)).astype(int).tolist()
     return red, green, blue
-
-
-def legend(view: DeliveryView) -> Sequence[tuple[str, Number]]:
-    """What the colours of the stage mean."""
-    some = [("camera, nothing arrived", BUSY), ("camera, all arrived", DELIVERED)]
-    if any(node.row < 0 for node in view.nodes):
-        some.append(("camera down", DOWN))
-    most = "empty battery" if view.sent.network.energy.battery_j else "most energy used here"
-    return [*some, ("lost here", LOSS), (f"ball: from little to {most}", EMPTY)]
-
-
-def most_j(view: DeliveryView) -> float:
-    """What a node's battery holds; without one, the most that any node uses until the last moment."""
-    battery_j = view.sent.network.energy.battery_j
-    used_j = [node.energy_j for moment in view.moments for node in moment.nodes]
-    return max(used_j, default=0.0) if battery_j is None else battery_j

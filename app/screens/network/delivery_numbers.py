@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from app.dock import time_text
 from app.screens.network.delivery_view import DeliveryView, MomentView
-from app.tables import Row, number, table
+from app.screens.network.labels import CAUSES
+from app.screens.network.view import What
+from app.tables import Head, Row, number, table
 from network_sim.config import NetworkConfig
+from network_sim.types import Cause
 from packetmesh.settings import differences
 
+REASONS = {
+    Cause.COLLISION: "Two cameras sent at once. It happens on every shared radio, even if the slider loses "
+    "nothing; WLAN sends such frames again.",
+    Cause.NOISE: "The signal was too weak for all bits to be read.",
+    Cause.RANGE: "The receiver was too far away, or behind a wall.",
+    Cause.LINK: "Lost as the slider above asks for.",
+    Cause.ACK_LOST: "The frame came, but the sender never heard so.",
+}
+"""By the cause of a loss: how it comes about."""
 BYTES_MB = 1e-6
 MOST_CHANGES = 4
 """That are told one by one."""
 
 
-def moment_table(view: DeliveryView, now: MomentView | None) -> str:
-    """HTML of what matters: at the clock, in the end, and where nothing is lost."""
+def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> str:
+    """HTML of what matters: at the clock ``now_ns``, in the end, and where nothing is lost."""
     end = view.moment_at(view.times_ns[-1])
     done = end is not None and end.t_ns == view.times_ns[-1]
-    columns = (
-        "nothing yet" if now is None else f"at {time_text(now.t_ns)}",
-        f"end, {time_text(view.times_ns[-1])}",
-        "no loss",
-    )
+    end_ns = max(view.run.end_ns, view.times_ns[-1])
+    columns = (_head(view, now, now_ns), f"end, {time_text(end_ns)}", "no loss")
     last, best = end if done else None, view.lossless
     rows: list[Row] = [
         (
@@ -38,6 +49,7 @@ def moment_table(view: DeliveryView, now: MomentView | None) -> str:
             _count(None if last is None else last.packets_lost),
             "0",
         ),
+        *_by_cause(view, now, last),
         (
             "Energy",
             "Radios, computers and cameras of all nodes until then.",
@@ -70,6 +82,33 @@ def moment_table(view: DeliveryView, now: MomentView | None) -> str:
             )
         )
     return table(rows, columns)
+
+
+def _head(view: DeliveryView, now: MomentView | None, now_ns: int) -> Head:
+    """Over the column of the clock: after the last moment nothing changes any more."""
+    if now is None:
+        return "nothing yet"
+    if now.t_ns == view.times_ns[-1]:
+        return f"at {time_text(now_ns)}"
+    return f"by {time_text(now.t_ns)}", "The last moment before the clock at which the surface is rebuilt."
+
+
+def _by_cause(view: DeliveryView, now: MomentView | None, last: MomentView | None) -> list[Row]:
+    """Why frames were lost, the most frequent cause first."""
+    pieces = view.run.pieces
+    lost = pieces.where((pieces.what == What.LOSS) & (pieces.start_ns <= view.times_ns[-1]))
+    counts = np.bincount(lost.cause, minlength=1)
+
+    def until(moment: MomentView | None, cause: int) -> str:
+        if moment is None:
+            return "–"
+        return f"{int(np.count_nonzero(lost.cause[lost.start_ns <= moment.t_ns] == cause)):,}"
+
+    causes = [Cause(row) for row in np.argsort(-counts, kind="stable").tolist() if counts[row]]
+    return [
+        (f"· {CAUSES[cause]}", REASONS.get(cause, ""), until(now, cause), until(last, cause), "0")
+        for cause in causes
+    ]
 
 
 def more_rows(view: DeliveryView, now: MomentView | None) -> str:

@@ -56,11 +56,11 @@ def _growth(view: DeliveryView) -> list[Curve]:
     holes = percent([None if one is None else one.no_hit_share for one in moments])
     arrived = 100.0 * view.arrived_bytes / max(view.total_bytes, 1)
     curves = [
-        Curve("bytes", "%", DELIVERED, view.arrived_ns, arrived, 0.0, 100.0),
-        Curve("rays without surface", "%", LOSS, t_ns, holes, 0.0, 100.0),
+        Curve("bytes", "%", DELIVERED, view.arrived_ns, arrived, 0.0, 100.0, 0),
+        Curve("rays without surface", "%", LOSS, t_ns, holes, 0.0, 100.0, 0),
     ]
     if np.isfinite(score).any() or not view.moments:
-        curves.insert(1, Curve("F-score", "%", INFERRED, t_ns, score, 0.0, 100.0))
+        curves.insert(1, Curve("F-score", "%", INFERRED, t_ns, score, 0.0, 100.0, 0))
     return curves
 
 
@@ -69,7 +69,7 @@ def run_curves(view: NetworkView) -> CurvesLane:
     delivery, throughput = view.series["delivery"], view.series["throughput"]
     most = float(np.nanmax(throughput.values, initial=1.0))
     curves = [
-        Curve("delivered", "%", DELIVERED, _ns(delivery.t_s), delivery.values, 0.0, 100.0),
+        Curve("delivered", "%", DELIVERED, _ns(delivery.t_s), delivery.values, 0.0, 100.0, 0),
         Curve("throughput", "kbit/s", SOURCE, _ns(throughput.t_s), throughput.values, 0.0, most),
     ]
     return CurvesLane("Of the packets", curves)

@@ -14,7 +14,8 @@ from app.drawing.cameras import turn
 from app.drawing.clouds import clear
 from app.drawing.colors import css
 from app.lesson import LessonFolder, read_lesson
-from app.screens.network.delivery_draw import DeliveryDrawing, legend, most_j
+from app.screens.network.delivery_draw import DeliveryDrawing
+from app.screens.network.delivery_legend import legend, most_j
 from app.screens.network.delivery_numbers import changes, difference, moment_table, more_rows, summary
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
@@ -66,7 +67,7 @@ class NetworkPanel(Panel):
         self._frames: list[Frames] = []
         self._drawing: DeliveryDrawing | NetworkDrawing | None = None
         self._drawn = 0
-        self._framed: tuple[tuple[int, float], ...] = ()
+        self._framed: tuple[tuple[int, float, int], ...] = ()
         self._visited = self._streaming = self._here = False
         self._moment_s = 0.0
         self._resting = ui.debounce(REST_S, self._run)
@@ -156,7 +157,10 @@ class NetworkPanel(Panel):
     def look(self) -> bool:
         """Turn the view to the cameras and the room, or the streets, once for each shape of the window."""
         clients = list(self.session.clients())
-        shape = tuple((client.client_id, round(client.camera.aspect, 1)) for client in clients)
+        shape = tuple(
+            (client.client_id, round(client.camera.aspect, 1), client.camera.image_height)
+            for client in clients
+        )
         if self._drawing is None or shape == self._framed:
             return True
         self._framed = shape
@@ -164,7 +168,9 @@ class NetworkPanel(Panel):
             look_at_ground(clients, self._drawing.ground)
         else:
             for client in clients:
-                turn(client, *self._drawing.viewpoint(client.camera.fov, client.camera.aspect))
+                camera = client.camera
+                turn(client, *self._drawing.viewpoint(camera.fov, camera.aspect))
+                self._drawing.spread_names(camera.fov, camera.aspect, camera.image_height)
         return True
 
     @property
@@ -303,7 +309,7 @@ class NetworkPanel(Panel):
         moment = view.moment_at(self._dock.now_ns)
         with self.ui.atomic():
             drawing.show_moment(moment, most_j(view))
-            self._table.content = moment_table(view, moment)
+            self._table.content = moment_table(view, moment, self._dock.now_ns)
             self._others.content = more_rows(view, moment) + metric_tables((view.run,))[1]
 
     # The inspector.

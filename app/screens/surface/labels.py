@@ -12,6 +12,8 @@ of holes. Drag the radius, and compare before and after fusion. Go on with **Exp
 AFTER, BEFORE, BOTH = "after fusion", "before fusion (sensor only)", "side by side"
 POISSON, ALPHA = "Poisson, a baseline", "alpha shape, a baseline"
 BASELINES: dict[str, BaselineName] = {POISSON: "poisson", ALPHA: "alpha"}
+BASELINE_HEADS: dict[BaselineName, str] = {"poisson": "Poisson", "alpha": "alpha shape"}
+OWN_COLORS = "Colours cannot be chosen: a baseline makes vertices of its own, of which no point is known."
 SHOWN: dict[str, Shown] = {AFTER: "after", BEFORE: "before", BOTH: "after", **BASELINES}
 """Which surface is drawn, and so exported; of two side by side the one after fusion."""
 COLORINGS: dict[str, Coloring] = {

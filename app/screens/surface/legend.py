@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET, css
 from app.records import ColorBar
+from app.screens.surface.labels import OWN_COLORS
 from app.screens.surface.view import Coloring
 from app.tables import bar_html
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"
 
 
-def legend_html(coloring: Coloring, has_truth: bool) -> str:
-    """Empty for the cameras' own colours."""
-    if coloring in ("photo", "color"):
+def legend_html(coloring: Coloring, has_truth: bool, baseline: bool = False) -> str:
+    """Empty for the cameras' own colours; of a baseline why it has others."""
+    if baseline:
+        text = OWN_COLORS
+    elif coloring in ("photo", "color"):
         return ""
-    if coloring == "violet":
+    elif coloring == "violet":
         text = f"{_box(INFERRED)}inferred by the network; all else was measured by a sensor"
     elif coloring == "source":
         text = f"{_box(TARGET)}measured by a sensor &emsp; {_box(INFERRED)}inferred by the network"

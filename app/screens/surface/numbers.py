@@ -6,6 +6,7 @@ import html
 from collections.abc import Callable, Iterable
 
 from app.records import MeshView
+from app.screens.surface.labels import BASELINE_HEADS
 from app.screens.surface.view import BaselineView, PaintedView, SurfaceView
 from app.tables import WAITING, Row, number, table, truth_rows
 
@@ -13,7 +14,7 @@ from app.tables import WAITING, Row, number, table, truth_rows
 def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_truth: bool) -> str:
     """HTML: before and after fusion and, beside them, the baselines that have been computed."""
     columns: dict[str, MeshView | None] = {"before": view.before, "after fusion": view.after}
-    columns |= {baseline.name: baseline.mesh for baseline in baselines}
+    columns |= {BASELINE_HEADS[baseline.name]: baseline.mesh for baseline in baselines}
 
     def row(name: str, hint: str, value: Callable[[MeshView], str]) -> Row:
         return (name, hint, *(WAITING if mesh is None else value(mesh) for mesh in columns.values()))

@@ -275,7 +275,8 @@ class SurfacePanel(Panel):
             self._stage.arrange(place, bool(self._loops.value), self._rolling.showing)
             baseline = self._shown.value in BASELINES
             self._coloring.disabled = baseline  # its vertices are no points with a source
-            self._legend.visible = bool(self._legend.content) and not baseline
+            self._legend.content = legend_html(COLORINGS[self._coloring.value], self._has_truth(), baseline)
+            self._legend.visible = bool(self._legend.content)
         shown = SHOWN[self._shown.value]
         if shown != self.session.spec.shown:
             self.session.want(replace(self.session.spec, shown=shown))
