@@ -19,7 +19,7 @@ from app.address import Address, Place
 from app.drawing.cameras import look, stage_of
 from app.drawing.colors import BRAND, DELIVERED
 from app.lecture import Lecture
-from app.page import add_script
+from app.page import add_script, stale_html
 from app.pool import ComputePool, LatestWins, Outcome
 from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
 from app.stepper import Stepper
@@ -51,8 +51,7 @@ class _Track:
 class Session:
     """Runs the chain for one browser and keeps its panels up to date.
 
-    Whatever happens (a click, a finished job, a tick of the player) is posted to one thread, so
-    nothing in the panels needs a lock and nothing slow runs there.
+    Whatever happens is posted to one thread: nothing there needs a lock, and nothing slow runs there.
     """
 
     def __init__(
@@ -218,16 +217,14 @@ class Session:
             step,
             self.store,
             self.spec,
-            on_progress=lambda value: self.post(self._progressed, step, value),
+            on_progress=lambda value: self.post(self._progressed, step, value, key),
             on_end=lambda outcome: self.post(self._ended, track, step, key, outcome),
         )
 
     def _waits(self, step: Step) -> bool:
         """Whether a step is not computed before somebody looks at it."""
-        return any(
-            panel.step == step and panel.only_when_shown and panel is not self._current
-            for panel in self._panels
-        )
+        waiting = (panel for panel in self._panels if panel.only_when_shown and panel is not self._current)
+        return any(panel.step == step for panel in waiting)
 
     def _ended(self, track: _Track, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
         latest = key == track.submitted
@@ -254,14 +251,17 @@ class Session:
         for panel in self._panels:
             panel.on_view(step, view)
 
-    def _progressed(self, step: Step | None, value: Any) -> None:
+    def _progressed(self, step: Step | None, value: Any, key: tuple[Any, ...] = ()) -> None:
         if isinstance(value, Progress):
             self._bar.value = min(100.0, 100.0 * value.fraction)
             self._status.content = f"**Computing** · {value.stage}"
             return
+        if step is not None:
+            self.results.begin(step, key)
         for panel in self._panels:
             if panel.step == step:
                 panel.on_partial(value)
+        self.show_staleness()
 
     # Its own part of the control panel.
 
@@ -271,6 +271,7 @@ class Session:
         self._stepper = Stepper(self.gui, titles, lambda title: self.post(self.show, title))
         self._status = self.gui.add_markdown("**Starting** …")
         self._bar = self.gui.add_progress_bar(0.0)
+        self._stale = self.gui.add_html("")
         actions = self.gui.add_button_group(
             "All steps",
             ("Cancel", "Retry", "Reset", "Copy as command"),
@@ -280,8 +281,8 @@ class Session:
         actions.on_click(lambda event: self.post(self._act, event.target.value))
         self._address: Address | None = None
         if isinstance(self.target, viser.ClientHandle):  # one that many share is nobody's to move
-            start = Place(self._start, self._current.title)
-            self._address = Address(self.ui, start, tuple(titles), self._go_to)
+            place = Place(self._start, self._current.title)
+            self._address = Address(self.ui, place, tuple(titles), self._go_to)
         self._folders: dict[str, viser.GuiFolderHandle] = {}
         for panel in self._panels:
             self.scene.add_frame(panel.drawn_below, show_axes=False, visible=False)
@@ -360,8 +361,15 @@ class Session:
         else:
             self.ui.show_command(self._current.command)
 
+    def show_staleness(self) -> None:
+        """Dim what belongs to other settings than those that are wanted."""
+        ahead = self._current.ahead
+        old = self.results.shows_other(self._current.step or CHAIN[-1], self.spec)
+        self._stale.content = stale_html(numbers=old or ahead, picture=old and not ahead)
+
     def _show_status(self) -> None:
-        """Bring the stepper and the status line up to date."""
+        """Bring the stepper and the status line up to date, and dim the rest."""
+        self.show_staleness()
         running = [track.running for track in self._tracks if track.running is not None]
         statuses = {
             panel.title: self.results.status(panel.step, self.spec, running)
@@ -371,8 +379,7 @@ class Session:
         self._stepper.show(self._current.title, statuses)
         if self._address is not None:
             self._address.show(Place(self.spec, self._current.title))
-        failures = [self.results.failure(step, self.spec) for step in STEPS]
-        failure = next((sentence for sentence in failures if sentence), None)
+        failure = next(filter(None, (self.results.failure(step, self.spec) for step in STEPS)), None)
         if running:
             self._status.content = f"**Computing** · {running[0]}"
         elif failure is not None:
@@ -381,8 +388,7 @@ class Session:
         elif not self._side.busy:
             self._status.content = "**Up to date**"
             self._bar.value = 100.0
-        working = bool(running) or self._side.busy
-        self._bar.color = BRAND if working else DELIVERED
+        self._bar.color = BRAND if running or self._side.busy else DELIVERED
 
     def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
         if self._closed:
