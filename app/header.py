@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import viser
 
 from app.drawing.colors import BRAND, DELIVERED
+from app.page import stale_html
 from app.state import Step, StepStatus
 from app.stepper import Stepper
 from packetmesh.progress import Progress
@@ -26,6 +27,7 @@ class Header:
         self._stepper = Stepper(gui, titles, on_pick)
         self._status = gui.add_markdown("**Starting** …")
         self._bar = gui.add_progress_bar(0.0)
+        self._stale = gui.add_html("")
         actions = gui.add_button_group(
             "All steps",
             ("Cancel", "Retry", "Reset", "Copy as command"),
@@ -38,6 +40,10 @@ class Header:
         """How far a computation is."""
         self._bar.value = min(100.0, 100.0 * report.fraction)
         self._status.content = f"**Computing** · {report.stage}"
+
+    def dim(self, numbers: bool, picture: bool) -> None:
+        """Dim what belongs to other settings than those that are wanted."""
+        self._stale.content = stale_html(numbers, picture)
 
     def show(
         self,

@@ -18,6 +18,12 @@ def add_script(gui: viser.GuiApi) -> None:
     gui.add_html(f"<style>{_STYLE}</style>{running(_SCRIPT)}")
 
 
+def stale_html(numbers: bool, picture: bool) -> str:
+    """HTML by which the style sheet dims the numbers of the panel, or the 3-D picture."""
+    marks = {"packetmesh-old-numbers": numbers, "packetmesh-old-picture": picture}
+    return "".join(f'<i class="{mark}"></i>' for mark, wanted in marks.items() if wanted)
+
+
 def running(script: str, mark: object = "") -> str:
     """HTML that runs a script when it is shown. It cannot hold one, but what is to be done without its image.
 

@@ -41,8 +41,7 @@ CANCELLED = "Cancelled."
 class Session:
     """Runs the chain for one browser and keeps its panels up to date.
 
-    Whatever happens (a click, a finished job, a tick of the player) is posted to one thread, so
-    nothing in the panels needs a lock and nothing slow runs there.
+    Whatever happens is posted to one thread: nothing there needs a lock, and nothing slow runs there.
     """
 
     def __init__(
@@ -224,17 +223,15 @@ class Session:
             step,
             self.store,
             self.spec,
-            on_progress=lambda value: self._post_in_turn(self._progressed, step, value),
+            on_progress=lambda value: self._post_in_turn(self._progressed, step, value, key),
             on_end=lambda outcome: self._post_in_turn(self._ended, track, step, key, outcome),
             key=key,
         )
 
     def _waits(self, step: Step) -> bool:
         """Whether a step is not computed before somebody looks at it."""
-        return any(
-            panel.step == step and panel.only_when_shown and panel is not self._current
-            for panel in self._panels
-        )
+        waiting = (panel for panel in self._panels if panel.only_when_shown and panel is not self._current)
+        return any(panel.step == step for panel in waiting)
 
     def _ended(self, track: Track, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
         latest = key == track.submitted
@@ -261,13 +258,16 @@ class Session:
         for panel in self._panels:
             panel.on_view(step, view)
 
-    def _progressed(self, step: Step | None, value: Any) -> None:
+    def _progressed(self, step: Step | None, value: Any, key: tuple[Any, ...] = ()) -> None:
         if isinstance(value, Progress):
             self._header.progressed(value)
             return
+        if step is not None:
+            self.results.begin(step, key)
         for panel in self._panels:
             if panel.step == step:
                 panel.on_partial(value)
+        self.show_staleness()
 
     # Its own part of the control panel.
 
@@ -286,8 +286,8 @@ class Session:
         )
         self._address: Address | None = None
         if isinstance(self.target, viser.ClientHandle):  # one that many share is nobody's to move
-            start = Place(self._start, self._current.title)
-            self._address = Address(self.ui, start, tuple(titles), self._go_to)
+            place = Place(self._start, self._current.title)
+            self._address = Address(self.ui, place, tuple(titles), self._go_to)
         self._folders: dict[str, viser.GuiFolderHandle] = {}
         for panel in self._panels:
             self.scene.add_frame(panel.drawn_below, show_axes=False, visible=False)
@@ -369,8 +369,15 @@ class Session:
         else:
             self.ui.show_command(self._current.command)
 
+    def show_staleness(self) -> None:
+        """Dim what belongs to other settings than those that are wanted."""
+        ahead = self._current.ahead
+        old = self.results.shows_other(self._current.step or CHAIN[-1], self.spec)
+        self._header.dim(numbers=old or ahead, picture=old and not ahead)
+
     def _show_status(self) -> None:
-        """Bring the stepper and the status line up to date."""
+        """Bring the stepper and the status line up to date, and dim the rest."""
+        self.show_staleness()
         running = [track.running for track in self._tracks if track.running is not None]
         statuses = {
             panel.title: self.results.status(panel.step, self.spec, running)

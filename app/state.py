@@ -121,11 +121,22 @@ class Results:
 
     _views: dict[Step, tuple[Hashable, Any]] = field(default_factory=dict)
     _failures: dict[Step, tuple[Hashable, str]] = field(default_factory=dict)
+    _shown: dict[Step, Hashable] = field(default_factory=dict)
+    """The key of what the panels show of a step, all or the beginning of it."""
 
     def put(self, step: Step, key: Hashable, view: Any) -> None:
         """Keep a result."""
         self._views[step] = (key, view)
+        self._shown[step] = key
         self._failures.pop(step, None)
+
+    def begin(self, step: Step, key: Hashable) -> None:
+        """The panels show what there is so far of a result."""
+        self._shown[step] = key
+
+    def shows_other(self, step: Step, spec: Spec) -> bool:
+        """Whether the panels show something of a step that is not what ``spec`` asks for."""
+        return step in self._shown and self._shown[step] != spec.key(step)
 
     def fail(self, step: Step, key: Hashable, sentence: str) -> None:
         """Remember that this cannot be computed, so that it is not tried again until something changes."""

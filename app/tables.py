@@ -63,7 +63,8 @@ def table(
         )
         lines.append(f'<tr><td style="{_CELL}">{text}</td>{cells}</tr>')
     return (
-        '<div style="padding: 0 0.8em 0.8em 0.8em; font-size: 13px; overflow-x: auto">'
+        '<div class="packetmesh-numbers" '
+        'style="padding: 0 0.8em 0.8em 0.8em; font-size: 13px; overflow-x: auto">'
         f'<table style="border-collapse: collapse; width: 100%">{"".join(lines)}</table></div>'
     )
 

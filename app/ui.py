@@ -157,6 +157,11 @@ class Panel(ABC):
     def on_action(self, action: str) -> None:
         """A button for all steps was pressed."""
 
+    @property
+    def ahead(self) -> bool:
+        """Whether its picture is newer than its numbers, as while a hand drags a slider."""
+        return False
+
     def look(self) -> bool:
         """Turn the view to what it draws; False leaves that to the session, which turns it to the scene."""
         return False

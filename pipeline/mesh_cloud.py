@@ -157,7 +157,8 @@ def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
     euler = len(surface.vertices_m) - len(edges_and_faces(surface.triangles)[0]) + len(surface.triangles)
     closed = quality.boundary_loops == 0 and quality.non_manifold_edges == 0 and quality.components == 1
     measures = asdict(quality)
-    for of_cameras in ("no_hit_ray_share", "within_2pct_share", "within_5pct_share", "guessed_ray_share"):
+    shares = "no_hit_ray_share", "within_2pct_share", "within_5pct_share", "guessed_ray_share"
+    for of_cameras in (*shares, "gaps"):
         del measures[of_cameras]  # a cloud from a file has none
     return {
         "points": meshed.points,

@@ -249,6 +249,18 @@ class RegistrationResult:
 
 
 @dataclass(frozen=True, slots=True)
+class Gaps:
+    """What all cameras together see of a mesh's holes; one that two of them see counts twice."""
+
+    count: int
+    """Patches of pixels side by side whose rays miss the mesh, whatever their size."""
+    large: int
+    """Those of 100 cm² or more."""
+    area_m2: float
+    """Of all, as if each pixel's gap faced its camera at the depth of the nearest pixel that hits."""
+
+
+@dataclass(frozen=True, slots=True)
 class SurfaceQuality:
     """Measures of a mesh's holes and health (SPEC 5); the first is the headline."""
 
@@ -273,6 +285,8 @@ class SurfaceQuality:
     guessed_ray_share: float = float("nan")
     """Share of the cameras' pixel rays that meet a triangle most of whose corners were inferred; NaN where
     the source of the points is unknown."""
+    gaps: Gaps | None = None
+    """Holes as a person counts them; None without cameras."""
 
 
 @dataclass(frozen=True, slots=True)

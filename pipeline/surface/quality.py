@@ -17,6 +17,7 @@ from pipeline.rays import (
     triangle_scene,
 )
 from pipeline.surface.boundary import connected_parts, edges_and_faces
+from pipeline.surface.gaps import gaps_of
 from pipeline.surface.holes import open_area_m2
 from pipeline.types import (
     BoolArray,
@@ -61,6 +62,7 @@ def measure_quality(
     views = list(seen_by(vertices_m, triangles, cameras, source))
     seen = [view.depth for view in views]
     edges, faces = edges_and_faces(triangles)
+    gaps = gaps_of(seen, cameras) if cameras else None
     rim = edges[faces == 1]
     rim_vertices, rim_corners = np.unique(rim, return_inverse=True)
     rim_parts = connected_parts(rim_corners.reshape(-1, 2), len(rim_vertices))
@@ -76,6 +78,7 @@ def measure_quality(
         within_2pct_share=kept_share(seen, sensed, 0.02) if sensed else float("nan"),
         within_5pct_share=kept_share(seen, sensed, 0.05) if sensed else float("nan"),
         guessed_ray_share=guessed_share(views),
+        gaps=gaps,
     )
 
 

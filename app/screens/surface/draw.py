@@ -1,11 +1,13 @@
-"""Surfaces before and after fusion, their holes as red loops."""
+"""Surfaces before and after fusion, their holes as red loops, and the points that the ball left out."""
 
 from __future__ import annotations
 
+import numpy as np
 import viser
 
+from app.drawing.colors import INFERRED, TARGET
 from app.records import MeshView
-from app.screens.surface.view import PaintedMesh
+from app.screens.surface.view import PaintedMesh, UnusedView
 from pipeline.types import FloatArray
 
 
@@ -16,6 +18,8 @@ class SurfaceDrawing:
         self._scene, self._below, self._label = scene, below, label
         self._meshes: list[viser.GlbHandle] = []
         self._rims: list[viser.GlbHandle] = []
+        self._points: dict[str, viser.PointCloudHandle] = {}
+        self._points_shown = True
         self._made = 0
         self._rims_shown = True
         self._frame = scene.add_frame(below, show_axes=False)
@@ -35,6 +39,31 @@ class SurfaceDrawing:
             _shorten(handles, 1 if glb else 0)
             if glb:
                 handles.append(self._add(f"{kind}-{self._made}", glb, kind == "mesh" or self._rims_shown))
+
+    def draw_unused(self, unused: UnusedView) -> None:
+        """Draw the points that the ball left out, in the colours of their sources."""
+        for name, points_m, color in (
+            ("measured", unused.measured_m, TARGET),
+            ("inferred", unused.inferred_m, INFERRED),
+        ):
+            handle = self._points.get(name)
+            if handle is None:
+                self._points[name] = handle = self._scene.add_point_cloud(
+                    f"{self._below}/{name}",
+                    points_m,
+                    np.array(color),
+                    point_shape="circle",
+                    point_shading="flat",
+                    precision="float32",
+                )
+            handle.points, handle.point_size = points_m, unused.size_m
+            handle.visible = self._points_shown
+
+    def show_unused(self, shown: bool) -> None:
+        """Whether those points are shown."""
+        self._points_shown = shown
+        for handle in self._points.values():
+            handle.visible = shown
 
     def drop_old(self) -> None:
         """Remove all but what was drawn last."""

@@ -11,7 +11,8 @@ import numpy as np
 from app.drawing.meshes import mesh_view
 from app.screens.surface.holes_job import hole_views, parts_of
 from app.screens.surface.sweep_job import suggestions_of
-from app.screens.surface.view import SpacingView, SurfaceView
+from app.screens.surface.unused import POINT_SHARE, unused_view
+from app.screens.surface.view import SpacingView, SurfaceView, UnusedView, Which
 from app.state import Spec
 from app.store import Store
 from packetmesh.progress import Progress
@@ -30,11 +31,16 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
     rig, placement = yield from store.stages(spec, "rig", "placement")
     in_photographs = functools.partial(dressed, rig, placement)
     view_after = mesh_view(after, None, in_photographs(after))
-    view = SurfaceView(spacing_of(clouds), after.radii_m, view_after, None, rolled.elapsed_s)
+    size_m = POINT_SHARE * clouds.r_F_m
+    unused: dict[Which, UnusedView] = {"after": unused_view(clouds.fused, after, size_m)}
+    view = SurfaceView(
+        spacing_of(clouds), after.radii_m, view_after, None, rolled.elapsed_s, unused=dict(unused)
+    )
     yield view
-    before = yield from store.stage(spec, "before")
+    before, both = yield from store.stages(spec, "before", "clouds")
+    unused["before"] = unused_view(both.sensor, before, size_m)
     view_before = mesh_view(before, None, in_photographs(before))
-    view = replace(view, before=view_before)
+    view = replace(view, before=view_before, unused=unused)
     yield view
     truth_before, truth_after = yield from store.stage(spec, "truth")
     if truth_before or truth_after:

@@ -16,6 +16,7 @@ BASELINE_HEADS: dict[BaselineName, str] = {"poisson": "Poisson", "alpha": "alpha
 OWN_COLORS = "Colours cannot be chosen: a baseline makes vertices of its own, of which no point is known."
 SHOWN: dict[str, Shown] = {AFTER: "after", BEFORE: "before", BOTH: "after", **BASELINES}
 """Which surface is drawn, and so exported; of two side by side the one after fusion."""
+SHOWN_HINT = "Which surface is drawn: the ball's, or that of another method over the same points."
 COLORINGS: dict[str, Coloring] = {
     "photographs": "photo",
     "inferred in violet (on photographs)": "violet",
@@ -31,3 +32,7 @@ RULES: dict[str, RadiusRule] = {
     "one radius (slider)": "manual",
 }
 """Which balls roll."""
+RULES_HINT = (
+    "r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the fused cloud. "
+    "Several balls roll one after the other, the small ones first."
+)

@@ -12,23 +12,27 @@ _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1
 
 
 def legend_html(coloring: Coloring, has_truth: bool, baseline: bool = False) -> str:
-    """Empty for the cameras' own colours; of a baseline why it has others."""
-    if baseline:
-        text = OWN_COLORS
-    elif coloring in ("photo", "color"):
+    """What the colours mean, of a baseline why it has others, and those of points that the ball left out."""
+    dots = f"Points the ball left out: {_box(TARGET)}measured &ensp; {_box(INFERRED)}inferred"
+    surface = OWN_COLORS if baseline else _surface_html(coloring, has_truth)
+    lines = [line for line in (surface, "" if baseline else dots) if line]
+    return "".join(f'<div style="padding: 0 0.8em; font-size: 13px">{line}</div>' for line in lines)
+
+
+def _surface_html(coloring: Coloring, has_truth: bool) -> str:
+    """Empty for the cameras' own colours."""
+    if coloring in ("photo", "color"):
         return ""
-    elif coloring == "violet":
-        text = f"{_box(INFERRED)}inferred by the network; all else was measured by a sensor"
-    elif coloring == "source":
-        text = f"{_box(TARGET)}measured by a sensor &emsp; {_box(INFERRED)}inferred by the network"
-    elif coloring == "normal":
-        text = "Red, green and blue are the x, y and z of the normal; floors are light blue (z up)."
-    elif not has_truth:
-        text = f"{_box(NEUTRAL)}The truth of this scene is not known, so there is no distance to show."
-    else:
-        half, most = (f"{100 * share * MOST_DISTANCE_M:.0f} cm" for share in (0.5, 1.0))
-        text = bar_html(ColorBar(DISTANCE_STOPS, ("on the truth", half, f"{most} or more")))
-    return f'<div style="padding: 0 0.8em; font-size: 13px">{text}</div>'
+    if coloring == "violet":
+        return f"{_box(INFERRED)}inferred by the network; all else was measured by a sensor"
+    if coloring == "source":
+        return f"{_box(TARGET)}measured by a sensor &emsp; {_box(INFERRED)}inferred by the network"
+    if coloring == "normal":
+        return "Red, green and blue are the x, y and z of the normal; floors are light blue (z up)."
+    if not has_truth:
+        return f"{_box(NEUTRAL)}The truth of this scene is not known, so there is no distance to show."
+    half, most = (f"{100 * share * MOST_DISTANCE_M:.0f} cm" for share in (0.5, 1.0))
+    return bar_html(ColorBar(DISTANCE_STOPS, ("on the truth", half, f"{most} or more")))
 
 
 def _box(color: tuple[int, int, int]) -> str:

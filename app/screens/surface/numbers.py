@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from app.records import MeshView
 from app.screens.surface.labels import BASELINE_HEADS
 from app.screens.surface.view import BaselineView, PaintedView, SurfaceView
-from app.tables import WAITING, Row, number, table, truth_rows
+from app.tables import UNKNOWN, WAITING, Row, number, table, truth_rows
 
 
 def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_truth: bool) -> str:
@@ -26,6 +26,21 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
             lambda m: number(m.quality.no_hit_ray_share, 1, "%", 100),
         ),
         row(
+            "Area of holes",
+            "Of all holes, as seen by the cameras, at the depth of the surface beside them.",
+            lambda m: UNKNOWN if m.quality.gaps is None else number(m.quality.gaps.area_m2, 2, "m²"),
+        ),
+        row(
+            "Large holes",
+            "Holes of 100 cm² or more: a hand fits through.",
+            lambda m: UNKNOWN if m.quality.gaps is None else f"{m.quality.gaps.large:,}",
+        ),
+        row(
+            "All holes",
+            "Holes of any size, down to a single ray.",
+            lambda m: UNKNOWN if m.quality.gaps is None else f"{m.quality.gaps.count:,}",
+        ),
+        row(
             "Rays by guess",
             "Share of the rays that meet surface most of whose points were inferred, not measured.",
             lambda m: number(m.quality.guessed_ray_share, 1, "%", 100),
@@ -41,21 +56,14 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
             "The same within 5 % of the measurement.",
             lambda m: number(m.quality.within_5pct_share, 1, "%", 100),
         ),
-        row(
-            "Hole area",
-            "Area of the holes whose rim is shorter than 1 m, filled flat.",
-            lambda m: number(m.quality.hole_area_m2, 3, "m²"),
-        ),
-        row(
-            "Rims",
-            "Boundary loops: chains of edges with one triangle. More of them can mean fewer holes.",
-            lambda m: f"{m.quality.boundary_loops:,}",
-        ),
-        row(
-            "Rim length", "Length of all these edges.", lambda m: number(m.quality.boundary_length_m, 1, "m")
-        ),
         row("Area", "Area of all triangles.", lambda m: number(m.quality.area_m2, 2, "m²")),
         row("Triangles", "Triangles of the surface.", lambda m: f"{m.triangles:,}"),
+        row(
+            "Rim length",
+            "Length of all edges with one triangle: around holes, at the ends of the scene, and where "
+            "something stands before its background.",
+            lambda m: number(m.quality.boundary_length_m, 1, "m"),
+        ),
         row("Pieces", "Connected components.", lambda m: f"{m.quality.components:,}"),
         row(
             "Unused points", "Points that the ball never rested on.", lambda m: f"{m.quality.unused_points:,}"
@@ -67,8 +75,9 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
     if has_truth:
         rows[1:1] = truth_rows(list(columns.values()))
     head = ", ".join(f"{1000 * radius_m:.1f}" for radius_m in view.radii_m)
-    caption = f"<div style='padding: 0 0.8em; font-size: 13px'>Ball radii: {head} mm</div>"
-    return caption + table(rows, tuple(columns)) + _price(view)
+    look = "class='packetmesh-numbers' style='padding: 0 0.8em; font-size: 13px'"
+    caption = f"<div {look}>Ball radii: {head} mm</div>"
+    return caption + table(rows, tuple(columns)) + _rule(view) + _price(view)
 
 
 WAIT = "<div style='padding: 0 0.8em; font-size: 13px'>Computing the baseline …</div>"
@@ -89,6 +98,22 @@ def quick_line(view: PaintedView) -> str:
         f"{mesh.triangles:,} triangles over {view.points:,} points{part}; rolled in "
         f"{1000 * view.roll_s:.0f} ms</div>"
     )
+
+
+def _rule(view: SurfaceView) -> str:
+    """What is counted as a hole and, where there are more after fusion, why."""
+    text = (
+        "A <b>hole</b> is a patch of a camera's picture, of any size, whose rays miss the surface. The outer "
+        "rim of the scene is not one."
+    )
+    before, after = (mesh and mesh.quality.gaps for mesh in (view.before, view.after))
+    if before and after and after.count > before.count and after.area_m2 < before.area_m2:
+        text += (
+            " Fusion leaves <b>more but smaller</b> ones: it fills the middle of a large hole, and where "
+            "guess and measurement do not quite meet, a seam of tiny ones stays. Their area falls from "
+            f"{before.area_m2:.2f} to {after.area_m2:.2f} m²."
+        )
+    return f"<div style='padding: 0.2em 0.8em; font-size: 13px'>{text}</div>"
 
 
 def _price(view: SurfaceView) -> str:

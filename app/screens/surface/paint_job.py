@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator
+from dataclasses import replace
 
 import numpy as np
 
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET, ramp
 from app.drawing.glb import lines_glb
 from app.drawing.meshes import photographed_glb, rim_segments_m, surface_glb
+from app.screens.surface.unused import POINT_SHARE, resting_ball_m, unused_view
 from app.screens.surface.view import Coloring, PaintedMesh, PaintedView, PaintRequest, Which
 from app.state import Spec
 from app.store import Store
@@ -17,11 +19,20 @@ from packetmesh.progress import Progress
 from pipeline.placement import Placement
 from pipeline.spec import key
 from pipeline.stages import cameras_of, dressed, run
-from pipeline.surface import Camera, distances_to_truth_m, roll_or_nothing, voxel_average, voxel_for_count
+from pipeline.surface import (
+    Camera,
+    distances_to_truth_m,
+    roll_or_nothing,
+    spacing,
+    voxel_average,
+    voxel_for_count,
+)
 from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
 PHOTOGRAPHED: tuple[Coloring, ...] = ("photo", "violet", "color")
 """What has a camera's light and shadow in it."""
+QUICK_UNUSED = 8_000
+"""Points left out that are sent in a quick look, at most."""
 
 
 def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Progress, None, PaintedView]:
@@ -37,13 +48,33 @@ def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Prog
         started = time.perf_counter()
         surfaces = {name: roll_or_nothing(thin[name], (request.radius_m,)) for name in request.which}
         roll_s = time.perf_counter() - started
-    return PaintedView(
+    first = request.which[0]
+    view = PaintedView(
         request,
         {name: _painted(surface, request, rig, placement) for name, surface in surfaces.items()},
-        len(thin[request.which[0]]),
-        len(whole[request.which[0]]),
+        len(thin[first]),
+        len(whole[first]),
         roll_s,
     )
+    if request.radius_m is None:
+        return view
+    spacing_m = yield from _spacing_m(store, spec, request.most_points)
+    unused = {
+        name: unused_view(thin[name], surface, POINT_SHARE * spacing_m, QUICK_UNUSED)
+        for name, surface in surfaces.items()
+    }
+    ball_m = None if request.ray is None else resting_ball_m(thin[first], request.ray, request.radius_m)
+    return replace(view, unused=unused, ball_m=ball_m)
+
+
+def _spacing_m(store: Store, spec: Spec, most_points: int) -> Generator[Progress, None, float]:
+    """Mean distance of nearest points in what a quick look rolls over."""
+
+    def measure() -> Generator[Progress, None, float]:
+        thin = yield from _thinned(store, spec, most_points)
+        return spacing(thin["after"].points_m)[0]
+
+    return (yield from store.remember(("spacing", most_points, key(spec, "clouds")), measure))
 
 
 def _clouds(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, PointCloud]]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -12,19 +10,29 @@ from app.drawing.cameras import stage_of, turn
 from app.lesson import LessonFolder, read_lesson
 from app.records import SceneView
 from app.screens.surface.advice import AdviceFolder
+from app.screens.surface.ball import ChosenBall
+from app.screens.surface.baselines import Baselines
 from app.screens.surface.holes import HolesFolder
-from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN, TEXT
+from app.screens.surface.labels import (
+    AFTER,
+    BASELINES,
+    BOTH,
+    COLORINGS,
+    RULES,
+    RULES_HINT,
+    SHOWN,
+    SHOWN_HINT,
+    TEXT,
+)
 from app.screens.surface.legend import legend_html
 from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook, surface_of
-from app.screens.surface.numbers import WAIT, note_html, quality_table, quick_line
+from app.screens.surface.numbers import quality_table, quick_line
 from app.screens.surface.quick import QuickLook
-from app.screens.surface.rolling import RollingFolder
 from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
 from app.screens.surface.spacing_plot import spacing_figure
 from app.screens.surface.stage import SurfaceStage
 from app.screens.surface.view import (
     BaselineName,
-    BaselineView,
     ExplainView,
     FilledView,
     PaintedView,
@@ -32,7 +40,7 @@ from app.screens.surface.view import (
     SurfaceView,
     Which,
 )
-from app.screens.surface.walk_view import WalkRequest, WalkView
+from app.screens.surface.walks import Walks
 from app.state import Spec, Step
 from app.ui import Panel
 from pipeline.types import FloatArray
@@ -51,11 +59,9 @@ class SurfacePanel(Panel):
         """Radius, rule, what to draw; histogram and quality."""
         gui, session = self.gui, self.session
         self._view: SurfaceView | None = None
-        self._baselines: dict[BaselineName, BaselineView] = {}
-        """Those that have been made of the surface that is wanted."""
         self._look: SurfaceLook | None = None
         self._quick_line = ""
-        self._by_click = False
+        self._by_click = self._quickly_drawn = False
         self._thinning: tuple[int, int] | None = None
         self._key = session.spec.key("surface")
         gui.add_markdown(TEXT)
@@ -68,35 +74,33 @@ class SurfacePanel(Panel):
             "Radii",
             list(RULES),
             initial_value=NAMES[session.spec.config.surface.radius_rule],
-            hint="r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the "
-            "fused cloud. Several balls roll one after the other, the small ones first.",
+            hint=RULES_HINT,
         )
         self.ui.when_changed(self._rule, self._picked_rule)
-        self._shown = gui.add_dropdown(
-            "Show",
-            list(SHOWN),
-            hint="Which surface is drawn: the ball's, or that of another method over the same points.",
-        )
-        self._coloring = gui.add_dropdown(
-            "Colours", list(COLORINGS), hint="What the colours of the surface mean."
-        )
-        self._legend = gui.add_html("", visible=False)
-        self.ui.when_changed(self._coloring, self._picked_coloring)
+        self._shown = gui.add_dropdown("Show", list(SHOWN), hint=SHOWN_HINT)
+        self._coloring = gui.add_dropdown("Colours", list(COLORINGS), hint="What the surface's colours mean.")
+        self._legend = gui.add_html(legend_html("photo", False))
         self._loops = gui.add_checkbox("Hole rims", True, hint="Edges with one triangle only, in red.")
+        self._unused = gui.add_checkbox("Points left out", True, hint="Those that the ball never rested on.")
+        self.ui.when_changed(self._coloring, self._picked_coloring)
         self.ui.when_changed(self._shown, self._picked_shown)
-        self.ui.when_changed(self._loops, self._arrange)
+        for shown in (self._loops, self._unused):
+            self.ui.when_changed(shown, self._arrange)
         self._quick = gui.add_html("")
         self._table = gui.add_html("")
         self._histogram = gui.add_plotly(spacing_figure(None), aspect=0.62, config={"displayModeBar": False})
         self._build_folders()
         self._stage = SurfaceStage(self.scene)
+        self._ball = ChosenBall(session, self._stage)
+        self._baselines = Baselines(session, self._stage, self._quick, self._made)
         self.ui.when_clicked(self.drawn_below, self._clicked)
 
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session
         self._advice = AdviceFolder(self.ui, self._sweep, session.cancel_side_job, self._take_radius)
         self._holes = HolesFolder(self.ui, self._explain, self._fill)
-        self._rolling = RollingFolder(self.ui, self._watch)
+        self._walks = Walks(session, self._arrange)
+        self._rolling = self._walks.folder
         with gui.add_folder("Advanced", expand_by_default=False):
             self._controls = Controls(self.ui, ADVANCED, session.spec.config, session.edit)
             self._look_quickly = QuickLook(session, self._painted, self._drawn, self._rested)
@@ -114,6 +118,11 @@ class SurfacePanel(Panel):
         """Whether both surfaces are shown."""
         return self._shown.value == BOTH
 
+    @property
+    def ahead(self) -> bool:
+        """Whether a quick look is drawn, or about to be."""
+        return self._quickly_drawn or self._look_quickly.moving
+
     def on_spec(self, spec: Spec) -> None:
         """Show the settings that are wanted; what was made with others goes."""
         if spec.key("surface") == self._key:
@@ -125,10 +134,10 @@ class SurfacePanel(Panel):
         if thinning != self._thinning:
             self._advice.forget()
         self._thinning = thinning
-        self._baselines = {}
+        self._baselines.forget()
         if self._shown.value in BASELINES:
             self._shown.value = AFTER
-        self._close_walk()
+        self._walks.close()
         self._arrange()
 
     def on_view(self, step: Step, view: Any) -> None:
@@ -136,6 +145,8 @@ class SurfacePanel(Panel):
         if step == "fuse":
             self._advice.forget()
             self._holes.forget()
+        if step == "scene":
+            self._ball.forget()
         if step == "surface":
             self.on_partial(view)
 
@@ -151,7 +162,9 @@ class SurfacePanel(Panel):
             self._shown.value = AFTER
             self._arrange()
         which, coloring = self._stage.which, COLORINGS[self._coloring.value]
-        self._look_quickly.want(PaintRequest(which, coloring, self._radius.value / 1000.0))
+        request = PaintRequest(which, coloring, self._radius.value / 1000.0, ray=self._ball.ray())
+        self._look_quickly.want(request)
+        self.session.show_staleness()
 
     def _drawn(self) -> None:
         """What was sent last stands on the screen; its numbers waited, as the page is slow to write them."""
@@ -165,6 +178,7 @@ class SurfacePanel(Panel):
         session.edit(with_rule("manual", self._radius.value))
         if self._view is not None and session.results.fresh("surface", session.spec):
             self._take(self._view)
+            session.show_staleness()
 
     def _take_radius(self, radius_m: float) -> None:
         self.session.edit(with_rule("manual", 1000.0 * radius_m))
@@ -178,6 +192,9 @@ class SurfacePanel(Panel):
     def _take(self, view: SurfaceView) -> None:
         """Show a view of the chain."""
         with self.ui.atomic():
+            self._quickly_drawn = False
+            self._ball.hide()
+            self._stage.draw_unused(view.unused)
             if COLORINGS[self._coloring.value] == "photo":
                 self._stage.draw("after", view.after)
                 if view.before is not None:
@@ -202,8 +219,7 @@ class SurfacePanel(Panel):
 
     def _show_numbers(self) -> None:
         if self._view is not None:
-            baselines = self._baselines.values()
-            self._table.content = quality_table(self._view, baselines, self._has_truth())
+            self._table.content = quality_table(self._view, self._baselines.views, self._has_truth())
 
     def _repaint(self) -> None:
         """Have the surfaces of the settings in the colours chosen."""
@@ -222,39 +238,32 @@ class SurfacePanel(Panel):
             return
         with self.ui.atomic():
             drawn = [mesh for which, mesh in view.meshes.items() if self._stage.draw(which, mesh, quick)]
+            if quick:
+                self._stage.draw_unused(view.unused)
+                self._ball.show(view)
+                self._quickly_drawn = True
             self._look_quickly.sent([mesh.vertices for mesh in drawn if mesh.triangles] if quick else ())
         self._quick_line = quick_line(view) if quick else ""
         self.ui.flush()
 
     def _picked_shown(self) -> None:
         """Show another surface; that of a baseline is made first."""
-        session, name = self.session, BASELINES.get(self._shown.value)
+        name = BASELINES.get(self._shown.value)
         self._quick.content = ""
         if name is None or self._view is None:
             self._load_holes()
         else:
-            if name not in self._baselines:
-                made = functools.partial(self._made, name, session.spec.key("surface"))
-                session.side_job("surface.baselines_job:baseline_job", name, on_end=made)
-            self._show_baseline(self._baselines.get(name))
+            self._baselines.show(name)
         self._arrange()
 
-    def _show_baseline(self, view: BaselineView | None) -> None:
-        """Draw a baseline, or say that it is being made."""
-        self._quick.content = WAIT if view is None else note_html(view)
-        self._stage.draw_baseline(None if view is None else view.mesh)
-
-    def _made(self, name: BaselineName, key: tuple[Hashable, ...], view: BaselineView | None) -> None:
+    def _made(self, name: BaselineName, made: bool) -> None:
         """A baseline is there, or could not be made."""
-        if key != self.session.spec.key("surface"):
-            return
-        if view is None:
+        if not made:
             self._shown.value, self._quick.content = AFTER, ""
         else:
-            self._baselines[name] = view
             self._show_numbers()
             if BASELINES.get(self._shown.value) == name:
-                self._show_baseline(view)
+                self._baselines.show(name)
         self._arrange()
 
     def _picked_coloring(self) -> None:
@@ -272,11 +281,11 @@ class SurfacePanel(Panel):
         with self.ui.atomic():
             self._stage.shown = self._shown.value
             place = None if scene is None else stage_of(scene.nodes)
-            self._stage.arrange(place, bool(self._loops.value), self._rolling.showing)
+            loops, unused = bool(self._loops.value), bool(self._unused.value)
+            self._stage.arrange(place, loops, unused, self._rolling.showing)
             baseline = self._shown.value in BASELINES
             self._coloring.disabled = baseline  # its vertices are no points with a source
             self._legend.content = legend_html(COLORINGS[self._coloring.value], self._has_truth(), baseline)
-            self._legend.visible = bool(self._legend.content)
         shown = SHOWN[self._shown.value]
         if shown != self.session.spec.shown:
             self.session.want(replace(self.session.spec, shown=shown))
@@ -299,6 +308,7 @@ class SurfacePanel(Panel):
         """Explain the hole that was clicked."""
         if self._rolling.showing or self._shown.value in BASELINES:
             return
+        self._ball.clicked(origin_m, direction)
         for which in self._stage.which:
             if self._holes.picked(origin_m, direction, which, self._stage.offset_m(which)):
                 self._by_click = True
@@ -334,30 +344,6 @@ class SurfacePanel(Panel):
             elif self._view is not None:
                 self._take(self._view)
 
-    def _watch(self, request: WalkRequest | None) -> None:
-        session = self.session
-        if request is None:
-            session.cancel_side_job()
-            self._close_walk()
-            self._arrange()
-        elif session.results.view("fuse") is not None:
-            ended = functools.partial(self._walked, session.spec.key("surface"))
-            session.side_job("surface.walk_job:walk_job", request, on_end=ended)
-
-    def _close_walk(self) -> None:
-        """Take the walk away, and stand back again after a close-up."""
-        near = self._rolling.focus is not None
-        self._rolling.forget()
-        if near:
-            self.session.frame_view(anew=True)
-
-    def _walked(self, key: tuple[Hashable, ...], view: WalkView | None) -> None:
-        if key != self.session.spec.key("surface"):
-            return
-        self._rolling.load(view)
-        self._arrange()
-        self.session.frame_view(anew=True)
-
     def look(self) -> bool:
         """Have the patch of a close-up in the picture; the session sees to the rest."""
         focus = self._rolling.focus
@@ -373,7 +359,7 @@ class SurfacePanel(Panel):
             self._shown.value = look.shown
             self._coloring.value = next(name for name, key in COLORINGS.items() if key == look.coloring)
             self._loops.value = look.rims
-            self._close_walk()
+            self._walks.close()
             self._picked_coloring()
         self._look = look
         session.edit(lambda config: replace(config, surface=surface_of(look, config.surface)))

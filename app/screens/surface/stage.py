@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import viser
 
 from app.drawing.cameras import Stage
+from app.drawing.colors import SOURCE
 from app.records import MeshView
 from app.screens.surface.draw import SurfaceDrawing
 from app.screens.surface.labels import AFTER, BASELINES, BEFORE, BOTH
-from app.screens.surface.view import PaintedMesh, Which
+from app.screens.surface.view import PaintedMesh, UnusedView, Which
 from pipeline.types import FloatArray
+
+BALL_OPACITY = 0.55
 
 
 class SurfaceStage:
@@ -24,6 +29,15 @@ class SurfaceStage:
         }
         self._drawn: dict[Which, MeshView | PaintedMesh] = {}
         self._baseline = SurfaceDrawing(scene, "/surface/baseline", "baseline")
+        self._ball = scene.add_icosphere(
+            "/surface/ball",
+            0.02,
+            SOURCE,
+            subdivisions=4,
+            opacity=BALL_OPACITY,
+            cast_shadow=False,
+            visible=False,
+        )
         self.shown = AFTER
         """One of ``app.screens.surface.labels.SHOWN``."""
         self._offset_m: FloatArray = np.zeros(3)
@@ -53,18 +67,31 @@ class SurfaceStage:
         self._drawn[which] = mesh
         return True
 
+    def draw_unused(self, unused: Mapping[Which, UnusedView]) -> None:
+        """Draw the points that the ball left out, of the surfaces that are given."""
+        for which, points in unused.items():
+            self._drawings[which].draw_unused(points)
+
+    def draw_ball(self, center_m: FloatArray | None, radius_m: float) -> None:
+        """The ball on the first surface that is shown, or none."""
+        self._ball.visible = center_m is not None
+        if center_m is not None:
+            self._ball.radius = radius_m
+            self._ball.position = center_m + self.offset_m(self.which[0])
+
     def draw_baseline(self, mesh: MeshView | None) -> None:
         """Draw a baseline's surface, or none."""
         self._baseline.clear()
         if mesh is not None:
             self._baseline.draw(mesh)
 
-    def arrange(self, place: Stage | None, loops: bool, hidden: bool) -> None:
+    def arrange(self, place: Stage | None, loops: bool, unused: bool, hidden: bool) -> None:
         """Show what is to be shown, two side by side.
 
         Args:
             place: where the scene is; None before there is one.
             loops: whether the rims of holes are drawn.
+            unused: whether the points that the ball left out are.
             hidden: whether something else is watched instead.
         """
         both = self.shown == BOTH and place is not None
@@ -74,6 +101,7 @@ class SurfaceStage:
         for which, drawing in self._drawings.items():
             visible = which in self.which and not hidden and not baseline
             drawing.show(visible, loops, self.offset_m(which), top_m)
+            drawing.show_unused(unused)
         self._baseline.show(baseline and not hidden, loops, np.zeros(3), None)
 
     def drop_old(self) -> None:

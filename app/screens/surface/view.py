@@ -34,6 +34,14 @@ QUICK_POINTS = 20_000
 
 
 @dataclass(frozen=True, slots=True)
+class Ray:
+    """A line of sight in the frame of the surface."""
+
+    origin_m: tuple[float, float, float]
+    direction: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class PaintRequest:
     """Surfaces to draw in certain colours; with a radius, a quick look while the ball is being chosen."""
 
@@ -43,6 +51,8 @@ class PaintRequest:
     """None takes the surfaces of the settings as they are."""
     most_points: int = QUICK_POINTS
     """A larger cloud is thinned to about so many for a quick look."""
+    ray: Ray | None = None
+    """Where it meets the cloud, the ball of a quick look lies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +63,18 @@ class PaintedMesh:
     rims_glb: bytes
     vertices: int
     triangles: int
+
+
+@dataclass(frozen=True, slots=True)
+class UnusedView:
+    """Points that the ball left out."""
+
+    measured_m: FloatArray
+    """(N, 3) float32, world frame: those of the sensors."""
+    inferred_m: FloatArray
+    """(M, 3) float32, those of the depth network."""
+    size_m: float
+    """Of a point on the screen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +89,10 @@ class PaintedView:
     """Of the whole cloud."""
     roll_s: float
     """The ball alone."""
+    unused: Mapping[Which, UnusedView] = field(default_factory=dict)
+    """Of a quick look."""
+    ball_m: FloatArray | None = None
+    """(3,) centre of the ball of a quick look, at rest on a point."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,3 +180,5 @@ class SurfaceView:
     """Of the surface after fusion."""
     suggestions: tuple[Suggestion, ...] = ()
     """Ball radii that the cloud after fusion suggests."""
+    unused: Mapping[Which, UnusedView] = field(default_factory=dict)
+    """Of the surfaces that are there."""

@@ -1,0 +1,60 @@
+"""Surfaces of other methods over the same points, made when they are first looked at."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Hashable, Iterable
+
+import viser
+
+from app.screens.surface.numbers import WAIT, note_html
+from app.screens.surface.stage import SurfaceStage
+from app.screens.surface.view import BaselineName, BaselineView
+from app.session import Session
+
+
+class Baselines:
+    """Those that have been made of the surface that is wanted."""
+
+    def __init__(
+        self,
+        session: Session,
+        stage: SurfaceStage,
+        line: viser.GuiHtmlHandle,
+        on_made: Callable[[BaselineName, bool], None],
+    ) -> None:
+        """Keep none yet.
+
+        Args:
+            session: who makes them.
+            stage: where they are drawn.
+            line: says something about the one that is shown.
+            on_made: called when one has been made, or could not be.
+        """
+        self._session, self._stage, self._line, self._on_made = session, stage, line, on_made
+        self._views: dict[BaselineName, BaselineView] = {}
+
+    @property
+    def views(self) -> Iterable[BaselineView]:
+        """All that are there."""
+        return self._views.values()
+
+    def forget(self) -> None:
+        """The surface that is wanted is another one."""
+        self._views = {}
+
+    def show(self, name: BaselineName) -> None:
+        """Draw one, or say that it is being made."""
+        session, view = self._session, self._views.get(name)
+        if view is None:
+            made = functools.partial(self._made, name, session.spec.key("surface"))
+            session.side_job("surface.baselines_job:baseline_job", name, on_end=made)
+        self._line.content = WAIT if view is None else note_html(view)
+        self._stage.draw_baseline(None if view is None else view.mesh)
+
+    def _made(self, name: BaselineName, key: tuple[Hashable, ...], view: BaselineView | None) -> None:
+        if key != self._session.spec.key("surface"):
+            return
+        if view is not None:
+            self._views[name] = view
+        self._on_made(name, view is not None)

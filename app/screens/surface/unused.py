@@ -1,0 +1,70 @@
+"""The points that the ball left out, and where it rests on the others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.screens.surface.view import Ray, UnusedView
+from pipeline.types import BoolArray, FloatArray, PointCloud, PointSource, Surface
+
+NEARLY_NOTHING = 0.05
+"""A mesh of fewer of the points, as a share, is no surface: all points are shown."""
+MOST_POINTS = 30_000
+POINT_SHARE = 0.5
+"""Size of a point on the screen over the mean distance of nearest points."""
+AIM = 0.01
+"""Tangent of the angle beside a ray within which the first point is meant, and the share of its distance
+within which another is as near."""
+
+
+def unused_view(cloud: PointCloud, surface: Surface, size_m: float, most: int = MOST_POINTS) -> UnusedView:
+    """The points of a cloud that no triangle of its surface uses.
+
+    Args:
+        cloud: that the ball rolled over.
+        surface: its vertices are points of the cloud.
+        size_m: of a point on the screen.
+        most: more are thinned evenly.
+    """
+    rows = np.flatnonzero(_unused(cloud.points_m, surface.vertices_m))
+    rows = rows[:: max(1, -(-len(rows) // most))]
+    points_m = cloud.points_m[rows].astype(np.float32)
+    inferred = np.zeros(len(rows), bool)
+    if cloud.source is not None:
+        inferred = cloud.source[rows] == PointSource.INFERRED
+    return UnusedView(points_m[~inferred], points_m[inferred], size_m)
+
+
+def _unused(points_m: FloatArray, vertices_m: FloatArray) -> BoolArray:
+    """(N,) True for points that are no vertex; True for all where nearly none is one."""
+    if len(vertices_m) < NEARLY_NOTHING * len(points_m):
+        return np.ones(len(points_m), bool)
+    return ~np.isin(_keys(points_m), _keys(vertices_m))
+
+
+def _keys(points_m: FloatArray) -> np.ndarray:
+    """(N,) one value a point, equal for equal points only."""
+    return np.ascontiguousarray(points_m, float).view([("x", float), ("y", float), ("z", float)])[:, 0]
+
+
+def resting_ball_m(cloud: PointCloud, ray: Ray, radius_m: float) -> FloatArray | None:
+    """(3,) centre of a ball that lies on the point that a ray means; None if no point is ahead.
+
+    Args:
+        cloud: with normals towards the outside.
+        ray: it means the first point very near to it or, if there is none, the nearest by angle.
+        radius_m: of the ball.
+    """
+    origin_m, direction = np.array(ray.origin_m), np.array(ray.direction)
+    direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
+    from_origin_m = cloud.points_m - origin_m
+    ahead_m = from_origin_m @ direction
+    beside_m = np.linalg.norm(from_origin_m - ahead_m[:, None] * direction, axis=1)
+    slope = np.divide(beside_m, ahead_m, out=np.full(len(ahead_m), np.inf), where=ahead_m > 1e-6)
+    if cloud.normals is None or not np.isfinite(slope).any():
+        return None
+    meant = slope <= max(AIM, float(slope.min()))
+    meant &= ahead_m <= (1.0 + AIM) * ahead_m[meant].min()
+    row = int(np.where(meant, slope, np.inf).argmin())
+    resting_m: FloatArray = cloud.points_m[row] + radius_m * cloud.normals[row]
+    return resting_m

@@ -1,0 +1,51 @@
+"""Holes as a person counts them: patches of the cameras' pictures behind which there is no surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from pipeline.rays import Camera
+from pipeline.types import BoolArray, DepthMap, FloatArray, Gaps
+
+LARGE_M2 = 0.01
+"""A gap of this area or more is large: a hand fits through it."""
+
+
+def gaps_of(seen: Sequence[DepthMap], cameras: Sequence[Camera]) -> Gaps:
+    """The gaps in the depth images of a mesh.
+
+    Nothing else counts: the outer rim of a scene is no gap, as no camera looks past it, nor is an edge of
+    the mesh that stands before other surface.
+
+    Args:
+        seen: depth of the mesh in each camera, NaN where a ray misses.
+        cameras: of these images.
+    """
+    areas_m2 = [
+        _areas_m2(depth, camera) for depth, camera in zip(seen, cameras, strict=True) if depth.valid.any()
+    ]
+    every_m2 = np.concatenate([np.empty(0), *areas_m2])
+    return Gaps(len(every_m2), int((every_m2 >= LARGE_M2).sum()), float(every_m2.sum()))
+
+
+def _areas_m2(depth: DepthMap, camera: Camera) -> FloatArray:
+    """(G,) of the gaps in one picture that has a pixel with depth."""
+    missed = ~depth.valid
+    count, patch = cv2.connectedComponents(missed.astype(np.uint8), connectivity=4)
+    pixel_m2 = _filled_m(depth, missed) ** 2 / (camera.intrinsics.fx_px * camera.intrinsics.fy_px)
+    sums_m2: FloatArray = np.bincount(patch[missed], pixel_m2[missed], count).astype(float)
+    return sums_m2[1:]
+
+
+def _filled_m(depth: DepthMap, missed: BoolArray) -> FloatArray:
+    """(H, W) depth where there is one, and elsewhere that of the nearest pixel that has one."""
+    _, nearest = cv2.distanceTransformWithLabels(
+        missed.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    known_m = np.zeros(int(nearest.max()) + 1)
+    known_m[nearest[~missed]] = depth.z_m[~missed]
+    filled_m: FloatArray = known_m[nearest]
+    return filled_m
