@@ -19,13 +19,13 @@ from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.files import atomic_path, finite, writable_folder, write_json
 from packetmesh.progress import Progress, drain
 from packetmesh.settings import settings
-from pipeline.config import PipelineConfig
+from pipeline.config import Baseline, PipelineConfig
 from pipeline.importing import is_recording, iterate_import
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.run_folder import metrics_of, write_run_folder
+from pipeline.run_folder import metrics_of, write_baseline, write_run_folder
 from pipeline.sources import MILLIMETRES, FileSource, RigFolder
 from pipeline.spec import Spec
-from pipeline.stages import RunCache, cameras_of, run
+from pipeline.stages import RunCache, cameras_of, compute, run
 from pipeline.surface.pictures import mesh_picture
 
 REPORT, PICTURE, TASK = "report.html", "picture.jpg", "task.json"
@@ -65,9 +65,11 @@ class RigOutcome:
 
 
 def iterate_run(
-    source: FileSource, preset: str, config: PipelineConfig, out: Path
+    source: FileSource, preset: str, config: PipelineConfig, out: Path, baseline: Baseline | None = None
 ) -> Generator[Progress, None, tuple[Reconstruction, dict[str, Any]]]:
     """Reconstruct, and write a run folder with its report; images that cannot be used leave no folder.
+
+    With a baseline, its surface is written, too.
 
     Returns:
         The reconstruction and its metrics.
@@ -79,9 +81,12 @@ def iterate_run(
     drain(run(spec, cache, ["rig"]))
     writable_folder(out)
     result = yield from iterate_reconstruction(spec, cache)
+    beside = None if baseline is None else (yield from compute(spec, baseline, cache)).value
     metrics = metrics_of(result)
     write_run_folder(result, metrics, out)
     write_reconstruction_report(result, metrics, out / REPORT)
+    if baseline is not None and beside is not None:
+        write_baseline(baseline, beside, result, out)
     return result, metrics
 
 

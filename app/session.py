@@ -24,7 +24,7 @@ from app.pool import ComputePool, LatestWins, Outcome
 from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
 from app.stepper import Stepper
 from app.store import Store
-from app.ui import Panel, Ui
+from app.ui import Offers, Panel, Ui
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig
@@ -193,6 +193,10 @@ class Session:
     def _cancel(self) -> None:
         for lane in (self._side, *(track.lane for track in self._tracks)):
             lane.cancel()
+
+    def offers(self) -> tuple[Offers, ...]:
+        """What can be taken along of what all screens show."""
+        return tuple(offer for panel in self._panels for offer in panel.offers())
 
     def advance(self) -> None:
         """Compute the first step of each track that is out of date."""

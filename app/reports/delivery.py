@@ -66,13 +66,12 @@ def _corners_m(hand_out: HandOut, meshes: list[Surface]) -> np.ndarray:
 
 def _record(hand_out: HandOut, meshes: list[Surface], box: Box) -> dict[str, Any]:
     """What the page knows besides pictures, meshes and frames."""
-    view = viewpoint(hand_out)
     return {
         "end_s": max(hand_out.end_s, hand_out.moments[-1].t_s),
         "causes": list(hand_out.frames.causes),
         "lossless_f_score": hand_out.lossless_f_score,
         "box": {"low_m": box.low_m.tolist(), "step_m": box.step_m},
-        "view": {"eye_m": view.eye_m.tolist(), "middle_m": view.middle_m.tolist(), "up": view.up.tolist()},
+        "view": viewpoint(hand_out).record(),
         "nodes": [
             {
                 "name": node.name,

@@ -127,7 +127,10 @@ class Player {
       step: () => this.step(1),
       end: () => this.seek(this.record.end_s),
       whole: () => this.dock.whole(),
-      light: () => this.light(),
+      light: () => {
+        toggleLight();
+        this.redraw();
+      },
     };
     for (const [id, action] of Object.entries(actions)) find(id).addEventListener("click", action);
     const keys = {Home: "start", ArrowLeft: "back", " ": "play", ArrowRight: "step", End: "end"};
@@ -139,13 +142,6 @@ class Player {
     });
     addEventListener("keyup", event => event.key === " " && event.preventDefault());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
-  }
-
-  light() {
-    const root = document.documentElement;
-    const dark = getComputedStyle(root).getPropertyValue("--dark").trim() === "1";
-    root.dataset.light = dark ? "light" : "dark";
-    this.redraw();
   }
 
   redraw() {

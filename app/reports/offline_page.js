@@ -11,3 +11,9 @@ async function inflate(id) {
   const stream = new Blob([bytesOf(id)]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
+
+function toggleLight() {
+  const root = document.documentElement;
+  const dark = getComputedStyle(root).getPropertyValue("--dark").trim() === "1";
+  root.dataset.light = dark ? "light" : "dark";
+}

@@ -12,8 +12,9 @@ from app.drawing.cameras import stage_of, turn
 from app.lesson import LessonFolder, read_lesson
 from app.records import SceneView
 from app.screens.surface.advice import AdviceFolder
+from app.screens.surface.export import surface_offers
 from app.screens.surface.holes import HolesFolder
-from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN, TEXT
+from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, HINTS, RULES, SHOWN, TEXT
 from app.screens.surface.legend import legend_html
 from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook, surface_of
 from app.screens.surface.numbers import WAIT, note_html, quality_table, quick_line
@@ -34,7 +35,7 @@ from app.screens.surface.view import (
 )
 from app.screens.surface.walk_view import WalkRequest, WalkView
 from app.state import Spec, Step
-from app.ui import Panel
+from app.ui import Offers, Panel
 from pipeline.types import FloatArray
 
 NAMES = {rule: name for name, rule in RULES.items()}
@@ -68,18 +69,11 @@ class SurfacePanel(Panel):
             "Radii",
             list(RULES),
             initial_value=NAMES[session.spec.config.surface.radius_rule],
-            hint="r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the "
-            "fused cloud. Several balls roll one after the other, the small ones first.",
+            hint=HINTS["Radii"],
         )
         self.ui.when_changed(self._rule, self._picked_rule)
-        self._shown = gui.add_dropdown(
-            "Show",
-            list(SHOWN),
-            hint="Which surface is drawn: the ball's, or that of another method over the same points.",
-        )
-        self._coloring = gui.add_dropdown(
-            "Colours", list(COLORINGS), hint="What the colours of the surface mean."
-        )
+        self._shown = gui.add_dropdown("Show", list(SHOWN), hint=HINTS["Show"])
+        self._coloring = gui.add_dropdown("Colours", list(COLORINGS), hint=HINTS["Colours"])
         self._legend = gui.add_html("", visible=False)
         self.ui.when_changed(self._coloring, self._picked_coloring)
         self._loops = gui.add_checkbox("Hole rims", True, hint="Edges with one triangle only, in red.")
@@ -280,6 +274,10 @@ class SurfacePanel(Panel):
         if shown != self.session.spec.shown:
             self.session.want(replace(self.session.spec, shown=shown))
         self.session.frame_view()
+
+    def offers(self) -> tuple[Offers, ...]:
+        """The surfaces as they are drawn."""
+        return (surface_offers(self._shown.value, self._coloring.value),)
 
     # The folders.
 
