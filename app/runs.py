@@ -21,15 +21,15 @@ from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.files import atomic_path, finite, writable_folder, write_json
 from packetmesh.progress import Progress, drain, part
 from packetmesh.settings import settings
-from pipeline.config import PipelineConfig
+from pipeline.config import Baseline, PipelineConfig
 from pipeline.importing import ImportReport, is_recording, iterate_import
 from pipeline.io.rigs import is_rig
 from pipeline.placement import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.run_folder import METRICS, clear_run_folder, metrics_of, write_run_folder
+from pipeline.run_folder import METRICS, clear_run_folder, metrics_of, write_baseline, write_run_folder
 from pipeline.sources import Calibrated, FileSource, RigFolder
 from pipeline.spec import Spec
-from pipeline.stages import RunCache, cameras_of, run
+from pipeline.stages import RunCache, cameras_of, compute, run
 from pipeline.surface.pictures import mesh_picture
 
 REPORT, PICTURE, TASK, IMPORTED = "report.html", "picture.jpg", "task.json", "imported"
@@ -69,11 +69,12 @@ class RigOutcome:
 
 
 def iterate_run(
-    source: FileSource, preset: str, config: PipelineConfig, out: Path
+    source: FileSource, preset: str, config: PipelineConfig, out: Path, baseline: Baseline | None = None
 ) -> Generator[Progress, None, tuple[Reconstruction, dict[str, Any]]]:
     """Reconstruct, and write a run folder with its report; images that cannot be used leave no folder.
 
-    A recording that is named as a rig is imported first, to ``out/imported``.
+    A recording that is named as a rig is imported first, to ``out/imported``. With a baseline, its surface
+    is written, too.
 
     Returns:
         The reconstruction and its metrics, with what was imported.
@@ -86,9 +87,12 @@ def iterate_run(
     drain(run(spec, cache, ["rig"]))
     writable_folder(out)
     result = yield from iterate_reconstruction(spec, cache)
+    beside = None if baseline is None else (yield from compute(spec, baseline, cache)).value
     metrics = metrics_of(result) | {"import": None if report is None else asdict(report)}
     clear_run_folder(out)
     write_reconstruction_report(result, metrics, out / REPORT)
+    if baseline is not None and beside is not None:
+        write_baseline(baseline, beside, result, out)
     write_run_folder(result, metrics, out)
     return result, metrics
 

@@ -24,7 +24,7 @@ from app.page import add_script
 from app.pool import ComputePool, Outcome
 from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
 from app.store import Store
-from app.ui import Panel, Ui
+from app.ui import Offers, Panel, Ui
 from packetmesh.errors import PacketMeshError
 from packetmesh.files import file_trouble
 from packetmesh.progress import Progress
@@ -198,6 +198,10 @@ class Session:
     def cancel_side_job(self) -> None:
         """End the job beside the chain now."""
         self._side.cancel()
+
+    def offers(self) -> tuple[Offers, ...]:
+        """What can be taken along of what all screens show."""
+        return tuple(offer for panel in self._panels for offer in panel.offers())
 
     def advance(self) -> None:
         """Compute the first step of each track that is out of date."""

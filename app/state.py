@@ -6,13 +6,13 @@ import threading
 from collections import OrderedDict
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from app.records import Shown
 from app.turns import Turns
 from network_sim.config import NetworkConfig
 from pipeline import spec
-from pipeline.config import Lens, Pattern
+from pipeline.config import Baseline, Lens, Pattern
 from pipeline.spec import StageName
 
 Step = Literal["scene", "depth", "fuse", "surface", "calibrate", "network"]
@@ -73,6 +73,11 @@ class Spec(spec.Spec):
     """A delivery of the rig's own images; None until somebody looks."""
     views: BoardViews | None = None
     """Photographs to calibrate from; None until somebody looks, or where there are none."""
+
+    def command(self, out: str = "runs/from-app") -> str:
+        """The command line that computes the same, with the surface that is shown."""
+        line = spec.Spec.command(self, out)
+        return f"{line} --baseline {self.shown}" if self.shown in get_args(Baseline) else line
 
     def asks_for(self, step: Step) -> bool:
         """Whether anybody wants the step: those beside the chain wait until somebody looks."""

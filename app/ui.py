@@ -114,6 +114,32 @@ def keep_upload(file: viser.UploadedFile, folder: Path, kind: str, limit_bytes: 
     return path
 
 
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A file to take along."""
+
+    label: str
+    file: str
+    """Its name."""
+    job: str
+    """That makes its content, as bytes."""
+    arguments: tuple[Any, ...] = ()
+    photographs: bool = False
+    """Whether the job takes the 3-D view as the browser draws it, (H, W, 4), as its last argument."""
+
+
+@dataclass(frozen=True, slots=True)
+class Offers:
+    """Files of one kind, and how a command makes the same."""
+
+    kind: str
+    hint: str
+    files: tuple[Offer, ...]
+    command: str = ""
+    note: str = ""
+    """On the command, or why there is none."""
+
+
 class Panel(ABC):
     """A step: its controls in the control panel and its nodes in the 3-D scene.
 
@@ -165,6 +191,10 @@ class Panel(ABC):
     def look(self) -> bool:
         """Turn the view to what it draws; False leaves that to the session, which turns it to the scene."""
         return False
+
+    def offers(self) -> tuple[Offers, ...]:
+        """What can be taken along of what it shows."""
+        return ()
 
     @property
     def command(self) -> str:

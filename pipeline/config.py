@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 else:
     Method = Literal[tuple(METHODS)]
 Metric = Literal["point", "plane"]
+Baseline = Literal["poisson", "alpha"]
+"""A stage that makes a surface of the same points by another method."""
 Direction = Literal["q2p", "p2q", "both"]
 FusionMode = Literal["union", "fill"]
 Fill = Literal["auto", "completion", "network"]

@@ -81,6 +81,13 @@ def write_run_folder(
     return [*files, folder / METRICS]
 
 
+def write_baseline(name: str, surface: SurfaceResult, reconstruction: Reconstruction, folder: Path) -> None:
+    """Write the surface of a baseline over the same points beside the run's own, as PLY and GLB."""
+    texture = dressed(reconstruction.rig, reconstruction.placement, surface)
+    write_mesh(folder / f"surface_{name}.ply", surface)
+    write_mesh(folder / f"surface_{name}.glb", surface, texture)
+
+
 def config_of(spec: Spec) -> dict[str, Any]:
     """What is recorded of how a run was asked for; as a file, it is itself a preset."""
     return {"scene": spec.source.title, "preset": spec.preset, "settings": settings(spec.config)}

@@ -10,7 +10,7 @@ from app.cli.options import Images, PresetName, Settings
 from app.cli.text import aligned, print_json, say, say_progress, wrong_use
 from packetmesh.progress import drain
 from packetmesh.settings import config_named, with_settings
-from pipeline.config import PRESETS
+from pipeline.config import PRESETS, Baseline
 
 if TYPE_CHECKING:
     from pipeline.placement import Placement
@@ -23,6 +23,7 @@ def reconstruct(
     scheduler: str | None = None,
     preset: PresetName = "packetmesh",
     set: Settings = (),
+    baseline: Baseline | None = None,
     json: bool = False,
 ) -> None:
     """Go the whole way from images to a surface before and after fusion.
@@ -37,8 +38,12 @@ def reconstruct(
             workers must see the same folders.
         preset: Settings to start from.
         set: Settings to change, for example `--set depth.alignment=median surface.max_points=20000`.
+        baseline: Also the surface of another method over the same points: surface_poisson.ply and .glb, or
+            surface_alpha.ply and .glb.
         json: Print the metrics as one JSON object.
     """
+    if rigs is not None and baseline is not None:
+        wrong_use("--baseline is for one rig: leave out --rigs")
     if rigs is not None:
         images.nothing_but_scale("--rigs")
         _many(rigs, out, images.depth_scale, scheduler, preset, set, json)
@@ -50,7 +55,7 @@ def reconstruct(
 
     from app.runs import iterate_run
 
-    result, metrics = drain(iterate_run(source, preset, config, out), say_progress)
+    result, metrics = drain(iterate_run(source, preset, config, out, baseline), say_progress)
     before, after = metrics["surface_before"], metrics["surface_after"]
     say(
         f"100%  rays without a surface: {before['no_hit_ray_share']:.1%} before fusion, "

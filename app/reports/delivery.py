@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import base64
-import json
 import zlib
-from html import escape
-from pathlib import Path
-from string import Template
 from typing import Any
 
 import numpy as np
 
-from app.drawing.colors import DELIVERED, INFERRED, LOSS, SOURCE, TARGET, css
 from app.reports.delivery_animation import delivery_animation
 from app.reports.hand_out import FramesOnAir, HandOut, HandOutMoment, HandOutNode, thumbnail, viewpoint
+from app.reports.offline_page import offline_page
 from app.reports.packed_mesh import Box, pack_within
 from pipeline.types import Surface
 
@@ -34,10 +29,10 @@ MOST_FRAMES = 1_000_000
 """On the timeline; what comes later is left out, and the page says so."""
 _TICK_S = 1e-6
 _BASE64 = 4 / 3
-_PARTS = ("hand_out_stage.js", "hand_out_dock.js", "hand_out.js")
-_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
-"""The page may load nothing from anywhere."""
-_COLORS = {"delivered": DELIVERED, "lost": LOSS, "source": SOURCE, "target": TARGET, "inferred": INFERRED}
+_PARTS = (
+    *("hand_out.css", "offline_page.js", "hand_out_view.js"),
+    *("hand_out_stage.js", "hand_out_dock.js", "hand_out.js"),
+)
 
 
 def delivery_page(hand_out: HandOut) -> str:
@@ -71,13 +66,12 @@ def _corners_m(hand_out: HandOut, meshes: list[Surface]) -> np.ndarray:
 
 def _record(hand_out: HandOut, meshes: list[Surface], box: Box) -> dict[str, Any]:
     """What the page knows besides pictures, meshes and frames."""
-    view = viewpoint(hand_out)
     return {
         "end_s": max(hand_out.end_s, hand_out.moments[-1].t_s),
         "causes": list(hand_out.frames.causes),
         "lossless_f_score": hand_out.lossless_f_score,
         "box": {"low_m": box.low_m.tolist(), "step_m": box.step_m},
-        "view": {"eye_m": view.eye_m.tolist(), "middle_m": view.middle_m.tolist(), "up": view.up.tolist()},
+        "view": viewpoint(hand_out).record(),
         "nodes": [
             {
                 "name": node.name,
@@ -132,22 +126,5 @@ def _frames(hand_out: HandOut) -> tuple[bytes, float, float]:
 
 
 def _page(hand_out: HandOut, record: dict[str, Any], blocks: dict[str, bytes]) -> str:
-    folder = Path(__file__).parent
-    style = (folder / "hand_out.css").read_text(encoding="utf-8")
-    colors = "".join(f"--{name}: {css(color)};" for name, color in _COLORS.items())
-    data = "".join(
-        f'<script type="text/plain" id="{name}">{base64.b64encode(block).decode()}</script>\n'
-        for name, block in blocks.items()
-    )
-    script = "\n".join((folder / part).read_text(encoding="utf-8") for part in _PARTS)
-    body = (folder / "hand_out.html").read_text(encoding="utf-8")
-    body = Template(body).substitute(title=escape(hand_out.title), sentence=escape(hand_out.sentence))
-    text = json.dumps(record, allow_nan=False).replace("<", "\\u003c")
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(hand_out.title)}</title><style>:root {{{colors}}}\n{style}</style></head>"
-        f'<body>{body}\n<script type="application/json" id="record">{text}</script>\n{data}'
-        f'<script>"use strict";\n{script}</script></body></html>\n'
-    )
+    words = {"title": hand_out.title, "sentence": hand_out.sentence}
+    return offline_page(f"{hand_out.title} · PacketMesh", "hand_out.html", words, _PARTS, record, blocks)

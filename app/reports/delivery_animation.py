@@ -8,9 +8,10 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
-from app.drawing.colors import BACKGROUND, DELIVERED, HOLE, LOSS, TARGET
+from app.drawing.colors import BACKGROUND, DELIVERED, LOSS, TARGET
+from app.reports.captioned import EDGE_PX, INK, PAPER, SOFT, font, gif, on_background
 from app.reports.hand_out import ASPECT, FIELD_RAD, HandOut, HandOutMoment, viewpoint
 from pipeline.rays import Camera
 from pipeline.surface.pictures import mesh_picture
@@ -22,28 +23,15 @@ PLAYS_S = 10.0
 LAST_S = 3.0
 """How long the last one stays."""
 _SHORTEST_S = 0.06
-_HEAD_PX, _FOOT_PX, _EDGE_PX = 44, 16, 14
+_HEAD_PX, _FOOT_PX = 44, 16
 _ROOM_PX = (640, 480)
-_COLORS = 256
-_INK, _SOFT, _PAPER = (20, 24, 28), (74, 84, 94), (255, 255, 255)
 
 
 def delivery_animation(hand_out: HandOut) -> bytes:
     """An animated GIF, which slides of every make play, of ``SIZE_PX``; it repeats without end."""
     camera = _camera(hand_out)
     frames = [_frame(hand_out, moment, camera) for moment in hand_out.moments]
-    palette = frames[-1].quantize(_COLORS)
-    frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    file = io.BytesIO()
-    frames[0].save(
-        file,
-        "GIF",
-        save_all=True,
-        append_images=frames[1:],
-        duration=[round(1000 * stay_s) for stay_s in _stays_s(hand_out)],
-        loop=0,
-    )
-    return file.getvalue()
+    return gif(frames, [round(1000 * stay_s) for stay_s in _stays_s(hand_out)])
 
 
 def _stays_s(hand_out: HandOut) -> Iterator[float]:
@@ -76,11 +64,11 @@ def _camera(hand_out: HandOut) -> Camera:
 
 
 def _frame(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> Image.Image:
-    picture = Image.new("RGB", SIZE_PX, _PAPER)
+    picture = Image.new("RGB", SIZE_PX, PAPER)
     pen = ImageDraw.Draw(picture)
-    pen.text((_EDGE_PX, _HEAD_PX // 2), hand_out.title, _INK, _font(24), anchor="lm")
+    pen.text((EDGE_PX, _HEAD_PX // 2), hand_out.title, INK, font(24), anchor="lm")
     picture.paste(Image.fromarray(_room(hand_out, moment, camera)), (0, _HEAD_PX))
-    left = _ROOM_PX[0] + _EDGE_PX
+    left = _ROOM_PX[0] + EDGE_PX
     _thumbnails(picture, moment, left, _numbers(pen, hand_out, moment, left, _HEAD_PX))
     top = SIZE_PX[1] - _FOOT_PX
     pen.rectangle((0, top, SIZE_PX[0], SIZE_PX[1]), BACKGROUND)
@@ -91,12 +79,9 @@ def _frame(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> Image.Im
 
 def _room(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> ByteArray:
     """The mesh, and the cameras' frusta over it."""
-    rgb = np.empty((_ROOM_PX[1], _ROOM_PX[0], 3), np.uint8)
-    rgb[:] = BACKGROUND
+    rgb = np.full((_ROOM_PX[1], _ROOM_PX[0], 3), BACKGROUND, np.uint8)
     if moment.surface is not None and len(moment.surface.triangles):
-        seen = mesh_picture(moment.surface, camera)
-        there = (seen != HOLE).any(axis=2)
-        rgb[there] = seen[there]
+        rgb = on_background(mesh_picture(moment.surface, camera))
     depth_m = 0.1 * float(np.linalg.norm(viewpoint(hand_out).middle_m - camera.T_world_camera[:3, 3]))
     for node in hand_out.nodes:
         K = node.intrinsics
@@ -106,7 +91,7 @@ def _room(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> ByteArray
         world_m = local_m @ node.T_world_camera[:3, :3].T + node.T_world_camera[:3, 3]
         at = _project(world_m, camera)
         ways = [[at[0], at[i], at[j]] for i, j in ((1, 2), (2, 3), (3, 4), (4, 1))]
-        cv2.polylines(rgb, [np.rint(way).astype(np.int32) for way in ways], True, _INK, 2, cv2.LINE_AA)
+        cv2.polylines(rgb, [np.rint(way).astype(np.int32) for way in ways], True, INK, 2, cv2.LINE_AA)
     return rgb
 
 
@@ -121,7 +106,7 @@ def _numbers(pen: ImageDraw.ImageDraw, hand_out: HandOut, moment: HandOutMoment,
     """The live numbers below each other; where the column goes on."""
     sent = _megabytes(moment.sent_bytes)
     rows = [
-        ("network time", f"{moment.t_s:.3g} s", f"of {hand_out.end_s:.3g} s", _INK),
+        ("network time", f"{moment.t_s:.3g} s", f"of {hand_out.end_s:.3g} s", INK),
         (
             "delivered",
             _megabytes(moment.delivered_bytes),
@@ -129,23 +114,23 @@ def _numbers(pen: ImageDraw.ImageDraw, hand_out: HandOut, moment: HandOutMoment,
             DELIVERED,
         ),
         ("frames lost", f"{moment.packets_lost:,}", "", LOSS),
-        ("energy of all nodes", f"{moment.energy_j:,.3g} J", "", _INK),
+        ("energy of all nodes", f"{moment.energy_j:,.3g} J", "", INK),
     ]
     if any(each.f_score is not None for each in hand_out.moments):
         rows.append(("F-score at 5 cm", _percent(moment.f_score), "", TARGET))
     if any(each.no_hit_share is not None for each in hand_out.moments):
         rows.append(("rays without surface", _percent(moment.no_hit_share), "", LOSS))
     for label, value, beside, color in rows:
-        pen.text((left, top), label, _SOFT, _font(17))
-        pen.text((left, top + 19), value, color, _font(34))
-        pen.text((left + pen.textlength(value, _font(34)) + 8, top + 33), beside, _SOFT, _font(17))
+        pen.text((left, top), label, SOFT, font(17))
+        pen.text((left, top + 19), value, color, font(34))
+        pen.text((left + pen.textlength(value, font(34)) + 8, top + 33), beside, SOFT, font(17))
         top += 64
     return top
 
 
 def _thumbnails(picture: Image.Image, moment: HandOutMoment, left: int, top: int) -> None:
     """The nodes' pictures as received, in one row as wide as the column."""
-    room = SIZE_PX[0] - left - _EDGE_PX
+    room = SIZE_PX[0] - left - EDGE_PX
     width = min(room // len(moment.thumbnails) - 4, 120)
     for row, jpeg in enumerate(moment.thumbnails):
         if not jpeg:
@@ -161,7 +146,3 @@ def _megabytes(count: int) -> str:
 
 def _percent(share: float | None) -> str:
     return "–" if share is None or not np.isfinite(share) else f"{100 * share:.1f} %"
-
-
-def _font(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    return ImageFont.load_default(size_px)

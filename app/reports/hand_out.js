@@ -5,18 +5,6 @@ const SPEEDS = [-3, -2, -1, 0, 1, 2, 3, 4].flatMap(ten => [1, 2, 5].map(each => 
 
 // Unpacking; the forms are those of packed_mesh.py and delivery.py.
 
-const find = id => document.getElementById(id);
-
-function bytesOf(id) {
-  const element = find(id);
-  return element && Uint8Array.from(atob(element.textContent), letter => letter.charCodeAt(0));
-}
-
-async function inflate(id) {
-  const stream = new Blob([bytesOf(id)]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
 // Numbers (unsigned) of a column that lies byte plane by byte plane.
 function column(bytes, offset, count, planes) {
   const numbers = new Uint32Array(count);
@@ -139,7 +127,10 @@ class Player {
       step: () => this.step(1),
       end: () => this.seek(this.record.end_s),
       whole: () => this.dock.whole(),
-      light: () => this.light(),
+      light: () => {
+        toggleLight();
+        this.redraw();
+      },
     };
     for (const [id, action] of Object.entries(actions)) find(id).addEventListener("click", action);
     const keys = {Home: "start", ArrowLeft: "back", " ": "play", ArrowRight: "step", End: "end"};
@@ -151,13 +142,6 @@ class Player {
     });
     addEventListener("keyup", event => event.key === " " && event.preventDefault());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
-  }
-
-  light() {
-    const root = document.documentElement;
-    const dark = getComputedStyle(root).getPropertyValue("--dark").trim() === "1";
-    root.dataset.light = dark ? "light" : "dark";
-    this.redraw();
   }
 
   redraw() {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -107,6 +108,10 @@ class Viewpoint:
     up: FloatArray
     """(3,) unit vector."""
 
+    def record(self) -> dict[str, list[float]]:
+        """As a page reads it."""
+        return {"eye_m": self.eye_m.tolist(), "middle_m": self.middle_m.tolist(), "up": self.up.tolist()}
+
 
 def thumbnail(rgb: ByteArray, known: BoolArray) -> bytes:
     """A picture as received, as a small JPEG; what has not arrived is a grey chequered pattern.
@@ -133,11 +138,17 @@ def thumbnail(rgb: ByteArray, known: BoolArray) -> bytes:
 def viewpoint(hand_out: HandOut) -> Viewpoint:
     """Behind and above the first camera, so far away that the last surface and all cameras are in view."""
     poses = [node.T_world_camera for node in hand_out.nodes]
-    up = _up(np.mean([-pose[:3, 1] for pose in poses], axis=0))
     surfaces = [moment.surface for moment in hand_out.moments if moment.surface is not None]
     seen_m = [surface.vertices_m for surface in surfaces if len(surface.triangles)]
+    return viewpoint_of(poses, seen_m[-1] if seen_m else np.zeros((0, 3)))
+
+
+def viewpoint_of(poses: Sequence[FloatArray], points_m: FloatArray) -> Viewpoint:
+    """The same for cameras' (4, 4) poses, T_world_camera, and (N, 3) points in the world."""
+    up = _up(np.mean([-pose[:3, 1] for pose in poses], axis=0))
     first = poses[0]
-    points_m = seen_m[-1] if seen_m else first[None, :3, 3] + 2.0 * first[None, :3, 2]
+    if not len(points_m):
+        points_m = first[None, :3, 3] + 2.0 * first[None, :3, 2]
     level = first[:3, 3] - np.median(points_m, axis=0)
     level -= (level @ up) * up
     back = level / max(float(np.linalg.norm(level)), 1e-9) * np.cos(TILT_RAD) + up * np.sin(TILT_RAD)

@@ -135,4 +135,4 @@ def test_what_is_shown_and_the_networks_runs_leave_the_chain_fresh():
     assert results.first_stale(other) is None
     assert results.first_stale(other, ("network",)) == "network"
     assert results.first_stale(SPEC, ("network",)) is None
-    assert other.command() == SPEC.command()
+    assert other.command() == f"{SPEC.command()} --baseline poisson"

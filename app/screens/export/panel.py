@@ -4,37 +4,34 @@ from __future__ import annotations
 
 from typing import Any
 
-import cv2
 import numpy as np
 import viser
 
 from app.records import Shown
-from app.state import Spec
+from app.state import Spec, Step
 from app.tables import command_html
-from app.ui import Panel
+from app.ui import Offer, Offers, Panel
 from packetmesh.errors import InputError
+from pipeline.types import ByteArray
 
-TEXT = """**Take it along.** Files hold metres, Z up. The HTML file needs no server: it opens in any
-browser, offline. The run folder is what `packetmesh reconstruct` writes: configuration, metrics, clouds,
-surfaces and the report."""
-GROUPS = {
-    "Surface": {"PLY": "surface.ply", "GLB": "surface.glb", "OBJ": "surface.obj"},
-    "Clouds": {"Fused PLY": "fused.ply", "Sensor PLY": "sensor.ply", "Inferred PLY": "inferred.ply"},
-    "Numbers": {"Metrics JSON": "metrics.json", "Config JSON": "config.json"},
-    "Whole": {"HTML, 3-D": "scene.html", "Run folder": "run.zip"},
-}
-HINTS = {
-    "Surface": "The surface that the Surface screen shows, with colours.",
-    "Clouds": "Points of all nodes in the world frame, as the ball meets them.",
-    "Numbers": "Everything measured; everything set.",
-    "Whole": "One self-contained page with the surface to turn; or a ZIP of the whole run.",
-}
+TEXT = """**Take it along.** Files hold metres, Z up. Pages need no server: they open in any browser, offline.
+The run folder is what `packetmesh reconstruct` writes: configuration, metrics, clouds, surfaces and the
+report."""
 SURFACES: dict[Shown, str] = {
     "after": "the surface after fusion",
     "before": "the surface before fusion",
     "poisson": "the Poisson surface",
     "alpha": "the alpha shape",
 }
+FILES: dict[Shown, str] = {
+    "after": "surface_after.ply",
+    "before": "surface_before.ply",
+    "poisson": "surface_poisson.ply",
+    "alpha": "surface_alpha.ply",
+}
+"""What the surface that is shown is called in the run folder."""
+KINDS = ("Surface", "Clouds", "Numbers", "To show", "Race", "Delivery", "Network")
+"""In the order of the buttons; those of which nothing is there are hidden."""
 
 
 class ExportPanel(Panel):
@@ -44,54 +41,108 @@ class ExportPanel(Panel):
     drawn_below = "/surface"
 
     def build(self) -> None:
-        """Buttons by kind, a picture of the view, the command."""
+        """Buttons by kind, the command."""
         gui = self.gui
+        self._offers: dict[str, Offers] = {}
         gui.add_markdown(TEXT)
         self._surface = gui.add_markdown("")
-        for label, kinds in GROUPS.items():
-            group = gui.add_button_group(label, list(kinds), hint=HINTS[label])
-            group.on_click(lambda event, kinds=kinds: self._clicked(kinds[event.target.value], event.client))
-        picture = gui.add_button_group("Picture", ["PNG of this view"], hint="The 3-D view as it is now.")
-        picture.on_click(lambda event: self._photograph(event.client))
+        self._groups = {kind: gui.add_button_group(kind, ("…",), visible=False) for kind in KINDS}
+        for kind, group in self._groups.items():
+            group.on_click(lambda event, kind=kind: self._clicked(kind, event.target.value, event.client))
         gui.add_markdown("**The same from the command line**")
-        self._command = gui.add_html("")
+        self._commands = {kind: (gui.add_markdown(""), gui.add_html("")) for kind in KINDS}
         self.on_spec(self.session.spec)
 
     def on_spec(self, spec: Spec) -> None:
-        """Show which surface is exported, and the command for these settings."""
+        """Show which surface is exported, and what else there is."""
         self._surface.content = (
             f"Surface and page hold **{SURFACES[spec.shown]}**, as the Surface screen shows."
         )
-        self._command.content = command_html(spec.command())
+        self._arrange()
 
-    def _clicked(self, name: str, client: viser.ClientHandle | None) -> None:
-        self.ui.post(self._export, name, client)
+    def on_view(self, step: Step, view: Any) -> None:
+        """There may be more to take along."""
+        self._arrange()
 
-    def _export(self, name: str, client: viser.ClientHandle | None) -> None:
+    def on_show(self) -> None:
+        """Show what there is now."""
+        self._arrange()
+
+    def offers(self) -> tuple[Offers, ...]:
+        """What the chain has, whichever screen is looked at."""
+        spec = self.session.spec
+        surfaces = tuple(_file(kind.upper(), f"surface.{kind}", spec.shown) for kind in ("ply", "glb", "obj"))
+        clouds = tuple(_file(name, f"{name.lower()}.ply") for name in ("Fused", "Sensor", "Inferred"))
+        numbers = (
+            _file("Metrics", "metrics.json"),
+            _file("Config", "config.json"),
+            _file("Run folder", "run.zip", spec.shown),
+        )
+        return (
+            Offers(
+                "Surface",
+                "The surface that the Surface screen shows, with colours.",
+                surfaces,
+                spec.command(),
+                f"`{FILES[spec.shown]}` in its folder is {SURFACES[spec.shown]}.",
+            ),
+            Offers("Clouds", "Points of all nodes in the world frame, as the ball meets them; PLY.", clouds),
+            Offers("Numbers", "Everything measured and set, as JSON; or a ZIP of the whole run.", numbers),
+        )
+
+    def _arrange(self) -> None:
+        """Have a row of buttons for each kind of which there is something."""
+        self._offers = {offers.kind: offers for offers in self.session.offers()}
+        with self.ui.atomic():
+            for kind, group in self._groups.items():
+                offers = self._offers.get(kind)
+                group.visible = offers is not None
+                text, command = self._commands[kind]
+                text.content, command.content = "", ""
+                if offers is None:
+                    continue
+                group.hint = offers.hint
+                labels = tuple(offer.label for offer in offers.files)
+                if group.options != labels:
+                    group.options = labels
+                if offers.note:
+                    text.content = f"{kind}: {offers.note}"
+                if offers.command:
+                    command.content = command_html(offers.command)
+
+    def _clicked(self, kind: str, label: str, client: viser.ClientHandle | None) -> None:
+        """Runs on the server's own thread, because a picture waits for the browser to draw."""
+        offers = self._offers.get(kind)
+        offer = next((one for one in offers.files if one.label == label), None) if offers else None
+        if offer is None or client is None:
+            return
+        picture = self._photograph(client) if offer.photographs else None
+        if offer.photographs and picture is None:
+            return
+        self.ui.post(self._export, offer, () if picture is None else (picture,), client)
+
+    def _export(self, offer: Offer, seen: tuple[Any, ...], client: viser.ClientHandle) -> None:
         session = self.session
-        if session.results.failure("scene", session.spec) or client is None:
+        if session.results.failure("scene", session.spec):
             raise InputError("There is no scene to export; choose one under Scene.")
 
         def send(content: Any) -> None:
             if content is not None:
-                client.send_file_download(name, content, save_immediately=True)
+                client.send_file_download(offer.file, content, save_immediately=True)
 
-        spec = session.spec
-        session.side_job("export.job:export_job", name, spec.shown, on_end=send)
+        session.side_job(offer.job, *offer.arguments, *seen, on_end=send)
 
-    def _photograph(self, client: viser.ClientHandle | None) -> None:
-        """Runs on the server's own thread, because it waits for the browser to draw."""
-        if client is None:
-            return
+    def _photograph(self, client: viser.ClientHandle) -> ByteArray | None:
+        """(H, W, 4) the view as the browser draws it."""
         camera = client.camera
         height = min(max(camera.image_height, 240), 2160)
         width = min(max(camera.image_width, 320), 3840)
         try:
-            pixels = client.get_render(height, width, transport_format="png", timeout=20.0)
+            return np.asarray(client.get_render(height, width, transport_format="png", timeout=20.0))
         except (RuntimeError, TimeoutError):
             self.session.notify("No picture", "The browser did not deliver a picture of the view; try again.")
-            return
-        share = pixels[..., 3:] / 255.0
-        opaque = (pixels[..., :3] * share + 255.0 * (1.0 - share)).astype(np.uint8)
-        encoded = cv2.imencode(".png", cv2.cvtColor(opaque, cv2.COLOR_RGB2BGR))[1].tobytes()
-        client.send_file_download("packetmesh.png", encoded, save_immediately=True)
+            return None
+
+
+def _file(label: str, name: str, *arguments: Any) -> Offer:
+    return Offer(label, name, "export.job:export_job", (name, *arguments))

@@ -32,7 +32,16 @@ RULES: dict[str, RadiusRule] = {
     "one radius (slider)": "manual",
 }
 """Which balls roll."""
-RULES_HINT = (
-    "r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the fused cloud. "
-    "Several balls roll one after the other, the small ones first."
-)
+NAMES: dict[Shown, str] = {
+    "after": "After fusion",
+    "before": "Before fusion",
+    "poisson": "Poisson surface",
+    "alpha": "Alpha shape",
+}
+"""What a surface is called where it is taken along."""
+HINTS = {
+    "Radii": "r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the fused "
+    "cloud. Several balls roll one after the other, the small ones first.",
+    "Show": "Which surface is drawn: the ball's, or that of another method over the same points.",
+    "Colours": "What the colours of the surface mean.",
+}

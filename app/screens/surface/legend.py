@@ -1,39 +1,52 @@
-"""What the colours of a surface mean, as a line of HTML."""
+"""What the colours of a surface mean."""
 
 from __future__ import annotations
 
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET, css
+from app.drawing.legend import Legend
 from app.records import ColorBar
 from app.screens.surface.labels import OWN_COLORS
 from app.screens.surface.view import Coloring
 from app.tables import bar_html
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"
+_INFERRED = ("inferred by the network", INFERRED)
+_OWN: dict[Coloring, str] = {
+    "photo": "The cameras' photographs; where none sees the surface, the colours of its points.",
+    "color": "The colours that the cameras saw at the points.",
+}
+
+
+def legend_of(coloring: Coloring, has_truth: bool) -> Legend:
+    """Of what is taken along, where the cameras' own colours are told, too."""
+    if coloring in _OWN:
+        return Legend(_OWN[coloring])
+    if coloring == "violet":
+        return Legend(swatches=((f"{_INFERRED[0]}; all else was measured by a sensor", INFERRED),))
+    if coloring == "source":
+        return Legend(swatches=(("measured by a sensor", TARGET), _INFERRED))
+    if coloring == "normal":
+        return Legend("Red, green and blue are the x, y and z of the normal; floors are light blue (z up).")
+    if not has_truth:
+        unknown = "The truth of this scene is not known, so there is no distance to show."
+        return Legend(swatches=((unknown, NEUTRAL),))
+    half, most = (f"{100 * share * MOST_DISTANCE_M:.0f} cm" for share in (0.5, 1.0))
+    return Legend(bar=ColorBar(DISTANCE_STOPS, ("on the truth", half, f"{most} or more")))
 
 
 def legend_html(coloring: Coloring, has_truth: bool, baseline: bool = False) -> str:
     """What the colours mean, of a baseline why it has others, and those of points that the ball left out."""
-    dots = f"Points the ball left out: {_box(TARGET)}measured &ensp; {_box(INFERRED)}inferred"
-    surface = OWN_COLORS if baseline else _surface_html(coloring, has_truth)
-    lines = [line for line in (surface, "" if baseline else dots) if line]
+    left_out = Legend("Points the ball left out:", (("measured", TARGET), _INFERRED))
+    surface = Legend() if coloring in _OWN else legend_of(coloring, has_truth)
+    legends = (Legend(OWN_COLORS),) if baseline else (surface, left_out)
+    lines = [_line(legend) for legend in legends if legend != Legend()]
     return "".join(f'<div style="padding: 0 0.8em; font-size: 13px">{line}</div>' for line in lines)
 
 
-def _surface_html(coloring: Coloring, has_truth: bool) -> str:
-    """Empty for the cameras' own colours."""
-    if coloring in ("photo", "color"):
-        return ""
-    if coloring == "violet":
-        return f"{_box(INFERRED)}inferred by the network; all else was measured by a sensor"
-    if coloring == "source":
-        return f"{_box(TARGET)}measured by a sensor &emsp; {_box(INFERRED)}inferred by the network"
-    if coloring == "normal":
-        return "Red, green and blue are the x, y and z of the normal; floors are light blue (z up)."
-    if not has_truth:
-        return f"{_box(NEUTRAL)}The truth of this scene is not known, so there is no distance to show."
-    half, most = (f"{100 * share * MOST_DISTANCE_M:.0f} cm" for share in (0.5, 1.0))
-    return bar_html(ColorBar(DISTANCE_STOPS, ("on the truth", half, f"{most} or more")))
-
-
-def _box(color: tuple[int, int, int]) -> str:
-    return f'<span style="{_BOX}; background: {css(color)}"></span>'
+def _line(legend: Legend) -> str:
+    if legend.bar is not None:
+        return bar_html(legend.bar)
+    boxes = (
+        f'<span style="{_BOX}; background: {css(color)}"></span>{text}' for text, color in legend.swatches
+    )
+    return " &emsp; ".join(filter(None, (legend.text, *boxes)))

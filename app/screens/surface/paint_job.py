@@ -99,14 +99,20 @@ def _thinned(
 
 def _painted(surface: Surface, request: PaintRequest, rig: Rig, placement: Placement) -> PaintedMesh:
     """The rims come when the radius rests, and so do photographs: both are costly to draw in software."""
-    quick, coloring = request.radius_m is not None, request.coloring
-    if coloring in ("photo", "violet") and not quick:
-        glb = photographed_glb(surface, dressed(rig, placement, surface), tinted=coloring == "violet")
-    else:
-        colors = vertex_colors(surface, coloring, rig, cameras_of(rig, placement))
-        glb = surface_glb(surface, colors, photographed=coloring in PHOTOGRAPHED)
+    quick = request.radius_m is not None
+    glb = colored_glb(surface, request.coloring, rig, placement, worn=not quick)
     rims_glb = b"" if quick else lines_glb(rim_segments_m(surface), LOSS)
     return PaintedMesh(glb, rims_glb, len(surface.vertices_m), len(surface.triangles))
+
+
+def colored_glb(
+    surface: Surface, coloring: Coloring, rig: Rig, placement: Placement, worn: bool = True
+) -> bytes:
+    """The mesh in its colours; photographs only where they may be ``worn``."""
+    if coloring in ("photo", "violet") and worn:
+        return photographed_glb(surface, dressed(rig, placement, surface), tinted=coloring == "violet")
+    colors = vertex_colors(surface, coloring, rig, cameras_of(rig, placement))
+    return surface_glb(surface, colors, photographed=coloring in PHOTOGRAPHED)
 
 
 def vertex_colors(surface: Surface, coloring: Coloring, rig: Rig, cameras: list[Camera]) -> ByteArray | None:

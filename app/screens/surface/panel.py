@@ -12,18 +12,9 @@ from app.records import SceneView
 from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.ball import ChosenBall
 from app.screens.surface.baselines import Baselines
+from app.screens.surface.export import surface_offers
 from app.screens.surface.holes import HolesFolder
-from app.screens.surface.labels import (
-    AFTER,
-    BASELINES,
-    BOTH,
-    COLORINGS,
-    RULES,
-    RULES_HINT,
-    SHOWN,
-    SHOWN_HINT,
-    TEXT,
-)
+from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, HINTS, RULES, SHOWN, TEXT
 from app.screens.surface.legend import legend_html
 from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook, surface_of
 from app.screens.surface.numbers import quality_table, quick_line
@@ -42,7 +33,7 @@ from app.screens.surface.view import (
 )
 from app.screens.surface.walks import Walks
 from app.state import Spec, Step
-from app.ui import Panel
+from app.ui import Offers, Panel
 from pipeline.types import FloatArray
 
 NAMES = {rule: name for name, rule in RULES.items()}
@@ -74,11 +65,11 @@ class SurfacePanel(Panel):
             "Radii",
             list(RULES),
             initial_value=NAMES[session.spec.config.surface.radius_rule],
-            hint=RULES_HINT,
+            hint=HINTS["Radii"],
         )
         self.ui.when_changed(self._rule, self._picked_rule)
-        self._shown = gui.add_dropdown("Show", list(SHOWN), hint=SHOWN_HINT)
-        self._coloring = gui.add_dropdown("Colours", list(COLORINGS), hint="What the surface's colours mean.")
+        self._shown = gui.add_dropdown("Show", list(SHOWN), hint=HINTS["Show"])
+        self._coloring = gui.add_dropdown("Colours", list(COLORINGS), hint=HINTS["Colours"])
         self._legend = gui.add_html(legend_html("photo", False))
         self._loops = gui.add_checkbox("Hole rims", True, hint="Edges with one triangle only, in red.")
         self._unused = gui.add_checkbox("Points left out", True, hint="Those that the ball never rested on.")
@@ -290,6 +281,10 @@ class SurfacePanel(Panel):
         if shown != self.session.spec.shown:
             self.session.want(replace(self.session.spec, shown=shown))
         self.session.frame_view()
+
+    def offers(self) -> tuple[Offers, ...]:
+        """The surfaces as they are drawn."""
+        return (surface_offers(self._shown.value, self._coloring.value),)
 
     # The folders.
 

@@ -1,0 +1,48 @@
+"""Two surfaces of one scene on a page that needs no network: one beside the other, cut by a line to drag."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.drawing.legend import Legend
+from app.reports.hand_out import Viewpoint
+from app.reports.offline_page import offline_page
+
+_PARTS = ("surface_page.css", "offline_page.js", "hand_out_view.js", "surface_page.js")
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """What is left or right of the line."""
+
+    name: str
+    note: str
+    """A sentence with its numbers."""
+    glb: bytes
+    """As ``app.drawing.glb`` writes it; empty without a triangle."""
+
+
+@dataclass(frozen=True, slots=True)
+class SurfacePage:
+    """What somebody without PacketMesh is to see of a reconstruction."""
+
+    title: str
+    """Of the scene."""
+    sentence: str
+    left: Side
+    right: Side
+    view: Viewpoint
+    legend: Legend
+
+
+def surface_page(page: SurfacePage) -> str:
+    """A self-contained HTML document."""
+    sides = (page.left, page.right)
+    record = {
+        "view": page.view.record(),
+        "sides": [{"name": side.name, "note": side.note, "there": bool(side.glb)} for side in sides],
+        "legend": page.legend.record(),
+    }
+    blocks = {f"mesh-{row}": side.glb for row, side in enumerate(sides)}
+    words = {"title": page.title, "sentence": page.sentence}
+    return offline_page(f"{page.title} · PacketMesh", "surface_page.html", words, _PARTS, record, blocks)

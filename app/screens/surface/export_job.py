@@ -1,0 +1,151 @@
+"""What is taken along of the surfaces as they are shown: a page, a way along the cameras, the view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from PIL import Image
+from scipy.spatial.transform import Rotation, Slerp
+
+from app.drawing.colors import BACKGROUND
+from app.drawing.meshes import VIOLET
+from app.records import Shown
+from app.reports.captioned import captioned, gif, on_background, png
+from app.reports.hand_out import viewpoint_of
+from app.reports.surface_page import Side, SurfacePage, surface_page
+from app.screens.surface.labels import NAMES
+from app.screens.surface.legend import legend_of
+from app.screens.surface.paint_job import colored_glb, vertex_colors
+from app.screens.surface.view import Coloring
+from app.state import Spec
+from app.store import Store
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from pipeline.geometry import rigid, scaled
+from pipeline.placement import Placement
+from pipeline.stages import cameras_of, dressed
+from pipeline.surface import Camera
+from pipeline.surface.pictures import beside, mesh_picture
+from pipeline.types import ByteArray, PointSource, Rig, Surface, SurfaceResult
+
+PICTURE_WIDTH_PX = 480
+MOST_PICTURES, LEG_PICTURES = 32, 16
+"""Of the whole way along the cameras, and from one camera to the next; the way back shows them again."""
+PICTURE_MS, REST_MS = 120, 800
+"""How long a picture stays, and one at an end of the way."""
+SWING_DEG = 15.0
+"""To both sides of a single camera."""
+
+
+def page_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progress, None, bytes]:
+    """A page with the surfaces before and after fusion or, if a baseline is shown, the ball's and that.
+
+    Raises:
+        InputError: neither surface has a triangle.
+    """
+    left, right = _pair(spec.shown)
+    one, other, rig, placement = yield from store.stages(spec, left, right, "rig", "placement")
+    _check(one, other)
+    yield Progress("writing the page", 0.8)
+    points_m = np.vstack([surface.vertices_m for surface in (one, other)])
+    cameras = cameras_of(rig, placement)
+    page = SurfacePage(
+        title=rig.name,
+        sentence=_sentence(len(rig.frames)),
+        left=_side(left, one, coloring, rig, placement),
+        right=_side(right, other, coloring, rig, placement),
+        view=viewpoint_of([camera.T_world_camera for camera in cameras], points_m),
+        legend=legend_of(coloring, rig.truth is not None),
+    )
+    return surface_page(page).encode()
+
+
+def flight_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progress, None, bytes]:
+    """A way from camera to camera and back along the surface that is shown, as a GIF.
+
+    Raises:
+        InputError: the surface has no triangle.
+    """
+    surface, rig, placement = yield from store.stages(spec, spec.shown, "rig", "placement")
+    _check(surface)
+    cameras, legend = cameras_of(rig, placement), legend_of(coloring, rig.truth is not None)
+    picture = _painter(surface, coloring, rig, placement)
+    there: list[Image.Image] = []
+    way = list(_way(cameras, surface))
+    for done, camera in enumerate(way):
+        yield Progress(f"picture {done + 1} of {len(way)}", 0.1 + 0.8 * done / len(way))
+        there.append(captioned(picture(camera), rig.name, NAMES[spec.shown], legend))
+    stays_ms = [REST_MS, *[PICTURE_MS] * (len(there) - 2), REST_MS]
+    yield Progress("writing the moving picture", 0.95)
+    return gif([*there, *there[-2:0:-1]], [*stays_ms, *stays_ms[-2:0:-1]])
+
+
+def view_job(
+    store: Store, spec: Spec, coloring: Coloring, rgba: ByteArray
+) -> Generator[Progress, None, bytes]:
+    """The view as the browser drew it, (H, W, 4), on the app's background with its title and legend."""
+    (rig,) = yield from store.stages(spec, "rig")
+    share = rgba[..., 3:] / 255.0
+    rgb = (rgba[..., :3] * share + np.array(BACKGROUND) * (1.0 - share)).astype(np.uint8)
+    return png(captioned(rgb, rig.name, NAMES[spec.shown], legend_of(coloring, rig.truth is not None)))
+
+
+def _pair(shown: Shown) -> tuple[Shown, Shown]:
+    """What is left and right of the line."""
+    return ("before", "after") if shown in ("before", "after") else ("after", shown)
+
+
+def _check(*surfaces: Surface) -> None:
+    if not any(len(surface.triangles) for surface in surfaces):
+        raise InputError("The surface has no triangle to show; try a larger ball radius")
+
+
+def _sentence(cameras: int) -> str:
+    made = "one camera node" if cameras == 1 else f"{cameras} camera nodes"
+    return f"A surface from what {made} delivered. Drag the line to compare."
+
+
+def _side(name: Shown, surface: SurfaceResult, coloring: Coloring, rig: Rig, placement: Placement) -> Side:
+    note = f"{100 * surface.quality.no_hit_ray_share:.1f} % of the cameras' rays meet no surface"
+    return Side(NAMES[name], note, colored_glb(surface, coloring, rig, placement))
+
+
+def _painter(
+    surface: Surface, coloring: Coloring, rig: Rig, placement: Placement
+) -> Callable[[Camera], ByteArray]:
+    """What paints a picture of the surface in its colours, from any camera."""
+    colors = vertex_colors(surface, coloring, rig, cameras_of(rig, placement))
+    painted = replace(surface, colors=colors)
+    texture = dressed(rig, placement, surface) if coloring in ("photo", "violet") else None
+    guessed = coloring == "violet" and surface.source is not None
+    marks = np.where(surface.source == PointSource.INFERRED, 255, 0) if guessed else np.zeros(0)
+    marked = replace(surface, colors=np.repeat(marks[:, None], 3, axis=1).astype(np.uint8))
+
+    def picture(camera: Camera) -> ByteArray:
+        seen = on_background(mesh_picture(painted, camera, texture=texture))
+        if guessed:
+            tinted = mesh_picture(marked, camera)[..., 1] > 64  # what no ray meets has no green
+            seen[tinted] = seen[tinted] * VIOLET
+        return seen
+
+    return picture
+
+
+def _way(cameras: Sequence[Camera], surface: Surface) -> Iterator[Camera]:
+    """From the first camera to the last through all others, slower near each; a single one swings."""
+    first = cameras[0]
+    K = first.intrinsics
+    K = scaled(K, PICTURE_WIDTH_PX / K.width_px)
+    if len(cameras) == 1:
+        cameras = [beside(first, surface, -SWING_DEG), first, beside(first, surface, SWING_DEG)]
+    count = max(2, min(LEG_PICTURES, MOST_PICTURES // (len(cameras) - 1)))
+    shares = np.linspace(0.0, 1.0, count, endpoint=False)
+    for one, other in pairwise(camera.T_world_camera for camera in cameras):
+        turn = Slerp([0.0, 1.0], Rotation.from_matrix([one[:3, :3], other[:3, :3]]))
+        for share in (0.5 - 0.5 * np.cos(np.pi * shares)).tolist():
+            place_m = (1.0 - share) * one[:3, 3] + share * other[:3, 3]
+            yield Camera(K, rigid(turn(share).as_matrix(), place_m))
+    yield Camera(K, cameras[-1].T_world_camera)
