@@ -141,6 +141,10 @@ class RigTruth:
     """True camera of every node."""
 
 
+MAX_NODES = 6
+"""Of a rig."""
+
+
 @dataclass(frozen=True, slots=True)
 class Rig:
     """One to six camera nodes that look at the same place; a single RGB-D pair is a rig of one."""

@@ -24,8 +24,7 @@ from pipeline.importing.bag_messages import (
 from pipeline.importing.depth_units import depth_of
 from pipeline.importing.rig_folder import NodeImages
 from pipeline.io.depth_scale import known_in, usual_scale
-from pipeline.io.rigs import MAX_NODES
-from pipeline.types import CameraIntrinsics, FloatArray
+from pipeline.types import MAX_NODES, CameraIntrinsics, FloatArray
 
 PROGRESS_EVERY = 20
 """Images that are looked at before progress is told."""

@@ -19,8 +19,7 @@ from pipeline.importing.kinds import kind_of, recognise
 from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
 from pipeline.importing.sequence import Candidate, Sequence
 from pipeline.io.images import read_color
-from pipeline.io.rigs import MAX_NODES
-from pipeline.types import AnyPath, FloatArray
+from pipeline.types import MAX_NODES, AnyPath, FloatArray
 
 MOST_TILT_DEG = 35.0
 """Of the cameras' mean upward direction from the world's; more is another world, which is turned."""

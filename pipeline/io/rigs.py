@@ -23,9 +23,8 @@ from pipeline.io.images import read_color, read_depth_noted, write_color, write_
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.io.poses import read_pose, write_pose
 from pipeline.io.truth import read_truth, write_truth
-from pipeline.types import AnyPath, CameraIntrinsics, DepthMap, RgbdFrame, Rig
+from pipeline.types import MAX_NODES, AnyPath, CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
-MAX_NODES = 6
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".tif", ".tiff", ".npy", ".pfm", ".exr")
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, ClassVar
 
+import assets
 from app.compare import CompareArea
 from app.controls import Controls
 from app.drawing.clouds import add_cloud, clear
@@ -22,7 +24,6 @@ from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, wit
 from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
 from app.state import Spec, Step
 from app.ui import Panel
-from pipeline.depth.completion import SHIPPED_COMPLETION
 
 TEXT = """**What you see.** Blue: points the sensor measured. Violet: points that are inferred: from the
 colour image, made metric where the sensor knows a depth too; in its holes from colours and measured depth
@@ -32,7 +33,7 @@ CONFIDENCE_TEXT = (
     "Inferred depth that flies, lies too far from anything measured or is hardly believed is left out."
 )
 
-WORTH = SHIPPED_COMPLETION.with_name("worth.md")
+WORTH = Path(assets.__file__).parent / "depth" / "worth.md"
 """What filling and its confidence are worth; `make results` writes it from the records."""
 
 

@@ -10,8 +10,8 @@ import viser
 
 from app.ui import Ui, keep_upload
 from packetmesh.errors import InputError
-from pipeline.io.rigs import MAX_NODES
 from pipeline.sources import ImagePair
+from pipeline.types import MAX_NODES
 
 PAIR_LIMIT_BYTES = 64 << 20
 RECORDING_LIMIT_BYTES = 256 << 20
