@@ -35,6 +35,7 @@ Target: TypeAlias = viser.ClientHandle | viser.ViserServer
 """Where a session lives: one browser, or the server for a session that all browsers share."""
 
 CANCELLED = "Cancelled."
+STARTING, COMPUTING = "**Starting** …", "**Computing** …"
 
 
 @dataclass(slots=True, eq=False)
@@ -269,7 +270,7 @@ class Session:
         titles = [panel.title for panel in self._panels]
         add_script(self.gui)
         self._stepper = Stepper(self.gui, titles, lambda title: self.post(self.show, title))
-        self._status = self.gui.add_markdown("**Starting** …")
+        self._status = self.gui.add_markdown(STARTING)
         self._bar = self.gui.add_progress_bar(0.0)
         actions = self.gui.add_button_group(
             "All steps",
@@ -381,6 +382,8 @@ class Session:
         elif not self._side.busy:
             self._status.content = "**Up to date**"
             self._bar.value = 100.0
+        elif self._status.content == STARTING:
+            self._status.content = COMPUTING
         working = bool(running) or self._side.busy
         self._bar.color = BRAND if working else DELIVERED
 
