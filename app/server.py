@@ -108,8 +108,9 @@ def build_server(
     folder = Path(tempfile.mkdtemp(prefix="packetmesh-"))
     pool = ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
     teacher = Token() if lecture else None
-    entrance = landing_first() if teacher is None else teacher.accepted()
-    with contextlib.redirect_stdout(io.StringIO()), entrance, only_own_page():
+    entrance = contextlib.nullcontext() if teacher is None else teacher.accepted()
+    landing = landing_first(lecture)
+    with contextlib.redirect_stdout(io.StringIO()), landing, entrance, only_own_page():
         server = viser.ViserServer(host=host, port=port, label="PacketMesh", verbose=False)
     app = AppServer(server, pool, folder, teacher=teacher)
     if port and server.get_port() != port:

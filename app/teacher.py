@@ -13,6 +13,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+from app.landing import WELCOME
 from app.origin import Answer, answering
 
 KEY = "teacher"
@@ -56,7 +57,7 @@ class Token:
             if not self._is(given[0]):
                 return connection.respond(http.HTTPStatus.FORBIDDEN, NOT_THAT)
             response = connection.respond(http.HTTPStatus.SEE_OTHER, "")
-            response.headers["Location"] = "/"
+            response.headers["Location"] = WELCOME
             response.headers["Set-Cookie"] = f"{self.cookie}={self.text}; Path=/; HttpOnly; SameSite=Strict"
             return response
 
