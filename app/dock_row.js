@@ -59,5 +59,5 @@ window.packetmeshDockRow ??= (() => {
     return true;
   }
 
-  return {DockRow, make, write};
+  return {DockRow, make, root, write};
 })();

@@ -15,6 +15,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any, Literal
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
+from app.landing import WELCOME
 from app.origin import Answer, answering
 
 NOT_THAT = "This is not a link of this server: open the one that was printed when it started.\n"
@@ -81,7 +82,8 @@ class Entrance:
             if not token.is_text(given.pop(token.key)):
                 return connection.respond(http.HTTPStatus.FORBIDDEN, NOT_THAT)
             response = connection.respond(http.HTTPStatus.SEE_OTHER, "")
-            response.headers["Location"] = f"/?{urlencode(given)}" if given else "/"
+            home = WELCOME if token is self.teacher else "/"
+            response.headers["Location"] = f"/?{urlencode(given)}" if given else home
             response.headers["Set-Cookie"] = f"{token.cookie}={token.text}; Path=/; HttpOnly; SameSite=Lax"
             return response
 

@@ -12,6 +12,8 @@ from app.state import Step, StepStatus
 from app.stepper import Stepper
 from packetmesh.progress import Progress
 
+STARTING = "**Starting** …"
+
 
 class Header:
     """Stepper, status line, bar and buttons."""
@@ -25,7 +27,7 @@ class Header:
     ) -> None:
         """Add them to the current container."""
         self._stepper = Stepper(gui, titles, on_pick)
-        self._status = gui.add_markdown("**Starting** …")
+        self._status = gui.add_markdown(STARTING)
         self._bar = gui.add_progress_bar(0.0)
         self._stale = gui.add_html("")
         actions = gui.add_button_group(
@@ -71,4 +73,6 @@ class Header:
         elif not busy:
             self._status.content = "**Up to date**"
             self._bar.value = 100.0
+        elif self._status.content == STARTING:
+            self._status.content = "**Computing** …"
         self._bar.color = BRAND if running or busy else DELIVERED

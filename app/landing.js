@@ -11,8 +11,11 @@
     else if (tries > 0) setTimeout(once, POLL_MS, find, act, tries - 1);
   }
 
+  const shared = "lecture" in landing.dataset; // a session that has no address of its own
+
   function leave() {
     landing.remove();
+    if (shared) history.replaceState(null, "", location.pathname); // or a reload would lead here again
     window.removeEventListener("keydown", escape, true);
   }
 
@@ -23,7 +26,10 @@
   }
 
   function goTo(place) {
-    once(() => window.packetmeshAddress, address => address.ask(place));
+    const screen = new URLSearchParams(place).get("screen");
+    const steps = () => [...document.querySelectorAll("div:has(> .packetmesh-steps) + div button")];
+    if (shared) once(() => steps().find(one => one.textContent.toLowerCase().startsWith(screen)), step => step.click());
+    else once(() => window.packetmeshAddress, address => address.ask(place));
   }
 
   function openLesson(title) {

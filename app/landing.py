@@ -1,7 +1,7 @@
 """What a new browser sees first: the lessons and the scenes, each with a picture, over the scene that loads.
 
 It is a part of the page itself, so that it is there before viser is. An address with anything behind a ``?``
-goes past it.
+goes past it; in a lecture only the one to which the teacher's link leads shows it, without the scenes.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import base64
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from typing import Any
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from app.lesson import LESSONS
+from app.lesson_file import LESSONS
 from app.origin import answering
 from pipeline.io.demos import DEMO_SCENES
 
@@ -34,21 +35,25 @@ LESSON_PLACES = {
 """The scene that each lesson speaks of and its screen, in the order in which they are offered."""
 _SCRIPT, _STYLE = (Path(__file__).with_suffix(kind).read_text(encoding="utf-8") for kind in (".js", ".css"))
 _END = b"</body>"
+WELCOME = "/?welcome"
+"""Where the teacher's link leads."""
 
 
-def landing_html() -> str:
+def landing_html(lecture: bool = False) -> str:
     """The screen: what stands over viser's page, with its style and script."""
     lessons = "".join(
         _card(name, _title(name), f"scene={scene}&screen={screen}", lesson=True)
         for name, (scene, screen) in LESSON_PLACES.items()
     )
     scenes = "".join(_card(name, scene.title, f"scene={name}") for name, scene in DEMO_SCENES.items())
+    shared = " data-lecture" if lecture else ""
+    others = "" if lecture else f"<h2>Or a scene to explore</h2><section>{scenes}</section>"
     return (
-        f'<style>{_STYLE}</style><main id="packetmesh-landing" role="dialog" aria-label="Welcome">'
+        f'<style>{_STYLE}</style><main id="packetmesh-landing"{shared} role="dialog" aria-label="Welcome">'
         "<header><div><h1>PacketMesh</h1><p>From a camera network's packets to a surface mesh.</p></div>"
         '<button type="button" data-explore>Explore <kbd>Esc</kbd></button></header>'
         f"<h2>Six lessons, each of one question</h2><section>{lessons}</section>"
-        f"<h2>Or a scene to explore</h2><section>{scenes}</section></main><script>{_SCRIPT}</script>"
+        f"{others}</main><script>{_SCRIPT}</script>"
     )
 
 
@@ -67,17 +72,18 @@ def _card(name: str, title: str, place: str, lesson: bool = False) -> str:
     return f'<button type="button" {data}>{image}<span>{label}</span></button>'
 
 
-def landing_first() -> AbstractContextManager[None]:
-    """Servers that start meanwhile send the landing with their page."""
-    return answering(_with_landing)
+def landing_first(lecture: bool = False) -> AbstractContextManager[None]:
+    """Servers that start meanwhile send the landing with their page; in a lecture only to the teacher."""
+    return answering(partial(_with_landing, WELCOME if lecture else "/", landing_html(lecture).encode()))
 
 
-def _with_landing(answer: Callable[[Any, Request], Response | None]) -> Callable[[Any, Request], Any]:
-    """The server's own answer, with the landing in the page that a browser opens."""
-    landing = landing_html().encode()
+def _with_landing(
+    path: str, landing: bytes, answer: Callable[[Any, Request], Response | None]
+) -> Callable[[Any, Request], Any]:
+    """The server's own answer, with the landing in the page that a browser opens by this path."""
 
     def landed(connection: Any, request: Request) -> Response | None:
-        is_page = request.path == "/" and request.headers.get("Upgrade") != "websocket"
+        is_page = request.path == path and request.headers.get("Upgrade") != "websocket"
         if not is_page:
             return answer(connection, request)
         plain = Headers(

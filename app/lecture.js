@@ -1,7 +1,6 @@
-// Somebody of a class: what stands over the picture, their votes, and whether the view is the teacher's or their own.
+// Somebody of a class: what they are told, their votes, and whether the view is the teacher's or their own.
 window.packetmeshLecture ??= (() => {
   const REFUSED_MS = 4000;
-  const EDGE_PX = 16; // between the chip and the picture's edges
   let name = null; // of the seat's hidden field
   let said = 0;
   let refused = 0; // the timer until it is forgotten
@@ -12,11 +11,8 @@ window.packetmeshLecture ??= (() => {
   }
 
   const chip = Object.assign(document.createElement("div"), {className: "packetmesh-seat"});
-  const ballot = make("span", chip, {className: "packetmesh-ballot", textContent: "Your vote"});
-  const votes = [1, 2, 3].map(vote => make("button", ballot, {textContent: vote, onclick: () => cast(vote)}));
   const text = make("span", chip);
   const back = make("button", chip, {textContent: "Back to the class", onclick: () => follow(true)});
-  const resized = new ResizeObserver(place);
 
   function say(word) {
     if (!window.packetmeshDockRow.write(name, `${said + 1} ${word}`)) return void setTimeout(say, 100, word);
@@ -30,49 +26,44 @@ window.packetmeshLecture ??= (() => {
     say(follows ? "follow" : "roam");
   }
 
+  // Whether a choice of the lesson's is a vote.
   function cast(vote) {
+    if (!state.asks || ![1, 2, 3].includes(vote)) return false;
     state.vote = vote;
     draw();
     say(`vote ${vote}`);
+    return true;
   }
 
   function draw() {
     const view = state.follows ? "You see what the teacher sees; drag to look around." : "You look around on your own.";
     text.textContent = refused ? "The teacher steers; drag the picture to look around." : state.steers ? `${view} You may steer.` : view;
     chip.classList.toggle("packetmesh-refused", refused > 0);
-    ballot.hidden = !state.asks;
-    votes.forEach((button, index) => button.setAttribute("aria-pressed", index + 1 === state.vote));
     back.hidden = state.follows;
+    document.documentElement.classList.toggle("packetmesh-seated", !state.steers);
+    window.packetmeshLesson?.show();
     place();
   }
 
   function place() {
-    const canvas = document.querySelector("canvas[data-engine]");
-    if (!canvas) return void setTimeout(place, 200);
-    resized.observe(canvas);
-    const {left, bottom, width} = canvas.getBoundingClientRect();
-    Object.assign(chip.style, {
-      left: `${left + EDGE_PX}px`, bottom: `${innerHeight - bottom + EDGE_PX}px`, maxWidth: `${width - 2 * EDGE_PX}px`,
-    });
-    if (!chip.isConnected) document.body.append(chip);
+    const home = window.packetmeshDockRow?.root();
+    if (!home) return void setTimeout(place, 200);
+    if (!chip.isConnected) home.append(chip);
   }
 
   // A hand on the picture turns the own view.
   const roam = event => event.target.matches?.("canvas[data-engine]") && follow(false);
   window.addEventListener("wheel", roam, {capture: true, passive: true});
   window.addEventListener("pointermove", event => event.buttons && roam(event), true);
-  window.addEventListener("resize", place);
-
-  // Before the lesson's own keys, which are the teacher's.
-  window.addEventListener("keydown", event => {
-    const vote = [1, 2, 3].find(one => String(one) === event.key);
-    if (!vote || !state.asks || event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.("input, textarea")) return;
-    event.preventDefault();
-    event.stopImmediatePropagation();
-    cast(vote);
-  }, true);
 
   return {
+    vote: cast,
+
+    // What was voted for, while a question is asked.
+    get voted() {
+      return state.asks ? state.vote : 0;
+    },
+
     begin(seat) {
       name = seat;
       draw();

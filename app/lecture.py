@@ -15,13 +15,14 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
+from urllib.parse import urlsplit
 
 import viser
 from viser import _messages as messages
 
 from app.dock_row import add_hidden
 from app.drawing.cameras import turn
-from app.entrance import Token
+from app.entrance import Token, is_loopback
 from app.page import running
 from app.qr import qr_html
 from app.ui import Ui
@@ -30,6 +31,11 @@ HEARD = (messages.FileTransferPartAck, messages.GetRenderResponseMessage, messag
 """Of what a browser sends, that which changes nothing for others."""
 SAID = re.compile(r"\d+ (?:(follow)|(roam)|vote ([123]))")
 """What the page of somebody in the class says; a number tells two apart that are alike."""
+UNREACHED = (
+    "<b>No other machine reaches this address.</b> Stop the lecture and start it again with "
+    "<code>--host 0.0.0.0</code>; then it is one that the class can open."
+)
+"""Of an address of this machine alone."""
 Count: TypeAlias = Callable[[int, int], None]
 """Counts the vote of a voter, both by their numbers; choices count from 1."""
 _SCRIPT, _STYLE = (Path(__file__).with_suffix(kind).read_text(encoding="utf-8") for kind in (".js", ".css"))
@@ -160,7 +166,12 @@ class Lecture:
 
     def _show_address(self, client: viser.ClientHandle) -> None:
         with client.gui.add_modal("Join the class") as modal:
-            shown = f'<div class="packetmesh-join">{qr_html(self._url)}<p>{self._url}</p></div>'
+            warning = (
+                f'<div class="warning">{UNREACHED}</div>'
+                if is_loopback(urlsplit(self._url).hostname or "")
+                else ""
+            )
+            shown = f'<div class="packetmesh-join">{warning}{qr_html(self._url)}<p>{self._url}</p></div>'
             client.gui.add_html(f"{shown}<style>{_STYLE}</style>")
             client.gui.add_button("Close").on_click(lambda _: modal.close())
 
@@ -177,7 +188,7 @@ class Lecture:
             seat.tell(told if size else "**Nobody is in the class yet.**")
 
     def _add_chip(self, seat: _Seat) -> None:
-        """What stands over the picture of somebody in the class."""
+        """What is told somebody in the class."""
         client, name = seat.client, uuid.uuid4().hex
         ui = Ui(client.gui, client.scene, self._post, client.atomic, client.flush)
         begin = f"; window.packetmeshLecture.begin({json.dumps(name)})"

@@ -1,4 +1,4 @@
-// Lessons in the page: the keys that lead through one, and its text large over the picture.
+// Lessons in the page: the row above the picture in which one stands, and the keys that lead through it.
 (() => {
   if (window.packetmeshLesson) return;
 
@@ -8,12 +8,12 @@
   };
   const TYPING = "input:not([type=checkbox]), textarea, select, [role=slider], [role=dialog], [contenteditable=true]";
   const PRESSED_BY_SPACE = "button, input";
-  const EDGE_PX = 16; // between the card and the picture's edges
   const FOLDERS_MS = 600; // until the folders of a stop are open
 
   const card = Object.assign(document.createElement("div"), {className: "packetmesh-lesson-card"});
   let mark = null; // of the lesson whose stop was shown last
   let folder = null; // that it stands in
+  let written = ""; // what the card holds
   let docked = false; // whether a hand was last on the dock
   let waiting = false; // for the next frame
 
@@ -28,10 +28,15 @@
     return around;
   }
 
-  // One that is seen of the lesson that is shown. Between two stops there is a new mark before it is told of.
+  // One of the lesson that is shown. Between two stops there is a new mark before it is told of.
   function button(name) {
     if (!folder?.isConnected || !folder.querySelector(".packetmesh-lesson")) return undefined;
-    return buttons(folder).find(one => one.textContent === name && one.offsetParent !== null);
+    return buttons(folder).find(one => one.textContent === name);
+  }
+
+  // A guess; of somebody in a class it is a vote.
+  function press(name) {
+    if (!window.packetmeshLecture?.vote(Number(name))) button(name)?.click();
   }
 
   function give(toDock) {
@@ -53,36 +58,62 @@
     if (event.key === " " && event.target.closest?.(PRESSED_BY_SPACE)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
-    button(KEYS[event.key])?.click();
+    press(KEYS[event.key]);
   }, true);
 
-  // The text stands in the control panel, before the buttons; what is large is a copy of what a class needs, as
-  // low a strip as it can be, for below it is what the lesson speaks of.
+  card.addEventListener("click", event => {
+    const pressed = event.target.closest("[data-press]");
+    if (!pressed) return;
+    pressed.blur(); // or space would press it again
+    press(pressed.dataset.press);
+  });
+
+  // The control panel holds the text and the buttons, unseen; what is seen is made of them here.
   function show() {
     waiting = false;
-    if (!mark?.isConnected) frame([]);
-    const canvas = document.querySelector("canvas[data-engine]");
-    const text = mark?.isConnected && "large" in mark.dataset && canvas ? written() : null;
-    if (!text) return card.remove();
-    const html = strip([...text.children]);
-    const changed = card.innerHTML !== html;
-    if (changed) card.innerHTML = html;
-    const {left, top, width, height} = canvas.getBoundingClientRect();
-    Object.assign(card.style, {
-      left: `${left + EDGE_PX}px`, top: `${top + EDGE_PX}px`, maxWidth: `${width - 2 * EDGE_PX - 1}px`,
-      maxHeight: `${height - 2 * EDGE_PX}px`,
-    });
-    if (!card.isConnected) document.body.append(card);
-    if (changed) card.scrollTop = 0;
+    if (!mark?.isConnected) frame([], []);
+    const text = mark?.isConnected ? textOf(mark) : null;
+    const home = window.packetmeshDockRow?.root();
+    if (!text || !home) return card.remove();
+    const large = "large" in mark.dataset;
+    const html = `<div class="told">${columns([...text.children], large)}</div>${row()}`;
+    if (html !== written) {
+      written = card.innerHTML = html;
+      card.toggleAttribute("data-large", large);
+    }
+    if (!card.isConnected) home.append(card);
   }
 
-  // Before a guess the title, the question and its choices; then the question, what is right and why.
-  function strip(parts) {
+  // The text, and beside it the question with its choices or the answer. What is large is as low as it can be:
+  // before a guess the title, the question and its choices; then the question, what is right and why.
+  function columns(parts, large) {
     const asked = parts.findIndex((one, index) => index > 0 && isQuestion(one));
-    const right = parts.flatMap(one => [...one.querySelectorAll("li")]).find(one => one.textContent.trim().startsWith("✓"));
-    const kept = parts.filter((one, index) => right ? index >= asked && !one.contains(right) : index === 0 || index >= asked);
-    if (right) kept.splice(1, 0, Object.assign(document.createElement("p"), {textContent: right.textContent.trim()}));
-    return kept.map(one => one.outerHTML).join("");
+    if (asked < 0) return `<div>${html(parts)}</div>`;
+    const question = parts.slice(asked);
+    const right = question.flatMap(one => [...one.querySelectorAll("li")]).find(one => one.textContent.trim().startsWith("✓"));
+    if (!large) return `<div>${html(parts.slice(0, asked))}</div><div>${html(question)}</div>`;
+    if (!right) return `<div>${html([parts[0], question[0]])}</div><div>${html(question.slice(1))}</div>`;
+    const answer = Object.assign(document.createElement("p"), {textContent: right.textContent.trim()});
+    return `<div>${html([question[0], answer])}</div><div>${html(question.slice(1).filter(one => !one.contains(right)))}</div>`;
+  }
+
+  // While a guess is waited for, a choice is a button.
+  function html(parts) {
+    const waits = button("1") !== undefined;
+    const choice = (one, index) => {
+      const voted = window.packetmeshLecture?.voted === index + 1;
+      return `<button type="button" class="choice" data-press="${index + 1}" aria-pressed="${voted}">` +
+        `<b>${index + 1}</b><span>${one.innerHTML}</span></button>`;
+    };
+    return parts.map(one => waits && one.matches("ol") ? [...one.children].map(choice).join("") : one.outerHTML).join("");
+  }
+
+  function row() {
+    const made = name => `<button type="button" data-press="${name}">${name === "End" ? "✕" : name}</button>`;
+    const skip = button("Skip") ? made("Skip") : "";
+    const end = made("End").replace(">", ' aria-label="End the lesson" title="End the lesson">');
+    return `<div class="go"><span class="keys">${mark.querySelector(".keys").innerHTML}</span>` +
+      `${skip}${made("Back")}${made("Next")}${end}</div>`;
   }
 
   // A paragraph that is bold from end to end.
@@ -91,22 +122,30 @@
     return one.matches("p") && bold !== null && bold.textContent.trim() === one.textContent.trim();
   }
 
-  function written() {
+  function textOf(mark) {
     for (let around = mark.parentElement; around; around = around.parentElement) {
-      const found = [...around.querySelectorAll("p")].find(one => !card.contains(one) && one.querySelector("strong, b"));
+      const found = [...around.querySelectorAll("p")].find(one => one.querySelector("strong, b"));
       if (found) return found.parentElement;
     }
     return null;
   }
 
-  // The folders that the stop speaks of are framed, and in view where the text stands elsewhere.
-  function frame(titles) {
+  // What a stop speaks of is framed and in view: folders by their titles, tabs, controls and numbers by their names.
+  function frame(folders, names) {
     document.querySelectorAll(".packetmesh-here").forEach(one => one.classList.remove("packetmesh-here"));
-    const heads = [...document.querySelectorAll("svg[class*=tabler-icon-chevron-]")].map(arrow => arrow.parentElement);
-    for (const head of heads.filter(one => titles.includes(one.textContent.trim()) && one.offsetParent !== null)) {
-      head.parentElement.classList.add("packetmesh-here");
-      if (card.isConnected) head.parentElement.scrollIntoView({block: "center"});
-    }
+    const called = (selector, titles) => [...document.querySelectorAll(selector)]
+      .filter(one => titles.includes(one.textContent.trim()) && one.offsetParent !== null && !card.contains(one));
+    const heads = [...document.querySelectorAll("svg[class*=tabler-icon-chevron-]")].map(arrow => arrow.parentElement)
+      .filter(one => folders.includes(one.textContent.trim()) && one.offsetParent !== null);
+    const found = [
+      ...heads.map(one => one.parentElement),
+      ...called("[role=tab]", folders).map(one => one.closest("[role=tablist]").parentElement),
+      ...called("label", names).map(one => one.parentElement.parentElement.parentElement),
+      ...called(".packetmesh-term", names).map(one => one.closest("tr") ?? one),
+    ];
+    found.forEach(one => one.classList.add("packetmesh-here"));
+    found.sort((one, other) => one.compareDocumentPosition(other) & Node.DOCUMENT_POSITION_FOLLOWING ? -1 : 1);
+    found[0]?.scrollIntoView({block: "start"});
   }
 
   new MutationObserver(records => {
@@ -114,18 +153,20 @@
     waiting = true;
     requestAnimationFrame(show);
   }).observe(document.body, {childList: true, subtree: true, characterData: true});
-  window.addEventListener("resize", show);
 
   window.packetmeshLesson = {
     // A stop is shown whose mark holds this image: the keys are its own, also after its list was used. A list
     // that somebody has opened again meanwhile stays open.
-    at(image, titles) {
+    at(image, folders, names) {
       mark = image.closest(".packetmesh-lesson");
       folder = folderOf(mark);
       give(false);
       if (document.activeElement?.matches("input:not([aria-expanded=true])")) document.activeElement.blur();
       show();
-      setTimeout(frame, FOLDERS_MS, titles);
+      card.querySelector(".told")?.scrollTo(0, 0);
+      setTimeout(frame, FOLDERS_MS, folders, names);
     },
+
+    show,
   };
 })();

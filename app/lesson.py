@@ -1,219 +1,65 @@
-"""Lessons: markdown files whose sections set a screen's controls and say what to look at.
-
-A lesson is a ``# title`` and sections. A section is a ``## title``, lines ``set: name = value``, lines
-``open: folder`` and its text. What a section does not set is at its default, so that every stop can be shown
-by itself; the folders that it speaks of are unfolded. Behind the text a section asks::
-
-    ask: What does it cost?
-    choices:
-    - [ ] Nothing. | Why somebody may think so, and why it is not so.
-    - [x] Time.
-    - [ ] Energy. | The reason here, too.
-    reveal: What there is to know, which is shown when a person has guessed.
-"""
+"""A lesson on a screen: it leads from stop to stop, asks before it tells, and counts a class's votes."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
+from typing import Generic
 
+from app.lesson_file import CHOICES, FIELD, SCENE, Lesson, Look, Numbers, Question
 from app.page import running
 from app.ui import Ui
-from packetmesh.errors import InputError
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
-LESSONS = Path(__file__).resolve().parents[1] / "assets" / "lessons"
-NUMBER = r"(\d+(?:\.\d+)?)"
 OFF, BEGIN = "not now", "Choose a stop, or press **Next**."
 SKIP, SKIPPED = "Skip", -1
-CHOICES = 3
-"""Of every question; they are the keys 1, 2 and 3."""
 GUESS = f"Take a guess: 1, 2 or 3. Or press **{SKIP}**."
 FIRST = "**Guess before you go on: 1, 2 or 3.** A wrong guess costs nothing. Or press **Skip**."
 VOTING = f"The class votes: 1, 2 or 3. A guess of the teacher's, or **{SKIP}**, shows the answer."
+FIRST_OF_ALL = -1.0
+"""Order of a lesson's folder in the panel of its screen."""
 BAR = 12
 """Blocks of a bar that holds all votes."""
 KEYS = (
-    "<span><b>→</b> or <b>space</b> next, <b>←</b> back, <b>1 2 3</b> guess, <b>S</b> skip. "
-    "Click the dock, and the keys are the dock's.</span>"
-    "<span>The keys are the dock's now; <b>Esc</b> gives them back to the lesson.</span>"
+    "<span class='keys'><span><b>→</b> or <b>space</b> next, <b>←</b> back, <b>1 2 3</b> guess, "
+    "<b>S</b> skip.<span class='docked'> Click the dock, and the keys are the dock's.</span></span>"
+    "<span>The keys are the dock's now; <b>Esc</b> gives them back to the lesson.</span></span>"
 )
 """What the page says of the keys: while they are the lesson's, and while they are the dock's."""
-PARTS = ("ask", "choices", "reveal")
-Value = TypeVar("Value")
-Look = TypeVar("Look", bound="DataclassInstance")
-"""What a screen is to show: a frozen record of all that a stop may set."""
-Setting: TypeAlias = Callable[[Look, str], Look]
-"""Changes a look as the text behind ``set: name =`` says; a ValueError says what to try instead."""
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """One of the answers that can be guessed."""
-
-    text: str
-    """Markdown."""
-    reason: str = ""
-    """Why it is wrong; empty for the one that is right."""
-
-
-@dataclass(frozen=True, slots=True)
-class Question:
-    """What a stop asks before it tells."""
-
-    text: str
-    """Markdown."""
-    choices: tuple[Choice, ...]
-    reveal: str
-    """Markdown, shown after a guess."""
-
-
-@dataclass(frozen=True, slots=True)
-class Stop(Generic[Look]):
-    """One section of a lesson."""
-
-    title: str
-    text: str
-    """Markdown."""
-    look: Look
-    opens: tuple[str, ...] = ()
-    """Titles of the folders that it speaks of."""
-    question: Question | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Lesson(Generic[Look]):
-    """A way through a screen in stops."""
-
-    title: str
-    stops: tuple[Stop[Look], ...]
-    default: Look
-    """What is shown where a section sets nothing."""
-
-
-def read_lesson(path: Path, settings: Mapping[str, Setting[Look]], default: Look) -> Lesson[Look]:
-    """The lesson in a markdown file.
-
-    Args:
-        path: the file.
-        settings: what a section can set, by the names that it uses.
-        default: what is shown where a section sets nothing.
-
-    Raises:
-        InputError: the file cannot be read, has no title or no section, sets what it cannot, or asks without
-            choices or an answer.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"The lesson {path.name} cannot be read as text: {error}.") from None
-    title = re.search(r"^# (.+)$", text, re.MULTILINE)
-    head, *sections = re.split(r"^## ", text, flags=re.MULTILINE)
-    if title is None or title.start() > len(head):
-        raise InputError(f"The lesson {path.name} has no title; begin it with a line '# title'.")
-    if not sections:
-        raise InputError(f"The lesson {path.name} has no sections; begin each with a line '## title'.")
-    stops = (_stop(section, path.name, settings, default) for section in sections)
-    return Lesson(title[1].strip(), tuple(stops), default)
-
-
-def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: Look) -> Stop[Look]:
-    title, *lines = section.splitlines()
-    told = "\n".join(line for line in lines if not line.startswith(("set:", "open:")))
-    text, *parts = re.split(rf"^({'|'.join(PARTS)}):", told, flags=re.MULTILINE)
-    opens = tuple(line[5:].strip() for line in lines if line.startswith("open:"))
-    where = f"The lesson {file}, section '{title.strip()}',"
-    if not text.strip():
-        raise InputError(f"{where} has no text.")
-    for line in lines:
-        if line.startswith("set:"):
-            name, _, value = (part.strip() for part in line[4:].partition("="))
-            try:
-                look = choice(settings)(name)(look, value)
-            except ValueError as error:
-                raise InputError(f"{where} cannot set {name} = {value}: {error}.") from None
-    if "" in opens:
-        raise InputError(f"{where} opens nothing; name a folder behind 'open:'.")
-    return Stop(title.strip(), text.strip(), look, opens, _question(parts, where) if parts else None)
-
-
-def _question(parts: list[str], where: str) -> Question:
-    """What the parts, each after its name, ask."""
-    asked, choices, reveal = (
-        (part.strip() for part in parts[1::2]) if tuple(parts[::2]) == PARTS else ("",) * 3
-    )
-    if not (asked and choices and reveal):
-        raise InputError(
-            f"{where} must ask with 'ask:', 'choices:' and 'reveal:', in this order, each with text."
-        )
-    _, *items = re.split(r"^- \[([ x])\] ", choices, flags=re.MULTILINE)
-    marks, texts = items[::2], [" ".join(item.split()) for item in items[1::2]]
-    if len(texts) != CHOICES or marks.count("x") != 1:
-        raise InputError(
-            f"{where} needs {CHOICES} choices: '- [x] choice' once, else '- [ ] choice | why it is wrong'."
-        )
-    found = tuple(Choice(*(part.strip() for part in text.partition(" | ")[::2])) for text in texts)
-    for mark, one in zip(marks, found, strict=True):
-        if (mark == "x") == bool(one.reason):
-            fault = "is right but has a reason why not" if one.reason else "has no reason why it is wrong"
-            raise InputError(f"{where} choice '{one.text}' {fault}; a reason stands behind ' | '.")
-    return Question(asked, found, reveal)
-
-
-def sets(key: str, read: Callable[[str], Any]) -> Callable[[Look, str], Look]:
-    """The setting that puts what ``read`` makes of the text into one field of the look."""
-    return lambda look, text: replace(look, **{key: read(text)})
-
-
-def choice(options: Mapping[str, Value]) -> Callable[[str], Value]:
-    """Reads one of the options' names."""
-
-    def read(text: str) -> Value:
-        if text not in options:
-            raise ValueError(f"try one of {', '.join(options)}")
-        return options[text]
-
-    return read
-
-
-def quantity(
-    unit: str, most: float, per_unit: float = 1.0, above_zero: bool = False
-) -> Callable[[str], float]:
-    """Reads such as '2 cm' with unit cm, up to ``most``; ``per_unit`` units make one of the stored unit."""
-
-    def read(text: str) -> float:
-        found = re.fullmatch(rf"{NUMBER} ?{unit}", text)
-        if found is None or float(found[1]) > most or (above_zero and float(found[1]) == 0.0):
-            raise ValueError(f"try {'more than ' if above_zero else ''}0 to {most:g} {unit}")
-        return float(found[1]) / per_unit
-
-    return read
-
-
-def short(label: str) -> str:
-    """What stands on the screen, up to its explanation."""
-    return re.split(r" \(|[,:]", label)[0]
+TO_COME = "…"
 
 
 class LessonFolder(Generic[Look]):
     """Leads through a lesson stop by stop; every stop sets the screen's controls and asks before it tells."""
 
-    def __init__(self, ui: Ui, lesson: Lesson[Look], on_stop: Callable[[Look], None]) -> None:
-        """Add the folder; ``on_stop`` is called with what the stop shows."""
-        self._lesson, self._on_stop = lesson, on_stop
+    def __init__(
+        self,
+        ui: Ui,
+        lesson: Lesson[Look],
+        on_stop: Callable[[Look], None],
+        numbers: Callable[[], Numbers] = dict,
+    ) -> None:
+        """Add the folder.
+
+        Args:
+            ui: of the browser.
+            lesson: what it leads through.
+            on_stop: called with what the stop shows.
+            numbers: what stands for the fields of its texts, once the screen shows the stop.
+        """
+        self._lesson, self._on_stop, self._numbers = lesson, on_stop, numbers
+        self._known: dict[int, Numbers] = {}
+        """By stop."""
         self._names = [f"{i}. {stop.title}" for i, stop in enumerate(lesson.stops, 1)]
         self._guesses: dict[int, int] = {}
         self._votes: dict[int, dict[int, int]] = {}
         """By stop and voter."""
         self._lecture = ui.lecture
-        with ui.gui.add_folder(f"Lesson: {lesson.title}", expand_by_default=False):
+        self._waiting = self._asking()
+        self._title = f"Lesson: {lesson.title}"
+        with ui.gui.add_folder(self._title, expand_by_default=False, order=FIRST_OF_ALL):
             self._stop = ui.gui.add_dropdown(
                 "Stop",
                 [OFF, *self._names],
@@ -223,7 +69,7 @@ class LessonFolder(Generic[Look]):
             self._large = ui.gui.add_checkbox(
                 "Large",
                 ui.lecture is not None,
-                hint="Shows the text large over the picture, for a room to read.",
+                hint="Shows less text, and that large, for a room to read.",
             )
             ui.when_changed(self._large, self._point_out)
             self._text = ui.gui.add_markdown(BEGIN)
@@ -236,8 +82,8 @@ class LessonFolder(Generic[Look]):
             )
             ui.buttons(
                 "Go",
-                {"Back": lambda: self._go(-1), "Next": lambda: self._go(1)},
-                "To the stop before or after.",
+                {"Back": lambda: self._go(-1), "Next": lambda: self._go(1), "End": self._end},
+                "To the stop before or after, or out of the lesson.",
             )
             self._mark = ui.gui.add_html("")
         self._marked = 0
@@ -258,6 +104,10 @@ class LessonFolder(Generic[Look]):
             self._stop.value = self._names[index]
             self._picked()
 
+    def _end(self) -> None:
+        self._stop.value = OFF
+        self._picked()
+
     def _index(self) -> int:
         return -1 if self._stop.value == OFF else self._names.index(self._stop.value)
 
@@ -275,21 +125,28 @@ class LessonFolder(Generic[Look]):
             self._poll()
             self._point_out()
             return
-        stop = self._lesson.stops[index]
+        self._known.pop(index, None)
+        self._on_stop(self._lesson.stops[index].look)
         self._write(self._asking())
         self._poll()
-        self._on_stop(stop.look)
         self._point_out()
 
+    def refresh(self) -> None:
+        """The screen shows something else: bring the numbers of the stop up to date."""
+        if self._index() >= 0:
+            self._write(self._waiting)
+
     def _point_out(self) -> None:
-        """Have the page give the keys to the stop, unfold what it speaks of and show it large or not."""
+        """Have the page show the stop, large or not, give it the keys and open what it speaks of."""
         index = self._index()
         self._marked += 1
         if index < 0:
             self._mark.content = ""
             return
-        titles = json.dumps(self._lesson.stops[index].opens)
-        script = f"window.packetmesh?.unfold({titles}); window.packetmeshLesson?.at(this, {titles})"
+        stop = self._lesson.stops[index]
+        opens, sees = json.dumps(stop.opens), json.dumps(stop.sees)
+        unfold = json.dumps([self._title, *stop.opens])
+        script = f"window.packetmesh?.unfold({unfold}); window.packetmeshLesson?.at(this, {opens}, {sees})"
         large = "data-large" if self._large.value else ""
         self._mark.content = (
             f"<div class='packetmesh-lesson' {large}>{KEYS}{running(script, self._marked)}</div>"
@@ -318,14 +175,29 @@ class LessonFolder(Generic[Look]):
 
     def _write(self, waiting: str) -> None:
         """Show the stop; ``waiting`` stands where the answer will be."""
-        index = self._index()
+        index, self._waiting = self._index(), waiting
         stop = self._lesson.stops[index]
         lines = [f"**{stop.title}** ({index + 1} of {len(self._names)})", stop.text]
         if stop.question is not None:
             asked = with_votes(stop.question, self._votes.get(index, {}).values())
             lines += [f"**{stop.question.text}**", *told(asked, self._guesses.get(index), waiting)]
-        self._text.content = "\n\n".join(lines)
+        text = self._filled("\n\n".join(lines), index)
+        if text != self._text.content:
+            self._text.content = text
         self._guess.visible = self._waits()
+
+    def _filled(self, text: str, index: int) -> str:
+        """The text with its numbers: of this stop, or as they were at another in the same scene."""
+        now = self._numbers()
+        if now:
+            same = {at: known for at, known in self._known.items() if known[SCENE] == now[SCENE]}
+            self._known = {index: now, **same}
+
+        def value(field: re.Match[str]) -> str:
+            known = now if field[1] is None else self._known.get(int(field[1]) - 1)
+            return f"(see stop {field[1]})" if known is None else known.get(field[2], TO_COME)
+
+        return FIELD.sub(value, text)
 
 
 def with_votes(question: Question, votes: Collection[int]) -> Question:

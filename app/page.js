@@ -92,17 +92,18 @@
     else held = false;
   };
 
-  // viser keeps to itself whether a folder is open; its title has an arrow down while it is not.
+  // viser keeps to itself whether a folder is open; its title has an arrow down while it is not. A tab says it.
   function unfold(titles, tries = UNFOLD_TRIES) {
     const shut = [...document.querySelectorAll("svg.tabler-icon-chevron-down")].map(arrow => arrow.parentElement);
-    const found = shut.filter(head => titles.includes(head.textContent.trim()) && head.offsetParent !== null);
+    const tabs = [...document.querySelectorAll("[role=tab][aria-selected=false]")];
+    const found = [...shut, ...tabs].filter(head => titles.includes(head.textContent.trim()) && head.offsetParent !== null);
     for (const head of found) head.click();
     const left = titles.filter(title => !found.some(head => head.textContent.trim() === title));
     if (left.length > 0 && tries > 1) setTimeout(unfold, UNFOLD_MS, left, tries - 1);
   }
 
   window.packetmesh = {
-    // Open folders by their titles; those that are not there yet, when they come within a second or two.
+    // Open folders and tabs by their titles; those that are not there yet, when they come within a second or two.
     unfold,
 
     // Draw nothing but new meshes for now.

@@ -1,4 +1,4 @@
-"""What the app adds to viser's page: scripts and style sheets of its own, ``page`` and ``lesson``."""
+"""What the app adds to viser's page: scripts and style sheets of its own, ``PARTS``."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from pathlib import Path
 
 import viser
 
+PARTS = ("page", "hint", "lesson")
 _SCRIPT, _STYLE = (
-    "".join(Path(__file__).with_name(name + kind).read_text(encoding="utf-8") for name in ("page", "lesson"))
+    "".join(Path(__file__).with_name(name + kind).read_text(encoding="utf-8") for name in PARTS)
     for kind in (".js", ".css")
 )
 

@@ -124,8 +124,7 @@ def build_server(
     with contextlib.ExitStack() as outermost_first:
         for answers in (strict_headers(), only_own_page(), entrance.guarded()):
             outermost_first.enter_context(answers)
-        if teacher is None:
-            outermost_first.enter_context(landing_first())
+        outermost_first.enter_context(landing_first(lecture))
         outermost_first.enter_context(contextlib.redirect_stdout(io.StringIO()))
         server = viser.ViserServer(host=host, port=port, label="PacketMesh", verbose=False)
     app = AppServer(server, pool, folder, entrance=entrance)

@@ -19,10 +19,6 @@ COLORS: dict[StepStatus, str] = {
 }
 
 
-WIDE_PX = 700
-"""Of a window in which all steps stand in one row."""
-
-
 class Stepper:
     """Buttons, one for each step; the current one is filled."""
 
@@ -49,15 +45,9 @@ class Stepper:
 
 
 def _style(current: int, statuses: Sequence[StepStatus | None]) -> str:
-    """CSS for the buttons that follow this element; without it they are merely plain."""
+    """CSS for the buttons that follow this element: their colours; ``page.css`` has their place."""
     row = "div:has(> .packetmesh-steps) + div"
-    rules = [
-        f"{row} > div > div:first-child {{ display: none; }}",
-        f"@media (min-width: {WIDE_PX}px) {{ {row} > div > div:last-child > div "
-        "{ flex-wrap: nowrap !important; gap: 3px !important; } }",
-        f"canvas[data-engine] {{ background: {css(BACKGROUND)} }}",
-        f"{row} button {{ height: 2.2em; padding: 0 0.15em; font-size: 11.5px; }}",
-    ]
+    rules = [f"canvas[data-engine] {{ background: {css(BACKGROUND)} }}"]
     for index, status in enumerate(statuses):
         color = COLORS[status] if status is not None else css(BRAND)
         look = f"background: {color}; color: white;" if index == current else f"color: {color};"

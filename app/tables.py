@@ -1,4 +1,4 @@
-"""Small tables of numbers, each explained when the pointer rests on its name."""
+"""Small tables of numbers, each explained by a click on its name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from app.drawing.colors import css
 from app.records import ColorBar, MeshView
 
 _CELL = "padding: 2px 8px 2px 0; vertical-align: top;"
-_NAME = "border-bottom: 1px dotted #999; cursor: help;"
 
 WAITING, UNKNOWN = "…", "–"
 """For a value that is to come, and for one that is not."""
@@ -38,8 +37,9 @@ TRUTH_ROWS = (
 
 
 def term(name: str, hint: str) -> str:
-    """HTML of a word that is explained when the pointer rests on it."""
-    return f'<span style="{_NAME}" title="{html.escape(hint, quote=True)}">{html.escape(name)}</span>'
+    """HTML of a word that is explained by a click on it, as ``hint.js`` does."""
+    told = html.escape(hint, quote=True)
+    return f'<button type="button" class="packetmesh-term" data-hint="{told}">{html.escape(name)}</button>'
 
 
 def table(

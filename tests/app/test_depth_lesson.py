@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from app.lesson import read_lesson
+from app.lesson_file import read_lesson
 from app.screens.depth.hide_job import hidden_pixels
 from app.screens.depth.labels import EVERYWHERE
-from app.screens.depth.lesson import SETTINGS, SHIPPED, DepthLook
+from app.screens.depth.lesson import NUMBERS, SETTINGS, SHIPPED, DepthLook
 from app.screens.depth.view import Disc, HideRequest
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig
@@ -18,7 +18,7 @@ from pipeline.io.demos import load_demo
 def lesson(tmp_path, text):
     path = tmp_path / "lesson.md"
     path.write_text(text)
-    return read_lesson(path, SETTINGS, DepthLook())
+    return read_lesson(path, SETTINGS, DepthLook(), NUMBERS)
 
 
 def test_a_stop_sets_what_it_names_and_leaves_the_rest_as_the_screen_begins(tmp_path):
@@ -71,7 +71,9 @@ def test_a_bad_setting_is_one_sentence(tmp_path, setting, sentence):
 
 
 def look_at(title):
-    (stop,) = (stop for stop in read_lesson(SHIPPED, SETTINGS, DepthLook()).stops if stop.title == title)
+    (stop,) = (
+        stop for stop in read_lesson(SHIPPED, SETTINGS, DepthLook(), NUMBERS).stops if stop.title == title
+    )
     return stop.look
 
 

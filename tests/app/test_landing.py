@@ -12,7 +12,7 @@ import viser
 
 from app.address import Place, place_of
 from app.landing import LESSON_PLACES, PICTURES, landing_first, landing_html
-from app.lesson import LESSONS
+from app.lesson_file import LESSONS
 from app.server import PANELS
 from app.state import Spec
 from pipeline.io.demos import DEMO_SCENES

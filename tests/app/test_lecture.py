@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from app.entrance import Token
-from app.lesson import Choice, Question, told, with_votes
+from app.entrance import Token, is_loopback
+from app.lesson import told, with_votes
+from app.lesson_file import Choice, Question
 from app.load.connection import Connection, wait_for
 from app.qr import modules_of, qr_html
 from app.server import build_server
@@ -57,9 +58,30 @@ def student(lecture, teacher):
 
 def test_the_teachers_link_gives_a_cookie_and_leaves_no_token_in_the_address(lecture):
     response = answer(lecture.teacher_url)
-    assert (response.status, response.headers["Location"]) == (303, "/")
+    assert (response.status, response.headers["Location"]) == (303, "/?welcome")
     assert "HttpOnly" in response.headers["Set-Cookie"]
     assert "SameSite=Lax" in response.headers["Set-Cookie"]
+
+
+def test_the_teacher_is_welcomed_with_the_lessons_and_the_class_is_not(lecture):
+    welcome, page = (answer(f"{lecture.url}{path}").text for path in ("/?welcome", "/"))
+    assert 'id="packetmesh-landing"' not in page
+    assert "ICP against CEICP" in welcome
+    assert "Or a scene" not in welcome
+
+
+@pytest.mark.parametrize(
+    ("url", "alone"),
+    [
+        ("http://127.0.0.1:8080", True),
+        ("http://localhost:8080", True),
+        ("http://[::1]:8080", True),
+        ("http://192.0.2.7:8080", False),
+        ("http://room.example:80", False),
+    ],
+)
+def test_an_address_that_no_other_machine_reaches_is_known(url, alone):
+    assert is_loopback(urlsplit(url).hostname) == alone
 
 
 def test_another_token_is_refused_in_one_sentence_and_none_gives_the_page(lecture):

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from app.lesson import BEGIN, FIRST, OFF, SKIP, SKIPPED, LessonFolder, read_lesson, told
+from app import jobs
+from app.lesson import BEGIN, FIRST, OFF, SKIP, SKIPPED, LessonFolder, told
+from app.lesson_file import FIELD, LESSONS, SCENE, read_lesson
 from app.screens.calibrate import lesson as calibrate
 from app.screens.depth import lesson as depth
 from app.screens.fuse import lesson as fuse
@@ -14,7 +16,11 @@ from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.view import Race, Start
 from app.screens.network import lesson as network
 from app.screens.surface import lesson as surface
+from app.state import CHAIN, Spec
+from app.tables import UNKNOWN
 from packetmesh.errors import InputError
+from packetmesh.progress import drain
+from pipeline.sources import Demo
 from tests.app.fakes import ui_of
 
 ASKED = """# A
@@ -40,7 +46,7 @@ def lesson(tmp_path, text):
 
 
 def test_the_stops_of_the_lesson_that_ships_have_different_titles_and_text():
-    shipped = read_lesson(SHIPPED, SETTINGS, RaceLook())
+    shipped = read_lesson(SHIPPED, SETTINGS, RaceLook(), fuse.NUMBERS)
     assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) > 1
     assert all("set:" not in stop.text and len(stop.text) > 100 for stop in shipped.stops)
     assert {stop.look.race.mode for stop in shipped.stops} == {"nodes", "inferred"}
@@ -48,19 +54,21 @@ def test_the_stops_of_the_lesson_that_ships_have_different_titles_and_text():
 
 
 @pytest.mark.parametrize(
-    ("path", "settings", "look"),
+    ("path", "numbers", "settings", "look"),
     [
-        (calibrate.SHIPPED, calibrate.SETTINGS, calibrate.CalibrateLook()),
-        (depth.SHIPPED, depth.SETTINGS, depth.DepthLook()),
-        (surface.SHIPPED, surface.SETTINGS, surface.SurfaceLook()),
-        (network.CROSSING, network.SETTINGS, network.NetworkLook()),
-        (network.LOST_PACKET, network.SETTINGS, network.NetworkLook()),
-        (SHIPPED, SETTINGS, RaceLook()),
+        (calibrate.SHIPPED, calibrate.NUMBERS, calibrate.SETTINGS, calibrate.CalibrateLook()),
+        (depth.SHIPPED, depth.NUMBERS, depth.SETTINGS, depth.DepthLook()),
+        (surface.SHIPPED, surface.NUMBERS, surface.SETTINGS, surface.SurfaceLook()),
+        (network.CROSSING, network.NUMBERS, network.SETTINGS, network.NetworkLook()),
+        (network.LOST_PACKET, network.NUMBERS, network.SETTINGS, network.NetworkLook()),
+        (SHIPPED, fuse.NUMBERS, SETTINGS, RaceLook()),
     ],
     ids=lambda value: getattr(value, "stem", ""),
 )
-def test_every_stop_that_ships_differs_and_asks_what_cannot_be_guessed_by_its_place(path, settings, look):
-    shipped = read_lesson(path, settings, look)
+def test_every_stop_that_ships_differs_and_asks_what_cannot_be_guessed_by_its_place(
+    path, numbers, settings, look
+):
+    shipped = read_lesson(path, settings, look, numbers)
     assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) >= 5
     assert len({stop.look for stop in shipped.stops}) == len(shipped.stops)
     rights = []
@@ -121,6 +129,75 @@ def test_reset_leaves_the_lesson_and_takes_back_what_its_stop_had_set(tmp_path):
     assert "Air scatters blue" not in ui.gui.text()
 
 
+PLAIN = (
+    r"3-D|k[12]|802\.11b?|1,500 bytes|1\.5 m only|1\.25 m|20 millionths|0\.02 ms|\b11? Mbit/s|250 kbit/s"
+    r"|0\.1 to the|node_02|16 × 16|16 pixels|√3|\+ 1, \+ 2 and \+ 4|from 0 to 2|within 5 %"
+)
+"""Numbers that no scene changes: of formulas, standards and settings."""
+
+
+@pytest.mark.parametrize("path", sorted(LESSONS.glob("*.md")), ids=lambda path: path.stem)
+def test_no_lesson_holds_a_number_that_somebody_measured(path):
+    text = re.sub(r"^(set|open|see):.*$", "", path.read_text(), flags=re.MULTILINE)
+    assert FIELD.search(text)
+    typed = re.sub(PLAIN, "", FIELD.sub("", text))
+    assert [line for line in typed.splitlines() if re.search(r"\d", line)] == []
+    fractions = r"\b(two fifths|a fifth of the|a third (more|of)|(nine|seven) in (ten|eight)|per cent)\b"
+    assert re.search(fractions, typed) is None
+
+
+def test_a_field_is_the_number_of_now_or_of_another_stop_in_the_same_scene(tmp_path):
+    path = tmp_path / "lesson.md"
+    path.write_text("# A\n## One\nNow {end}.\n## Two\nNow {end}, it was {1:end}.\n")
+    shipped, ui, shown = read_lesson(path, SETTINGS, RaceLook(), ("end",)), ui_of(), {}
+    folder = LessonFolder(ui, shipped, lambda look: shown.clear(), lambda: dict(shown))
+    ui.gui.press("Go", "Next")
+    assert "Now …." in ui.gui.text()
+    shown.update(scene="room", end="2 cm")
+    folder.refresh()
+    assert "Now 2 cm." in ui.gui.text()
+    ui.gui.press("Go", "Next")
+    shown.update(scene="room", end="3 cm")
+    folder.refresh()
+    assert "Now 3 cm, it was 2 cm." in ui.gui.text()
+    shown.update(scene="desk", end="4 cm")
+    folder.refresh()
+    assert "Now 4 cm, it was (see stop 1)." in ui.gui.text()
+    ui.gui.press("Go", "End")
+    assert ui.gui.text() == BEGIN
+
+
+@pytest.mark.parametrize("field", ["{begun}", "{3:end}", "{0:end}"])
+def test_a_field_that_nobody_computes_is_one_sentence(tmp_path, field):
+    path = tmp_path / "lesson.md"
+    path.write_text(f"# A\n## One\nx {field}\n## Two\ny")
+    with pytest.raises(InputError, match="no number of its screen; try one of end"):
+        read_lesson(path, SETTINGS, RaceLook(), ("end",))
+
+
+@pytest.mark.parametrize("scene", ["box-on-table", "office"])
+def test_the_numbers_of_a_lesson_are_those_of_the_scene(scene, store):
+    spec, views = Spec(Demo(scene)), {}
+    for step in CHAIN:
+        views[step] = drain(jobs.run_step(step, store, spec))
+    race = Race(start=Start.towards(*fuse.START, seed=0))
+    raced = drain(jobs.run("fuse.race_job:race_job", store, spec, race))
+    title = views["scene"].title
+    told = {
+        depth: depth.numbers(views["scene"], 0, views["depth"].nodes[0]),
+        fuse: fuse.numbers(title, race, raced),
+        surface: surface.numbers(title, views["surface"], {}),
+    }
+    for screen, numbers in told.items():
+        text = screen.SHIPPED.read_text()
+        assert set(numbers) == {*screen.NUMBERS, SCENE}
+        lacking = {name for _, name in FIELD.findall(text) if numbers[name] == UNKNOWN}
+        assert all(name.endswith(("_3", "_4", "_poisson")) for name in lacking)
+    missed = views["surface"].after.quality.no_hit_ray_share
+    assert told[surface]["missed"] == f"{missed:.1%}".replace("%", " %")
+    assert told[fuse]["turn"] == "3°"
+
+
 @pytest.mark.parametrize(
     ("path", "screen"),
     [
@@ -135,9 +212,12 @@ def test_reset_leaves_the_lesson_and_takes_back_what_its_stop_had_set(tmp_path):
 )
 def test_the_folders_that_lessons_unfold_are_on_their_screens(path, screen):
     sources = "".join(one.read_text() for one in Path(screen.__file__).parent.glob("*.py"))
-    folders = set(re.findall(r'add_folder\(\s*"([^"]+)"', sources))
+    folders = set(re.findall(r'add_(?:folder|tab)\(\s*"([^"]+)"', sources))
     named = set(re.findall(r"^open: (.+)$", path.read_text(), re.MULTILINE))
     assert named <= folders
+    sources += Path("app/compare.py").read_text()
+    seen = re.findall(r"^see: (.+)$", path.read_text(), re.MULTILINE)
+    assert [name for name in seen if f'"{name}"' not in sources] == []
 
 
 def test_a_start_in_numbers_and_the_end(tmp_path):
@@ -237,7 +317,7 @@ def test_a_missing_or_binary_lesson_is_one_sentence(tmp_path):
 
 def test_the_folder_begins_with_how_to_begin_and_goes_from_stop_to_stop():
     ui, shown = ui_of(), []
-    shipped = read_lesson(surface.SHIPPED, surface.SETTINGS, surface.SurfaceLook())
+    shipped = read_lesson(surface.SHIPPED, surface.SETTINGS, surface.SurfaceLook(), surface.NUMBERS)
     LessonFolder(ui, shipped, shown.append)
     stops, gui = shipped.stops, ui.gui
     assert gui.text() == BEGIN

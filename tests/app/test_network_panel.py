@@ -12,12 +12,12 @@ import pytest
 import viser
 
 from app.drawing.colors import COVERAGE_STOPS, linear
-from app.lesson import read_lesson
+from app.lesson_file import read_lesson
 from app.screens.network.delivery_draw import EMPTY, FULL
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.draw import STREET, ground_of
 from app.screens.network.labels import NETWORKS
-from app.screens.network.lesson import CROSSING, LOST_PACKET, SETTINGS, NetworkLook
+from app.screens.network.lesson import CROSSING, LOST_PACKET, NUMBERS, SETTINGS, NetworkLook
 from app.screens.network.panel import ORIGIN, PICK, NetworkPanel
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import What
@@ -301,7 +301,7 @@ def test_every_stop_of_the_lessons_asks_for_a_network_that_there_is(path):
     setup.add_advanced()
     setup.what_if.offer(["node_00", "node_01", "node_02"])
     asked = []
-    for stop in read_lesson(path, SETTINGS, NetworkLook()).stops:
+    for stop in read_lesson(path, SETTINGS, NetworkLook(), NUMBERS).stops:
         setup.take(stop.look)
         asked.append(tuple(setup.runs().values()) if setup.street else setup.sent())
         if stop.look.off:

@@ -1,14 +1,13 @@
 """The lesson about ball radii: what a stop sets, bad settings, and whether what it says is true."""
 
-import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from app.lesson import read_lesson
+from app.lesson_file import read_lesson
 from app.screens.surface.labels import BEFORE, BOTH, POISSON
-from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook
+from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from pipeline.config import PRESETS, SurfaceConfig
@@ -31,7 +30,7 @@ CONFIG = PRESETS["packetmesh"]
 def lesson(tmp_path, text):
     path = tmp_path / "lesson.md"
     path.write_text(text)
-    return read_lesson(path, SETTINGS, SurfaceLook())
+    return read_lesson(path, SETTINGS, SurfaceLook(), NUMBERS)
 
 
 def test_a_stop_sets_what_it_names_and_leaves_the_rest_as_the_screen_begins(tmp_path):
@@ -143,16 +142,8 @@ def four_balls(room):
 
 
 def stop_named(title):
-    (stop,) = (stop for stop in read_lesson(SHIPPED, SETTINGS, SurfaceLook()).stops if stop.title == title)
-    return stop.look, " ".join(f"{stop.text} {stop.question.text} {stop.question.reveal}".split())
-
-
-def about(text, pattern, shares, points=2.0):
-    """Whether the percentages that the text names are those shares, within some points."""
-    found = re.search(pattern, text)
-    assert found is not None, pattern
-    named = [float(number) for number in found.groups()]
-    return np.allclose(named, 100.0 * np.array(shares), atol=points, rtol=0.0)
+    shipped = read_lesson(SHIPPED, SETTINGS, SurfaceLook(), NUMBERS)
+    return next(stop.look for stop in shipped.stops if stop.title == title)
 
 
 def missed(surface):
@@ -164,58 +155,41 @@ def unused(surface, cloud):
 
 
 def test_too_small_a_ball_uses_only_one_point_in_eight(room):
-    look, _ = stop_named("Too small a ball")
+    look = stop_named("Too small a ball")
     assert 0.85 < unused(room.roll(look, room.fused), room.fused) < 0.89
     assert look.radius_in_r_F > 1.0 / np.sqrt(3.0)  # wide enough for three points that are r_F apart
 
 
 def test_r_F_uses_nine_points_in_ten_and_leaves_much_open_and_the_thesis_closes_it(room):
-    look, _ = stop_named("A ball of r_F")
+    look = stop_named("A ball of r_F")
     least = room.roll(look, room.fused)
     assert 0.07 < unused(least, room.fused) < 0.12
     assert 0.38 < missed(least) < 0.42
-    look, text = stop_named("The thesis's radii")
+    look = stop_named("The thesis's radii")
     thesis = room.roll(look, room.fused)
     largest_m = room.r_F_m + room.sigma_D_m
     alone = reconstruct_surface(room.fused, (largest_m,), room.cameras)
-    assert about(text, r"from (\d+) % to \*\*(\d+) %", (missed(least), missed(thesis)))
-    assert about(text, r"(\d+) mm here", (10.0 * largest_m,))
-    assert about(text, r"alone it leaves (\d+) %", (missed(alone),))
     assert abs(missed(alone) - missed(thesis)) < 0.1 * (missed(least) - missed(thesis))
 
 
 def test_too_large_a_ball_loses_rays_points_and_truth(room, four_balls):
-    look, text = stop_named("Too large a ball")
+    look = stop_named("Too large a ball")
     large = room.roll(look, room.fused)
     assert missed(large) > 2.0 * missed(four_balls)
-    assert about(
-        text,
-        r"leave (\d+) % of the rays without surface, this one (\d+) %",
-        (missed(four_balls), missed(large)),
-    )
     assert 0.38 < unused(large, room.fused) < 0.45
     score, best = (room.truth(surface)["f_score_5cm"] for surface in (large, four_balls))
     assert score < best - 0.05
-    assert about(text, r"\*F-score\* is (\d+) % instead of (\d+) %", (score, best))
-    radius_m = look.radius_in_r_F * room.r_F_m
-    assert about(text, r"rests (\d+) cm away", (radius_m,), 1.0)
-    assert about(text, r"cuts off up to (\d+) cm", (radius_m / np.sqrt(2.0),), 1.0)
 
 
 def test_one_ball_after_the_other_leaves_fewer_points_than_the_largest_alone(room, four_balls):
-    text = stop_named("One ball after the other")[1]
     largest_m = four_balls.radii_m[-1]
     alone = reconstruct_surface(room.fused, (largest_m,), room.cameras)
     assert abs(missed(alone) - missed(four_balls)) < 0.01
     assert unused(alone, room.fused) > 2.0 * unused(four_balls, room.fused)
-    assert about(text, r"Drag the radius to (\d+) mm", (10.0 * largest_m,))
-    assert about(text, r"as few rays miss, (\d+) %", (missed(alone),))
-    shares = (unused(alone, room.fused), unused(four_balls, room.fused))
-    assert about(text, r"leaves (\d+) % of the points unused; the four together leave (\d+) %", shares)
 
 
 def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, four_balls):
-    look, text = stop_named("Why holes stay: noise")
+    look = stop_named("Why holes stay: noise")
     noisy = clouds(room.rig, room.nodes, room.poses, look.smoothing_passes)
     torn = noisy.roll(look, noisy.fused)
     assert missed(torn) > 1.1 * missed(four_balls)
@@ -223,22 +197,15 @@ def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, fo
     old_normals = room.roll(look, replace(room.fused, normals=noisy.fused.normals))
     new_normals = noisy.roll(look, replace(noisy.fused, normals=room.fused.normals))
     assert missed(old_normals) <= missed(four_balls) < missed(torn) <= missed(new_normals)
-    pattern = (
-        r"old normals close as well \(([\d.]+) %\); noisy points with smoothed normals do not \(([\d.]+) %\)"
-    )
-    assert about(text, pattern, (missed(old_normals), missed(new_normals)), 0.3)
     raw = replace(CONFIG, acquisition=replace(CONFIG.acquisition, average=False))
     rough = room_of(raw, look.smoothing_passes)
-    shares = (missed(rough.roll(look, rough.fused)), missed(four_balls))
-    assert about(text, r"\*\*(\d+) %\*\* of the rays miss instead of \*\*(\d+) %", shares, 1.0)
+    assert missed(rough.roll(look, rough.fused)) > 2.0 * missed(four_balls)
 
 
 def test_no_ball_closes_before_fusion_what_the_sensor_did_not_see(room, four_balls):
-    look, text = stop_named("Which holes no ball can close")
+    look = stop_named("Which holes no ball can close")
     assert look.shown == BOTH
     before = room.roll(look, room.sensor)
-    pattern = r"left \*\*(\d+) %\*\* of the rays miss, on the right \*\*(\d+) %"
-    assert about(text, pattern, (missed(before), missed(four_balls)))
     views = [
         View(camera, frame.depth.valid, node.alignment.depth.valid)
         for camera, frame, node in zip(room.cameras, room.rig.frames, room.nodes, strict=True)
@@ -248,11 +215,9 @@ def test_no_ball_closes_before_fusion_what_the_sensor_did_not_see(room, four_bal
     singles = (SurfaceLook(rule="manual", radius_in_r_F=factor) for factor in (2.0, 4.0, 6.0, 8.0))
     best = min(missed(room.roll(single, room.sensor)) for single in singles)
     assert best > 2.0 * missed(four_balls)
-    assert about(text, r"even the best radius leaves (\d+) %", (best,))
 
 
 def test_what_is_guessed_is_a_fifth_and_an_eighth_of_it_is_off(room, four_balls):
-    text = stop_named("Measured or guessed?")[1]
     guessed = four_balls.source == PointSource.INFERRED
     a, b, c = four_balls.vertices_m[four_balls.triangles].swapaxes(0, 1)
     area_m2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -266,16 +231,13 @@ def test_what_is_guessed_is_a_fifth_and_an_eighth_of_it_is_off(room, four_balls)
         room.truth(surface)["f_score_5cm"] for surface in (room.roll(SurfaceLook(), room.sensor), four_balls)
     )
     assert after < before + 0.005
-    assert about(text, r"gains nothing: ([\d.]+) % before, ([\d.]+) % after", (before, after), 0.5)
 
 
 def test_poisson_closes_nearly_everything_and_is_no_better(room, four_balls):
-    look, text = stop_named("Is no hole at all better?")
+    look = stop_named("Is no hole at all better?")
     assert look.shown == POISSON
     poisson = poisson_surface(room.fused, room.r_F_m)
     assert no_hit_ray_share(poisson.vertices_m, poisson.triangles, room.cameras) < 0.001
     theirs, ours = room.truth(poisson), room.truth(four_balls)
     assert theirs["f_score_5cm"] < ours["f_score_5cm"]
-    scores = (theirs["f_score_5cm"], ours["f_score_5cm"])
-    assert about(text, r"F-score is (\d+) %, the ball's (\d+) %", scores)
     assert theirs["accuracy_1cm"] < ours["accuracy_1cm"] - 0.03

@@ -1,4 +1,4 @@
-"""Lessons led through by keys alone, and their text over the picture."""
+"""Lessons led through by keys alone, and what of them is in view; names explained by a click."""
 
 from __future__ import annotations
 
@@ -98,7 +98,27 @@ def test_the_dock_has_the_keys_after_a_click_on_it_until_escape(page):
     unfold(page, "Lesson: ICP against CEICP")
 
 
-def test_large_text_lies_over_the_picture_and_follows(page):
+@pytest.mark.parametrize("size", [(1280, 720), (390, 844)])
+def test_a_lesson_is_read_and_answered_without_scrolling_and_covers_nothing(page, size):
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    go(page, "Fuse")
+    begin(page, "ICP against CEICP", 10)
+    card, picture = page.locator(".packetmesh-lesson-card"), page.locator("canvas[data-engine]")
+    for name in ("Skip", "Back", "Next"):
+        expect(card.get_by_role("button", name=name, exact=True)).to_be_in_viewport(ratio=1)
+    steps = page.get_by_role("button", name=re.compile("^(Scene|Export)"))
+    assert steps.first.bounding_box()["y"] == steps.last.bounding_box()["y"]
+    upper, lower = card.bounding_box(), picture.bounding_box()
+    assert upper["y"] + upper["height"] <= lower["y"] + 1
+    card.locator(".choice").first.click()
+    expect(card).to_contain_text(RIGHT)
+    page.mouse.move(size[0] - 60, steps.first.bounding_box()["y"] + 60)
+    page.mouse.wheel(0, 4000)
+    page.wait_for_timeout(400)
+    expect(steps.last).to_be_in_viewport(ratio=1)
+
+
+def test_large_text_has_no_more_than_a_room_needs_and_what_it_speaks_of_is_in_view(page):
     go(page, "Surface")
     begin(page, "Which ball radius?", 10)
     page.get_by_label("Large", exact=True).locator("visible=true").check()
@@ -106,14 +126,23 @@ def test_large_text_lies_over_the_picture_and_follows(page):
     expect(card).to_contain_text("(1 of 10)")
     page.keyboard.press("3")
     expect(card).to_contain_text(RIGHT)
-    expect(card).not_to_contain_text("(1 of 10)")  # no more than is needed lies over the picture
+    expect(card).not_to_contain_text("(1 of 10)")
     ball = page.locator(".packetmesh-here")
     expect(ball).to_have_count(1)
     expect(ball).to_contain_text("Watch the ball roll")
     expect(ball).to_be_in_viewport()
     assert float(card.evaluate("one => parseFloat(getComputedStyle(one).fontSize)")) >= 17.0
-    inner, outer = card.bounding_box(), page.locator("canvas").first.bounding_box()
-    assert inner["x"] + inner["width"] < outer["x"] + outer["width"]
-    assert inner["y"] + inner["height"] <= outer["y"] + outer["height"]
     go(page, "Scene")
     expect(card).to_have_count(0)
+
+
+def test_a_name_is_explained_by_a_click_on_it(page):
+    go(page, "Surface")
+    seen(page, "Up to date").wait_for()
+    page.get_by_role("button", name="Hole area").click()
+    note = page.locator(".packetmesh-hint")
+    expect(note).to_contain_text("filled flat")
+    page.locator("label", has_text="Radius (mm)").click()
+    expect(note).to_contain_text("Radius of the ball")
+    page.keyboard.press("Escape")
+    expect(note).to_have_count(0)

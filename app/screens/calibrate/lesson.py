@@ -9,9 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from app.lesson import LESSONS, Setting, choice, quantity, sets
+from app.lesson_file import LESSONS, SCENE, Numbers, Setting, choice, quantity, sets
 from app.screens.calibrate.labels import AROUND, PAIRS, STRAIGHTENED, Around
+from app.screens.calibrate.numbers import unseen_rms_px, views_used, within
 from app.screens.calibrate.view import CameraView
+from app.tables import UNKNOWN, number
 from pipeline.config import Lens
 
 SHIPPED = LESSONS / "how-good-is-my-calibration.md"
@@ -85,3 +87,21 @@ def _spread_deg(normals: list[np.ndarray]) -> float:
     """The largest angle between two of them."""
     cosines = np.clip(np.array(normals) @ np.array(normals).T, -1.0, 1.0)
     return float(np.degrees(np.arccos(cosines.min())))
+
+
+NUMBERS = ("circles", "measurements", "views", "rms", "held_out", "fx")
+"""Fields of the texts."""
+
+
+def numbers(scene: str, circles: int, camera: CameraView) -> Numbers:
+    """Their values for a camera in a scene, and a board of so many circles."""
+    found = camera.calibration
+    return {
+        SCENE: f"{scene}, {camera.name}",
+        "circles": str(circles),
+        "measurements": str(2 * circles),
+        "views": views_used(camera),
+        "rms": UNKNOWN if found is None else number(found.rms_px, 3, "px"),
+        "held_out": number(unseen_rms_px(camera), 3, "px"),
+        "fx": within(found, "fx"),
+    }

@@ -7,7 +7,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
 
-from app.lesson import LessonFolder, read_lesson
+from app.lesson import LessonFolder
+from app.lesson_file import Numbers, read_lesson
 from app.records import Picture, SceneView
 from app.screens.calibrate.answers import Answers
 from app.screens.calibrate.area import PictureArea
@@ -16,7 +17,7 @@ from app.screens.calibrate.depth import DepthFolder
 from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of, stand_before
 from app.screens.calibrate.labels import AROUND, DEPTH, NOTHING, TEXT
 from app.screens.calibrate.lens_folder import LensFolder
-from app.screens.calibrate.lesson import SETTINGS, SHIPPED, CalibrateLook, left_out
+from app.screens.calibrate.lesson import NUMBERS, SETTINGS, SHIPPED, CalibrateLook, left_out, numbers
 from app.screens.calibrate.noise import NoiseFolder
 from app.screens.calibrate.noise_view import NoiseRequest
 from app.screens.calibrate.numbers import summary_table
@@ -58,7 +59,8 @@ class CalibratePanel(Panel):
         self._came: SceneView | None = None
         """The scene as it came."""
         gui.add_markdown(TEXT)
-        LessonFolder(ui, read_lesson(SHIPPED, SETTINGS, CalibrateLook()), self._take_look)
+        lesson = read_lesson(SHIPPED, SETTINGS, CalibrateLook(), NUMBERS)
+        self._lesson = LessonFolder(ui, lesson, self._take_look, self._lesson_numbers)
         self._status = gui.add_markdown("")
         self._open = ui.buttons(
             "Open",
@@ -368,6 +370,16 @@ class CalibratePanel(Panel):
             self._noise.set(look.noise_px, look.other_lens)
         if look.used and not isinstance(self.session.spec.source, Calibrated):
             self._use_it()
+
+    def _lesson_numbers(self) -> Numbers:
+        """Of the camera that is shown; empty while it is computed."""
+        session, view, camera = self.session, self._view, self._shown()
+        scene: SceneView | None = session.results.view("scene")
+        fresh = session.results.fresh("calibrate", session.spec) and self._look is None
+        if scene is None or view is None or camera is None or not fresh:
+            return {}
+        columns, rows = view.board.size
+        return numbers(scene.title, columns * rows, camera)
 
     # What is drawn.
 

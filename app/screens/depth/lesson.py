@@ -6,9 +6,11 @@ import re
 from dataclasses import dataclass, replace
 from typing import get_args
 
-from app.lesson import LESSONS, NUMBER, Setting, choice, quantity, sets, short
+from app.lesson_file import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets, short
+from app.records import DepthNode, SceneView
 from app.screens.depth.labels import COLORINGS, DRAWN, HOLES, PICTURES, PointColoring
 from app.screens.depth.view import Disc, HideRequest, PictureName
+from app.tables import number
 from pipeline.config import AlignmentMode, DepthConfig
 
 SHIPPED = LESSONS / "can-a-picture-measure.md"
@@ -55,3 +57,23 @@ SETTINGS: dict[str, Setting[DepthLook]] = {
     "hide": _hide,
 }
 """What a stop can set, by its name in the file."""
+
+
+NUMBERS = ("no_depth", "median", "rms", "inliers", "let_in", "flying", "out_of_reach")
+"""Fields of the texts."""
+
+
+def numbers(scene: SceneView, index: int, node: DepthNode) -> Numbers:
+    """Their values for a node, which has that index in the scene."""
+    judged = node.judged
+    shares = {
+        "no_depth": 1.0 - scene.nodes[index].coverage,
+        "inliers": node.inlier_share,
+        "let_in": judged.kept_share,
+        "flying": judged.flying_share,
+        "out_of_reach": judged.out_of_reach_share,
+    }
+    told = {name: number(share, 1, "%", 100.0) for name, share in shares.items()}
+    errors = {"median": node.residuals.median_m, "rms": node.residuals.rms_m}
+    told |= {name: number(error_m, 1, "cm", 100.0) for name, error_m in errors.items()}
+    return {SCENE: f"{scene.title}, {node.name}", **told}

@@ -12,11 +12,12 @@ from app.compare import CompareArea
 from app.controls import Controls
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import INFERRED, LOSS, TARGET
-from app.lesson import LessonFolder, read_lesson
+from app.lesson import LessonFolder
+from app.lesson_file import Numbers, read_lesson
 from app.records import DepthNode, DepthView, Sample, SceneView
 from app.screens.depth.hide import HideFolder
 from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PICTURES
-from app.screens.depth.lesson import SETTINGS, SHIPPED, DepthLook
+from app.screens.depth.lesson import NUMBERS, SETTINGS, SHIPPED, DepthLook, numbers
 from app.screens.depth.model import ModelFolder
 from app.screens.depth.numbers import confidence_table, depth_table, residual_table
 from app.screens.depth.residuals import residual_figure
@@ -50,7 +51,8 @@ class DepthPanel(Panel):
         self._look: DepthLook | None = None
         self._source, self._key = session.spec.source, session.spec.key("depth")
         gui.add_markdown(TEXT)
-        self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, DepthLook()), self._take_look)
+        lesson = read_lesson(SHIPPED, SETTINGS, DepthLook(), NUMBERS)
+        self._lesson = LessonFolder(self.ui, lesson, self._take_look, self._lesson_numbers)
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images and numbers are shown below.")
         self.ui.when_changed(self._node, self._picked_node)
         self._area = CompareArea(self.ui, PICTURES, "photo", "sensor")
@@ -172,6 +174,7 @@ class DepthPanel(Panel):
             self._residuals.content = residual_table(node)
             self._confidence_table.content = confidence_table(node)
             self._histogram.figure = residual_figure(node.residuals)
+            self._lesson.refresh()
 
     # The folders.
 
@@ -214,6 +217,14 @@ class DepthPanel(Panel):
         self._model.load(view)
 
     # The lesson.
+
+    def _lesson_numbers(self) -> Numbers:
+        """Of the node that is chosen; empty while its depth is computed."""
+        session, shown = self.session, self._shown()
+        scene: SceneView | None = session.results.view("scene")
+        if shown is None or scene is None or not session.results.fresh("depth", session.spec):
+            return {}
+        return numbers(scene, *shown)
 
     def _take_look(self, look: DepthLook) -> None:
         """Set the controls as a stop of the lesson says; what is to be hidden waits for the depth."""

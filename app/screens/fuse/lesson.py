@@ -7,9 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from app.lesson import LESSONS, NUMBER, Setting, choice, quantity, sets, short
+import numpy as np
+
+from app.lesson_file import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets, short
 from app.screens.fuse.labels import DIRECTIONS, MODES, MOST_LANES, RIVALS, STARTS
-from app.screens.fuse.view import Race, Rival, Start
+from app.screens.fuse.view import Race, RaceView, Rival, Start
+from app.tables import UNKNOWN, number
 
 SHIPPED = LESSONS / "icp-against-ceicp.md"
 START = (3.0, 6.0)
@@ -76,3 +79,29 @@ SETTINGS: dict[str, Setting[RaceLook]] = {
     "lane": sets("lane", choice({str(index + 1): index for index in range(MOST_LANES)})),
 }
 """What a stop can set, by its name in the file."""
+
+
+PER_LANE = ("end", "iterations", "time")
+NUMBERS = (
+    *(f"{name}_{lane}" for name in PER_LANE for lane in range(1, MOST_LANES + 1)),
+    *("begin", "turn", "shift", "holes", "bias", "noise"),
+)
+"""Fields of the texts; those of a lane end with its number."""
+
+
+def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
+    """Their values for a race in a scene; ends are distances from the truth or else from the other cloud."""
+    told = dict.fromkeys(NUMBERS, UNKNOWN)
+    for place, lane in enumerate(view.lanes, 1):
+        told[f"end_{place}"] = number(lane.steps[-1].off_m, 2, "cm", 100.0)
+        told[f"iterations_{place}"] = str(lane.iterations)
+        told[f"time_{place}"] = number(lane.elapsed_s, 0, "ms", 1000.0)
+    told |= {
+        "begin": number(view.lanes[0].steps[0].off_m, 1, "cm", 100.0),
+        "turn": f"{np.linalg.norm(race.start.turn_deg):.0f}°",
+        "shift": number(float(np.linalg.norm(race.start.shift_cm)), 0, "cm"),
+        "holes": number(race.hole_share, 0, "%", 100.0),
+        "bias": number(race.depth_bias, 0, "%", 100.0),
+        "noise": number(race.noise_m, 0, "cm", 100.0),
+    }
+    return {SCENE: scene, **told}

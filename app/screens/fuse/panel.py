@@ -14,14 +14,15 @@ from app.controls import Choice, Controls
 from app.drawing.cameras import Stage, stage_of
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.poses import move, place
-from app.lesson import LessonFolder, read_lesson
+from app.lesson import LessonFolder
+from app.lesson_file import Numbers, read_lesson
 from app.records import DepthView
 from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
 from app.screens.fuse.draw import RaceDrawing, gizmo_pose
 from app.screens.fuse.labels import MARKS, MODES
-from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
+from app.screens.fuse.lesson import NUMBERS, SETTINGS, SHIPPED, RaceLook, numbers
 from app.screens.fuse.numbers import places_table, race_table, verdict
 from app.screens.fuse.player import RacePlayer
 from app.screens.fuse.setup import RaceSetup
@@ -84,7 +85,8 @@ class FusePanel(Panel):
         self._placed: list[viser.PointCloudHandle] = []
         gui.add_markdown(TEXT)
         self._single = gui.add_markdown(SINGLE, visible=False)
-        self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, RaceLook()), self._take_stop)
+        lesson = read_lesson(SHIPPED, SETTINGS, RaceLook(), NUMBERS)
+        self._lesson = LessonFolder(self.ui, lesson, self._take_stop, self._lesson_numbers)
         self._shown = gui.add_dropdown("Show", [*RACES, RESULT, BEFORE], hint="What the 3-D view shows.")
         self.ui.when_changed(self._shown, self._picked_shown)
         self._setup = RaceSetup(self.ui, self._start)
@@ -207,6 +209,13 @@ class FusePanel(Panel):
             self._setup.write_start(Start.towards(turn_deg, 100.0 * shift_m, self._setup.race.seed))
         self._start()
 
+    def _lesson_numbers(self) -> Numbers:
+        """Of the race that is wanted; empty while it is computed."""
+        scene = self.session.results.view("scene")
+        if scene is None or self._view is None or self._wanted() != self._arrived:
+            return {}
+        return numbers(scene.title, self._setup.race, self._view)
+
     # The race.
 
     def _start(self) -> bool:
@@ -257,6 +266,7 @@ class FusePanel(Panel):
             self._player.seek_at(self._seek_at)
             self._seek_at = 0
             self._arrange()
+            self._lesson.refresh()
 
     def _show_parts(self) -> None:
         """Have board and dock there while a race is shown, and only then."""

@@ -8,10 +8,15 @@ from typing import Literal
 
 import numpy as np
 
-from app.lesson import LESSONS, NUMBER, Setting, choice, quantity, sets
+from app.dock import time_text
+from app.lesson_file import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets
+from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.labels import ACCESS, CAUSES, CODINGS, NETWORKS, SCHEMES
+from app.screens.network.numbers import verdict
 from app.screens.network.packets import Frames
 from app.screens.network.view import FAILURES, NetworkView, What
+from app.tables import UNKNOWN, number
+from network_sim.types import Cause
 
 CROSSING, LOST_PACKET = LESSONS / "how-images-cross-a-network.md", LESSONS / "what-one-lost-packet-costs.md"
 _ON_OFF = {"on": True, "off": False}
@@ -119,3 +124,91 @@ SETTINGS: dict[str, Setting[NetworkLook]] = {
     "window": sets("window_s", quantity("ms", 60_000.0, per_unit=1000.0, above_zero=True)),
 }
 """What a stop can set, by its name in the file."""
+
+
+SHARES = ("arrived", "color", "depth", "missed", "f_score", "missed_lossless", "f_score_lossless", "collided")
+NUMBERS = (
+    *(
+        "cameras",
+        "megabytes",
+        "payload",
+        "packets",
+        "packets_about",
+        "packets_tenfold",
+        "frame_time",
+        "least",
+    ),
+    *("tries", "collisions", "lost", "last", "bytes_time", "radio", "energy", "other", "worst", "verdict"),
+    *SHARES,
+)
+"""Fields of the texts of both lessons."""
+
+
+def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
+    """Their values for a delivery of a scene; empty until its last moment is there."""
+    end = view.moment_at(view.times_ns[-1])
+    if end is None or end.t_ns != view.times_ns[-1]:
+        return {}
+    best, total = view.lossless, max(1, view.total_bytes)
+    told = dict.fromkeys(NUMBERS, UNKNOWN) | _frame_numbers(view, frames)
+    shares = {
+        "arrived": end.delivered_bytes / total,
+        "color": float(np.mean([node.color_share for node in end.nodes])),
+        "depth": float(np.mean([node.depth_share for node in end.nodes])),
+        "missed": end.no_hit_share,
+        "f_score": end.f_score,
+        "missed_lossless": None if best is None else best.no_hit_share,
+        "f_score_lossless": None if best is None else best.f_score,
+    }
+    told |= {name: number(share, 1, "%", 100.0) for name, share in shares.items()}
+    return {
+        **told,
+        SCENE: scene,
+        "cameras": str(len(view.nodes)),
+        "megabytes": number(view.total_bytes, 2, "MB", 1e-6),
+        "lost": f"{end.packets_lost:,}",
+        "last": time_text(end.t_ns),
+        "radio": number(end.radio_j, 1, "J"),
+        "energy": number(end.energy_j, 1, "J"),
+        "other": number(end.energy_j - end.radio_j, 1, "J"),
+        "worst": _worst(view, end),
+    }
+
+
+def _frame_numbers(view: DeliveryView, frames: Frames) -> dict[str, str]:
+    """Of what is on the air; nothing where no frame carried an image."""
+    air = frames.pieces
+    images = [item for item in range(len(air.node)) if frames.carries_image(item)]
+    if not images:
+        return {}
+    first = images[0]
+    payload = frames.bytes_of(first)[1]
+    packets = sum(-(-node.total_bytes // payload) for node in view.nodes)
+    frame_ns = int(air.end_ns[first] - air.start_ns[first])
+    collisions = int(np.count_nonzero(air.cause[images] == Cause.COLLISION))
+    digit = 10 ** (len(str(packets)) - 1)
+    return {
+        "payload": f"{payload:,} bytes",
+        "packets": f"{packets:,}",
+        "packets_about": f"{round(packets / digit) * digit:,}",
+        "packets_tenfold": f"{round(packets / digit) * digit * 10:,}",
+        "frame_time": time_text(frame_ns),
+        "least": time_text(packets * frame_ns),
+        "bytes_time": time_text(round(8e9 * view.total_bytes / view.run.config.mac.rate_bps)),
+        "tries": f"{len(images):,}",
+        "collisions": f"{collisions:,}",
+        "collided": number(collisions / len(images), 1, "%", 100.0),
+    }
+
+
+def _worst(view: DeliveryView, end: MomentView) -> str:
+    """The camera of which least depth is there, in a sentence."""
+    name, node = min(
+        zip((one.name for one in view.nodes), end.nodes, strict=True), key=lambda one: one[1].depth_share
+    )
+    return f"Of {name} {number(node.depth_share, 1, '%', 100.0)} of the measured pixels are there."
+
+
+def street_numbers(scene: str, runs: tuple[NetworkView, ...]) -> Numbers:
+    """Values of the fields for runs on streets."""
+    return {**dict.fromkeys(NUMBERS, UNKNOWN), SCENE: scene, "verdict": verdict(runs)}

@@ -13,7 +13,8 @@ from app.dock import Dock
 from app.drawing.cameras import turn
 from app.drawing.clouds import clear
 from app.drawing.colors import css
-from app.lesson import LessonFolder, read_lesson
+from app.lesson import LessonFolder
+from app.lesson_file import Numbers, read_lesson
 from app.screens.network.delivery_draw import DeliveryDrawing
 from app.screens.network.delivery_legend import legend, most_j
 from app.screens.network.delivery_numbers import changes, difference, moment_table, more_rows, summary
@@ -21,7 +22,16 @@ from app.screens.network.delivery_view import DeliveryView, MomentView, PacketVi
 from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
 from app.screens.network.labels import NETWORKS
 from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_names, stops_ns
-from app.screens.network.lesson import CROSSING, LOST_PACKET, SETTINGS, NetworkLook, find
+from app.screens.network.lesson import (
+    CROSSING,
+    LOST_PACKET,
+    NUMBERS,
+    SETTINGS,
+    NetworkLook,
+    find,
+    numbers,
+    street_numbers,
+)
 from app.screens.network.numbers import metric_tables, runs_summary, verdict
 from app.screens.network.packets import Frames
 from app.screens.network.setup import NetworkSetup
@@ -75,8 +85,8 @@ class NetworkPanel(Panel):
         self._look: NetworkLook | None = None
         self._text = gui.add_markdown(TEXT)
         self._difference = gui.add_markdown("")
-        for path in (CROSSING, LOST_PACKET):
-            LessonFolder(ui, read_lesson(path, SETTINGS, NetworkLook()), self._take_look)
+        lessons = [read_lesson(path, SETTINGS, NetworkLook(), NUMBERS) for path in (CROSSING, LOST_PACKET)]
+        self._lessons = [LessonFolder(ui, one, self._take_look, self._lesson_numbers) for one in lessons]
         self._setup = NetworkSetup(ui, self._resting.restart)
         self._about = gui.add_markdown("")
         self._status = gui.add_markdown("Nothing is sent yet.")
@@ -145,6 +155,8 @@ class NetworkPanel(Panel):
             else:
                 self._take_delivery(view)
         self._streaming = False
+        for lesson in self._lessons:
+            lesson.refresh()
         self.session.frame_view()
 
     def on_failure(self, step: Step, sentence: str) -> None:
@@ -248,6 +260,16 @@ class NetworkPanel(Panel):
         self._run()
         if self._delivery is not None and self._delivery.sent == self.session.spec.sent:
             self._aim(self._delivery.run)  # it is being computed already
+
+    def _lesson_numbers(self) -> Numbers:
+        """Of what is shown; empty while something else is computed."""
+        session = self.session
+        scene = session.results.view("scene")
+        if scene is None or self._look is not None or not session.results.fresh("network", session.spec):
+            return {}
+        if self._delivery is None:
+            return street_numbers(scene.title, self._runs) if self._runs else {}
+        return numbers(scene.title, self._delivery, self._frames[0])
 
     def _aim(self, run: NetworkView) -> None:
         """Go where the stop of a lesson looks, and tell of the frame there."""

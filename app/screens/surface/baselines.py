@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable
 
 import viser
 
@@ -32,20 +32,16 @@ class Baselines:
             on_made: called when one has been made, or could not be.
         """
         self._session, self._stage, self._line, self._on_made = session, stage, line, on_made
-        self._views: dict[BaselineName, BaselineView] = {}
-
-    @property
-    def views(self) -> Iterable[BaselineView]:
+        self.views: dict[BaselineName, BaselineView] = {}
         """All that are there."""
-        return self._views.values()
 
     def forget(self) -> None:
         """The surface that is wanted is another one."""
-        self._views = {}
+        self.views = {}
 
     def show(self, name: BaselineName) -> None:
         """Draw one, or say that it is being made."""
-        session, view = self._session, self._views.get(name)
+        session, view = self._session, self.views.get(name)
         if view is None:
             made = functools.partial(self._made, name, session.spec.key("surface"))
             session.side_job("surface.baselines_job:baseline_job", name, on_end=made)
@@ -56,5 +52,5 @@ class Baselines:
         if key != self._session.spec.key("surface"):
             return
         if view is not None:
-            self._views[name] = view
+            self.views[name] = view
         self._on_made(name, view is not None)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, get_args
 
-from app.lesson import LESSONS, NUMBER, Setting, choice, sets, short
-from app.screens.surface.labels import AFTER, COLORINGS, RULES, SHOWN, Coloring
+from app.lesson_file import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, sets, short
+from app.records import MeshView
+from app.screens.surface.labels import AFTER, COLORINGS, RULES, SHOWN
+from app.screens.surface.view import BaselineName, BaselineView, Coloring, SurfaceView
+from app.tables import UNKNOWN, number
 from pipeline.config import RadiusRule, SurfaceConfig
 
 SHIPPED = LESSONS / "which-ball-radius.md"
@@ -79,3 +82,37 @@ SETTINGS: dict[str, Setting[SurfaceLook]] = {
     "hole": sets("holes", choice({"largest": True, "none": False})),
 }
 """What a stop can set, by its name in the file."""
+
+
+SURFACES = ("", "_before", "_poisson")
+"""After fusion, before it, and Poisson's: how their fields end."""
+MEASURES = ("missed", "unused", "f_score", "guessed")
+NUMBERS = (
+    *(f"{measure}{which}" for which in SURFACES for measure in MEASURES),
+    *("r_f", "sigma_d", "ball", "ball_width", "cut_off", "thesis_ball", "largest_ball", "hole_area"),
+)
+"""Fields of the texts."""
+
+
+def numbers(scene: str, view: SurfaceView, baselines: Mapping[BaselineName, BaselineView]) -> Numbers:
+    """Their values for the surfaces in a scene."""
+    poisson = baselines.get("poisson")
+    meshes = {"": view.after, "_before": view.before, "_poisson": None if poisson is None else poisson.mesh}
+    told: dict[str, str] = {SCENE: scene}
+    for which, mesh in meshes.items():
+        told |= {f"{name}{which}": value for name, value in _measures(mesh).items()}
+    r_F_m, sigma_D_m, ball_m = view.spacing.r_F_m, view.spacing.sigma_D_m, view.radii_m[-1]
+    lengths = {"r_f": r_F_m, "sigma_d": sigma_D_m, "ball": ball_m, "ball_width": 2.0 * ball_m}
+    lengths |= {"cut_off": ball_m / 2.0**0.5, "thesis_ball": r_F_m + sigma_D_m}
+    lengths |= {"largest_ball": r_F_m + 4.0 * sigma_D_m}
+    told |= {name: number(length_m, 0, "mm", 1000.0) for name, length_m in lengths.items()}
+    return {**told, "hole_area": number(view.after.quality.hole_area_m2, 3, "m²")}
+
+
+def _measures(mesh: MeshView | None) -> dict[str, str]:
+    if mesh is None:
+        return dict.fromkeys(MEASURES, UNKNOWN)
+    quality, score = mesh.quality, None if mesh.truth is None else mesh.truth.get("f_score_5cm")
+    unused = quality.unused_points / max(1, quality.unused_points + mesh.vertices)
+    shares = (quality.no_hit_ray_share, unused, score, quality.guessed_ray_share)
+    return {name: number(share, 1, "%", 100.0) for name, share in zip(MEASURES, shares, strict=True)}

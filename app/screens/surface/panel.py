@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 
 from app.controls import Controls
 from app.drawing.cameras import stage_of, turn
-from app.lesson import LessonFolder, read_lesson
+from app.lesson import LessonFolder
+from app.lesson_file import Numbers, read_lesson
 from app.records import SceneView
 from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.ball import ChosenBall
@@ -16,7 +17,7 @@ from app.screens.surface.export import surface_offers
 from app.screens.surface.holes import HolesFolder
 from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, HINTS, RULES, SHOWN, TEXT
 from app.screens.surface.legend import legend_html
-from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook, surface_of
+from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook, numbers, surface_of
 from app.screens.surface.numbers import quality_table, quick_line
 from app.screens.surface.quick import QuickLook
 from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
@@ -56,7 +57,8 @@ class SurfacePanel(Panel):
         self._thinning: tuple[int, int] | None = None
         self._key = session.spec.key("surface")
         gui.add_markdown(TEXT)
-        self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, SurfaceLook()), self._take_look)
+        lesson = read_lesson(SHIPPED, SETTINGS, SurfaceLook(), NUMBERS)
+        self._lesson = LessonFolder(self.ui, lesson, self._take_look, self._lesson_numbers)
         self._radius = gui.add_slider(
             "Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint="Radius of the ball; drag to roll another."
         )
@@ -207,10 +209,12 @@ class SurfacePanel(Panel):
                 self._holes.parts(view.parts)
                 self._load_holes()
             self._show_look()
+            self._lesson.refresh()
 
     def _show_numbers(self) -> None:
         if self._view is not None:
-            self._table.content = quality_table(self._view, self._baselines.views, self._has_truth())
+            self._table.content = quality_table(self._view, self._baselines.views.values(), self._has_truth())
+            self._lesson.refresh()
 
     def _repaint(self) -> None:
         """Have the surfaces of the settings in the colours chosen."""
@@ -360,6 +364,15 @@ class SurfacePanel(Panel):
         session.edit(lambda config: replace(config, surface=surface_of(look, config.surface)))
         if self._view is not None and session.results.fresh("surface", session.spec):
             self._take(self._view)
+
+    def _lesson_numbers(self) -> Numbers:
+        """Of the surfaces that are wanted; empty while they are computed."""
+        session, view = self.session, self._view
+        scene: SceneView | None = session.results.view("scene")
+        if scene is None or view is None or self._look is not None:
+            return {}
+        fresh = session.results.fresh("surface", session.spec) and view.holes
+        return numbers(scene.title, view, self._baselines.views) if fresh else {}
 
     def _show_look(self) -> None:
         """What the stop wants of the surface that has just come."""

@@ -1,0 +1,62 @@
+// What a name means, by a click on it: names in tables and texts, and labels of controls.
+(() => {
+  if (window.packetmeshHint) return;
+  window.packetmeshHint = true;
+
+  const GAP_PX = 6;
+  const FARTHEST = 40; // parts of the page between a label and its control
+  const note = Object.assign(document.createElement("div"), {className: "packetmesh-hint"});
+  note.setAttribute("role", "note");
+  let about = null; // whose meaning is shown
+  let waiting = false;
+
+  // viser keeps the hint of a control in what its page is made of.
+  function hintOf(label) {
+    const key = Object.keys(label).find(one => one.startsWith("__reactFiber$"));
+    for (let made = label[key], up = 0; made && up < FARTHEST; made = made.return, up += 1) {
+      const of = made.memoizedProps;
+      if (of?.uuid === label.htmlFor && (of.hint ?? of.props?.hint)) return of.hint ?? of.props.hint;
+    }
+    return "";
+  }
+
+  function markLabels() {
+    waiting = false;
+    for (const label of document.querySelectorAll("label[for]:not([data-hint], [data-plain])")) {
+      const hint = hintOf(label);
+      label.dataset[hint ? "hint" : "plain"] = hint;
+    }
+  }
+
+  function close() {
+    note.remove();
+    about = null;
+  }
+
+  function show(one) {
+    about = one;
+    note.textContent = one.dataset.hint;
+    document.body.append(note);
+    const at = one.getBoundingClientRect(), {width, height} = note.getBoundingClientRect();
+    const below = at.bottom + GAP_PX + height < innerHeight;
+    note.style.left = `${Math.max(8, Math.min(at.left, innerWidth - width - 8))}px`;
+    note.style.top = `${below ? at.bottom + GAP_PX : Math.max(8, at.top - GAP_PX - height)}px`;
+  }
+
+  window.addEventListener("click", event => {
+    const one = event.target.closest?.("[data-hint]");
+    const again = one === about;
+    close();
+    if (!one || again) return;
+    if (one.matches("label") && !document.getElementById(one.htmlFor)?.matches("[type=checkbox]")) event.preventDefault();
+    show(one);
+  }, true);
+  window.addEventListener("keydown", event => event.key === "Escape" && close(), true);
+  window.addEventListener("scroll", close, true);
+
+  new MutationObserver(() => {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(markLabels);
+  }).observe(document.body, {childList: true, subtree: true});
+})();
