@@ -6,6 +6,7 @@ from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRA
 from app.records import ColorBar
 from app.screens.surface.view import Coloring
 from app.tables import bar_html
+from pipeline.texture import SEAM_M
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"
 
@@ -14,6 +15,8 @@ def legend_html(coloring: Coloring, has_truth: bool) -> str:
     """What the colours mean, and those of the points that the ball left out."""
     dots = f"Points the ball left out: {_box(TARGET)}measured &ensp; {_box(INFERRED)}inferred"
     lines = [line for line in (_surface_html(coloring, has_truth), dots) if line]
+    if coloring in ("photo", "violet"):
+        lines.append(f"Holes of up to {100 * SEAM_M:.0f} cm around are closed here, not in the numbers.")
     return "".join(f'<div style="padding: 0 0.8em; font-size: 13px">{line}</div>' for line in lines)
 
 

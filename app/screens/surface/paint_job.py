@@ -27,6 +27,7 @@ from pipeline.surface import (
     voxel_average,
     voxel_for_count,
 )
+from pipeline.surface.fill import without_seams
 from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
 PHOTOGRAPHED: tuple[Coloring, ...] = ("photo", "violet", "color")
@@ -101,6 +102,7 @@ def _painted(surface: Surface, request: PaintRequest, rig: Rig, placement: Place
     """The rims come when the radius rests, and so do photographs: both are costly to draw in software."""
     quick, coloring = request.radius_m is not None, request.coloring
     if coloring in ("photo", "violet") and not quick:
+        surface = without_seams(surface)
         glb = photographed_glb(surface, dressed(rig, placement, surface), tinted=coloring == "violet")
     else:
         colors = vertex_colors(surface, coloring, rig, cameras_of(rig, placement))
