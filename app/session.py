@@ -281,8 +281,7 @@ class Session:
         actions.on_click(lambda event: self.post(self._act, event.target.value))
         self._address: Address | None = None
         if isinstance(self.target, viser.ClientHandle):  # one that many share is nobody's to move
-            place = Place(self._start, self._current.title)
-            self._address = Address(self.ui, place, tuple(titles), self._go_to)
+            self._address = Address(self.ui, Place(self._start, titles[0]), tuple(titles), self._go_to)
         self._folders: dict[str, viser.GuiFolderHandle] = {}
         for panel in self._panels:
             self.scene.add_frame(panel.drawn_below, show_axes=False, visible=False)
@@ -363,8 +362,7 @@ class Session:
 
     def show_staleness(self) -> None:
         """Dim what belongs to other settings than those that are wanted."""
-        ahead = self._current.ahead
-        old = self.results.shows_other(self._current.step or CHAIN[-1], self.spec)
+        old, ahead = self.results.shows_other(self._current.step or CHAIN[-1], self.spec), self._current.ahead
         self._stale.content = stale_html(numbers=old or ahead, picture=old and not ahead)
 
     def _show_status(self) -> None:
