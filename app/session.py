@@ -290,8 +290,7 @@ class Session:
         )
         self._address: Address | None = None
         if isinstance(self.target, viser.ClientHandle):  # one that many share is nobody's to move
-            place = Place(self._start, self._current.title)
-            self._address = Address(self.ui, place, tuple(titles), self._go_to)
+            self._address = Address(self.ui, Place(self._start, titles[0]), tuple(titles), self._go_to)
         self._folders: dict[str, viser.GuiFolderHandle] = {}
         for panel in self._panels:
             self.scene.add_frame(panel.drawn_below, show_axes=False, visible=False)

@@ -73,7 +73,7 @@ def stage_around(clouds_m: Sequence[FloatArray], T_world_camera: Sequence[FloatA
 def look(clients: Iterable[viser.ClientHandle], stage: Stage, wide: bool = False) -> None:
     """Turn every browser's view to the scene, from far enough that it, or two side by side, fit in."""
     back_m = stage.viewpoint_m - stage.middle_m
-    width_m = (2.2 if wide else 1.3) * stage.width_m
+    width_m = (2.6 if wide else 1.3) * stage.width_m
     for client in clients:
         half_angle = np.tan(0.5 * client.camera.fov) * client.camera.aspect
         fitting = 0.5 * width_m / max(half_angle * float(np.linalg.norm(back_m)), 1e-9)

@@ -21,7 +21,7 @@ def surface(tab):
     """The Surface step with everything computed, as a fresh session has it."""
     tab.reload()
     go(tab, "Surface")
-    tab.get_by_role("row", name="No-hit rays").wait_for()
+    tab.get_by_role("row", name="No-hit rays").wait_for(timeout=180_000)
     tab.get_by_text("Up to date").wait_for()
     return tab
 
@@ -50,6 +50,29 @@ def test_a_dragged_radius_is_shown_at_once_and_measured_when_it_rests(surface):
     surface.get_by_text("Up to date").wait_for()
     assert numbers(surface, "Triangles") != triangles
     assert changed_from(surface, before)
+
+
+def measured_px(png):
+    """How many pixels show blue, the colour of measured points that the ball left out."""
+    blue, green, red = cv2.split(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR).astype(int))
+    return int(((red < 40) & (blue > 140) & (abs(green - 114) < 30)).sum())
+
+
+def test_where_the_ball_falls_through_the_points_stay_and_old_numbers_are_dimmed(surface):
+    meshed = measured_px(canvas(surface))
+    table = surface.locator(".packetmesh-numbers", has=surface.get_by_role("row", name="No-hit rays"))
+    old = surface.locator(".packetmesh-old-numbers")
+    expect(table).to_have_css("opacity", "1")
+    handle = slider(surface, "Radius (mm)")
+    handle.focus()
+    handle.press("Home")
+    old.wait_for(state="attached")
+    expect(table).to_have_css("opacity", "0.3")
+    expect(old).to_have_count(0, timeout=60_000)
+    surface.get_by_text("Up to date").wait_for()
+    expect(table).to_have_css("opacity", "1")
+    assert min(numbers(surface, "No-hit rays")) > 90.0
+    assert measured_px(canvas(surface)) > 10 * (meshed + 100)
 
 
 def test_side_by_side_and_colours_by_source_tell_what_was_guessed(surface):

@@ -13,8 +13,9 @@ from app.ui import Ui
 from pipeline.findings import Explanation, RayParts
 from pipeline.types import FloatArray
 
-TEXT = """**Click a red rim in the picture, or choose one here**, and read why it is there. A *hole* has
-surface all around it; at a *rim* the surface ends."""
+TEXT = """**Click a red rim in the picture, or choose one here**, and read why it is there. The list goes
+along the mesh, so it also has gaps that no camera looks into: a *hole* is a loop of edges shorter than
+1 m with surface all around it; at a *rim* the surface ends, or the loop is longer."""
 NONE = "none"
 LISTED_HOLES, LISTED_RIMS = 30, 10
 ASKING = "Looking for the reason …"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import replace
 
 import numpy as np
 
 from app.drawing.meshes import mesh_view
+from app.records import MeshView
 from app.screens.surface.holes_job import hole_views, parts_of
 from app.screens.surface.sweep_job import suggestions_of
 from app.screens.surface.unused import POINT_SHARE, unused_view
@@ -19,6 +20,9 @@ from packetmesh.progress import Progress
 from pipeline.merging import FusedCloud
 from pipeline.stages import compute, dressed
 from pipeline.surface import nearest_distances_m
+from pipeline.surface.fill import without_seams
+from pipeline.texture import Texture
+from pipeline.types import Surface, SurfaceResult
 
 HISTOGRAM_BINS = 60
 
@@ -30,7 +34,7 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
     after = rolled.value
     rig, placement = yield from store.stages(spec, "rig", "placement")
     in_photographs = functools.partial(dressed, rig, placement)
-    view_after = mesh_view(after, None, in_photographs(after))
+    view_after = _worn(after, in_photographs)
     size_m = POINT_SHARE * clouds.r_F_m
     unused: dict[Which, UnusedView] = {"after": unused_view(clouds.fused, after, size_m)}
     view = SurfaceView(
@@ -39,7 +43,7 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
     yield view
     before, both = yield from store.stages(spec, "before", "clouds")
     unused["before"] = unused_view(both.sensor, before, size_m)
-    view_before = mesh_view(before, None, in_photographs(before))
+    view_before = _worn(before, in_photographs)
     view = replace(view, before=view_before, unused=unused)
     yield view
     truth_before, truth_after = yield from store.stage(spec, "truth")
@@ -57,6 +61,13 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
         parts=(yield from parts_of(store, spec, after)),
         suggestions=(yield from suggestions_of(store, spec)),
     )
+
+
+def _worn(surface: SurfaceResult, in_photographs: Callable[[Surface], Texture]) -> MeshView:
+    """A surface in photographs without its seams, and the numbers as the ball left it."""
+    closed = without_seams(surface)
+    view = mesh_view(closed, None, in_photographs(closed))
+    return replace(view, triangles=len(surface.triangles))
 
 
 def spacing_of(clouds: FusedCloud) -> SpacingView:

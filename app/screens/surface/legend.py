@@ -8,8 +8,10 @@ from app.records import ColorBar
 from app.screens.surface.labels import OWN_COLORS
 from app.screens.surface.view import Coloring
 from app.tables import bar_html
+from pipeline.texture import SEAM_M
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"
+CLOSED = f"Holes of up to {100 * SEAM_M:.0f} cm around are closed here, not in the numbers."
 _INFERRED = ("inferred by the network", INFERRED)
 _OWN: dict[Coloring, str] = {
     "photo": "The cameras' photographs; where none sees the surface, the colours of its points.",
@@ -38,7 +40,8 @@ def legend_html(coloring: Coloring, has_truth: bool, baseline: bool = False) -> 
     """What the colours mean, of a baseline why it has others, and those of points that the ball left out."""
     left_out = Legend("Points the ball left out:", (("measured", TARGET), _INFERRED))
     surface = Legend() if coloring in _OWN else legend_of(coloring, has_truth)
-    legends = (Legend(OWN_COLORS),) if baseline else (surface, left_out)
+    closed = Legend(CLOSED if coloring in ("photo", "violet") else "")
+    legends = (Legend(OWN_COLORS),) if baseline else (surface, left_out, closed)
     lines = [_line(legend) for legend in legends if legend != Legend()]
     return "".join(f'<div style="padding: 0 0.8em; font-size: 13px">{line}</div>' for line in lines)
 

@@ -27,6 +27,7 @@ from pipeline.surface import (
     voxel_average,
     voxel_for_count,
 )
+from pipeline.surface.fill import without_seams
 from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
 PHOTOGRAPHED: tuple[Coloring, ...] = ("photo", "violet", "color")
@@ -110,7 +111,8 @@ def colored_glb(
 ) -> bytes:
     """The mesh in its colours; photographs only where they may be ``worn``."""
     if coloring in ("photo", "violet") and worn:
-        return photographed_glb(surface, dressed(rig, placement, surface), tinted=coloring == "violet")
+        closed = without_seams(surface)
+        return photographed_glb(closed, dressed(rig, placement, closed), tinted=coloring == "violet")
     colors = vertex_colors(surface, coloring, rig, cameras_of(rig, placement))
     return surface_glb(surface, colors, photographed=coloring in PHOTOGRAPHED)
 

@@ -16,6 +16,9 @@ from app.screens.surface.view import PaintedMesh, UnusedView, Which
 from pipeline.types import FloatArray
 
 BALL_OPACITY = 0.55
+APART = 0.63
+"""From the middle to each of two surfaces side by side, over the width of the scene: what stands nearer to
+the view than its middle looks wider."""
 
 
 class SurfaceStage:
@@ -25,7 +28,7 @@ class SurfaceStage:
         """Draw below "/surface"."""
         self._drawings: dict[Which, SurfaceDrawing] = {
             "after": SurfaceDrawing(scene, "/surface/after", AFTER),
-            "before": SurfaceDrawing(scene, "/surface/before", BEFORE),
+            "before": SurfaceDrawing(scene, "/surface/before", BEFORE.partition(" (")[0]),
         }
         self._drawn: dict[Which, MeshView | PaintedMesh] = {}
         self._baseline = SurfaceDrawing(scene, "/surface/baseline", "baseline")
@@ -38,6 +41,7 @@ class SurfaceStage:
             cast_shadow=False,
             visible=False,
         )
+        self._ball_name = scene.add_label("/surface/ball/name", "", anchor="bottom-center")
         self.shown = AFTER
         """One of ``app.screens.surface.labels.SHOWN``."""
         self._offset_m: FloatArray = np.zeros(3)
@@ -78,6 +82,8 @@ class SurfaceStage:
         if center_m is not None:
             self._ball.radius = radius_m
             self._ball.position = center_m + self.offset_m(self.which[0])
+            self._ball_name.text = f"ball, {2000.0 * radius_m:.0f} mm across"
+            self._ball_name.position = (0.0, 0.0, 1.2 * radius_m)
 
     def draw_baseline(self, mesh: MeshView | None) -> None:
         """Draw a baseline's surface, or none."""
@@ -95,7 +101,7 @@ class SurfaceStage:
             hidden: whether something else is watched instead.
         """
         both = self.shown == BOTH and place is not None
-        self._offset_m = 0.55 * place.width_m * place.right if both and place is not None else np.zeros(3)
+        self._offset_m = APART * place.width_m * place.right if both and place is not None else np.zeros(3)
         top_m = place.top_m if both and place is not None else None
         baseline = self.shown in BASELINES
         for which, drawing in self._drawings.items():

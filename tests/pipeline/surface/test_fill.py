@@ -7,7 +7,7 @@ from packetmesh.errors import InputError
 from pipeline.rays import triangle_areas_m2
 from pipeline.surface import measure_quality, reconstruct_surface
 from pipeline.surface.boundary import edges_and_faces
-from pipeline.surface.fill import fill_holes, least_area, skin_points_m
+from pipeline.surface.fill import fill_holes, least_area, skin_points_m, without_seams
 from pipeline.surface.holes import find_holes
 from pipeline.types import PointCloud, SurfaceResult
 from tests.pipeline.surface.shapes import grid_mesh, perforated_plane, sphere
@@ -194,3 +194,12 @@ def test_a_loop_without_area_has_only_its_corners():
 def test_a_length_that_is_not_positive_gets_its_sentence(plane, longest_m):
     with pytest.raises(InputError, match=r"longest hole to fill is .* m; try a positive length"):
         fill_holes(plane, longest_m)
+
+
+def test_a_picture_has_its_small_holes_closed_and_its_numbers_as_they_were(plane):
+    assert len(without_seams(plane).triangles) == len(plane.triangles)  # 50 cm around
+    small = reconstruct_surface(perforated_plane(0.3, 0.0025, 0.02), (0.0025,))
+    closed = without_seams(small)
+    assert [hole.rim for hole in find_holes(closed.vertices_m, closed.triangles)] == [True]
+    assert closed.quality == small.quality
+    np.testing.assert_array_equal(closed.triangles[: len(small.triangles)], small.triangles)
