@@ -12,10 +12,11 @@ from PIL import Image, ImageDraw
 
 from app.drawing.colors import BACKGROUND, DELIVERED, LOSS, TARGET
 from app.reports.captioned import EDGE_PX, INK, PAPER, SOFT, font, gif, on_background
-from app.reports.hand_out import ASPECT, FIELD_RAD, HandOut, HandOutMoment, viewpoint
+from app.reports.hand_out import HandOut, HandOutMoment, viewpoint
+from app.reports.projecting import camera_of, project
 from pipeline.rays import Camera
 from pipeline.surface.pictures import mesh_picture
-from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
+from pipeline.types import ByteArray
 
 SIZE_PX = (960, 540)
 PLAYS_S = 10.0
@@ -29,7 +30,7 @@ _ROOM_PX = (640, 480)
 
 def delivery_animation(hand_out: HandOut) -> bytes:
     """An animated GIF, which slides of every make play, of ``SIZE_PX``; it repeats without end."""
-    camera = _camera(hand_out)
+    camera = camera_of(viewpoint(hand_out), _ROOM_PX)
     frames = [_frame(hand_out, moment, camera) for moment in hand_out.moments]
     return gif(frames, [round(1000 * stay_s) for stay_s in _stays_s(hand_out)])
 
@@ -40,27 +41,6 @@ def _stays_s(hand_out: HandOut) -> Iterator[float]:
     for since_s, until_s in pairwise(t_s):
         yield max(PLAYS_S * (until_s - since_s) / max(hand_out.end_s, 1e-9), _SHORTEST_S)
     yield LAST_S
-
-
-def _camera(hand_out: HandOut) -> Camera:
-    """From where the page is looked at first, too."""
-    view = viewpoint(hand_out)
-    ahead = view.middle_m - view.eye_m
-    ahead /= np.linalg.norm(ahead)
-    right = np.cross(ahead, view.up)
-    right /= np.linalg.norm(right)
-    T_world_camera = np.eye(4)
-    T_world_camera[:3, :3] = np.column_stack([right, np.cross(ahead, right), ahead])
-    T_world_camera[:3, 3] = view.eye_m
-    width_px, height_px = _ROOM_PX
-    assert width_px == round(ASPECT * height_px)
-    focal_px = 0.5 * height_px / np.tan(0.5 * FIELD_RAD)
-    return Camera(
-        CameraIntrinsics.pinhole(
-            focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1), width_px, height_px
-        ),
-        T_world_camera,
-    )
 
 
 def _frame(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> Image.Image:
@@ -89,17 +69,10 @@ def _room(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> ByteArray
         rays = (corners - (K.cx_px, K.cy_px)) / (K.fx_px, K.fy_px)
         local_m = depth_m * np.vstack([np.zeros(3), np.column_stack([rays, np.ones(4)])])
         world_m = local_m @ node.T_world_camera[:3, :3].T + node.T_world_camera[:3, 3]
-        at = _project(world_m, camera)
+        at, _ = project(world_m, camera)
         ways = [[at[0], at[i], at[j]] for i, j in ((1, 2), (2, 3), (3, 4), (4, 1))]
         cv2.polylines(rgb, [np.rint(way).astype(np.int32) for way in ways], True, INK, 2, cv2.LINE_AA)
     return rgb
-
-
-def _project(points_m: FloatArray, camera: Camera) -> FloatArray:
-    """(N, 2) pixels of world points in front of an undistorted camera."""
-    T = camera.T_world_camera
-    seen = (points_m - T[:3, 3]) @ T[:3, :3] @ camera.intrinsics.matrix.T
-    return seen[:, :2] / seen[:, 2:]
 
 
 def _numbers(pen: ImageDraw.ImageDraw, hand_out: HandOut, moment: HandOutMoment, left: int, top: int) -> int:

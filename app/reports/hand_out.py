@@ -143,7 +143,9 @@ def viewpoint(hand_out: HandOut) -> Viewpoint:
     return viewpoint_of(poses, seen_m[-1] if seen_m else np.zeros((0, 3)))
 
 
-def viewpoint_of(poses: Sequence[FloatArray], points_m: FloatArray) -> Viewpoint:
+def viewpoint_of(
+    poses: Sequence[FloatArray], points_m: FloatArray, cameras_in_sight: bool = True
+) -> Viewpoint:
     """The same for cameras' (4, 4) poses, T_world_camera, and (N, 3) points in the world."""
     up = _up(np.mean([-pose[:3, 1] for pose in poses], axis=0))
     first = poses[0]
@@ -156,7 +158,8 @@ def viewpoint_of(poses: Sequence[FloatArray], points_m: FloatArray) -> Viewpoint
     right = np.cross(up, back)
     right /= np.linalg.norm(right)
     axes = np.array([right, np.cross(back, right), back])
-    place_m = np.vstack([points_m, [pose[:3, 3] for pose in poses]]) @ axes.T
+    cameras_m = [pose[:3, 3] for pose in poses if cameras_in_sight]
+    place_m = np.vstack([points_m, *cameras_m]) @ axes.T
     slope = np.tan(0.5 * FIELD_RAD) / MARGIN * np.array([ASPECT, 1.0])
     # The four sides of the view as planes: each touches the outermost point on its side.
     high_m, low_m = (sign * (sign * place_m[:, :2] + slope * place_m[:, 2:]).max(axis=0) for sign in (1, -1))

@@ -94,14 +94,13 @@ class View {
     return true;
   }
 
-  // Of the whole canvas, or of a part of it that is so wide.
-  camera(width = this.canvas.width) {
+  // Of the whole canvas, or of a part of it that is so large.
+  camera(width = this.canvas.width, height = this.canvas.height) {
     const ahead = add(this.ahead.map(v => v * Math.cos(this.turn)), this.side, Math.sin(this.turn));
     const back = add(ahead.map(v => v * Math.cos(this.tilt)), this.up, Math.sin(this.tilt));
     const right = unit(cross(this.up, back));
     const top = cross(back, right);
     const eye = add(this.middle, back, this.far);
-    const {height} = this.canvas;
     const tall = Math.min(height, 0.75 * width);
     const near = this.far / 100, most = this.far * 100;
     const turn = [0, 1, 2].flatMap(i => [right[i], top[i], back[i], 0]);

@@ -21,6 +21,7 @@ from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
 from app.screens.fuse.draw import RaceDrawing, gizmo_pose
+from app.screens.fuse.export import race_offers
 from app.screens.fuse.labels import MARKS, MODES
 from app.screens.fuse.lesson import NUMBERS, SETTINGS, SHIPPED, RaceLook, numbers
 from app.screens.fuse.numbers import places_table, race_table, verdict
@@ -28,7 +29,7 @@ from app.screens.fuse.player import RacePlayer
 from app.screens.fuse.setup import RaceSetup
 from app.screens.fuse.view import CaptureView, FuseView, Race, RaceView, Start
 from app.state import Spec, Step
-from app.ui import Panel
+from app.ui import Offers, Panel
 from pipeline.config import Method
 
 TEXT = """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
@@ -151,6 +152,10 @@ class FusePanel(Panel):
         """Go back to the race of the start, once the session has gone back to its settings."""
         if action == "Reset":
             self.ui.post(self._reset)
+
+    def offers(self) -> tuple[Offers, ...]:
+        """The race that is shown, once it has run."""
+        return () if self._arrived is None else (race_offers(self._arrived[1]),)
 
     # What races.
 

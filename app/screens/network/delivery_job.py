@@ -73,17 +73,18 @@ def packet_job(
         first_byte: of the packet.
         byte_count: of the packet.
     """
-    sending = yield from _sending(store, spec)
+    sending = yield from sending_of(store, spec)
     frame, stream = sending.rig.frames[row], sending.streams[row]
     there = np.zeros(len(stream), np.bool_)
     there[first_byte : first_byte + byte_count] = True
     got = sending.coding.decode(np.where(there, stream, 0), there, frame.rgb.shape[:2], sending.packet_bytes)
     depth, color = (got.depth > 0) | (got.coarse > 0), got.rgb_known
-    cloud = _cloud(replace(frame, depth=DepthMap(np.where(depth, frame.depth.z_m, np.nan))))
+    cloud = cloud_of(replace(frame, depth=DepthMap(np.where(depth, frame.depth.z_m, np.nan))))
     return PacketView(row, depth, color, _lit(frame.rgb, depth | color), cloud.points_m.astype(np.float32))
 
 
-def _sending(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
+def sending_of(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
+    """The images on their way, and what became of them."""
     key = ("sending", spec_key(spec, "rig"), spec.sent)
     return (yield from store.remember(key, partial(_send, spec)))
 
@@ -96,24 +97,27 @@ def _send(spec: Spec) -> Generator[Progress, None, Sending]:
 
 def _delivered(store: Store, spec: Spec) -> Steps:
     started = time.perf_counter()
-    sending = yield from _sending(store, spec)
+    sending = yield from sending_of(store, spec)
     view = _first_view(sending, _asked(spec), time.perf_counter() - started)
     yield view
     rebuilder, count = Rebuilder(sending), len(sending.times_ns)
     moments: list[MomentView] = []
     for done, index in enumerate((count - 1, *range(count - 1))):
-        key = ("moment", spec.key("network"), index)
-        compute = partial(
-            part,
-            _moment(rebuilder, index),
-            f"moment {done + 1} of {count}",
-            (done + 0.5) / (count + 1),
-            (done + 1.5) / (count + 1),
-        )
-        moments.append((yield from store.remember(key, compute)))
+        moment = yield from moment_of(store, spec, rebuilder, index, done)
+        moments.append(_moment_view(sending, moment, int(sending.times_ns[index])))
         yield moments[-1]
     moments.sort(key=lambda one: one.t_ns)
     return replace(view, moments=tuple(moments), lossless=(yield from _lossless(store, spec)))
+
+
+def moment_of(
+    store: Store, spec: Spec, rebuilder: Rebuilder, index: int, done: int
+) -> Generator[Progress, None, Moment]:
+    """One of the moments, after so many others are done."""
+    count = len(rebuilder.sending.times_ns)
+    stage, low, high = f"moment {done + 1} of {count}", (done + 0.5) / (count + 1), (done + 1.5) / (count + 1)
+    compute = partial(part, rebuilder.moment(index), stage, low, high)
+    return (yield from store.remember(("moment", spec.key("network"), index), compute))
 
 
 def _asked(spec: Spec) -> Sent:
@@ -159,11 +163,6 @@ def _stage(frames: Sequence[RgbdFrame]) -> Stage:
     return stage_around([cloud.astype(float) for cloud in clouds], [f.T_world_camera for f in frames])
 
 
-def _moment(rebuilder: Rebuilder, index: int) -> Generator[Progress, None, MomentView]:
-    moment = yield from rebuilder.moment(index)
-    return _moment_view(rebuilder.sending, moment, int(rebuilder.sending.times_ns[index]))
-
-
 def _moment_view(sending: Sending, moment: Moment, t_ns: int) -> MomentView:
     received = received_at(sending, t_ns)
     frames = frames_at_sink(sending, received)
@@ -206,7 +205,7 @@ def _node_moment(
     whole: RgbdFrame,
     energy_j: float,
 ) -> NodeMoment:
-    cloud = _cloud(frame)
+    cloud = cloud_of(frame)
     thin = sample(cloud.points_m, cloud.colors, NODE_POINTS)
     colors = thin.colors if thin.colors is not None else np.zeros((0, 3), np.uint8)
     if not known.any():
@@ -224,7 +223,7 @@ def _node_moment(
     )
 
 
-def _cloud(frame: RgbdFrame) -> PointCloud:
+def cloud_of(frame: RgbdFrame) -> PointCloud:
     """The frame's points, of which there may be none."""
     if not frame.depth.valid.any():
         return PointCloud(np.zeros((0, 3)), np.zeros((0, 3), np.uint8))

@@ -20,6 +20,7 @@ from app.screens.network.delivery_legend import legend, most_j
 from app.screens.network.delivery_numbers import changes, difference, moment_table, more_rows, summary
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
+from app.screens.network.export import delivery_offers, network_offers
 from app.screens.network.labels import NETWORKS
 from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_names, stops_ns
 from app.screens.network.lesson import (
@@ -38,7 +39,7 @@ from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import NetworkView
 from app.state import Spec, Step
 from app.timeline import Lane
-from app.ui import Panel
+from app.ui import Offers, Panel
 
 TEXT = """The cameras of the room send their pictures and depth by radio, packet by packet; some are lost.
 **Play** below, and watch the mesh grow from what has arrived."""
@@ -184,6 +185,15 @@ class NetworkPanel(Panel):
                 turn(client, *self._drawing.viewpoint(camera.fov, camera.aspect))
                 self._drawing.spread_names(camera.fov, camera.aspect, camera.image_height)
         return True
+
+    def offers(self) -> tuple[Offers, ...]:
+        """The delivery or the runs that are shown, once all of it is there."""
+        session = self.session
+        if not session.results.fresh("network", session.spec):
+            return ()
+        if self._delivery is None:
+            return (network_offers(self._labels, self.command),) if self._runs else ()
+        return (delivery_offers(self._delivery, self._dock.now_ns, self.command), network_offers((), ""))
 
     @property
     def command(self) -> str:

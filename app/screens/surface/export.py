@@ -11,13 +11,13 @@ and after; a moving picture of a flight along the cameras, for slides; the 3-D v
 NOTE = "No command makes these: each is of what you see. The meshes in them are those of the command above."
 
 
-def surface_offers(shown: str, colors: str) -> Offers:
-    """Of what the screen's two choices say; a baseline has its points' colours only."""
+def surface_offers(shown: str, colors: str, rims: bool) -> Offers:
+    """Of what the screen shows, perhaps with rims; a baseline has its points' colours only."""
     coloring: Coloring = "color" if shown in BASELINES else COLORINGS[colors]
     job = "surface.export_job"
     files = (
         Offer("3-D page", "scene.html", f"{job}:page_job", (coloring,)),
         Offer("Flight, GIF", "flight.gif", f"{job}:flight_job", (coloring,)),
-        Offer("This view, PNG", "view.png", f"{job}:view_job", (coloring,), photographs=True),
+        Offer("This view, PNG", "view.png", f"{job}:view_job", (coloring, rims), photographs=True),
     )
     return Offers("To show", HINT, files, note=NOTE)

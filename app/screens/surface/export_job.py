@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 from scipy.spatial.transform import Rotation, Slerp
 
-from app.drawing.colors import BACKGROUND
+from app.drawing.colors import BACKGROUND, LOSS
 from app.drawing.meshes import VIOLET
 from app.records import Shown
 from app.reports.captioned import captioned, gif, on_background, png
@@ -84,13 +84,16 @@ def flight_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progre
 
 
 def view_job(
-    store: Store, spec: Spec, coloring: Coloring, rgba: ByteArray
+    store: Store, spec: Spec, coloring: Coloring, rims: bool, rgba: ByteArray
 ) -> Generator[Progress, None, bytes]:
     """The view as the browser drew it, (H, W, 4), on the app's background with its title and legend."""
     (rig,) = yield from store.stages(spec, "rig")
     share = rgba[..., 3:] / 255.0
     rgb = (rgba[..., :3] * share + np.array(BACKGROUND) * (1.0 - share)).astype(np.uint8)
-    return png(captioned(rgb, rig.name, NAMES[spec.shown], legend_of(coloring, rig.truth is not None)))
+    legend = legend_of(coloring, rig.truth is not None)
+    if rims and legend.bar is None:
+        legend = replace(legend, swatches=(*legend.swatches, ("rims of holes", LOSS)))
+    return png(captioned(rgb, rig.name, NAMES[spec.shown], legend))
 
 
 def _pair(shown: Shown) -> tuple[Shown, Shown]:

@@ -288,7 +288,7 @@ class SurfacePanel(Panel):
 
     def offers(self) -> tuple[Offers, ...]:
         """The surfaces as they are drawn."""
-        return (surface_offers(self._shown.value, self._coloring.value),)
+        return (surface_offers(self._shown.value, self._coloring.value, bool(self._loops.value)),)
 
     # The folders.
 

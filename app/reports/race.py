@@ -1,0 +1,96 @@
+"""A race of registrations as somebody without PacketMesh is to see it: plain values, and their page."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.drawing.colors import DISTANCE_STOPS, NEUTRAL, css
+from app.reports.hand_out import Viewpoint
+from app.reports.offline_page import offline_page
+from pipeline.types import ByteArray, FloatArray
+
+_PARTS = ("race_page.css", "offline_page.js", "hand_out_view.js", "race_page.js")
+
+
+@dataclass(frozen=True, slots=True)
+class RaceRun:
+    """One method's way, a step for each iteration and one for its end."""
+
+    name: str
+    color: tuple[int, int, int]
+    poses: FloatArray
+    """(K, 4, 4) T_world_source."""
+    offs_cm: FloatArray
+    """(K,) how far off it is; NaN where that is unknown."""
+    notes: tuple[str, ...]
+    """(K,) how it stands."""
+    arrived: bool | None
+    """At its end; None where no truth tells."""
+    shades: ByteArray
+    """(K, N) distance of each point, 0 to 255 along the scale."""
+    lens: tuple[ByteArray, ...]
+    """(K,) of (M, 3) column, row and shade of the points in the magnified corner."""
+
+
+@dataclass(frozen=True, slots=True)
+class RaceShow:
+    """A race as it was set up."""
+
+    title: str
+    sentence: str
+    source_m: FloatArray
+    """(N, 3) its own frame."""
+    target_m: FloatArray
+    """(M, 3) world."""
+    view: Viewpoint
+    runs: tuple[RaceRun, ...]
+    lens_target: ByteArray | None
+    """(K, 2) column and row, 0 to 255 across the corner; None without one."""
+    lens_cm: float
+    """Width of the corner."""
+    scale: tuple[str, str, str]
+    """What the colours of the moving cloud mean, and the words at the ends of their scale."""
+
+    @property
+    def steps(self) -> int:
+        """Of the longest run."""
+        return max(len(run.poses) for run in self.runs)
+
+
+def race_page(race: RaceShow) -> str:
+    """A self-contained HTML document that plays the race."""
+    record = {
+        "view": race.view.record(),
+        "steps": race.steps,
+        "scale": {
+            "words": race.scale,
+            "stops": [css(stop) for stop in DISTANCE_STOPS],
+            "stays": css(NEUTRAL),
+        },
+        "lens_cm": None if race.lens_target is None else race.lens_cm,
+        "runs": [
+            {
+                "name": run.name,
+                "color": css(run.color),
+                "poses": [pose.T.ravel().tolist() for pose in run.poses],
+                "offs_cm": [float(off) if np.isfinite(off) else None for off in run.offs_cm],
+                "notes": run.notes,
+                "arrived": run.arrived,
+                "lens": [len(points) for points in run.lens],
+            }
+            for run in race.runs
+        ],
+    }
+    places = {"source": race.source_m, "target": race.target_m}
+    blocks = {name: points_m.astype("<f4").tobytes() for name, points_m in places.items()}
+    if race.lens_target is not None:
+        blocks["lens"] = race.lens_target.tobytes()
+    for row, run in enumerate(race.runs):
+        blocks[f"shades-{row}"] = run.shades.tobytes()
+        blocks[f"lens-{row}"] = b"".join(points.astype(np.uint8).tobytes() for points in run.lens)
+    packed = {name: zlib.compress(block) for name, block in blocks.items()}
+    words = {"title": race.title, "sentence": race.sentence}
+    return offline_page(f"{race.title} · PacketMesh", "race_page.html", words, _PARTS, record, packed)

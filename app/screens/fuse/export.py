@@ -1,0 +1,20 @@
+"""What the Fuse screen offers to take along."""
+
+from __future__ import annotations
+
+from app.screens.fuse.view import Race
+from app.ui import Offer, Offers
+
+HINT = """The race as it is set up on the Fuse screen, with the error of every method: a page that plays it,
+offline, and a moving picture for slides."""
+NOTE = "No command plays a race; `packetmesh register` moves one cloud onto another by any of these methods."
+
+
+def race_offers(race: Race) -> Offers:
+    """Of a race that has run."""
+    job = "fuse.export_job"
+    files = (
+        Offer("Page", "race.html", f"{job}:page_job", (race,)),
+        Offer("GIF", "race.gif", f"{job}:animation_job", (race,)),
+    )
+    return Offers("Race", HINT, files, note=NOTE)

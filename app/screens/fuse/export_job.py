@@ -1,0 +1,82 @@
+"""The race as it is set up, to be taken along: a page that plays it, and a moving picture."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+
+from app.drawing.colors import MOST_DISTANCE_M
+from app.reports.hand_out import viewpoint_of
+from app.reports.race import RaceRun, RaceShow, race_page
+from app.reports.race_animation import race_animation
+from app.screens.fuse.methods import color_of
+from app.screens.fuse.numbers import verdict
+from app.screens.fuse.race_job import race_job
+from app.screens.fuse.view import SUCCESS_M, Race, RaceLane, RaceView
+from app.state import Spec
+from app.store import Store
+from packetmesh.progress import Progress
+from pipeline.geometry import apply
+
+
+def page_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, bytes]:
+    """A page that plays the race."""
+    show = yield from _show(store, spec, race)
+    return race_page(show).encode()
+
+
+def animation_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, bytes]:
+    """The race as a GIF."""
+    show = yield from _show(store, spec, race)
+    yield Progress("drawing the race", 0.7)
+    return race_animation(show)
+
+
+def _show(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, RaceShow]:
+    (rig,) = yield from store.stages(spec, "rig")
+    view = yield from race_job(store, spec, race)
+    names = [frame.name for frame in rig.frames]
+    who = f"{names[race.source]} onto {names[race.target]}"
+    if race.mode == "inferred":
+        who = f"the inferred cloud of {names[race.source]} onto what its sensor measured"
+    return race_show(view, f"{rig.name}: {who}")
+
+
+def race_show(view: RaceView, title: str) -> RaceShow:
+    """What somebody without PacketMesh is to see of a race."""
+    T = view.T_world_target
+    target_m = apply(T, view.target.points_m.astype(float))
+    start_m = apply(T @ view.lanes[0].steps[0].T_target_source, view.source.points_m.astype(float))
+    seen_m = np.vstack([target_m, start_m])
+    low_m, high_m = np.percentile(seen_m, [1, 99], axis=0)
+    inside = np.all((seen_m >= low_m) & (seen_m <= high_m), axis=1)
+    what = "Distance from its true place" if view.has_truth else "Distance to the nearest point"
+    return RaceShow(
+        title=title,
+        sentence=verdict(view.lanes).replace("**", ""),
+        source_m=view.source.points_m,
+        target_m=target_m,
+        view=viewpoint_of([T], seen_m[inside], cameras_in_sight=False),
+        runs=tuple(_run(lane, view) for lane in view.lanes),
+        lens_target=None if view.lens is None else view.lens.target,
+        lens_cm=0.0 if view.lens is None else 100.0 * view.lens.window_m,
+        scale=(what, "0", f"{100.0 * MOST_DISTANCE_M:.0f} cm and more"),
+    )
+
+
+def _run(lane: RaceLane, view: RaceView) -> RaceRun:
+    last = lane.steps[-1]
+    arrived = None if last.point_error_m is None else last.point_error_m < SUCCESS_M
+    end = "stopped" if arrived is None else "arrived" if arrived else "missed"
+    notes = [f"iteration {row} of {lane.iterations}" for row in range(len(lane.steps) - 1)]
+    return RaceRun(
+        name=lane.label,
+        color=color_of(lane.rival),
+        poses=np.array([view.T_world_target @ step.T_target_source for step in lane.steps]),
+        offs_cm=np.array([100.0 * step.off_m for step in lane.steps]),
+        notes=(*notes, f"{end} after {lane.iterations} iterations"),
+        arrived=arrived,
+        shades=np.stack([step.shades for step in lane.steps]),
+        lens=tuple(step.lens for step in lane.steps),
+    )

@@ -1,0 +1,42 @@
+"""What the Network screen offers to take along."""
+
+from __future__ import annotations
+
+from app.screens.network.delivery_view import DeliveryView
+from app.ui import Offer, Offers
+
+JOB = "network.export_job"
+
+
+def delivery_offers(view: DeliveryView, now_ns: int, command: str) -> Offers:
+    """Of a delivery whose moments are all there, and of what has arrived at the clock's moment."""
+    files = [
+        Offer("Page", "delivery.html", f"{JOB}:page_job"),
+        Offer("GIF", "delivery.gif", f"{JOB}:animation_job"),
+    ]
+    moment = view.moment_at(now_ns)
+    at = "its first moment"
+    if moment is not None:
+        index, at = view.times_ns.index(moment.t_ns), f"{moment.t_ns / 1e9:.3g} s"
+        files += [
+            Offer(f"Mesh at {at}", "moment.glb", f"{JOB}:mesh_job", (index, "moment.glb")),
+            Offer(f"Clouds at {at}", "moment.ply", f"{JOB}:cloud_job", (index,)),
+        ]
+    hint = f"""A page that plays the delivery, offline, and a moving picture of it; mesh and measured points
+of what has arrived by the moment that the Network screen's clock shows ({at})."""
+    note = "`delivery.html` and `delivery.gif` in its folder are page and GIF; its mesh is that of the end."
+    return Offers("Delivery", hint, tuple(files), command, note)
+
+
+def network_offers(labels: tuple[str, ...], commands: str) -> Offers:
+    """Of the network's time: runs with these labels and commands, or a delivery without any."""
+    files = (
+        Offer("Timeline, PNG", "timeline.png", f"{JOB}:timeline_job", (labels,)),
+        Offer("Trace, ZIP", "trace.zip", f"{JOB}:trace_job", (labels,)),
+    )
+    hint = "The whole timeline of the Network screen; every event of the network as NDJSON and CSV."
+    if not commands:
+        return Offers("Network", hint, files, note="The command of the delivery writes no trace.")
+    lines = [f"{line} --out runs/network-{row + 1}" for row, line in enumerate(commands.splitlines())]
+    note = "`trace.ndjson` and `trace.csv` in its folder are the trace; no command draws the timeline."
+    return Offers("Network", hint, files, "\n".join(lines), note)

@@ -1,0 +1,146 @@
+"""What the network did and delivered, to be taken along."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zipfile
+from collections.abc import Callable, Generator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.drawing.colors import NEUTRAL
+from app.reports.captioned import png
+from app.reports.delivery import delivery_animation, delivery_page
+from app.reports.hand_out import HandOut
+from app.reports.hand_out_of import hand_out_of
+from app.reports.timeline_picture import timeline_picture
+from app.screens.network.delivery_job import cloud_of, moment_of, sending_of
+from app.screens.network.delivery_view import DeliveryView
+from app.screens.network.job import network_job
+from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_names
+from app.screens.network.packets import Frames
+from app.screens.network.view import NetworkView
+from app.state import Spec
+from app.store import Store
+from app.timeline import Lane
+from network_sim.simulate import iterate_simulation
+from network_sim.trace import NetworkTrace
+from network_sim.trace_files import write_trace
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from pipeline.deliver import Delivery
+from pipeline.delivery.moments import Moment, Rebuilder
+from pipeline.delivery.sending import frames_at_sink, received_at
+from pipeline.geometry import apply
+from pipeline.io.clouds import write_cloud
+from pipeline.io.meshes import write_mesh
+from pipeline.reconstruct import iterate_reconstruction
+from pipeline.types import PointCloud
+
+Content = Generator[Progress, None, bytes]
+
+
+def page_job(store: Store, spec: Spec) -> Content:
+    """The page that plays the delivery."""
+    hand_out = yield from _hand_out(store, spec)
+    yield Progress("writing the page", 0.9)
+    return delivery_page(hand_out).encode()
+
+
+def animation_job(store: Store, spec: Spec) -> Content:
+    """The delivery as a GIF."""
+    hand_out = yield from _hand_out(store, spec)
+    yield Progress("drawing the moments", 0.9)
+    return delivery_animation(hand_out)
+
+
+def mesh_job(store: Store, spec: Spec, index: int, file: str) -> Content:
+    """The surface of what has arrived by a moment, in a mesh format by the file's name.
+
+    Raises:
+        InputError: there is none yet.
+    """
+    sending = yield from sending_of(store, spec)
+    moment = yield from moment_of(store, spec, Rebuilder(sending), index, 0)
+    surface = moment.surface
+    if surface is None or not len(surface.triangles):
+        raise InputError(f"At {moment.t_s:.3g} s there is no surface yet; move the Network screen's clock on")
+    return _written(file, lambda path: write_mesh(path, surface))
+
+
+def cloud_job(store: Store, spec: Spec, index: int) -> Content:
+    """The measured points of all nodes that have arrived by a moment, in the world, as PLY.
+
+    Raises:
+        InputError: there are none yet.
+    """
+    sending = yield from sending_of(store, spec)
+    moment = yield from moment_of(store, spec, Rebuilder(sending), index, 0)
+    received = received_at(sending, int(sending.times_ns[index]))
+    places, colors = [], []
+    for frame, got in zip(frames_at_sink(sending, received), received, strict=True):
+        cloud = cloud_of(frame)
+        places.append(apply(moment.T_world_camera.get(frame.name, frame.T_world_camera), cloud.points_m))
+        grey = np.tile(np.array(NEUTRAL, np.uint8), (len(cloud), 1))
+        colors.append(grey if cloud.colors is None or not got.rgb_known.any() else cloud.colors)
+    whole = PointCloud(np.vstack(places), np.vstack(colors))
+    if not len(whole):
+        raise InputError(f"At {moment.t_s:.3g} s no point is there yet; move the Network screen's clock on")
+    return _written("cloud.ply", lambda path: write_cloud(path, whole))
+
+
+def timeline_job(store: Store, spec: Spec, labels: tuple[str, ...]) -> Content:
+    """The whole timeline as PNG; the labels are those of runs that are compared."""
+    seen = yield from network_job(store, spec)
+    lanes: list[Lane]
+    if isinstance(seen, DeliveryView):
+        runs: tuple[NetworkView, ...] = (seen.run,)
+        lanes = [frames_lane(seen.run, Frames(seen.run)), growth_lane(seen)]
+        title = f"{spec.source.title}: frames on the air, and what has arrived"
+    else:
+        runs = tuple(replace(run, label=label) for run, label in zip(seen, labels, strict=True))
+        named = zip(runs, run_names(runs), strict=True)
+        lanes = [frames_lane(run, Frames(run), name) for run, name in named]
+        lanes += [run_curves(runs[0])] if len(runs) == 1 else []
+        title = f"Frames on the air: {', '.join(labels)}"
+    start_ns, end_ns = min(run.start_ns for run in runs), max(run.end_ns for run in runs)
+    return png(timeline_picture(title, lanes, start_ns, end_ns))
+
+
+def trace_job(store: Store, spec: Spec, labels: tuple[str, ...]) -> Content:
+    """A ZIP with trace.ndjson, trace.csv and trace.json; of two runs, each in a folder of its own."""
+    traces: dict[str, NetworkTrace] = {}
+    if spec.sent is not None:
+        traces[""] = (yield from sending_of(store, spec)).trace
+    for row, config in enumerate(spec.networks):
+        folder = f"run_{row + 1}/" if len(labels) > 1 else ""
+        traces[folder] = yield from iterate_simulation(config)
+    yield Progress("writing the trace", 0.9)
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive, tempfile.TemporaryDirectory() as folder:
+        for name, trace in traces.items():
+            write_trace(trace, Path(folder))
+            for path in sorted(Path(folder).iterdir()):
+                archive.write(path, f"{name}{path.name}")
+    return file.getvalue()
+
+
+def _hand_out(store: Store, spec: Spec) -> Generator[Progress, None, HandOut]:
+    sending = yield from sending_of(store, spec)
+    rebuilder, count = Rebuilder(sending), len(sending.times_ns)
+    moments: tuple[Moment, ...] = ()
+    for index in range(count):
+        moments += ((yield from moment_of(store, spec, rebuilder, index, index)),)
+    lossless = yield from iterate_reconstruction(spec, store)
+    return hand_out_of(Delivery(sending, moments, None, lossless))
+
+
+def _written(name: str, write: Callable[[Path], Any]) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, name)
+        write(path)
+        return path.read_bytes()

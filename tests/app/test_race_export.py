@@ -1,0 +1,85 @@
+"""A race to take along: the same numbers as on the board, on a page and in a moving picture."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import re
+import zlib
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.drawing.colors import NEUTRAL
+from app.reports.race import race_page
+from app.reports.race_animation import off_text, race_animation
+from app.screens.fuse.export import race_offers
+from app.screens.fuse.export_job import race_show
+from app.screens.fuse.methods import color_of
+from app.screens.fuse.race_job import race_job
+from app.screens.fuse.view import Race, Start
+from app.state import Spec
+from packetmesh.progress import drain
+from pipeline.sources import Demo
+
+SPEC = Spec(Demo("box-on-table"))
+RACE = Race(mode="inferred", source=0, target=0, start=Start((0.0, 3.0, 0.0), (5.0, 0.0, 0.0)))
+
+
+@pytest.fixture(scope="module")
+def view(store):
+    return drain(race_job(store, SPEC, RACE))
+
+
+@pytest.fixture(scope="module")
+def show(view):
+    return race_show(view, "a race")
+
+
+def test_every_step_of_every_method_is_there_with_its_error(view, show):
+    for lane, run in zip(view.lanes, show.runs, strict=True):
+        assert len(run.poses) == len(run.notes) == len(run.lens) == len(lane.steps)
+        np.testing.assert_allclose(run.offs_cm, [100.0 * step.off_m for step in lane.steps])
+        assert run.color == color_of(lane.rival)
+        assert str(lane.iterations) in run.notes[-1]
+    assert show.steps == max(len(lane.steps) for lane in view.lanes)
+
+
+def test_the_page_holds_the_race_and_asks_for_nothing(show):
+    page = race_page(show)
+    assert "<title>a race · PacketMesh</title>" in page
+    record = json.loads(re.search(r'id="record">(.*?)</script>', page)[1])
+    packed = dict(re.findall(r'<script type="text/plain" id="([^"]+)">([^<]*)</script>', page))
+    blocks = {name: zlib.decompress(base64.b64decode(text)) for name, text in packed.items()}
+    places_m = np.frombuffer(blocks["source"], "<f4").reshape(-1, 3)
+    np.testing.assert_allclose(places_m, show.source_m)
+    for row, (run, told) in enumerate(zip(show.runs, record["runs"], strict=True)):
+        assert len(blocks[f"shades-{row}"]) == len(run.poses) * len(places_m)
+        pose = np.array(told["poses"][-1]).reshape(4, 4).T  # column by column, as WebGL wants it
+        np.testing.assert_allclose(pose, run.poses[-1])
+    assert "http" not in page.replace("http-equiv", "")
+
+
+def test_the_moving_picture_shows_the_cloud_coming_nearer(show):
+    film = Image.open(io.BytesIO(race_animation(show)))
+    assert 2 <= film.n_frames <= show.steps
+    pictures = []
+    for index in (0, film.n_frames - 1):
+        film.seek(index)
+        pictures.append(np.asarray(film.convert("RGB")).astype(int))
+    grey = [int((np.abs(picture - NEUTRAL).max(axis=2) < 12).sum()) for picture in pictures]
+    assert min(grey) > 500
+    assert np.abs(pictures[0] - pictures[1]).max(axis=2).astype(bool).mean() > 0.02
+
+
+def test_numbers_have_as_many_digits_as_on_the_board():
+    assert [off_text(off_cm) for off_cm in (28.14, 0.034, float("nan"))] == ["28.1 cm", "0.03 cm", "–"]
+
+
+def test_a_race_is_offered_with_an_honest_word_on_commands():
+    offers = race_offers(RACE)
+    assert all(file.arguments == (RACE,) for file in offers.files)
+    assert "No command" in offers.note
+    assert not offers.command
