@@ -21,6 +21,8 @@ from pipeline.types import ByteArray, FloatArray
 
 SIDE = 10.0
 """The longer side of a network in units of the scene; all lengths are drawn to one scale."""
+BAR_ROOM = 0.6
+"""South of the ground, for the scale bar."""
 GAP = 1.12
 """Distance of two networks over their width."""
 ROLE_LOOKS: dict[str, tuple[tuple[int, int, int], float]] = {
@@ -91,11 +93,12 @@ def ground_of(views: Sequence[NetworkView]) -> Ground:
 def look_at_ground(clients: Iterable[viser.ClientHandle], ground: Ground) -> None:
     """Turn every browser's view to the whole ground, from the south and above."""
     width = ground.width * (1.0 + GAP * (ground.networks - 1))
+    depth = ground.depth + 2.0 * BAR_ROOM
     for client in clients:
         slope = float(np.tan(0.5 * client.camera.fov))
         across = 0.5 * width / max(slope * client.camera.aspect, 1e-9)
-        along = 0.5 * ground.depth * np.sin(ELEVATION_RAD) / max(slope, 1e-9)
-        distance = 1.08 * max(across, along) + 0.5 * ground.depth * np.cos(ELEVATION_RAD)
+        along = 0.5 * depth * np.sin(ELEVATION_RAD) / max(slope, 1e-9)
+        distance = 1.08 * max(across, along) + 0.5 * depth * np.cos(ELEVATION_RAD)
         stand = distance * np.array([0.0, -np.cos(ELEVATION_RAD), np.sin(ELEVATION_RAD)])
         turn(client, np.zeros(3), stand)
 
