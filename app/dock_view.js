@@ -101,7 +101,8 @@ window.packetmeshDockView ??= (() => {
       }
       this.cursor.style.left = `${cursor}px`;
       const step = (this.window[1] - this.window[0]) / width;
-      const fine = Math.max(10 ** Math.ceil(Math.log10(step)), 1);
+      // As fine as a pixel, and at least three digits of the end, as in tables.
+      const fine = Math.max(10 ** Math.min(Math.ceil(Math.log10(step)), Math.floor(Math.log10(this.end / 100))), 1);
       const [now, end] = [this.now, this.end].map(ns => this.text(ns, fine, this.end));
       this.time.textContent = `${this.counts} ${now} of ${end}`.trim();
       this.drawBox(scale);

@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 import viser
 
+from app.dock import time_text
 from app.drawing.colors import COVERAGE_STOPS, linear
 from app.lesson_file import read_lesson
 from app.screens.network.delivery_draw import EMPTY, FULL
+from app.screens.network.delivery_legend import legend
+from app.screens.network.delivery_numbers import moment_table
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.draw import STREET, ground_of
-from app.screens.network.labels import NETWORKS
+from app.screens.network.labels import ANSWER, NETWORKS
 from app.screens.network.lesson import CROSSING, LOST_PACKET, NUMBERS, SETTINGS, NetworkLook
 from app.screens.network.panel import ORIGIN, PICK, NetworkPanel
 from app.screens.network.setup import NetworkSetup
@@ -133,6 +136,19 @@ def test_more_and_more_arrives(screen):
         for before, after in zip(one.nodes, two.nodes, strict=True):
             assert before.depth_share <= after.depth_share
     assert moments[-1].no_hit_share < moments[0].no_hit_share
+
+
+def test_the_table_shows_the_clock_and_says_why_frames_were_lost(screen):
+    view = screen.view
+    screen.dock.seek(view.run.end_ns)
+    html = moment_table(view, view.moments[-1], view.run.end_ns)
+    at_end = time_text(view.run.end_ns)
+    assert f">at {at_end}<" in html
+    assert f">end, {at_end}<" in html
+    why = re.findall(r">· ([\w ]+)</span></td><td[^>]*>([\d,]+)</td>", html)
+    assert sum(int(count.replace(",", "")) for _, count in why) == view.moments[-1].packets_lost
+    assert ">by " in moment_table(view, view.moments[0], view.times_ns[0])
+    assert ("acknowledgement on its way", ANSWER) in legend(view)
 
 
 def test_the_more_a_node_has_used_the_nearer_is_its_ball_to_orange(screen):

@@ -74,7 +74,7 @@ def test_changing_an_early_step_recomputes_the_later_ones(page):
     row = page.get_by_role("row", name="Alignment")
     page.get_by_label("Alignment").first.click()
     page.get_by_role("option", name="one scale").click()
-    row.get_by_text("median").wait_for()
+    row.get_by_text("one scale", exact=True).wait_for()
     page.get_by_text("Up to date").wait_for()
     go(page, "Export")
     assert "depth.alignment=median" in page.locator("pre").first.inner_text()

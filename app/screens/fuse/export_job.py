@@ -10,6 +10,7 @@ from app.drawing.colors import MOST_DISTANCE_M
 from app.reports.hand_out import viewpoint_of
 from app.reports.race import RaceRun, RaceShow, race_page
 from app.reports.race_animation import race_animation
+from app.screens.fuse.labels import OFF_FROM
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.numbers import verdict
 from app.screens.fuse.race_job import race_job
@@ -51,10 +52,10 @@ def race_show(view: RaceView, title: str) -> RaceShow:
     seen_m = np.vstack([target_m, start_m])
     low_m, high_m = np.percentile(seen_m, [1, 99], axis=0)
     inside = np.all((seen_m >= low_m) & (seen_m <= high_m), axis=1)
-    what = "Distance from its true place" if view.has_truth else "Distance to the nearest point"
+    what = f"Distance {OFF_FROM[view.reference]}"
     return RaceShow(
         title=title,
-        sentence=verdict(view.lanes).replace("**", ""),
+        sentence=verdict(view.reference, view.lanes).replace("**", ""),
         source_m=view.source.points_m,
         target_m=target_m,
         view=viewpoint_of([T], seen_m[inside], cameras_in_sight=False),
