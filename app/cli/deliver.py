@@ -67,6 +67,8 @@ def deliver(
     write_delivery_folder(delivery, metrics, preset, out)
     page = write_hand_out(delivery, out)
     say(f"100%  {summary(delivery)}; see {page}")
+    for note in delivery.lossless.rig.notes:
+        say(note)
     if json:
         print_json(metrics)
 
