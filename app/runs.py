@@ -88,7 +88,7 @@ def iterate_run(
     writable_folder(out)
     result = yield from iterate_reconstruction(spec, cache)
     beside = None if baseline is None else (yield from compute(spec, baseline, cache)).value
-    metrics = metrics_of(result) | {"import": None if report is None else asdict(report)}
+    metrics = metrics_of(result) | ({} if report is None else {"import": asdict(report)})
     clear_run_folder(out)
     write_reconstruction_report(result, metrics, out / REPORT)
     if baseline is not None and beside is not None:
@@ -156,7 +156,8 @@ def iterate_rigs(
             yield Progress(f"{outcome.name} {outcome.state}: {said}", len(outcomes) / len(tasks))
     finally:
         done = tuple(outcomes[index] for index in sorted(outcomes))
-        write_rigs_table(done, out)
+        if done:
+            write_rigs_table(done, out)
     return done
 
 
@@ -220,7 +221,7 @@ def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome
         measured["agreement_between_nodes"],
         sum(metrics["timings_s"].values()),
     )
-    sentences = [] if metrics["import"] is None else [*metrics["import"]["notes"]]
+    sentences = [*metrics.get("import", {"notes": ()})["notes"]]
     for node in metrics["nodes"]:
         sentences += [node["place"]["sentence"], *(f"{node['name']}: {note}" for note in node["notes"])]
     said = "; ".join(filter(None, sentences))

@@ -69,6 +69,8 @@ def deliver(
     page = write_hand_out(delivery, out)
     write_delivery_folder(delivery, metrics, preset, out)
     say(f"100%  {summary(delivery)}; see {page}")
+    for note in delivery.lossless.rig.notes:
+        say(note)
     if json:
         print_json(metrics)
 

@@ -65,7 +65,7 @@ def reconstruct(
     )
     if not after["triangles"]:
         say("The ball falls through everywhere; try larger surface.radii_m")
-    for note in (*imported_notes(metrics["import"]), *result.rig.notes):
+    for note in (*imported_notes(metrics.get("import")), *result.rig.notes):
         say(note)
     if json:
         print_json(metrics)

@@ -86,7 +86,7 @@ def _agreeing(measured: dict[str, float]) -> str:
 
 def _must_be_known(metrics: dict[str, Any]) -> Iterator[str]:
     """What is doubtful about the images, and of nodes that found no place, or one that little speaks for."""
-    for note in metrics["import"]["notes"] if metrics.get("import") else ():
+    for note in metrics.get("import", {"notes": ()})["notes"]:
         yield f'<p class="lead">{escape(note)}.</p>'
     for node in metrics["nodes"]:
         for note in node["notes"]:

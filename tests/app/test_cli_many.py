@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from app.runs import rigs_in
-from packetmesh.errors import InputError
+from app.runs import RigTask, iterate_rigs, rigs_in
+from packetmesh.errors import InputError, PacketMeshError
+from packetmesh.progress import drain
+from pipeline.config import PipelineConfig
 from pipeline.io.demos import load_demo
 from pipeline.io.rigs import is_rig, save_rig
 from pipeline.types import Rig
@@ -122,6 +124,19 @@ def test_an_error_of_the_program_and_a_rig_that_failed_are_rows_and_the_table_is
     _, printed, _ = run(capsys, *words, "--json")
     assert [row["state"] for row in json.loads(printed)] == ["kept", "failed"]
     assert (out / "b-strangers" / "metrics.json").stat().st_mtime_ns == written
+
+
+def test_the_table_is_written_of_what_was_done_when_the_rest_cannot_be(rigs, tmp_path, monkeypatch):
+    def lost(do, tasks, *_, **__):
+        yield 0, do(tasks[0])
+        raise PacketMeshError("The cluster was lost")
+
+    monkeypatch.setattr("app.runs.run_batch", lost)
+    chain = "packetmesh", PipelineConfig(), None
+    tasks = [RigTask(n, str(rigs / n), str(tmp_path / n), *chain) for n in ("c-empty", "a-rig")]
+    with pytest.raises(PacketMeshError, match="lost"):
+        drain(iterate_rigs(tasks, tmp_path, None))
+    assert list(table(tmp_path)) == ["c-empty"]
 
 
 def nothing(frame, config):
