@@ -248,6 +248,22 @@ class LessonFolder(Generic[Look]):
             self._stop.value = self._names[index]
             self._picked()
 
+    def place(self) -> str:
+        """The number of the stop, for the address; empty without one."""
+        return "" if self._index() < 0 else str(self._index() + 1)
+
+    def take(self, place: str) -> None:
+        """Go to the stop of that number, or to none.
+
+        Raises:
+            InputError: there is no such stop.
+        """
+        numbers = ["", *(str(number) for number in range(1, len(self._names) + 1))]
+        if place not in numbers:
+            raise InputError(f"The address has stop {place[:9]}; this lesson has 1 to {len(self._names)}")
+        self._stop.value = (OFF, *self._names)[numbers.index(place)]
+        self._picked()
+
     def _index(self) -> int:
         return -1 if self._stop.value == OFF else self._names.index(self._stop.value)
 
@@ -279,7 +295,8 @@ class LessonFolder(Generic[Look]):
             self._mark.content = ""
             return
         titles = json.dumps(self._lesson.stops[index].opens)
-        script = f"window.packetmesh?.unfold({titles}); window.packetmeshLesson?.at(this, {titles})"
+        folders = json.dumps([f"Lesson: {self._lesson.title}", *self._lesson.stops[index].opens])
+        script = f"window.packetmesh?.unfold({folders}); window.packetmeshLesson?.at(this, {titles})"
         large = "data-large" if self._large.value else ""
         self._mark.content = (
             f"<div class='packetmesh-lesson' {large}>{KEYS}{running(script, self._marked)}</div>"

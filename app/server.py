@@ -32,6 +32,7 @@ from app.session import Session, Target
 from app.state import SharedViews, Spec
 from app.store import Store
 from app.teacher import Token
+from app.uploads import Uploads
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Demo, RigFolder
@@ -116,16 +117,16 @@ def build_server(
         app.stop()
         raise InputError(_taken(port))
     _dress(server)
-    store, shared = Store(str(folder)), SharedViews()
+    store, uploads, shared = Store(str(folder)), Uploads(folder), SharedViews()
 
     def begin(target: Target, number: int, lecture: Lecture | None = None) -> Session:
-        app.sessions[number] = Session(target, pool, store, shared, spec, PANELS, lecture)
+        app.sessions[number] = Session(target, pool, store, uploads, shared, spec, PANELS, lecture)
         return app.sessions[number]
 
     if teacher is not None:
         together = Lecture(server, teacher, app.class_url)
         session = begin(server, -1, together)
-        together.begin(session.post, lambda: session.frame_view(anew=True))
+        together.begin(session.post, lambda: session.frame_view(anew=True), session.places.add)
     else:
         server.on_client_connect(lambda client: begin(client, client.client_id))
 

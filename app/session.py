@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -15,16 +13,18 @@ from typing import Any, TypeAlias
 import viser
 
 from app import jobs
-from app.address import Address, Place
 from app.drawing.cameras import look, stage_of
 from app.drawing.colors import BRAND, DELIVERED
 from app.lecture import Lecture
-from app.page import add_script
+from app.page import add_script, screen_mark
+from app.places import Places
 from app.pool import ComputePool, LatestWins, Outcome
 from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
 from app.stepper import Stepper
 from app.store import Store
 from app.ui import Panel, Ui
+from app.uploads import Uploads, plain
+from app.views import Views
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig
@@ -60,6 +60,7 @@ class Session:
         target: Target,
         pool: ComputePool,
         store: Store,
+        uploads: Uploads,
         shared: SharedViews,
         spec: Spec,
         panels: Sequence[type[Panel]],
@@ -68,25 +69,24 @@ class Session:
         self.target = target
         self.gui, self.scene = target.gui, target.scene
         self.ui = Ui(target.gui, target.scene, self.post, target.atomic, target.flush, lecture=lecture)
-        self.store = store
+        self.store, self.uploads = store, uploads
         self._shared = shared
-        self.spec = spec
-        self._start = spec
+        self.spec = self._start = spec
         self.results = Results()
-        self.folder = Path(tempfile.mkdtemp(prefix="upload-", dir=store.folder))
+        self.folder = self.new_folder()
         self._tracks = (
             _Track(LatestWins(pool, self), CHAIN),
             _Track(LatestWins(pool, object()), ("calibrate",)),
             _Track(LatestWins(pool, object()), ("network",)),
         )
-        self._side = LatestWins(pool, self)
-        self._quick = LatestWins(pool, object())
-        self._wide = False
+        self._side, self._quick = LatestWins(pool, self), LatestWins(pool, object())
+        self._wide = self._closed = False
         self._shape = self._seen_shape = 0.0
-        self._closed = False
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="session")
-        self._panels = [panel(self) for panel in panels]
-        self._current = self._panels[0]
+        self.panels = [panel(self) for panel in panels]
+        self.current = self.panels[0]
+        self.views = Views(target) if isinstance(target, viser.ClientHandle) else None
+        self.places = Places(self)
         self._thread.submit(self._guarded, self._build)
         if isinstance(target, viser.ClientHandle):
             target.camera.on_update(lambda _: self._look_at_window())
@@ -107,10 +107,10 @@ class Session:
         self._thread.shutdown(wait=False)
 
     def _end(self) -> None:
-        """Stop computing and delete what was uploaded; the browser is gone."""
+        """Stop computing and leave what was uploaded; the browser is gone."""
         self._cancel()
         self.ui.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        self.uploads.leave(self)
 
     def clients(self) -> Iterable[viser.ClientHandle]:
         """The browsers whose view is this session's to turn."""
@@ -122,9 +122,13 @@ class Session:
         """Tell the people who watch."""
         everybody = self.clients() if self.ui.lecture is None else self.ui.lecture.everybody()
         for client in everybody:
-            client.add_notification(title, sentence, color=color, auto_close_seconds=15.0)
+            client.add_notification(title, plain(sentence), color=color, auto_close_seconds=15.0)
 
     # What panels ask of it, on its thread.
+
+    def new_folder(self) -> Path:
+        """For an upload, or what is made of one."""
+        return self.uploads.new_folder(self)
 
     def edit(self, change: Callable[[PipelineConfig], PipelineConfig]) -> None:
         """Change the settings and recompute what depends on them."""
@@ -134,7 +138,8 @@ class Session:
         """Want something else; whatever is still right is kept."""
         if spec != self.spec:
             self.spec = spec
-            for panel in self._panels:
+            self.uploads.keep(spec.source, self)
+            for panel in self.panels:
                 panel.on_spec(spec)
         self.advance()
 
@@ -225,8 +230,8 @@ class Session:
     def _waits(self, step: Step) -> bool:
         """Whether a step is not computed before somebody looks at it."""
         return any(
-            panel.step == step and panel.only_when_shown and panel is not self._current
-            for panel in self._panels
+            panel.step == step and panel.only_when_shown and panel is not self.current
+            for panel in self.panels
         )
 
     def _ended(self, track: _Track, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
@@ -237,7 +242,7 @@ class Session:
             self._shared.put(key, outcome.value)
             self._take(step, key, outcome.value)
         elif outcome.kind == "error" or latest:
-            sentence = CANCELLED if outcome.kind == "stopped" else outcome.value
+            sentence = CANCELLED if outcome.kind == "stopped" else plain(outcome.value)
             self.results.fail(step, key, sentence)
             if latest:
                 self._fail(step, sentence)
@@ -246,12 +251,12 @@ class Session:
     def _fail(self, step: Step, sentence: str) -> None:
         if sentence != CANCELLED:
             self.notify(f"{step.capitalize()} failed", sentence)
-        for panel in self._panels:
+        for panel in self.panels:
             panel.on_failure(step, sentence)
 
     def _take(self, step: Step, key: tuple[Any, ...], view: Any) -> None:
         self.results.put(step, key, view)
-        for panel in self._panels:
+        for panel in self.panels:
             panel.on_view(step, view)
 
     def _progressed(self, step: Step | None, value: Any) -> None:
@@ -259,14 +264,14 @@ class Session:
             self._bar.value = min(100.0, 100.0 * value.fraction)
             self._status.content = f"**Computing** · {value.stage}"
             return
-        for panel in self._panels:
+        for panel in self.panels:
             if panel.step == step:
                 panel.on_partial(value)
 
     # Its own part of the control panel.
 
     def _build(self) -> None:
-        titles = [panel.title for panel in self._panels]
+        titles = [panel.title for panel in self.panels]
         add_script(self.gui)
         self._stepper = Stepper(self.gui, titles, lambda title: self.post(self.show, title))
         self._status = self.gui.add_markdown("**Starting** …")
@@ -278,40 +283,30 @@ class Session:
             "back to the settings of the start; Copy as command shows the command that computes the same.",
         )
         actions.on_click(lambda event: self.post(self._act, event.target.value))
-        self._address: Address | None = None
-        if isinstance(self.target, viser.ClientHandle):  # one that many share is nobody's to move
-            start = Place(self._start, self._current.title)
-            self._address = Address(self.ui, start, tuple(titles), self._go_to)
         self._folders: dict[str, viser.GuiFolderHandle] = {}
-        for panel in self._panels:
+        for panel in self.panels:
             self.scene.add_frame(panel.drawn_below, show_axes=False, visible=False)
-            self._folders[panel.title] = self.gui.add_folder(None, visible=panel is self._current)
+            self._folders[panel.title] = self.gui.add_folder(None, visible=panel is self.current)
             with self._folders[panel.title]:
+                self.gui.add_html(screen_mark(panel.title))
                 panel.build()
-        self.show(self._current.title)
-
-    def _go_to(self, place: Place) -> None:
-        """Show what an address asks for; what it does not name of the spec stays."""
-        spec = place.spec
-        self.want(
-            replace(self.spec, source=spec.source, preset=spec.preset, config=spec.config, shown=spec.shown)
-        )
-        if place.screen != self._current.title:
-            self.show(place.screen)
+        self.show(self.current.title)
+        if self.views is not None:  # what many share is its teachers' to move
+            self.places.add(self.ui)
 
     def show(self, title: str) -> None:
         """Make a step the current one."""
-        self._current.on_hide()
-        self._current = next(panel for panel in self._panels if panel.title == title)
+        self.current.on_hide()
+        self.current = next(panel for panel in self.panels if panel.title == title)
         with self.target.atomic():
-            for panel in self._panels:
-                self._folders[panel.title].visible = panel is self._current
-            for name in {panel.drawn_below for panel in self._panels}:
+            for panel in self.panels:
+                self._folders[panel.title].visible = panel is self.current
+            for name in {panel.drawn_below for panel in self.panels}:
                 frame = self.scene.get_handle_by_name(name)
                 if frame is not None:
-                    frame.visible = name == self._current.drawn_below
-        self._current.on_show()
-        self.frame_view()
+                    frame.visible = name == self.current.drawn_below
+        self.current.on_show()
+        self.frame_view(keep=True)
         self._pause_unseen()
         self.advance()
 
@@ -322,18 +317,26 @@ class Session:
                 track.running = track.submitted = None
                 track.lane.stop()
 
-    def frame_view(self, anew: bool = False) -> None:
-        """Turn the view to the scene: a new one, two instead of one, or another shape of the window."""
-        if self._current.look():
+    def frame_view(self, anew: bool = False, keep: bool = False) -> None:
+        """Turn the view to what is shown; ``keep`` leaves it where a person has turned it."""
+        if self.views is None:
+            self._turn_view(anew)
+        else:
+            self.views.frame(lambda: self._turn_view(anew), keep)
+
+    def _turn_view(self, anew: bool) -> str:
+        """Turn it, and name what is looked at."""
+        if self.current.look():
             self._shape = 0.0
-            return
-        below = self._current.drawn_below
-        wide = any(panel.wide for panel in self._panels if panel.drawn_below == below)
+            return self.current.drawn_below
+        below = self.current.drawn_below
+        wide = any(panel.wide for panel in self.panels if panel.drawn_below == below)
         scene = self.results.view("scene")
         shape = self._window()
         if scene is not None and (anew or wide != self._wide or shape != self._shape):
             look(self.clients(), stage_of(scene.nodes), wide)
             self._wide, self._shape = wide, shape
+        return "both" if wide else "scene"
 
     def _window(self) -> float:
         """Width over height of the picture, roughly; that of a shared session is nobody's own."""
@@ -345,10 +348,10 @@ class Session:
         """Fit the view anew when the picture has another shape, as when the dock comes or goes."""
         if self._window() != self._seen_shape:
             self._seen_shape = self._window()
-            self.post(self.frame_view)
+            self.post(self.frame_view, False, True)
 
     def _act(self, action: str) -> None:
-        for panel in self._panels:
+        for panel in self.panels:
             panel.on_action(action)
         if action == "Cancel":
             self._cancel()
@@ -358,19 +361,17 @@ class Session:
         elif action == "Reset":
             self.want(self._start)
         else:
-            self.ui.show_command(self._current.command)
+            self.ui.show_command(self.current.command)
 
     def _show_status(self) -> None:
         """Bring the stepper and the status line up to date."""
         running = [track.running for track in self._tracks if track.running is not None]
         statuses = {
             panel.title: self.results.status(panel.step, self.spec, running)
-            for panel in self._panels
+            for panel in self.panels
             if panel.step is not None
         }
-        self._stepper.show(self._current.title, statuses)
-        if self._address is not None:
-            self._address.show(Place(self.spec, self._current.title))
+        self._stepper.show(self.current.title, statuses)
         failures = [self.results.failure(step, self.spec) for step in STEPS]
         failure = next((sentence for sentence in failures if sentence), None)
         if running:
@@ -381,6 +382,8 @@ class Session:
         elif not self._side.busy:
             self._status.content = "**Up to date**"
             self._bar.value = 100.0
+            if self.views is not None:
+                self.views.settle()
         working = bool(running) or self._side.busy
         self._bar.color = BRAND if working else DELIVERED
 
@@ -389,6 +392,7 @@ class Session:
             return
         try:
             function(*arguments)
+            self.places.follow()
         except PacketMeshError as error:
             self.notify("That did not work", str(error))
         except Exception as error:

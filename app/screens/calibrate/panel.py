@@ -29,7 +29,7 @@ from app.screens.calibrate.uploads import UploadFolder
 from app.screens.calibrate.use import WRITING, UseRow
 from app.screens.calibrate.view import CalibrationView, CameraView, RigView, TrustView
 from app.state import BoardViews, Spec, Step
-from app.ui import Panel
+from app.ui import STOP, Panel
 from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_SCENES, board_views_of
 from pipeline.sources import Calibrated, Demo
@@ -58,7 +58,8 @@ class CalibratePanel(Panel):
         self._came: SceneView | None = None
         """The scene as it came."""
         gui.add_markdown(TEXT)
-        LessonFolder(ui, read_lesson(SHIPPED, SETTINGS, CalibrateLook()), self._take_look)
+        lesson = read_lesson(SHIPPED, SETTINGS, CalibrateLook())
+        self.in_address[STOP] = LessonFolder(ui, lesson, self._take_look)
         self._status = gui.add_markdown("")
         self._open = ui.buttons(
             "Open",
@@ -313,7 +314,7 @@ class CalibratePanel(Panel):
         """Write what is shown, and have the chain compute with it."""
         self._uses += 1
         self._use.say(WRITING)
-        folder = str(self.session.folder / f"calibration_{self._uses:02d}")
+        folder = str(self.session.new_folder() / f"calibration_{self._uses:02d}")
         self.session.quick_job("calibrate.use_job:use_job", folder, on_end=self._written)
 
     def _written(self, folder: str | None) -> None:

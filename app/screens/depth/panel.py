@@ -21,7 +21,7 @@ from app.screens.depth.residuals import residual_figure
 from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_model
 from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
 from app.state import Spec, Step
-from app.ui import Panel
+from app.ui import STOP, Panel, Picked
 
 TEXT = """**What you see.** Blue: points the sensor measured. Violet: points that are inferred: from the
 colour image, made metric where the sensor knows a depth too; in its holes from colours and measured depth
@@ -45,7 +45,7 @@ class DepthPanel(Panel):
         self._look: DepthLook | None = None
         self._source, self._key = session.spec.source, session.spec.key("depth")
         gui.add_markdown(TEXT)
-        self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, DepthLook()), self._take_look)
+        lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, DepthLook()), self._take_look)
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images and numbers are shown below.")
         self.ui.when_changed(self._node, self._picked_node)
         self._area = CompareArea(self.ui, PICTURES, "photo", "sensor")
@@ -55,6 +55,8 @@ class DepthPanel(Panel):
         )
         self.ui.when_changed(self._coloring, self._draw)
         self._numbers = gui.add_html("")
+        colors: dict[str, str] = {coloring: label for label, coloring in COLORINGS.items()}
+        self.in_address |= {STOP: lesson, "color": Picked(self._coloring, colors, self._draw)}
         self._build_folders()
 
     def _build_folders(self) -> None:

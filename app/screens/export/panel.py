@@ -12,6 +12,7 @@ from app.records import Shown
 from app.state import Spec
 from app.tables import command_html
 from app.ui import Panel
+from app.uploads import plain
 from packetmesh.errors import InputError
 
 TEXT = """**Take it along.** Files hold metres, Z up. The HTML file needs no server: it opens in any
@@ -62,7 +63,7 @@ class ExportPanel(Panel):
         self._surface.content = (
             f"Surface and page hold **{SURFACES[spec.shown]}**, as the Surface screen shows."
         )
-        self._command.content = command_html(spec.command())
+        self._command.content = command_html(plain(spec.command()))
 
     def _clicked(self, name: str, client: viser.ClientHandle | None) -> None:
         self.ui.post(self._export, name, client)

@@ -14,6 +14,8 @@ POISSON, ALPHA = "Poisson, a baseline", "alpha shape, a baseline"
 BASELINES: dict[str, BaselineName] = {POISSON: "poisson", ALPHA: "alpha"}
 SHOWN: dict[str, Shown] = {AFTER: "after", BEFORE: "before", BOTH: "after", **BASELINES}
 """Which surface is drawn, and so exported; of two side by side the one after fusion."""
+PLACES = {"after": AFTER, "before": BEFORE, "both": BOTH, "poisson": POISSON, "alpha": ALPHA}
+"""The same in the address."""
 COLORINGS: dict[str, Coloring] = {
     "photographs": "photo",
     "inferred in violet (on photographs)": "violet",
@@ -29,3 +31,8 @@ RULES: dict[str, RadiusRule] = {
     "one radius (slider)": "manual",
 }
 """Which balls roll."""
+HINTS = {
+    "Show": "Which surface is drawn: the ball's, or that of another method over the same points.",
+    "Radii": "r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the fused "
+    "cloud. Several balls roll one after the other, the small ones first.",
+}

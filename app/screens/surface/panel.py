@@ -13,10 +13,11 @@ from app.lesson import LessonFolder, read_lesson
 from app.records import SceneView
 from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.holes import HolesFolder
-from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, RULES, SHOWN, TEXT
+from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, HINTS, RULES, SHOWN, TEXT
 from app.screens.surface.legend import legend_html
 from app.screens.surface.lesson import SETTINGS, SHIPPED, SurfaceLook, surface_of
 from app.screens.surface.numbers import WAIT, note_html, quality_table, quick_line
+from app.screens.surface.place import picked
 from app.screens.surface.quick import QuickLook
 from app.screens.surface.rolling import RollingFolder
 from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
@@ -34,7 +35,7 @@ from app.screens.surface.view import (
 )
 from app.screens.surface.walk_view import WalkRequest, WalkView
 from app.state import Spec, Step
-from app.ui import Panel
+from app.ui import STOP, Panel
 from pipeline.types import FloatArray
 
 NAMES = {rule: name for name, rule in RULES.items()}
@@ -59,24 +60,15 @@ class SurfacePanel(Panel):
         self._thinning: tuple[int, int] | None = None
         self._key = session.spec.key("surface")
         gui.add_markdown(TEXT)
-        self._lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, SurfaceLook()), self._take_look)
+        lesson = LessonFolder(self.ui, read_lesson(SHIPPED, SETTINGS, SurfaceLook()), self._take_look)
         self._radius = gui.add_slider(
             "Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint="Radius of the ball; drag to roll another."
         )
         self.ui.when_changed(self._radius, self._dragged)
-        self._rule = gui.add_dropdown(
-            "Radii",
-            list(RULES),
-            initial_value=NAMES[session.spec.config.surface.radius_rule],
-            hint="r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the "
-            "fused cloud. Several balls roll one after the other, the small ones first.",
-        )
+        rule = NAMES[session.spec.config.surface.radius_rule]
+        self._rule = gui.add_dropdown("Radii", list(RULES), initial_value=rule, hint=HINTS["Radii"])
         self.ui.when_changed(self._rule, self._picked_rule)
-        self._shown = gui.add_dropdown(
-            "Show",
-            list(SHOWN),
-            hint="Which surface is drawn: the ball's, or that of another method over the same points.",
-        )
+        self._shown = gui.add_dropdown("Show", list(SHOWN), hint=HINTS["Show"])
         self._coloring = gui.add_dropdown(
             "Colours", list(COLORINGS), hint="What the colours of the surface mean."
         )
@@ -89,6 +81,8 @@ class SurfacePanel(Panel):
         self._table = gui.add_html("")
         self._histogram = gui.add_plotly(spacing_figure(None), aspect=0.62, config={"displayModeBar": False})
         self._build_folders()
+        self.in_address |= {STOP: lesson, "ball": self._rolling}
+        self.in_address |= picked(self._shown, self._picked_shown, self._coloring, self._picked_coloring)
         self._stage = SurfaceStage(self.scene)
         self.ui.when_clicked(self.drawn_below, self._clicked)
 
@@ -199,6 +193,9 @@ class SurfacePanel(Panel):
                 self._holes.parts(view.parts)
                 self._load_holes()
             self._show_look()
+            if BASELINES.get(self._shown.value) not in (None, *self._baselines):
+                self._picked_shown()  # as an address asks, before there is anything to make it of
+            self._rolling.resume()
 
     def _show_numbers(self) -> None:
         if self._view is not None:
