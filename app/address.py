@@ -154,6 +154,10 @@ class Address:
         if self._text and not self._timer.pending:
             self._timer.restart()
 
+    def close(self) -> None:
+        """Say nothing more: the browser is gone."""
+        self._timer.cancel()
+
     def _hear(self) -> None:
         text = self._field.value.partition(" ")[2]
         begins, self._text = not self._text, text or " "

@@ -40,7 +40,12 @@ class Places:
         address = Address(ui, session.uploads, self._start, titles, (*keys, CAMERA), self._go_to)
         self._addresses.append(address)
         address.show(self._now())
-        return lambda: self._addresses.remove(address)
+
+        def remove() -> None:
+            self._addresses.remove(address)
+            address.close()
+
+        return remove
 
     def follow(self) -> None:
         """Something may be different now."""
