@@ -17,17 +17,12 @@ ADDED = {
     "depth": {"stop": "2", "color": "confidence"},
     "fuse": {"stop": "2", "race": "seed=3", "t": "4"},
     "surface": {"surface": "before", "color": "normal", "cam": "0.500,2.000,2.500,2.600,2.600,0.800"},
-    "network": {"net": "preset=street-grid;vehicles=20", "t": "700.5"},
+    "network": {"net": "lose=10;burst=4", "t": "1.5"},
     "export": {"surface": "poisson"},
 }
 """By screen, what a link sets that is not as at the start."""
-SEEN = {
-    "calibrate": "(2 of ",
-    "depth": "(2 of ",
-    "fuse": re.compile(r"iteration 4 of \d"),
-    "network": re.compile(r"700.50* s of"),
-}
-"""What a person sees of it."""
+SEEN = {"calibrate": "(2 of ", "depth": "(2 of ", "fuse": "(2 of "}
+"""What a person sees of it before anything is computed."""
 FILES = {
     "color.png": "Colour image …",
     "depth.png": "Depth image …",
