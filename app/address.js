@@ -1,14 +1,14 @@
 // The address of the page: what stands in it is what the app shows, and the other way round. It is in the
 // query, beside what viser puts there, for viser cannot connect from an address with a # in it.
 window.packetmeshAddress ??= (() => {
-  const KEYS = ["scene", "preset", "set", "surface", "screen"];
   let name = null; // of the session's hidden field
+  let keys = []; // its own in the query
   let said = 0;
 
   function split() {
     const own = new URLSearchParams(), others = new URLSearchParams();
     for (const [key, value] of new URLSearchParams(location.search))
-      (KEYS.includes(key) ? own : others).append(key, value);
+      (keys.includes(key) ? own : others).append(key, value);
     return [own.toString(), others.toString()];
   }
 
@@ -22,8 +22,9 @@ window.packetmeshAddress ??= (() => {
 
   return {
     // A session has begun: by a new page, a reload, or after the server was away.
-    begin(session) {
+    begin(session, own) {
       name = session;
+      keys = own;
       say();
     },
 

@@ -92,6 +92,11 @@ class Dock:
         return self._playing
 
     @property
+    def rest_ns(self) -> int:
+        """Where the clock stands, or stood when it began to move."""
+        return self._anchor[1] if self._playing else self.now_ns
+
+    @property
     def shown_ns(self) -> int:
         """Simulated time from one picture to the next while it plays."""
         return round(self._speed * PICTURE_S * 1e9)

@@ -54,6 +54,8 @@ class _Seat:
     """Runs a script in its page."""
     tell: Callable[[str], None] = lambda _: None
     """Shows the teacher how many are there, in markdown."""
+    leave: Callable[[], None] = lambda: None
+    """Has the teacher's address no longer follow."""
 
 
 class Lecture:
@@ -70,14 +72,21 @@ class Lecture:
         self._hear = server._websock_server._handle_incoming_message
         setattr(server._websock_server, "_handle_incoming_message", self._heard)  # noqa: B010
 
-    def begin(self, post: Callable[..., None], frame: Callable[[], None]) -> None:
+    def begin(
+        self,
+        post: Callable[..., None],
+        frame: Callable[[], None],
+        add_address: Callable[[Ui], Callable[[], None]],
+    ) -> None:
         """Let browsers in.
 
         Args:
             post: runs a function on the session's thread.
             frame: turns the followers' views to what the screen shows.
+            add_address: has a browser's address follow what is shown, and be followed, until what it returns
+                is called.
         """
-        self._post, self._frame = post, frame
+        self._post, self._frame, self._add_address = post, frame, add_address
         self._server.on_client_connect(lambda client: post(self._join, client))
         self._server.on_client_disconnect(lambda client: post(self._leave, client.client_id))
 
@@ -108,6 +117,7 @@ class Lecture:
         self._seats[client.client_id] = seat
         if seat.teaches:
             self._add_desk(seat)
+            seat.leave = self._add_address(self._own_ui(client))
             client.camera.on_update(lambda _: self._moved(seat))
         else:
             self._add_chip(seat)
@@ -115,7 +125,9 @@ class Lecture:
         self._count()
 
     def _leave(self, number: int) -> None:
-        self._seats.pop(number, None)
+        seat = self._seats.pop(number, None)
+        if seat is not None:
+            seat.leave()
         self._count()
 
     def _leader(self) -> _Seat | None:
@@ -190,7 +202,7 @@ class Lecture:
     def _add_chip(self, seat: _Seat) -> None:
         """What is told somebody in the class."""
         client, name = seat.client, uuid.uuid4().hex
-        ui = Ui(client.gui, client.scene, self._post, client.atomic, client.flush)
+        ui = self._own_ui(client)
         begin = f"; window.packetmeshLecture.begin({json.dumps(name)})"
         with add_hidden(ui, name, _SCRIPT + begin):
             field = client.gui.add_text("Seat", "")
@@ -219,6 +231,10 @@ class Lecture:
         seat.say = say
         ui.when_changed(field, hear)
         self._show(seat)
+
+    def _own_ui(self, client: viser.ClientHandle) -> Ui:
+        """For what one browser has beside what all share."""
+        return Ui(client.gui, client.scene, self._post, client.atomic, client.flush)
 
     def _show(self, seat: _Seat) -> None:
         state = {

@@ -12,6 +12,7 @@ from typing import Generic
 from app.lesson_file import CHOICES, FIELD, SCENE, Lesson, Look, Numbers, Question
 from app.page import running
 from app.ui import Ui
+from packetmesh.errors import InputError
 
 OFF, BEGIN = "not now", "Choose a stop, or press **Next**."
 SKIP, SKIPPED = "Skip", -1
@@ -106,6 +107,22 @@ class LessonFolder(Generic[Look]):
 
     def _end(self) -> None:
         self._stop.value = OFF
+        self._picked()
+
+    def place(self) -> str:
+        """The number of the stop, for the address; empty without one."""
+        return "" if self._index() < 0 else str(self._index() + 1)
+
+    def take(self, place: str) -> None:
+        """Go to the stop of that number, or to none.
+
+        Raises:
+            InputError: there is no such stop.
+        """
+        numbers = ["", *(str(number) for number in range(1, len(self._names) + 1))]
+        if place not in numbers:
+            raise InputError(f"The address has stop {place[:9]}; this lesson has 1 to {len(self._names)}")
+        self._stop.value = (OFF, *self._names)[numbers.index(place)]
         self._picked()
 
     def _index(self) -> int:

@@ -102,7 +102,37 @@
     if (left.length > 0 && tries > 1) setTimeout(unfold, UNFOLD_MS, left, tries - 1);
   }
 
+  // When another screen is shown viser forgets which folders of the one before were open; the page remembers
+  // it as long as the tab is there.
+  const REMEMBERED = "packetmesh-folders";
+  const HEADS = "svg[class*=tabler-icon-chevron-]";
+  const folders = JSON.parse(sessionStorage.getItem(REMEMBERED) ?? "{}"); // by screen, title and count of it
+
+  function heads() {
+    const screen = document.querySelector("[data-packetmesh-screen]")?.dataset.packetmeshScreen;
+    const counts = {};
+    return [...document.querySelectorAll(HEADS)].map(arrow => {
+      const title = arrow.parentElement.textContent.trim();
+      counts[title] = (counts[title] ?? 0) + 1;
+      const open = arrow.classList.contains("tabler-icon-chevron-up");
+      return {head: arrow.parentElement, key: `${screen}/${title}/${counts[title]}`, open};
+    });
+  }
+
+  document.addEventListener("click", event => {
+    const clicked = heads().find(one => one.head.contains(event.target));
+    if (!clicked) return;
+    folders[clicked.key] = !clicked.open;
+    sessionStorage.setItem(REMEMBERED, JSON.stringify(folders));
+  }, true);
+
   window.packetmesh = {
+    // A screen is shown: its folders are as they were left.
+    shown() {
+      for (const {head, key, open} of heads())
+        if (folders[key] !== undefined && folders[key] !== open) head.click();
+    },
+
     // Open folders and tabs by their titles; those that are not there yet, when they come within a second or two.
     unfold,
 

@@ -25,6 +25,12 @@ def stale_html(numbers: bool, picture: bool) -> str:
     return "".join(f'<i class="{mark}"></i>' for mark, wanted in marks.items() if wanted)
 
 
+def screen_mark(title: str) -> str:
+    """HTML that begins a screen, by which the page knows that it is shown."""
+    mark = f'<span data-packetmesh-screen="{escape(title)}"></span>'
+    return mark + running("window.packetmesh?.shown()", title)
+
+
 def running(script: str, mark: object = "") -> str:
     """HTML that runs a script when it is shown. It cannot hold one, but what is to be done without its image.
 

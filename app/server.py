@@ -32,7 +32,8 @@ from app.screens.surface.panel import SurfacePanel
 from app.session import Session, Target
 from app.state import SharedViews, Spec
 from app.store import Store
-from app.uploads import limit_uploads
+from app.upload_gate import limit_uploads
+from app.uploads import Uploads
 from packetmesh.errors import InputError
 from packetmesh.files import file_trouble
 from packetmesh.memory import give_back_memory, share_arenas
@@ -132,17 +133,17 @@ def build_server(
         app.stop()
         raise InputError(_taken(port))
     _dress(server)
-    store, shared = Store(str(folder.path)), SharedViews()
+    store, uploads, shared = Store(str(folder.path)), Uploads(folder.path), SharedViews()
 
     def begin(target: Target, number: int, lecture: Lecture | None = None) -> Session:
-        app.sessions[number] = Session(target, pool, store, shared, spec, PANELS, lecture)
+        app.sessions[number] = Session(target, pool, store, uploads, shared, spec, PANELS, lecture)
         return app.sessions[number]
 
     if teacher is not None:
         limit_uploads(server._websock_server, lambda _: None)
         together = Lecture(server, teacher, app.class_link)
         session = begin(server, -1, together)
-        together.begin(session.post, lambda: session.frame_view(anew=True))
+        together.begin(session.post, lambda: session.frame_view(anew=True), session.places.add)
     else:
 
         def leave(client: viser.ClientHandle) -> None:

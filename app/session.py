@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
@@ -15,16 +13,18 @@ from typing import Any, TypeAlias
 import viser
 
 from app import jobs
-from app.address import Address, Place
 from app.drawing.cameras import look, stage_of
 from app.header import Header
 from app.lane import LatestWins, Track
 from app.lecture import Lecture
-from app.page import add_script
+from app.page import add_script, screen_mark
+from app.places import Places
 from app.pool import ComputePool, Outcome
 from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
 from app.store import Store
 from app.ui import Offers, Panel, Ui
+from app.uploads import Uploads, plain
+from app.views import Views
 from packetmesh.errors import PacketMeshError
 from packetmesh.files import file_trouble
 from packetmesh.progress import Progress
@@ -49,6 +49,7 @@ class Session:
         target: Target,
         pool: ComputePool,
         store: Store,
+        uploads: Uploads,
         shared: SharedViews,
         spec: Spec,
         panels: Sequence[type[Panel]],
@@ -57,25 +58,24 @@ class Session:
         self.target = target
         self.gui, self.scene = target.gui, target.scene
         self.ui = Ui(target.gui, target.scene, self.post, target.atomic, target.flush, lecture=lecture)
-        self.store = store
+        self.store, self.uploads = store, uploads
         self._shared = shared
-        self.spec = spec
-        self._start = spec
+        self.spec = self._start = spec
         self.results = Results()
-        self.folder = Path(tempfile.mkdtemp(prefix="upload-", dir=store.folder))
+        self.folder = self.new_folder()
         self._tracks = (
             Track(LatestWins(pool, self), CHAIN),
             Track(LatestWins(pool, object()), ("calibrate",)),
             Track(LatestWins(pool, object()), ("network",)),
         )
-        self._side = LatestWins(pool, self)
-        self._quick = LatestWins(pool, object(), urgent=True)
-        self._wide = False
+        self._side, self._quick = LatestWins(pool, self), LatestWins(pool, object(), urgent=True)
+        self._wide = self._closed = False
         self._shape = self._seen_shape = 0.0
-        self._closed = False
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="session")
-        self._panels = [panel(self) for panel in panels]
-        self._current = self._panels[0]
+        self.panels = [panel(self) for panel in panels]
+        self.current = self.panels[0]
+        self.views = Views(target) if isinstance(target, viser.ClientHandle) else None
+        self.places = Places(self)
         self._thread.submit(self._guarded, self._build_in_turn)
         if isinstance(target, viser.ClientHandle):
             target.camera.on_update(lambda _: self._look_at_window())
@@ -104,11 +104,11 @@ class Session:
         self._thread.shutdown(wait=False)
 
     def _end(self) -> None:
-        """Stop computing and delete what was uploaded; the browser is gone."""
+        """Stop computing and leave what was uploaded; the browser is gone."""
         for lane in self._lanes:
             lane.stop()
         self.ui.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        self.uploads.leave(self)
 
     @property
     def owners(self) -> list[object]:
@@ -129,9 +129,13 @@ class Session:
         """Tell the people who watch."""
         everybody = self.clients() if self.ui.lecture is None else self.ui.lecture.everybody()
         for client in everybody:
-            client.add_notification(title, sentence, color=color, auto_close_seconds=15.0)
+            client.add_notification(title, plain(sentence), color=color, auto_close_seconds=15.0)
 
     # What panels ask of it, on its thread.
+
+    def new_folder(self) -> Path:
+        """For an upload, or what is made of one."""
+        return self.uploads.new_folder(self)
 
     def edit(self, change: Callable[[PipelineConfig], PipelineConfig]) -> None:
         """Change the settings and recompute what depends on them."""
@@ -141,7 +145,8 @@ class Session:
         """Want something else; whatever is still right is kept."""
         if spec != self.spec:
             self.spec = spec
-            for panel in self._panels:
+            self.uploads.keep(spec.source, self)
+            for panel in self.panels:
                 panel.on_spec(spec)
         self.advance()
 
@@ -201,7 +206,7 @@ class Session:
 
     def offers(self) -> tuple[Offers, ...]:
         """What can be taken along of what all screens show."""
-        return tuple(offer for panel in self._panels for offer in panel.offers())
+        return tuple(offer for panel in self.panels for offer in panel.offers())
 
     def advance(self) -> None:
         """Compute the first step of each track that is out of date."""
@@ -234,7 +239,7 @@ class Session:
 
     def _waits(self, step: Step) -> bool:
         """Whether a step is not computed before somebody looks at it."""
-        waiting = (panel for panel in self._panels if panel.only_when_shown and panel is not self._current)
+        waiting = (panel for panel in self.panels if panel.only_when_shown and panel is not self.current)
         return any(panel.step == step for panel in waiting)
 
     def _ended(self, track: Track, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
@@ -245,7 +250,7 @@ class Session:
             self._shared.put(key, outcome.value)
             self._take(step, key, outcome.value)
         elif outcome.kind == "error" or latest:
-            sentence = CANCELLED if outcome.kind == "stopped" else outcome.value
+            sentence = CANCELLED if outcome.kind == "stopped" else plain(outcome.value)
             self.results.fail(step, key, sentence)
             if latest:
                 self._fail(step, sentence)
@@ -254,12 +259,12 @@ class Session:
     def _fail(self, step: Step, sentence: str) -> None:
         if sentence != CANCELLED:
             self.notify(f"{step.capitalize()} failed", sentence)
-        for panel in self._panels:
+        for panel in self.panels:
             panel.on_failure(step, sentence)
 
     def _take(self, step: Step, key: tuple[Any, ...], view: Any) -> None:
         self.results.put(step, key, view)
-        for panel in self._panels:
+        for panel in self.panels:
             panel.on_view(step, view)
 
     def _progressed(self, step: Step | None, value: Any, key: tuple[Any, ...] = ()) -> None:
@@ -268,7 +273,7 @@ class Session:
             return
         if step is not None:
             self.results.begin(step, key)
-        for panel in self._panels:
+        for panel in self.panels:
             if panel.step == step:
                 panel.on_partial(value)
         self.show_staleness()
@@ -280,7 +285,7 @@ class Session:
             self._build()
 
     def _build(self) -> None:
-        titles = [panel.title for panel in self._panels]
+        titles = [panel.title for panel in self.panels]
         add_script(self.gui)
         self._header = Header(
             self.gui,
@@ -288,39 +293,30 @@ class Session:
             lambda title: self.post(self.show, title),
             lambda action: self.post(self._act, action),
         )
-        self._address: Address | None = None
-        if isinstance(self.target, viser.ClientHandle):  # one that many share is nobody's to move
-            self._address = Address(self.ui, Place(self._start, titles[0]), tuple(titles), self._go_to)
         self._folders: dict[str, viser.GuiFolderHandle] = {}
-        for panel in self._panels:
+        for panel in self.panels:
             self.scene.add_frame(panel.drawn_below, show_axes=False, visible=False)
-            self._folders[panel.title] = self.gui.add_folder(None, visible=panel is self._current)
+            self._folders[panel.title] = self.gui.add_folder(None, visible=panel is self.current)
             with self._folders[panel.title]:
+                self.gui.add_html(screen_mark(panel.title))
                 panel.build()
-        self.show(self._current.title)
-
-    def _go_to(self, place: Place) -> None:
-        """Show what an address asks for; what it does not name of the spec stays."""
-        spec = place.spec
-        self.want(
-            replace(self.spec, source=spec.source, preset=spec.preset, config=spec.config, shown=spec.shown)
-        )
-        if place.screen != self._current.title:
-            self.show(place.screen)
+        self.show(self.current.title)
+        if self.views is not None:  # what many share is its teachers' to move
+            self.places.add(self.ui)
 
     def show(self, title: str) -> None:
         """Make a step the current one."""
-        self._current.on_hide()
-        self._current = next(panel for panel in self._panels if panel.title == title)
+        self.current.on_hide()
+        self.current = next(panel for panel in self.panels if panel.title == title)
         with self.target.atomic():
-            for panel in self._panels:
-                self._folders[panel.title].visible = panel is self._current
-            for name in {panel.drawn_below for panel in self._panels}:
+            for panel in self.panels:
+                self._folders[panel.title].visible = panel is self.current
+            for name in {panel.drawn_below for panel in self.panels}:
                 frame = self.scene.get_handle_by_name(name)
                 if frame is not None:
-                    frame.visible = name == self._current.drawn_below
-        self._current.on_show()
-        self.frame_view()
+                    frame.visible = name == self.current.drawn_below
+        self.current.on_show()
+        self.frame_view(keep=True)
         self._pause_unseen()
         self.advance()
 
@@ -331,18 +327,26 @@ class Session:
                 track.running = track.submitted = None
                 track.lane.stop()
 
-    def frame_view(self, anew: bool = False) -> None:
-        """Turn the view to the scene: a new one, two instead of one, or another shape of the window."""
-        if self._current.look():
+    def frame_view(self, anew: bool = False, keep: bool = False) -> None:
+        """Turn the view to what is shown; ``keep`` leaves it where a person has turned it."""
+        if self.views is None:
+            self._turn_view(anew)
+        else:
+            self.views.frame(lambda: self._turn_view(anew), keep)
+
+    def _turn_view(self, anew: bool) -> str:
+        """Turn it, and name what is looked at."""
+        if self.current.look():
             self._shape = 0.0
-            return
-        below = self._current.drawn_below
-        wide = any(panel.wide for panel in self._panels if panel.drawn_below == below)
+            return self.current.drawn_below
+        below = self.current.drawn_below
+        wide = any(panel.wide for panel in self.panels if panel.drawn_below == below)
         scene = self.results.view("scene")
         shape = self._window()
         if scene is not None and (anew or wide != self._wide or shape != self._shape):
             look(self.clients(), stage_of(scene.nodes), wide)
             self._wide, self._shape = wide, shape
+        return "both" if wide else "scene"
 
     def _window(self) -> float:
         """Width over height of the picture, roughly; that of a shared session is nobody's own."""
@@ -354,10 +358,10 @@ class Session:
         """Fit the view anew when the picture has another shape, as when the dock comes or goes."""
         if self._window() != self._seen_shape:
             self._seen_shape = self._window()
-            self.post(self.frame_view)
+            self.post(self.frame_view, False, True)
 
     def _act(self, action: str) -> None:
-        for panel in self._panels:
+        for panel in self.panels:
             panel.on_action(action)
         if action == "Cancel":
             for lane in self._lanes:
@@ -370,12 +374,12 @@ class Session:
                 reset()
             self.want(self._start)
         else:
-            self.ui.show_command(self._current.command)
+            self.ui.show_command(self.current.command)
 
     def show_staleness(self) -> None:
         """Dim what belongs to other settings than those that are wanted."""
-        ahead = self._current.ahead
-        old = self.results.shows_other(self._current.step or CHAIN[-1], self.spec)
+        ahead = self.current.ahead
+        old = self.results.shows_other(self.current.step or CHAIN[-1], self.spec)
         self._header.dim(numbers=old or ahead, picture=old and not ahead)
 
     def _show_status(self) -> None:
@@ -384,14 +388,14 @@ class Session:
         running = [track.running for track in self._tracks if track.running is not None]
         statuses = {
             panel.title: self.results.status(panel.step, self.spec, running)
-            for panel in self._panels
+            for panel in self.panels
             if panel.step is not None
         }
         failures = [self.results.failure(step, self.spec) for step in STEPS]
         failure = next((sentence for sentence in failures if sentence), None)
-        self._header.show(self._current.title, statuses, running, failure, self._side.busy)
-        if self._address is not None:
-            self._address.show(Place(self.spec, self._current.title))
+        self._header.show(self.current.title, statuses, running, failure, self._side.busy)
+        if self.views is not None and not (running or failure or self._side.busy):
+            self.views.settle()
 
     def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
         if self._closed:
@@ -399,6 +403,7 @@ class Session:
         try:
             with self.target.atomic():
                 function(*arguments)
+                self.places.follow()
         except PacketMeshError as error:
             self.notify("That did not work", str(error))
         except OSError as error:

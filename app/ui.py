@@ -6,8 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 import viser
@@ -15,14 +14,16 @@ import viser
 from app.debounce import Debounce
 from app.state import Spec, Step
 from app.tables import command_html
+from app.uploads import plain
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path
 from pipeline.types import FloatArray
 
 if TYPE_CHECKING:
     from app.lecture import Lecture
     from app.session import Session
 
+STOP = "stop"
+"""What the keys of lessons in the address begin with: Back goes from stop to stop."""
 Input = TypeVar("Input", bound="viser.GuiInputHandle[Any]")
 
 
@@ -67,7 +68,7 @@ class Ui:
         """Show a command in a window of its own."""
         with self.gui.add_modal("The same from the command line") as modal:
             self.gui.add_markdown("This computes and writes what the app shows now:")
-            self.gui.add_html(command_html(command))
+            self.gui.add_html(command_html(plain(command)))
             self.gui.add_button("Close").on_click(lambda _: modal.close())
 
     def when_clicked(self, below: str, action: Callable[[FloatArray, FloatArray], object]) -> None:
@@ -96,22 +97,61 @@ class Ui:
             close()
 
 
-def keep_upload(file: viser.UploadedFile, folder: Path, kind: str, limit_bytes: int, instead: str) -> Path:
-    """The file where an upload is kept, under a name of our own.
+class InAddress(Protocol):
+    """What the address says of a part of a screen."""
 
-    Raises:
-        InputError: it is larger than the limit; ``instead`` says what to do then.
-    """
-    if len(file.content) > limit_bytes:
-        raise InputError(
-            f"{file.name} has {len(file.content) >> 20} MB; the app takes up to {limit_bytes >> 20} MB, so "
-            f"{instead}."
-        )
-    suffix = Path(file.name).suffix.lower()[:8]
-    path = folder / f"{kind}_{len(list(folder.iterdir())):03d}{suffix}"
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(file.content)
-    return path
+    def place(self) -> str:
+        """Its state; empty where it is as at the start."""
+        ...
+
+    def take(self, place: str) -> None:
+        """Go to such a state, at once or when what it is about has come.
+
+        Raises:
+            InputError: there is none like it.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A part whose two ways are elsewhere."""
+
+    say: Callable[[], str]
+    hear: Callable[[str], object]
+
+    def place(self) -> str:
+        """Its state."""
+        return self.say()
+
+    def take(self, place: str) -> None:
+        """Go to such a state."""
+        self.hear(place)
+
+
+@dataclass(frozen=True, slots=True)
+class Picked:
+    """A list, of which the address says what was picked."""
+
+    handle: viser.GuiDropdownHandle[str]
+    names: Mapping[str, str]
+    """What the address says, and what the list says; the first is the one of the start."""
+    action: Callable[[], object]
+    """Answers a change."""
+
+    def place(self) -> str:
+        """The name of what is picked."""
+        names = list(self.names)[1:]
+        return next((name for name in names if self.names[name] == self.handle.value), "")
+
+    def take(self, place: str) -> None:
+        """Pick it."""
+        name = place or next(iter(self.names))
+        if name not in self.names or self.names[name] not in self.handle.options:
+            raise InputError(f"The address has {name[:40]}; try one of {', '.join(self.names)}")
+        if self.handle.value != self.names[name]:
+            self.handle.value = self.names[name]
+            self.action()
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +197,8 @@ class Panel(ABC):
     def __init__(self, session: Session) -> None:
         self.session, self.ui = session, session.ui
         self.gui, self.scene = session.ui.gui, session.ui.scene
+        self.in_address: dict[str, InAddress] = {}
+        """By key, what the address says while what the screen draws is shown; lessons under ``STOP``."""
 
     @abstractmethod
     def build(self) -> None:

@@ -204,6 +204,11 @@ class Bench:
     def gui(self):
         return self.ui.gui
 
+    def new_folder(self):
+        folder = self.folder / f"upload{len(list(self.folder.iterdir()))}"
+        folder.mkdir()
+        return folder
+
     def drawn(self, name):
         """What is drawn by this name, or None."""
         return self.ui.scene.get_handle_by_name(name)

@@ -172,7 +172,8 @@ def test_an_upload_is_kept_in_the_folder_listed_and_tried(model, tmp_path):
     model.upload("../mine.onnx", b"2")
     paths = [Path(choice.model) for choice in model.asked]
     assert [path.read_bytes() for path in paths] == [b"1", b"2"]
-    assert {path.parent for path in paths} == {tmp_path}
+    assert [path.name for path in paths] == ["mine.onnx", "mine.onnx"]
+    assert {path.parent.parent for path in paths} == {tmp_path}
     assert model.gui.find("Network file").options == (SHIPPED, "mine.onnx", "mine.onnx′")
     model.gui.set("Network file", SHIPPED)
     assert model.asked[-1] == ModelChoice()

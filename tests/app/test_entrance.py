@@ -16,7 +16,7 @@ from app.entrance import Entrance, Token, is_loopback
 from app.headers import strict_headers
 from app.load.connection import Connection, wait_for
 from app.origin import only_own_page
-from app.uploads import MOST_A_MINUTE, MOST_BYTES, MOST_TOTAL_BYTES, REFUSED, UploadGate, limit_uploads
+from app.upload_gate import MOST_A_MINUTE, MOST_BYTES, MOST_TOTAL_BYTES, REFUSED, UploadGate, limit_uploads
 from packetmesh.errors import InputError
 
 ENTRANCE = Entrance(Token("token"), Token("teacher"))

@@ -111,7 +111,16 @@ def test_a_student_cannot_change_a_setting_and_gets_its_value_back(lecture, teac
     wait_for(lambda: lecture.sessions[-1].spec.preset == "thesis")
     teacher.set("Preset", "packetmesh")
     wait_for(lambda: lecture.sessions[-1].spec == before)
-    assert lecture.sessions[-1]._current.title == "Scene"
+    assert lecture.sessions[-1].current.title == "Scene"
+
+
+def test_the_teachers_address_leads_the_class_and_a_student_has_none(lecture, teacher, student):
+    teacher.set("Address", "1 scene=box-on-table&preset=thesis&screen=export")
+    wait_for(lambda: lecture.sessions[-1].current.title == "Export")
+    assert lecture.sessions[-1].spec.preset == "thesis"
+    teacher.set("Address", "2 preset=packetmesh&screen=scene")
+    wait_for(lambda: lecture.sessions[-1].current.title == "Scene")
+    assert "Address" not in student.uuids
 
 
 def test_the_class_steers_once_the_teacher_lets_it(lecture, teacher, student):

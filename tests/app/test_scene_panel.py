@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -40,7 +41,7 @@ def test_a_recording_in_a_zip_becomes_a_rig(session, tmp_path, write):
     session.gui.upload("Recording …", "my desk.zip", zipped(tmp_path / "desk"))
     nodes = session.results.view("scene").nodes
     assert len(nodes) == 3
-    assert session.gui.find("Scene").value.startswith("my-desk-")
+    assert session.gui.find("Scene").value == "my-desk"
     assert session.gui.find("Node").options == ("node_00", "node_01", "node_02")
     assert "3 of 5 frames became nodes" in session.gui.text(FOLDER)
     assert "units in a metre" in session.gui.text(FOLDER)
@@ -53,8 +54,10 @@ def test_a_rig_in_a_zip_is_taken_as_it_is_and_may_come_twice(session, tmp_path):
     for _ in range(2):
         session.gui.upload("Recording …", "rig.zip", zipped(tmp_path / "rig"))
         assert len(session.results.view("scene").nodes) == 2
-    assert len(list(session.folder.glob("rig-*"))) == 2
-    assert sorted(path.suffix for path in session.folder.iterdir()) == ["", "", ".zip", ".zip"]
+    for upload in ("upload0", "upload1"):
+        below = session.folder / upload
+        there = sorted(str(path.relative_to(below)) for path in below.glob("*/*"))
+        assert there == ["own/rig.zip", "rig/node_00", "rig/node_01"]
 
 
 def test_a_scale_and_a_number_of_frames_hold_for_a_recording_and_a_rig(session, tmp_path):
@@ -105,6 +108,25 @@ def test_a_pair_may_be_metres_in_floating_point_with_a_bare_matrix(session, tmp_
     session.gui.press("Reconstruct this pair")
     assert "no room is like that: try --depth-scale 1" in session.gui.text()
 
+    assert session.gui.find("Scene").value == "color.ppm"
+
+
+def test_images_of_one_name_are_both_kept_by_it(session):
+    (frame,) = orbit(1).frames
+    depth_mm = np.nan_to_num(1000.0 * frame.depth.z_m).astype(np.uint16)
+    color, depth = (cv2.imencode(".png", image)[1].tobytes() for image in (frame.rgb, depth_mm))
+    for label, name, content in (
+        ("Colour image …", "rgb/0001.PNG", color),
+        ("Depth image …", r"C:\depth\0001.png", depth),
+        ("Intrinsics …", "k.txt", b"30 0 19.5\n0 30.5 14.5\n0 0 1\n"),
+    ):
+        session.gui.upload(label, name, content)
+    session.gui.press("Reconstruct this pair")
+    source = session.spec.source
+    (upload,) = (path for path in session.folder.iterdir() if path.name.startswith("upload"))
+    paths = [Path(one).relative_to(upload) for one in (source.color, source.depth, source.intrinsics)]
+    assert [str(path) for path in paths] == ["own/0001.png", "own/depth/0001.png", "own/k.txt"]
+
 
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
@@ -125,7 +147,7 @@ def test_what_is_no_recording_gets_a_sentence_and_the_scene_stays(session, name,
     assert sentence in session.notices.pop()
     assert isinstance(session.spec.source, Demo)
     assert "Nothing could be used" in session.gui.text(FOLDER)
-    assert [path.name for path in session.folder.iterdir()] == [f"recording_000{name[1:]}"]
+    assert [path.name for path in session.folder.glob("upload0/**/*")] == ["own", name]
     assert not (session.folder.parent / "outside.txt").exists()
 
 
@@ -137,4 +159,4 @@ def test_too_much_is_refused_before_it_is_unpacked_or_kept(session, tmp_path, mo
     monkeypatch.setattr(own, "RECORDING_LIMIT_BYTES", 100)
     with pytest.raises(InputError, match="takes up to 0 MB"):
         session.gui.upload("Recording …", "rig.zip", zipped(tmp_path / "rig"))
-    assert len(list(session.folder.iterdir())) == 1
+    assert len(list(session.folder.glob("**/*.zip"))) == 1

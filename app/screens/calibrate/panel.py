@@ -30,7 +30,7 @@ from app.screens.calibrate.uploads import UploadFolder
 from app.screens.calibrate.use import WRITING, UseRow
 from app.screens.calibrate.view import CalibrationView, CameraView, RigView, TrustView
 from app.state import BoardViews, Spec, Step
-from app.ui import Panel
+from app.ui import STOP, Panel
 from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_SCENES, board_views_of
 from pipeline.sources import Calibrated, Demo
@@ -61,6 +61,7 @@ class CalibratePanel(Panel):
         gui.add_markdown(TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, CalibrateLook(), NUMBERS)
         self._lesson = LessonFolder(ui, lesson, self._take_look, self._lesson_numbers)
+        self.in_address[STOP] = self._lesson
         self._status = gui.add_markdown("")
         self._open = ui.buttons(
             "Open",
@@ -315,7 +316,7 @@ class CalibratePanel(Panel):
         """Write what is shown, and have the chain compute with it."""
         self._uses += 1
         self._use.say(WRITING)
-        folder = str(self.session.folder / f"calibration_{self._uses:02d}")
+        folder = str(self.session.new_folder() / f"calibration_{self._uses:02d}")
         self.session.quick_job("calibrate.use_job:use_job", folder, on_end=self._written)
 
     def _written(self, folder: str | None) -> None:

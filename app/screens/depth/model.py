@@ -10,7 +10,8 @@ import viser
 from app.screens.depth.labels import AS_IT_SAYS, NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
 from app.screens.depth.view import ModelChoice, ModelView
 from app.tables import number, table
-from app.ui import Ui, keep_upload
+from app.ui import Ui
+from app.uploads import OWN, keep_upload
 from pipeline.config import DepthConfig, ModelKind
 
 SHIPPED = "the network that ships"
@@ -124,7 +125,7 @@ class ModelFolder:
 
     def _keep(self, file: viser.UploadedFile) -> None:
         instead = "name larger networks with depth.model on the command line"
-        path = keep_upload(file, self._folder, "network", LIMIT_BYTES, instead)
+        path = keep_upload(file, self._folder / f"{OWN}{len(self._models)}", LIMIT_BYTES, instead)
         self._model.value = self._add(Path(file.name).name, str(path))
         self._picked()
 

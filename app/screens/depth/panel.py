@@ -24,7 +24,7 @@ from app.screens.depth.residuals import residual_figure
 from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_model
 from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
 from app.state import Spec, Step
-from app.ui import Panel
+from app.ui import STOP, Panel, Picked
 
 TEXT = """**What you see.** Blue: points the sensor measured. Violet: points that are inferred: from the
 colour image, made metric where the sensor knows a depth too; in its holes from colours and measured depth
@@ -62,6 +62,8 @@ class DepthPanel(Panel):
         )
         self.ui.when_changed(self._coloring, self._draw)
         self._numbers = gui.add_html("")
+        colors: dict[str, str] = {coloring: label for label, coloring in COLORINGS.items()}
+        self.in_address |= {STOP: self._lesson, "color": Picked(self._coloring, colors, self._draw)}
         self._build_folders()
 
     def _build_folders(self) -> None:

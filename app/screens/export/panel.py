@@ -11,6 +11,7 @@ from app.records import Shown
 from app.state import Spec, Step
 from app.tables import command_html
 from app.ui import Offer, Offers, Panel
+from app.uploads import plain
 from packetmesh.errors import InputError
 from pipeline.types import ByteArray
 
@@ -83,7 +84,7 @@ class ExportPanel(Panel):
                 "Surface",
                 "The surface that the Surface screen shows, with colours.",
                 surfaces,
-                spec.command(),
+                plain(spec.command()),
                 f"`{FILES[spec.shown]}` in its folder is {SURFACES[spec.shown]}.",
             ),
             Offers("Clouds", "Points of all nodes in the world frame, as the ball meets them; PLY.", clouds),
@@ -108,7 +109,7 @@ class ExportPanel(Panel):
                 if offers.note:
                     text.content = f"{kind}: {offers.note}"
                 if offers.command:
-                    command.content = command_html(offers.command)
+                    command.content = command_html(plain(offers.command))
 
     def _clicked(self, kind: str, label: str, client: viser.ClientHandle | None) -> None:
         """Runs on the server's own thread, because a picture waits for the browser to draw."""

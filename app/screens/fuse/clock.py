@@ -56,6 +56,6 @@ class RaceClock:
         """Times on an axis."""
         return t_ns / (NS_PER_MS if self.in_ms else COUNT_NS)
 
-    def at(self, place: int | None) -> int:
+    def at(self, place: float | None) -> int:
         """The time of an iteration or millisecond; None is the end."""
-        return self.end_ns if place is None else place * (NS_PER_MS if self.in_ms else COUNT_NS)
+        return self.end_ns if place is None else round(place * (NS_PER_MS if self.in_ms else COUNT_NS))

@@ -25,6 +25,7 @@ STARTS: dict[str, tuple[float, float]] = {
     "far off (20°, 40 cm)": (20.0, 40.0),
 }
 """Start errors to choose from: degrees, centimetres."""
+SLIGHTLY = list(STARTS)[1]
 BY_HAND = "by hand"
 RIVALS: dict[str, Rival] = {
     f"{method.upper()}, {metric}": (method, metric)
@@ -39,6 +40,15 @@ COMPARISONS: dict[str, tuple[Rival, ...]] = {
 }
 """Races that tell apart what the weights do, what the metric does, and both."""
 NOBODY = "none"
+DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
+    "noise_m": ("Noise (cm)", 10.0, 0.5, 100.0, "More noise along the view rays: its standard deviation."),
+    "outlier_share": ("Outliers (%)", 60.0, 5.0, 100.0, "Points thrown anywhere into the cloud's box."),
+    "hole_share": ("Holes (%)", 80.0, 5.0, 100.0, "Points removed in round patches of the view."),
+    "crop_share": ("Cut off (%)", 80.0, 5.0, 100.0, "Points removed at one side, so that less overlaps."),
+    "depth_bias": ("Bias (%)", 15.0, 0.5, 100.0, "Smooth relative error of the depth: its RMS."),
+}
+"""By field of ``Race``: label, most, step, units shown in one unit of the field, hint."""
 MOST_LANES = 4
+MOST_SEED = 20
 MARKS = "①②③④"
 """Of the lanes."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any, ClassVar, TypeAlias, get_args
@@ -15,7 +16,7 @@ from app.drawing.cameras import Stage, stage_of
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.poses import move, place
 from app.lesson import LessonFolder
-from app.lesson_file import Numbers, read_lesson
+from app.lesson_file import NUMBER, Numbers, read_lesson
 from app.records import DepthView
 from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
@@ -25,11 +26,13 @@ from app.screens.fuse.export import race_offers
 from app.screens.fuse.labels import MARKS, MODES
 from app.screens.fuse.lesson import NUMBERS, SETTINGS, SHIPPED, RaceLook, numbers
 from app.screens.fuse.numbers import places_table, race_table, verdict
-from app.screens.fuse.player import RacePlayer
+from app.screens.fuse.place import race_of, race_text
+from app.screens.fuse.player import END, RacePlayer
 from app.screens.fuse.setup import RaceSetup
 from app.screens.fuse.view import CaptureView, FuseView, Race, RaceView, Start
 from app.state import Spec, Step
-from app.ui import Offers, Panel
+from app.ui import STOP, Offers, Panel, Picked, Said
+from packetmesh.errors import InputError
 from pipeline.config import Method
 
 TEXT = """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
@@ -37,10 +40,12 @@ are how far off every point is. **Play** below (space), then compare what made t
 difference."""
 SINGLE = """This scene has a single node: no other node to find its place beside. What races here is its
 inferred cloud, onto what its sensor measured."""
+MS = "ms"
 RUNNING = "Who comes nearer? At the end of the race its numbers are here."
 RACES = {f"race: {name}": mode for name, mode in MODES.items()}
 RACE_NAMES = {mode: name for name, mode in RACES.items()}
 RESULT, BEFORE = "result", "before registration"
+SHOWN = {"race": next(iter(RACES)), "result": RESULT, "before": BEFORE}
 ADVANCED = (
     Choice(
         "Chain: method",
@@ -77,7 +82,8 @@ class FusePanel(Panel):
         self._drawing: RaceDrawing | None = None
         self._drawn: Start = Start()
         self._gizmo: Any = None
-        self._seek_at: int | None = 0
+        self._seek_at: float | None = 0.0
+        """Where the next race is to stand when it comes; None is its end."""
         self._framed: tuple[tuple[int, float, int], ...] = ()
         self._fov_rad: float | None = None
         self._here = False
@@ -100,6 +106,9 @@ class FusePanel(Panel):
         self._charts = RaceCharts(self.ui)
         self._build_folders()
         self._rows = gui.add_html("")
+        shown = Picked(self._shown, SHOWN, self._picked_shown)
+        self.in_address |= {STOP: self._lesson, "race": Said(self._race_text, self._take_race_text)}
+        self.in_address |= {"show": shown, "t": Said(self._moment, self._take_moment)}
 
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session
@@ -221,6 +230,36 @@ class FusePanel(Panel):
             return {}
         return numbers(scene.title, self._setup.race, self._view)
 
+    # What the address says.
+
+    def _race_text(self) -> str:
+        return race_text(self._setup.race)
+
+    def _take_race_text(self, text: str) -> None:
+        race = race_of(text)
+        with self.ui.atomic():
+            if self._shown.value in RACES and RACE_NAMES[race.mode] in self._shown.options:
+                self._shown.value = RACE_NAMES[race.mode]
+            self._setup.choose(race)
+        self._start()
+
+    def _moment(self) -> str:
+        """Iteration or millisecond, unless it is the start."""
+        if self._seek_at != 0.0:
+            at = END if self._seek_at is None else f"{self._seek_at:.6g}"
+        else:
+            at = self._player.rest if self._racing else ""
+        return "" if at in ("", "0") else f"{at}{MS if self._player.in_ms else ''}"
+
+    def _take_moment(self, text: str) -> None:
+        number = text.removesuffix(MS)
+        if re.fullmatch(rf"{NUMBER}|{END}|", number) is None:
+            raise InputError(f"The address has t={text[:20]}; try an iteration, such as 12ms or {END}")
+        self._player.choose(text.endswith(MS))
+        self._seek_at = None if number == END else float(number or 0.0)
+        if not self._start() and self._view is not None:
+            self._take_race(self._view)
+
     # The race.
 
     def _start(self) -> bool:
@@ -269,7 +308,7 @@ class FusePanel(Panel):
             self._verdict.content, self._table.content = RUNNING, ""
             self._player.load(view.lanes, view.reference)
             self._player.seek_at(self._seek_at)
-            self._seek_at = 0
+            self._seek_at = 0.0
             self._arrange()
             self._lesson.refresh()
 

@@ -17,6 +17,7 @@ from app.ui import Ui
 RUN_S = 12.0
 """How long a race takes on the screen, about."""
 LANE_PX = 96
+END = "end"
 
 
 class RacePlayer:
@@ -46,12 +47,27 @@ class RacePlayer:
         """Where it is."""
         return self._dock.now_ns
 
+    @property
+    def in_ms(self) -> bool:
+        """Whether it counts milliseconds."""
+        return CLOCKS[self._axis.value]
+
+    @property
+    def rest(self) -> str:
+        """The iteration or millisecond at which it stands, or stood before it played; ``end`` for the end."""
+        if self.clock is None:
+            return ""
+        rest_ns = self._dock.rest_ns
+        if rest_ns >= self.clock.end_ns:
+            return END
+        return f"{float(self.clock.shown(np.array(rest_ns))):.6g}"
+
     def load(self, lanes: Sequence[RaceLane], reference: Reference) -> None:
         """Take another race, at its start; none without lanes."""
         self._lanes, self._reference = lanes, reference
         if not lanes:
             return
-        clock = self.clock = RaceClock.of(lanes, CLOCKS[self._axis.value])
+        clock = self.clock = RaceClock.of(lanes, self.in_ms)
         self._on_clock()
         counts = "" if clock.in_ms else "iteration"
         self._dock.load(
@@ -62,7 +78,7 @@ class RacePlayer:
         """Count milliseconds or iterations from the next race on."""
         self._axis.value = next(name for name, value in CLOCKS.items() if value == in_ms)
 
-    def seek_at(self, place: int | None) -> None:
+    def seek_at(self, place: float | None) -> None:
         """Go to an iteration or millisecond; None is the end."""
         if self.clock is not None:
             self._dock.seek(self.clock.at(place))

@@ -11,27 +11,21 @@ import viser
 from app.screens.fuse.labels import (
     BY_HAND,
     COMPARISONS,
+    DEGRADATIONS,
     DIRECTIONS,
     MOST_LANES,
+    MOST_SEED,
     NOBODY,
     RIVAL_NAMES,
     RIVALS,
+    SLIGHTLY,
     STARTS,
 )
+from app.screens.fuse.place import FIRST
 from app.screens.fuse.view import Race, RaceMode, Rival, Start
 from app.ui import Ui
 
-SLIGHTLY = list(STARTS)[1]
-SLIGHT = Start.towards(*STARTS[SLIGHTLY], seed=0)
 METHOD_HINT = "Method and what it minimises: distance to the paired point, or to the plane at it."
-DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
-    "noise_m": ("Noise (cm)", 10.0, 0.5, 100.0, "More noise along the view rays: its standard deviation."),
-    "outlier_share": ("Outliers (%)", 60.0, 5.0, 100.0, "Points thrown anywhere into the cloud's box."),
-    "hole_share": ("Holes (%)", 80.0, 5.0, 100.0, "Points removed in round patches of the view."),
-    "crop_share": ("Cut off (%)", 80.0, 5.0, 100.0, "Points removed at one side, so that less overlaps."),
-    "depth_bias": ("Bias (%)", 15.0, 0.5, 100.0, "Smooth relative error of the depth: its RMS."),
-}
-"""By field of ``Race``: label, most, step, units shown in one unit of the field, hint."""
 
 
 class RaceSetup:
@@ -40,7 +34,9 @@ class RaceSetup:
     def __init__(self, ui: Ui, on_change: Callable[[], object]) -> None:
         """Set up without controls, which the panel adds where it wants them."""
         self._ui, self._on_change = ui, on_change
-        self._race = Race(start=SLIGHT)
+        self._race = FIRST
+        self._asked = False
+        """Whether the nodes are those that an address has asked for, which may still have to come."""
         self._slots: list[viser.GuiDropdownHandle[str]] = []
 
     def add_comparisons(self) -> None:
@@ -106,7 +102,12 @@ class RaceSetup:
         for handle in (self._turn, self._shift):
             self._ui.when_changed(handle, self._picked_numbers)
         self._seed = gui.add_slider(
-            "Seed", 0, 20, 1, 0, hint="Draws the directions of the start error and what is done to the cloud."
+            "Seed",
+            0,
+            MOST_SEED,
+            1,
+            0,
+            hint="Draws the directions of the start error and what is done to the cloud.",
         )
         self._ui.when_changed(self._seed, self._picked_preset)
 
@@ -128,7 +129,7 @@ class RaceSetup:
         """Go back to the race of the start."""
         names = self._source.options
         self._source.value, self._target.value = names[min(1, len(names) - 1)], names[0]
-        self.write(Race(mode=mode, start=SLIGHT))
+        self.write(Race(mode=mode, start=FIRST.start))
         self._race = self._read(self._race)
 
     def choose_nodes(self, names: Sequence[str]) -> None:
@@ -136,7 +137,22 @@ class RaceSetup:
         if tuple(names) != tuple(self._source.options):
             self._source.options = self._target.options = tuple(names)
             self._source.value, self._target.value = names[min(1, len(names) - 1)], names[0]
+            if self._asked:
+                self._show_nodes()
+        self._asked = False
         self._race = self._read(self._race)
+
+    def choose(self, race: Race) -> None:
+        """Show another race, and between its own nodes, now or when the scene's nodes are known."""
+        self.write(race)
+        self._race, self._asked = race, True
+        self._show_nodes()
+
+    def _show_nodes(self) -> None:
+        names = self._source.options
+        for handle, index in ((self._source, self._race.source), (self._target, self._race.target)):
+            if index < len(names):
+                handle.value = names[index]
 
     def choose_mode(self, mode: RaceMode) -> None:
         """Race nodes, or one node's inferred cloud."""

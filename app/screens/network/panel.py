@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import time
-from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar
-
-import numpy as np
 
 from app.dock import Dock
 from app.drawing.cameras import turn
 from app.drawing.clouds import clear
-from app.drawing.colors import css
 from app.lesson import LessonFolder
 from app.lesson_file import Numbers, read_lesson
 from app.screens.network.delivery_draw import DeliveryDrawing
@@ -35,11 +33,13 @@ from app.screens.network.lesson import (
 )
 from app.screens.network.numbers import metric_tables, runs_summary, verdict
 from app.screens.network.packets import Frames
+from app.screens.network.packets_told import legend_html, told
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import NetworkView
 from app.state import Spec, Step
 from app.timeline import Lane
-from app.ui import Offers, Panel
+from app.ui import STOP, Offers, Panel, Said
+from packetmesh.errors import InputError
 
 TEXT = """The cameras of the room send their pictures and depth by radio, packet by packet; some are lost.
 **Play** below, and watch the mesh grow from what has arrived."""
@@ -47,6 +47,8 @@ STREET_TEXT = """Vehicles with cameras drive on a grid of streets and offer imag
 **Play** below: every moving point is a frame on the air, a red one was lost there."""
 ORIGIN = """The schemes are our reconstruction: of the paper they come from (Bruno & Nurchis, arXiv 1311.6013)
 only the abstract and the first lines could be read."""
+LESSONS = {STOP: CROSSING, f"{STOP}-lost": LOST_PACKET}
+"""By their keys in the address."""
 REST_S = 0.6
 """How long the settings have to rest before a run begins."""
 HAND_S = 0.15
@@ -84,10 +86,15 @@ class NetworkPanel(Panel):
         self._resting = ui.debounce(REST_S, self._run)
         self._hand = ui.debounce(HAND_S, self._show_moment)
         self._look: NetworkLook | None = None
+        self._asked_ns: int | None = None
+        """The moment that an address asks for, until its run is there."""
         self._text = gui.add_markdown(TEXT)
         self._difference = gui.add_markdown("")
-        lessons = [read_lesson(path, SETTINGS, NetworkLook(), NUMBERS) for path in (CROSSING, LOST_PACKET)]
-        self._lessons = [LessonFolder(ui, one, self._take_look, self._lesson_numbers) for one in lessons]
+        self._lessons = {}
+        for key, path in LESSONS.items():
+            lesson = read_lesson(path, SETTINGS, NetworkLook(), NUMBERS)
+            take = partial(self._take_look, key)
+            self._lessons[key] = LessonFolder(ui, lesson, take, self._lesson_numbers)
         self._setup = NetworkSetup(ui, self._resting.restart)
         self._about = gui.add_markdown("")
         self._status = gui.add_markdown("Nothing is sent yet.")
@@ -103,6 +110,9 @@ class NetworkPanel(Panel):
         with gui.add_folder("Advanced", expand_by_default=False):
             self._setup.add_advanced()
         self._dock = Dock(ui, self._moved, self._picked)
+        self.in_address |= self._lessons
+        self.in_address["net"] = Said(self._setup.place, self._take_place)
+        self.in_address["t"] = Said(self._moment, self._take_moment)
 
     def on_show(self) -> None:
         """Send at the first visit; turn the view to the cameras."""
@@ -156,7 +166,7 @@ class NetworkPanel(Panel):
             else:
                 self._take_delivery(view)
         self._streaming = False
-        for lesson in self._lessons:
+        for lesson in self._lessons.values():
             lesson.refresh()
         self.session.frame_view()
 
@@ -232,7 +242,9 @@ class NetworkPanel(Panel):
         self._frames = [Frames(view.run)]
         drawing = self._drawing = DeliveryDrawing(self.scene, self._next_name(), view)
         self._setup.what_if.load(view, drawing.place_m)
-        self._legend.content = _legend_html(legend(view))
+        if self._setup.grant():
+            self.ui.post(self._run)
+        self._legend.content = legend_html(legend(view))
         self._packet.content = PICK
         self._load(view.run.start_ns, view.run.end_ns, stops_ns(view.run))
         self._dock.seek(view.run.end_ns if now_ns is None else now_ns)
@@ -262,8 +274,42 @@ class NetworkPanel(Panel):
         self._load(start_ns, end_ns, stops_ns(*runs))
         self._aim(runs[0])
 
-    def _take_look(self, look: NetworkLook) -> None:
+    # What the address says.
+
+    def _take_place(self, place: str) -> None:
+        try:
+            self._setup.take_place(place)
+        finally:
+            self._run()
+
+    def _first_ns(self) -> int:
+        """Where the clock stands when a run has come."""
+        if self._delivery is not None:
+            return self._delivery.run.end_ns
+        return min(run.start_ns for run in self._runs)
+
+    def _moment(self) -> str:
+        """Simulated seconds, unless it is where the clock stands at first."""
+        if self._asked_ns is None and (self._drawing is None or self._dock.rest_ns == self._first_ns()):
+            return ""
+        at_ns = self._dock.rest_ns if self._asked_ns is None else self._asked_ns
+        return f"{at_ns / 1e9:.9f}".rstrip("0").rstrip(".")
+
+    def _take_moment(self, text: str) -> None:
+        if text and re.fullmatch(r"\d{1,7}(\.\d+)?", text) is None:
+            raise InputError(f"The address has t={text[:20]}; try simulated seconds, such as 3.5")
+        self._asked_ns = round(1e9 * float(text)) if text else None
+        spec, delivery = self.session.spec, self._delivery
+        streams = delivery is not None and delivery.sent == spec.sent
+        if (streams or self.session.results.fresh("network", spec)) and self._drawing is not None:
+            self._dock.seek(self._first_ns() if self._asked_ns is None else self._asked_ns)
+            self._asked_ns = None
+
+    def _take_look(self, lesson: str, look: NetworkLook) -> None:
         """Send as a stop of a lesson says; where it looks is seen when the frames are there."""
+        for key, other in self._lessons.items():
+            if key != lesson and other.place():
+                other.take("")
         with self.ui.atomic():
             self._setup.take(look)
         self._look = look
@@ -284,8 +330,13 @@ class NetworkPanel(Panel):
     def _aim(self, run: NetworkView) -> None:
         """Go where the stop of a lesson looks, and tell of the frame there."""
         look, self._look = self._look, None
-        if look is None:
-            return
+        if look is not None:
+            self._aim_at(look, run)
+        if self._asked_ns is not None:
+            self._dock.seek(self._asked_ns)
+            self._asked_ns = None
+
+    def _aim_at(self, look: NetworkLook, run: NetworkView) -> None:
         t_ns, item = find(look.at, run, self._frames[0])
         span_ns = run.end_ns - run.start_ns if look.window_s is None else round(1e9 * look.window_s)
         self._dock.look(t_ns - span_ns // 2, t_ns + span_ns // 2)
@@ -375,24 +426,3 @@ class NetworkPanel(Panel):
         self._packet.content = f"{story}\n\n{told(packet)}"
         with self.ui.atomic():
             self._drawing.light(packet)
-
-
-def told(packet: PacketView) -> str:
-    """What a packet says of its image, in a sentence."""
-    parts = []
-    for what, pixels in (("depth", packet.depth), ("colour", packet.color)):
-        rows = np.flatnonzero(pixels.any(axis=1))
-        if len(rows):
-            where = f"row {rows[0] + 1}" if rows[0] == rows[-1] else f"rows {rows[0] + 1} to {rows[-1] + 1}"
-            parts.append(f"{what} of {int(pixels.sum()):,} pixels in {where}")
-    if not parts:
-        return "By itself it tells no measured pixel: there is none in its rows, or it needs other packets."
-    return f"It tells the {' and the '.join(parts)} (yellow in the picture and the cloud)."
-
-
-def _legend_html(colors: Sequence[tuple[str, tuple[int, int, int]]]) -> str:
-    words = " &ensp; ".join(
-        f"<span style='white-space: nowrap'><b style='color: {css(color)}'>●</b> {name}</span>"
-        for name, color in colors
-    )
-    return f"<div style='padding: 0 0.8em 0.8em; font-size: 12px'>{words}</div>"

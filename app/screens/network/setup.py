@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import shlex
 from collections.abc import Callable
+from typing import Any
 
+import numpy as np
 import viser
 
 from app.screens.network.labels import CODINGS, NETWORKS, ways
 from app.screens.network.lesson import NetworkLook
+from app.screens.network.place import show, shown, text_of, values_of
 from app.screens.network.what_if import WhatIf
 from app.state import Sent, Spec
 from app.ui import Ui
@@ -24,6 +28,7 @@ CODING_NAMES = {title: name for name, title in CODINGS.items()}
 NOTHING = "nothing"
 FIRST = next(iter(NETWORKS))
 MOMENTS = 20
+OF_NODES = ("off", "wall", "moved")
 FREE = """Any setting of `packetmesh simulate --describe`, several separated by spaces, for example
 `radio.capture_db=6 nodes.deadline_s=4`. Those for the second run apply to it alone."""
 
@@ -38,6 +43,10 @@ class NetworkSetup:
         self._extra: tuple[str, ...] = ()
         self._beside_extra: tuple[str, ...] = ()
         self._ways = ways(FIRST)
+        self._own: dict[str, str] = {}
+        """What the controls show where nobody has changed them."""
+        self._wished: dict[str, str] = {}
+        """Of the nodes, which are known when a delivery has come."""
         self._preset = gui.add_dropdown("Preset", list(TITLES), hint="Which network carries the images.")
         self._coding = gui.add_dropdown(
             "Coding", list(CODING_NAMES), hint="How images become bytes, and which bytes go first."
@@ -122,6 +131,82 @@ class NetworkSetup:
         self._moments.value = MOMENTS
         self.what_if.forget()
         self._load()
+        self._own |= self._values()
+
+    def place(self) -> str:
+        """What an address says of it."""
+        values, own = self._values() | self._wished, self._own | {"preset": FIRST}
+        return text_of({"preset": self.preset, **values}, own)
+
+    def take_place(self, place: str) -> None:
+        """Set the controls as an address says; what is of a node waits for it.
+
+        Raises:
+            InputError: some of it is not known; the rest is set.
+        """
+        asked, wrong = values_of(place), list[InputError]()
+        preset = asked.pop("preset", FIRST)
+        self.reset()
+        if preset in NETWORKS:
+            self._preset.value = NETWORKS[preset].title
+            self._load()
+        else:
+            wrong.append(InputError(f"The address has the network {preset[:40]}; try {', '.join(NETWORKS)}"))
+        self._wished = {name: asked.pop(name) for name in OF_NODES if name in asked}
+        self._text.value, self._beside_text.value = asked.pop("extra", ""), asked.pop("beside-extra", "")
+        handles = self._handles()
+        for name, text in asked.items():
+            try:
+                if name not in handles:
+                    raise InputError(f"The address has {name[:40]} of a network, which is no control of it")
+                show(name, handles[name], text)
+            except InputError as error:
+                wrong.append(error)
+        try:
+            self._read_text()
+        except InputError as error:
+            wrong.append(error)
+        self.grant()
+        if wrong:
+            raise wrong[0]
+
+    def grant(self) -> bool:
+        """Do to the nodes what was asked for before they were known; whether there was anything to do."""
+        wished, what_if = self._wished, self.what_if
+        if not wished or not what_if.in_room:
+            return False
+        self._wished, moved = {}, wished.pop("moved", "").split(",")
+        for name, text in wished.items():
+            if text in what_if.handles[name].options:
+                what_if.handles[name].value = text
+        for name, *place_m in zip(moved[::3], moved[1::3], moved[2::3], strict=False):
+            with contextlib.suppress(ValueError):
+                what_if.put(name, np.array([float(text) for text in place_m]))
+        return True
+
+    def _handles(self) -> dict[str, Any]:
+        names = {
+            "coding": self._coding,
+            "lose": self._share,
+            "burst": self._burst,
+            "again": self._retransmit,
+            "vehicles": self._vehicles,
+            "scheme": self._scheme,
+            "beside": self._beside,
+            "seed": self._seed,
+            "access": self._access,
+            "shadowing": self._shadowing,
+            "moments": self._moments,
+        }
+        return names | self.what_if.handles
+
+    def _values(self) -> dict[str, str]:
+        """By the names that an address has for them."""
+        texts = {"extra": " ".join(self._extra), "beside-extra": " ".join(self._beside_extra)}
+        return {name: shown(handle) for name, handle in self._handles().items()} | {
+            **texts,
+            "moved": self.what_if.moved,
+        }
 
     def take(self, look: NetworkLook) -> None:
         """Set the controls as a stop of a lesson says."""
@@ -136,7 +221,8 @@ class NetworkSetup:
         self._retransmit.value = look.again and self._retransmit.value
         self._moments.value = MOMENTS
         self.what_if.forget()
-        self.what_if.switch_off(look.off)
+        self._wished = {"off": look.off} if look.off else {}
+        self.grant()
         self._extra = look.settings
         self._text.value = " ".join(look.settings)
 
@@ -221,9 +307,15 @@ class NetworkSetup:
             handle.visible = street
         self._extra = self._beside_extra = ()
         self._text.value = self._beside_text.value = ""
+        loaded = ("seed", "lose", "again", "shadowing", "vehicles", "scheme", "beside", "access")
+        self._own |= {name: shown(self._handles()[name]) for name in loaded}
 
     def _use_text(self) -> None:
         """Take the free settings, unless they are wrong: then the ones before stay."""
+        self._read_text()
+        self._on_change()
+
+    def _read_text(self) -> None:
         before = self._extra, self._beside_extra
         self._extra = tuple(self._text.value.split())
         self._beside_extra = tuple(self._beside_text.value.split()) if self.street else ()
@@ -232,7 +324,6 @@ class NetworkSetup:
         except InputError:
             self._extra, self._beside_extra = before
             raise
-        self._on_change()
 
 
 def deliver_command(spec: Spec, preset: str, sent: Sent) -> str:

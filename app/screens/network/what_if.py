@@ -92,6 +92,22 @@ class WhatIf:
         """The node that has failed."""
         return () if self._off.value == NOBODY else (self._off.value,)
 
+    @property
+    def handles(self) -> dict[str, Any]:
+        """The controls that an address names."""
+        names = ("off", "wall", "wall-db", "retries", "rate")
+        return dict(zip(names, self._controls, strict=True))
+
+    @property
+    def moved(self) -> str:
+        """The radios that were moved, each as name, metres east and north."""
+        return ",".join(f"{name},{_text(place_m)}" for name, place_m in self._moved_m.items())
+
+    @property
+    def in_room(self) -> bool:
+        """Whether the nodes of the room are known."""
+        return self._at_m is not None
+
     def settings(self) -> tuple[str, ...]:
         """What is changed of the network, as ``key=value``."""
         changes = []
@@ -128,10 +144,6 @@ class WhatIf:
         self._places_m, self._at_m = {}, None
         self.offer([])
         return happened
-
-    def switch_off(self, name: str) -> None:
-        """Have a node fail, if it is there."""
-        self._off.value = name if name in self._off.options else NOBODY
 
     def show(self, visible: bool) -> None:
         """Show the controls or hide them; without them, what they have drawn goes, too."""
@@ -225,9 +237,14 @@ class WhatIf:
 
     def move(self, name: str, place_m: FloatArray) -> None:
         """Have the radio of a node of this room stand somewhere else: (2,)."""
+        if self.put(name, place_m):
+            self._on_change()
+
+    def put(self, name: str, place_m: FloatArray) -> bool:
+        """The same before anything is asked for; whether there is such a node."""
         if name in self._places_m:
             self._moved_m[name] = place_m
-            self._on_change()
+        return name in self._places_m
 
 
 def places_of(view: DeliveryView) -> dict[str, FloatArray]:

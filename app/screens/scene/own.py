@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import viser
 
-from app.ui import Ui, keep_upload
+from app.ui import Ui
+from app.uploads import OWN, keep_upload
 from packetmesh.errors import InputError
 from pipeline.sources import ImagePair
 from pipeline.types import MAX_NODES
@@ -37,6 +39,7 @@ class OwnFolder:
         self,
         ui: Ui,
         below: Path,
+        new_folder: Callable[[], Path],
         on_pair: Callable[[ImagePair], None],
         on_recording: Callable[[Path, str, float | None, int], None],
     ) -> None:
@@ -45,11 +48,12 @@ class OwnFolder:
         Args:
             ui: where to add it.
             below: folder of the session.
+            new_folder: makes a folder for one upload.
             on_pair: called with a pair that is to be reconstructed.
             on_recording: called with the file of a recording, a name for its rig, depth units in a metre if
                 they are given, and how many frames become nodes.
         """
-        self._ui, self._below = ui, below
+        self._ui, self._below, self._new_folder = ui, below, new_folder
         self._on_pair, self._on_recording = on_pair, on_recording
         self._files: dict[str, Path] = {}
         gui = ui.gui
@@ -86,7 +90,7 @@ class OwnFolder:
         button.on_upload(lambda event: self._ui.post(action, *arguments, event.target.value))
 
     def _keep_file(self, kind: str, file: viser.UploadedFile) -> None:
-        self._files[kind] = keep_upload(file, self._below, kind, PAIR_LIMIT_BYTES, INSTEAD)
+        self._files[kind] = keep_upload(file, self._below / kind, PAIR_LIMIT_BYTES, INSTEAD)
         missing = [name for name in FILES if name not in self._files]
         self._have.content = (
             f"Still needed: {', '.join(missing)}." if missing else "All there: press the button."
@@ -95,15 +99,21 @@ class OwnFolder:
     def _use_files(self) -> None:
         if len(self._files) < len(FILES):
             raise InputError("A pair needs a colour image, a depth image and intrinsics; add all three.")
-        files = {kind: str(path) for kind, path in self._files.items()}
+        folder, files = self._new_folder() / OWN, dict[str, str]()
+        folder.mkdir()
+        for kind, path in self._files.items():
+            place = folder / path.name
+            if place.exists():  # as where images of both kinds are numbered
+                place = folder / kind / path.name
+                place.parent.mkdir()
+            files[kind] = str(shutil.copyfile(path, place))
         self._on_pair(ImagePair(**files, depth_scale=self._depth_scale))
 
     def _keep_recording(self, file: viser.UploadedFile) -> None:
-        path = keep_upload(file, self._below, "recording", RECORDING_LIMIT_BYTES, INSTEAD)
+        path = keep_upload(file, self._new_folder() / OWN, RECORDING_LIMIT_BYTES, INSTEAD)
         self.tell(("Reading the recording …",))
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", Path(file.name).stem).strip(".-")[:40]
-        name = f"{stem or 'rig'}-{path.stem[-3:]}"
-        self._on_recording(path, name, self._depth_scale, int(self._frames.value))
+        self._on_recording(path, stem or "rig", self._depth_scale, int(self._frames.value))
 
     @property
     def _depth_scale(self) -> float | None:

@@ -57,7 +57,9 @@ class ScenePanel(Panel):
         self.ui.when_changed(self._preset, self._picked_preset)
         self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images are shown below.")
         self.ui.when_changed(self._node, self._show_node)
-        self._own = OwnFolder(self.ui, self.session.folder, self._use_pair, self._read_recording)
+        self._own = OwnFolder(
+            self.ui, self.session.folder, self.session.new_folder, self._use_pair, self._read_recording
+        )
         self._notes = gui.add_markdown("")
         self._color = gui.add_image(EMPTY, label="Colour image")
         self._depth = gui.add_image(EMPTY, label="Sensor depth", format="png")
@@ -147,7 +149,7 @@ class ScenePanel(Panel):
 
 
 def _title(spec: Spec) -> str:
-    """What to call the scene: a demo by its title, a rig by its folder's name."""
-    if isinstance(spec.source, RigFolder):
-        return Path(spec.source.path).name
+    """What to call the scene: a demo by its title, a rig by its folder's name, a pair by its colour image."""
+    if isinstance(spec.source, RigFolder | ImagePair):
+        return Path(spec.source.title).name
     return DEMOS.get(spec.source.title, spec.source.title)

@@ -30,8 +30,8 @@ def recording_job(
     Args:
         store: not used.
         spec: not used.
-        path: a bag or a ZIP, in the folder of the session.
-        name: of the rig, which will lie beside it.
+        path: a bag or a ZIP, in a folder of its own.
+        name: of the rig, which will lie beside that folder.
         depth_scale: depth units in a metre; None takes what the images or the kind of recording use.
         frames: how many frames of a recording become nodes.
 
@@ -39,8 +39,8 @@ def recording_job(
         InputError: a file that cannot be read, that is too large, or that holds no recording or several.
     """
     yield Progress("reading the recording", 0.0)
-    rig = path.with_name(name)
-    if path.suffix != ".zip":
+    rig = path.parent.with_name(name)
+    if path.suffix.lower() != ".zip":
         return (yield from _imported(path, rig, frames, depth_scale))
     unpacked = path.with_suffix("")
     try:

@@ -16,7 +16,8 @@ BASELINE_HEADS: dict[BaselineName, str] = {"poisson": "Poisson", "alpha": "alpha
 OWN_COLORS = "Colours cannot be chosen: a baseline makes vertices of its own, of which no point is known."
 SHOWN: dict[str, Shown] = {AFTER: "after", BEFORE: "before", BOTH: "after", **BASELINES}
 """Which surface is drawn, and so exported; of two side by side the one after fusion."""
-SHOWN_HINT = "Which surface is drawn: the ball's, or that of another method over the same points."
+PLACES = {"after": AFTER, "before": BEFORE, "both": BOTH, "poisson": POISSON, "alpha": ALPHA}
+"""The same in the address."""
 COLORINGS: dict[str, Coloring] = {
     "photographs": "photo",
     "inferred in violet (on photographs)": "violet",

@@ -19,6 +19,7 @@ from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, HINTS,
 from app.screens.surface.legend import legend_html
 from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook, numbers, surface_of
 from app.screens.surface.numbers import quality_table, quick_line
+from app.screens.surface.place import picked
 from app.screens.surface.quick import QuickLook
 from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
 from app.screens.surface.spacing_plot import spacing_figure
@@ -34,7 +35,7 @@ from app.screens.surface.view import (
 )
 from app.screens.surface.walks import Walks
 from app.state import Spec, Step
-from app.ui import Offers, Panel
+from app.ui import STOP, Offers, Panel
 from pipeline.types import FloatArray
 
 NAMES = {rule: name for name, rule in RULES.items()}
@@ -63,12 +64,8 @@ class SurfacePanel(Panel):
             "Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint="Radius of the ball; drag to roll another."
         )
         self.ui.when_changed(self._radius, self._dragged)
-        self._rule = gui.add_dropdown(
-            "Radii",
-            list(RULES),
-            initial_value=NAMES[session.spec.config.surface.radius_rule],
-            hint=HINTS["Radii"],
-        )
+        rule = NAMES[session.spec.config.surface.radius_rule]
+        self._rule = gui.add_dropdown("Radii", list(RULES), initial_value=rule, hint=HINTS["Radii"])
         self.ui.when_changed(self._rule, self._picked_rule)
         self._shown = gui.add_dropdown("Show", list(SHOWN), hint=HINTS["Show"])
         self._coloring = gui.add_dropdown("Colours", list(COLORINGS), hint=HINTS["Colours"])
@@ -83,6 +80,8 @@ class SurfacePanel(Panel):
         self._table = gui.add_html("")
         self._histogram = gui.add_plotly(spacing_figure(None), aspect=0.62, config={"displayModeBar": False})
         self._build_folders()
+        self.in_address |= {STOP: self._lesson, "ball": self._walks.folder}
+        self.in_address |= picked(self._shown, self._picked_shown, self._coloring, self._picked_coloring)
         self._stage = SurfaceStage(self.scene)
         self._ball = ChosenBall(session, self._stage)
         self._baselines = Baselines(session, self._stage, self._quick, self._made)
@@ -210,6 +209,9 @@ class SurfacePanel(Panel):
                 self._load_holes()
             self._show_look()
             self._lesson.refresh()
+            if BASELINES.get(self._shown.value) not in (None, *self._baselines.views):
+                self._picked_shown()  # as an address asks, before there is anything to make it of
+            self._walks.folder.resume()
 
     def _show_numbers(self) -> None:
         if self._view is not None:

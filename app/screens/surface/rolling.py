@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -15,10 +16,12 @@ from app.screens.surface.view import Which
 from app.screens.surface.walk_view import Happening, WalkRequest, WalkView
 from app.timeline import Curve, CurvesLane
 from app.ui import Ui
+from packetmesh.errors import InputError
 from pipeline.types import FloatArray
 
 BELOW = "/surface/rolling"
 CLOSE_UP, WHOLE = "close up, pivot by pivot", "the whole surface, fast"
+WAYS = {CLOSE_UP: "close", WHOLE: "whole"}
 CLOUDS: dict[str, Which] = {AFTER: "after", BEFORE: "before"}
 TEXT = """A ball of true size is put down on three points and turns about one edge after the other until it
 touches the next point; every rest leaves a triangle. Green: the front, edges it has yet to turn about. Red:
@@ -50,6 +53,8 @@ class RollingFolder:
         self._drawing: RollingDrawing | None = None
         self._drawn = 0
         self._waiting = self._here = False
+        self._asked: int | None = None
+        """The step of the walk that an address has asked for, until it is played."""
         with ui.gui.add_folder("Watch the ball roll", expand_by_default=False):
             ui.gui.add_markdown(TEXT)
             self._add_choices(ui)
@@ -84,6 +89,35 @@ class RollingFolder:
         self._way.value = CLOSE_UP if close_up else WHOLE
         self._request()
 
+    def place(self) -> str:
+        """``close-after-120``, for the address: the way, the cloud and the step; empty without a walk."""
+        if self._asked is None and self._view is None:
+            return ""
+        step = self._dock.rest_ns // COUNT_NS if self._asked is None else self._asked
+        return f"{WAYS[self._way.value]}-{CLOUDS[self._cloud.value]}-{step}"
+
+    def take(self, place: str) -> None:
+        """Show that walk once there are points; none for an empty place.
+
+        Raises:
+            InputError: there is none like it.
+        """
+        if not place:
+            self._asked = None
+            self._close()
+            return
+        found = re.fullmatch(r"(\w+)-(\w+)-(\d{1,9})", place)
+        ways, clouds = ({value: name for name, value in names.items()} for names in (WAYS, CLOUDS))
+        if found is None or found[1] not in ways or found[2] not in clouds:
+            raise InputError(f"The address has ball={place[:30]}; try such as close-after-120")
+        self._way.value, self._cloud.value, self._asked = ways[found[1]], clouds[found[2]], int(found[3])
+        self._request()
+
+    def resume(self) -> None:
+        """There is a surface: ask for the walk that an address has asked for before."""
+        if self._asked is not None:
+            self._request()
+
     def load(self, view: WalkView | None) -> None:
         """Play a walk from its start; None did not come."""
         self.forget()
@@ -100,8 +134,11 @@ class RollingFolder:
             stops_ns = COUNT_NS * np.arange(view.steps + 1)
             self._dock.load(0, COUNT_NS * view.steps, stops_ns, [front_lane(view)], "step", run_s)
             self._dock.show(self._here)
-        if self._here:
+        if self._asked is not None:
+            self._dock.seek(COUNT_NS * self._asked)
+        elif self._here:
             self._dock.play()
+        self._asked = None
 
     def forget(self) -> None:
         """Take the walk away; its cloud or radii are no longer those of the screen."""

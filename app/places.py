@@ -1,0 +1,104 @@
+"""What a session's address says, and what is done when one asks for something."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import viser
+
+from app.address import Address, Place
+from app.state import Spec
+from app.ui import STOP, InAddress, Ui
+from packetmesh.errors import InputError
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+CAMERA = "cam"
+REST_S = 0.3
+"""How long the view has to rest before the address follows."""
+
+
+class Places:
+    """The addresses of those who steer a session: of its one browser, or of the teachers in a lecture."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._start = self._now()
+        self._addresses: list[Address] = []
+        if isinstance(session.target, viser.ClientHandle):
+            rest = session.ui.debounce(REST_S, self.follow)
+            session.target.camera.on_update(lambda _: rest.restart())
+
+    def add(self, ui: Ui) -> Callable[[], None]:
+        """Have a browser's address follow, and be followed, until what is returned is called."""
+        session = self._session
+        titles = [panel.title for panel in session.panels]
+        keys = dict.fromkeys(key for panel in session.panels for key in panel.in_address)
+        address = Address(ui, session.uploads, self._start, titles, (*keys, CAMERA), self._go_to)
+        self._addresses.append(address)
+        address.show(self._now())
+
+        def remove() -> None:
+            self._addresses.remove(address)
+            address.close()
+
+        return remove
+
+    def follow(self) -> None:
+        """Something may be different now."""
+        if self._addresses:
+            place = self._now()
+            for address in self._addresses:
+                address.show(place)
+
+    def _now(self) -> Place:
+        session = self._session
+        said = {key: part.place() for key, part in self._parts().items()}
+        added = tuple((key, text) for key, text in said.items() if text)
+        return Place(session.spec, session.current.title, added)
+
+    def _parts(self) -> dict[str, InAddress]:
+        """By key, what is said of what is drawn now."""
+        session = self._session
+        parts = dict[str, InAddress]()
+        for panel in session.panels:
+            if panel.drawn_below == session.current.drawn_below:
+                parts |= panel.in_address
+        return parts if session.views is None else parts | {CAMERA: session.views}
+
+    def _go_to(self, place: Place, wrong: list[str]) -> None:
+        """Show what an address asks for; what it cannot be followed in gets one sentence."""
+        session = self._session
+        session.want(_with(session.spec, place.spec))
+        if place.screen != session.current.title:
+            session.show(place.screen)
+        wrong += self._take(dict(place.added), place.spec)
+        if wrong:
+            more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
+            session.notify("Not all of the address can be followed", f"{wrong[0].rstrip('.')}{more}.")
+
+    def _take(self, asked: Mapping[str, str], spec: Spec) -> list[str]:
+        """A stop first, then what differs from what it sets; the sentences of what is not known."""
+        session, wrong = self._session, list[str]()
+        parts = self._parts()
+        stops = sorted((key for key in parts if key.startswith(STOP)), key=lambda key: key in asked)
+        stopped = any(key in asked for key in stops)
+        others = [key for key in parts if key not in stops and (key in asked or not stopped)]
+        for keys in (stops, others):
+            for key in keys:
+                try:
+                    if parts[key].place() != asked.get(key, ""):
+                        parts[key].take(asked.get(key, ""))
+                except InputError as error:
+                    wrong.append(str(error))
+            if keys is stops and spec.config != self._start.spec.config:
+                session.want(_with(session.spec, spec))
+        return wrong
+
+
+def _with(spec: Spec, asked: Spec) -> Spec:
+    """What an address asks for; what it does not name of the spec stays."""
+    return replace(spec, source=asked.source, preset=asked.preset, config=asked.config)

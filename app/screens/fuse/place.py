@@ -1,0 +1,62 @@
+"""What the address says of a race: the settings that differ from those of the start, separated by spaces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from app.lesson_file import choice
+from app.screens.fuse.labels import DEGRADATIONS, MOST_LANES, MOST_SEED, RIVALS, SLIGHTLY, STARTS
+from app.screens.fuse.view import Race, Rival, Start
+from packetmesh.errors import InputError
+from packetmesh.settings import settings, with_settings
+
+FIRST = Race(start=Start.towards(*STARTS[SLIGHTLY], seed=0))
+"""The race of the start."""
+MOST_NODE, MOST_AWAY = 99, 1000.0
+"""The largest index of a node, and degrees or centimetres along an axis, that an address may name."""
+_RIVALS = "rivals"
+_NAMES: Mapping[str, Rival] = {"-".join(rival): rival for rival in RIVALS.values()}
+
+
+def race_text(race: Race) -> str:
+    """``seed=3 rivals=icp-point,ceicp-a-plane``; empty for the race of the start."""
+    first = _settings(FIRST)
+    return " ".join(f"{key}={value}" for key, value in _settings(race).items() if value != first[key])
+
+
+def race_of(text: str) -> Race:
+    """The race of such a text.
+
+    Raises:
+        InputError: a setting that there is not, or a value that it does not take.
+    """
+    changes = dict(change.partition("=")[::2] for change in text.split())
+    rivals = changes.pop(_RIVALS, None)
+    race = with_settings(FIRST, [f"{key}={value}" for key, value in changes.items()])
+    if rivals is not None:
+        try:
+            race = replace(race, rivals=tuple(choice(_NAMES)(name) for name in rivals.split(",")))
+        except ValueError as error:
+            raise InputError(f"The address has the methods {rivals[:60]}; {error}") from None
+    _check(race)
+    return race
+
+
+def _settings(race: Race) -> dict[str, str]:
+    return settings(race) | {_RIVALS: ",".join("-".join(rival) for rival in race.rivals)}
+
+
+def _check(race: Race) -> None:
+    vectors = (race.start.turn_deg, race.start.shift_cm)
+    worse = all(
+        0.0 <= getattr(race, name) <= most / per for name, (_, most, _, per, _) in DEGRADATIONS.items()
+    )
+    if not (
+        worse
+        and 1 <= len(race.rivals) <= MOST_LANES
+        and all(0 <= node <= MOST_NODE for node in (race.source, race.target))
+        and 0 <= race.seed <= MOST_SEED
+        and all(len(vector) == 3 and max(map(abs, vector)) <= MOST_AWAY for vector in vectors)
+    ):
+        raise InputError("The address has a race beyond what the sliders of the Fuse screen can set")
