@@ -29,7 +29,7 @@ def page(browser, app):
     """A session of its own: a lesson goes on where somebody left it."""
     context = browser.new_context(viewport={"width": 900, "height": 640})
     page = context.new_page()
-    page.set_default_timeout(60_000)
+    page.set_default_timeout(120_000)
     page.goto(f"{app.url}?fixedDpr=1")
     page.get_by_text("Up to date").wait_for()
     dismiss_notifications(page)
@@ -133,7 +133,7 @@ def test_large_text_has_no_more_than_a_room_needs_and_what_it_speaks_of_is_in_vi
     expect(ball).to_be_in_viewport()
     assert float(card.evaluate("one => parseFloat(getComputedStyle(one).fontSize)")) >= 17.0
     go(page, "Scene")
-    expect(card).to_have_count(0)
+    expect(card).to_have_count(0, timeout=LONG_MS)
 
 
 def test_a_name_is_explained_by_a_click_on_it(page):
@@ -142,7 +142,5 @@ def test_a_name_is_explained_by_a_click_on_it(page):
     page.get_by_role("button", name="Hole area").click()
     note = page.locator(".packetmesh-hint")
     expect(note).to_contain_text("filled flat")
-    page.locator("label", has_text="Radius (mm)").click()
-    expect(note).to_contain_text("Radius of the ball")
     page.keyboard.press("Escape")
     expect(note).to_have_count(0)
