@@ -81,7 +81,7 @@ def real_frames(numbers: Row) -> str:
     )
     rows = [
         (
-            *(name, found["frames"], percent(found["kept_share"])),
+            *(name, found["frames"], percent(found["kept_share"], 2)),
             *(change(found[f"{key}_before"], found[f"{key}_after"]) for key in _FRAME_SHARES),
             *(percent(found["guessed_ray_share"]), found["lower_after"]),
         )
@@ -89,8 +89,8 @@ def real_frames(numbers: Row) -> str:
     ]
     lower, frames = (sum(found[key] for found in numbers.values()) for key in ("lower_after", "frames"))
     return f"""Before → after fusion by the preset `packetmesh`, means over the frames; no truth is needed.
-*Within*: of the measured pixels, those whose ray meets the surface so near to the measurement. None of these
-frames had a part in training or tuning. The desk and the basket are Kinect frames, `sr300` frames of a
+*Within*: of the measured pixels, those whose ray meets the surface so near to the measurement. No network was
+trained on any of these frames. The desk and the basket are Kinect frames, `sr300` frames of a
 RealSense SR300 in Debian's visp-images-data, `middlebury` the motorcycle in the wheel of scikit-image 0.17.2;
 `PACKETMESH_DEPTH_SETS` names where the last two lie.
 
