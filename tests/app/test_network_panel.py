@@ -19,9 +19,9 @@ from app.screens.network.delivery_legend import legend
 from app.screens.network.delivery_numbers import moment_table
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.draw import STREET, ground_of
-from app.screens.network.labels import ANSWER, NETWORKS
+from app.screens.network.labels import ANSWER, NETWORKS, ORIGIN, PICK
 from app.screens.network.lesson import CROSSING, LOST_PACKET, NUMBERS, SETTINGS, NetworkLook
-from app.screens.network.panel import ORIGIN, PICK, NetworkPanel
+from app.screens.network.panel import NetworkPanel
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import What
 from app.screens.network.what_if import WhatIf

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
+from app.controls import Choice
 from app.screens.fuse.view import RaceMode, Reference, Rival
 from pipeline.config import Direction, Method, Metric
 
@@ -52,3 +53,24 @@ MOST_LANES = 4
 MOST_SEED = 20
 MARKS = "①②③④"
 """Of the lanes."""
+TEXT = """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
+are how far off every point is. **Play** below (space), then compare what made the
+difference."""
+SINGLE = """This scene has a single node: no other node to find its place beside. What races here is its
+inferred cloud, onto what its sensor measured."""
+MS = "ms"
+RUNNING = "Who comes nearer? At the end of the race its numbers are here."
+RACES = {f"race: {name}": mode for name, mode in MODES.items()}
+RACE_NAMES = {mode: name for name, mode in RACES.items()}
+RESULT, BEFORE = "result", "before registration"
+SHOWN = {"race": next(iter(RACES)), "result": RESULT, "before": BEFORE}
+ADVANCED = (
+    Choice(
+        "Chain: method",
+        "node_registration.method",
+        {m: m.upper() for m in get_args(Method)},
+        hint="Method that places the nodes in the chain (not in the race).",
+    ),
+    Choice("Chain: metric", "node_registration.metric"),
+    Choice("Chain: points", "fusion.align_nodes_with"),
+)

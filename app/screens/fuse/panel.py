@@ -6,12 +6,12 @@ import functools
 import re
 from collections.abc import Hashable
 from dataclasses import replace
-from typing import Any, ClassVar, TypeAlias, get_args
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import viser
 
-from app.controls import Choice, Controls
+from app.controls import Controls
 from app.drawing.cameras import Stage, stage_of
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.poses import move, place
@@ -23,7 +23,19 @@ from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
 from app.screens.fuse.draw import RaceDrawing, gizmo_pose
 from app.screens.fuse.export import race_offers
-from app.screens.fuse.labels import MARKS, MODES
+from app.screens.fuse.labels import (
+    ADVANCED,
+    BEFORE,
+    MARKS,
+    MS,
+    RACE_NAMES,
+    RACES,
+    RESULT,
+    RUNNING,
+    SHOWN,
+    SINGLE,
+    TEXT,
+)
 from app.screens.fuse.lesson import NUMBERS, SETTINGS, SHIPPED, RaceLook, numbers
 from app.screens.fuse.numbers import places_table, race_table, verdict
 from app.screens.fuse.place import race_of, race_text
@@ -33,29 +45,6 @@ from app.screens.fuse.view import CaptureView, FuseView, Race, RaceView, Start
 from app.state import Spec, Step
 from app.ui import STOP, Offers, Panel, Picked, Said
 from packetmesh.errors import InputError
-from pipeline.config import Method
-
-TEXT = """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
-are how far off every point is. **Play** below (space), then compare what made the
-difference."""
-SINGLE = """This scene has a single node: no other node to find its place beside. What races here is its
-inferred cloud, onto what its sensor measured."""
-MS = "ms"
-RUNNING = "Who comes nearer? At the end of the race its numbers are here."
-RACES = {f"race: {name}": mode for name, mode in MODES.items()}
-RACE_NAMES = {mode: name for name, mode in RACES.items()}
-RESULT, BEFORE = "result", "before registration"
-SHOWN = {"race": next(iter(RACES)), "result": RESULT, "before": BEFORE}
-ADVANCED = (
-    Choice(
-        "Chain: method",
-        "node_registration.method",
-        {m: m.upper() for m in get_args(Method)},
-        hint="Method that places the nodes in the chain (not in the race).",
-    ),
-    Choice("Chain: metric", "node_registration.metric"),
-    Choice("Chain: points", "fusion.align_nodes_with"),
-)
 
 _Wanted: TypeAlias = tuple[tuple[Hashable, ...], Race]
 """A race of the clouds with this key."""

@@ -151,3 +151,13 @@ def _possible(config: NetworkConfig, settings: tuple[str, ...]) -> bool:
     except InputError:
         return False
     return True
+
+
+TEXT = """The cameras of the room send their pictures and depth by radio, packet by packet; some are lost.
+**Play** below, and watch the mesh grow from what has arrived."""
+STREET_TEXT = """Vehicles with cameras drive on a grid of streets and offer images to access points (green).
+**Play** below: every moving point is a frame on the air, a red one was lost there."""
+ORIGIN = """The schemes are our reconstruction: of the paper they come from (Bruno & Nurchis, arXiv 1311.6013)
+only the abstract and the first lines could be read."""
+RUNNING = "Sending; the bar at the top shows how far. *Cancel* ends it."
+PICK = "Click a frame on the timeline to see what it carried and how it fared."

@@ -19,7 +19,7 @@ from app.screens.network.delivery_numbers import changes, difference, moment_tab
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
 from app.screens.network.export import delivery_offers, network_offers
-from app.screens.network.labels import NETWORKS
+from app.screens.network.labels import NETWORKS, ORIGIN, PICK, RUNNING, STREET_TEXT, TEXT
 from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_names, stops_ns
 from app.screens.network.lesson import (
     CROSSING,
@@ -41,12 +41,6 @@ from app.timeline import Lane
 from app.ui import STOP, Offers, Panel, Said
 from packetmesh.errors import InputError
 
-TEXT = """The cameras of the room send their pictures and depth by radio, packet by packet; some are lost.
-**Play** below, and watch the mesh grow from what has arrived."""
-STREET_TEXT = """Vehicles with cameras drive on a grid of streets and offer images to access points (green).
-**Play** below: every moving point is a frame on the air, a red one was lost there."""
-ORIGIN = """The schemes are our reconstruction: of the paper they come from (Bruno & Nurchis, arXiv 1311.6013)
-only the abstract and the first lines could be read."""
 LESSONS = {STOP: CROSSING, f"{STOP}-lost": LOST_PACKET}
 """By their keys in the address."""
 REST_S = 0.6
@@ -57,8 +51,6 @@ MESH_S = 0.5
 """While it plays, a moment is drawn at once if the one before is so old."""
 SHOWN = 10
 """How many pictures of the player a packet is seen moving at least, and a loss stays."""
-RUNNING = "Sending; the bar at the top shows how far. *Cancel* ends it."
-PICK = "Click a frame on the timeline to see what it carried and how it fared."
 
 
 class NetworkPanel(Panel):
