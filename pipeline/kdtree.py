@@ -20,7 +20,7 @@ LEAF_POINTS = 10
 """A node with more points is split."""
 SERIAL_POINTS = 512
 """Fewer points are searched on the calling thread: others would take longer to wake."""
-CORES = int(numba.get_num_threads())
+CORES = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 """Of this machine, or fewer where ``NUMBA_NUM_THREADS`` says so, as for processes that work side by side."""
 _MOST_LEVELS = 64
 compiled = numba.njit(cache=True, nogil=True)
