@@ -145,7 +145,7 @@ def test_the_table_shows_the_clock_and_says_why_frames_were_lost(screen):
     at_end = time_text(view.run.end_ns)
     assert f">at {at_end}<" in html
     assert f">end, {at_end}<" in html
-    why = re.findall(r">· ([\w ]+)</span></td><td[^>]*>([\d,]+)</td>", html)
+    why = re.findall(r">· ([\w ]+)</button></td><td[^>]*>([\d,]+)</td>", html)
     assert sum(int(count.replace(",", "")) for _, count in why) == view.moments[-1].packets_lost
     assert ">by " in moment_table(view, view.moments[0], view.times_ns[0])
     assert ("acknowledgement on its way", ANSWER) in legend(view)

@@ -106,7 +106,7 @@ class WhatIf:
     @property
     def in_room(self) -> bool:
         """Whether the nodes of the room are known."""
-        return self._at_m is not None
+        return self._at_m is not None or len(self._off.options) > 1
 
     def settings(self) -> tuple[str, ...]:
         """What is changed of the network, as ``key=value``."""
