@@ -14,7 +14,7 @@ from tests.browser.hands import canvas, changed_from, go, press, slider, unfold
 
 LONG_MS = 240_000
 """For the cameras and their depth on a busy machine."""
-BARS = ".packetmesh-views button"
+BARS = ".packetmesh-views [data-view]"
 DOCK = ".packetmesh-dock-row"
 
 
