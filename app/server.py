@@ -122,12 +122,7 @@ def build_server(
     teacher = Token("teacher") if lecture else None
     visitor = Token("token") if with_token and not is_loopback(host) else None
     entrance = Entrance(visitor, teacher)
-    with contextlib.ExitStack() as outermost_first:
-        for answers in (strict_headers(), only_own_page(), entrance.guarded()):
-            outermost_first.enter_context(answers)
-        outermost_first.enter_context(landing_first(lecture))
-        outermost_first.enter_context(contextlib.redirect_stdout(io.StringIO()))
-        server = viser.ViserServer(host=host, port=port, label="PacketMesh", verbose=False)
+    server = _listening(host, port, entrance, lecture)
     app = AppServer(server, pool, folder, entrance=entrance)
     if port and server.get_port() != port:
         app.stop()
@@ -145,31 +140,45 @@ def build_server(
         session = begin(server, -1, together)
         together.begin(session.post, lambda: session.frame_view(anew=True), session.places.add)
     else:
-
-        def leave(client: viser.ClientHandle) -> None:
-            session = app.sessions.pop(client.client_id, None)
-            if session is not None:
-                session.close()
-                give_back_memory()
-
-        def come(client: viser.ClientHandle) -> None:
-            def tell(sentence: str) -> None:
-                session = app.sessions.get(client.client_id)
-                if session is not None:
-                    session.post(session.notify, "That did not work", sentence)
-
-            limit_uploads(client._websock_connection, tell)
-            try:
-                begin(client, client.client_id)
-            except OSError as error:
-                client.add_notification("You cannot come in", file_trouble(error), color="red")
-            if client.client_id not in server.get_clients():  # it left before its session was there
-                leave(client)
-
-        server.on_client_connect(come)
-        server.on_client_disconnect(leave)
-
+        _let_in(app, begin)
     return app
+
+
+def _listening(host: str, port: int, entrance: Entrance, lecture: bool) -> viser.ViserServer:
+    """A server whose every answer passes the rules on headers, origin, entrance and landing, in this order."""
+    with contextlib.ExitStack() as outermost_first:
+        for answers in (strict_headers(), only_own_page(), entrance.guarded(), landing_first(lecture)):
+            outermost_first.enter_context(answers)
+        outermost_first.enter_context(contextlib.redirect_stdout(io.StringIO()))
+        return viser.ViserServer(host=host, port=port, label="PacketMesh", verbose=False)
+
+
+def _let_in(app: AppServer, begin: Callable[[Target, int], Session]) -> None:
+    """Give every browser a session of its own, as long as it is there."""
+    server = app.viser_server
+
+    def leave(client: viser.ClientHandle) -> None:
+        session = app.sessions.pop(client.client_id, None)
+        if session is not None:
+            session.close()
+            give_back_memory()
+
+    def come(client: viser.ClientHandle) -> None:
+        def tell(sentence: str) -> None:
+            session = app.sessions.get(client.client_id)
+            if session is not None:
+                session.post(session.notify, "That did not work", sentence)
+
+        limit_uploads(client._websock_connection, tell)
+        try:
+            begin(client, client.client_id)
+        except OSError as error:
+            client.add_notification("You cannot come in", file_trouble(error), color="red")
+        if client.client_id not in server.get_clients():  # it left before its session was there
+            leave(client)
+
+    server.on_client_connect(come)
+    server.on_client_disconnect(leave)
 
 
 def _behind(token: Token | None) -> str:
