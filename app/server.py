@@ -145,7 +145,7 @@ def build_server(
 
 
 def _listening(host: str, port: int, entrance: Entrance, lecture: bool) -> viser.ViserServer:
-    """A server whose every answer passes the rules on headers, origin, entrance and landing, in this order."""
+    """A server whose answers pass the rules on headers, origin, entrance and landing, in this order."""
     with contextlib.ExitStack() as outermost_first:
         for answers in (strict_headers(), only_own_page(), entrance.guarded(), landing_first(lecture)):
             outermost_first.enter_context(answers)
