@@ -142,7 +142,7 @@ def task(rig, tmp_path_factory):
     return task
 
 
-class ComputedAgain(Exception):
+class ComputedAgain(BaseException):
     """As it should be."""
 
 
