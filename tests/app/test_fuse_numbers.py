@@ -82,7 +82,7 @@ def test_the_table_has_a_column_for_each_lane_and_explains_every_row():
         "truth", tuple(lane(str(i), 0.01, "No point of the source lies within") for i in range(4))
     )
     assert re.findall("[①②③④]", html) == list("①②③④")
-    assert html.count("title=") == 8
+    assert html.count("data-hint=") == 8
     assert html.count(">lost<") == 4
     for mark in "①②③④":  # in the colour of its method, as everywhere
         assert re.search(rf"color: {css(color_of(lane('0', 0.0).rival))};\">{mark}<", html)

@@ -65,7 +65,8 @@ def test_every_card_leads_to_a_place_that_an_address_can_name():
     sources = {name: Demo(name) for name in DEMO_SCENES}
     titles = tuple(panel.title for panel in PANELS)
     places = [html.unescape(place) for place in re.findall('data-place="([^"]+)"', landing_html())]
-    found = [place_of(place, start, titles, sources) for place in places]
+    found, wrong = zip(*(place_of(place, start, titles, sources) for place in places), strict=True)
+    assert not any(wrong)
     wanted = [(scene, screen) for scene, screen in LESSON_PLACES.values()]
     wanted += [(name, "scene") for name in DEMO_SCENES]
     assert [(place.spec.source.name, place.screen.lower()) for place in found] == wanted

@@ -116,7 +116,7 @@ def test_numbers_have_units_and_definitions(view):
     first, others = metric_tables([view, view])
     assert first.count("by hand</th>") == 2
     assert "Packet delivery ratio" in first
-    assert 'title="' in first
+    assert 'data-hint="' in first
     assert "Attempts lost to a busy channel" in others
     assert value_text("packet_delay_mean", None) == "–"
     assert value_text("packet_delay_mean", Metric(0.00137, "s", "")) == "1.37 ms"

@@ -119,7 +119,7 @@ def test_a_stop_of_the_lesson_unfolds_what_it_speaks_of(calibrated):
     pick(calibrated, "Stop", "4. Sure of what, and where?")
     expect(sliders).to_have_count(1)
     pick(calibrated, "Stop", "3. Ask those it has not seen")
-    calibrated.get_by_text("(3 of 7)").locator("visible=true").wait_for()
+    calibrated.get_by_text("(3 of 7)").locator("visible=true").first.wait_for()
     pick(calibrated, "Stop", "4. Sure of what, and where?")
     calibrated.wait_for_timeout(600)
     expect(sliders).to_have_count(1)

@@ -37,7 +37,7 @@ def test_it_covers_the_page_while_the_scene_loads_and_escape_leaves_to_it(landin
 
 def test_a_lesson_opens_at_its_first_stop(landing):
     landing.get_by_role("button", name="What one lost packet costs").click()
-    landing.get_by_text("(1 of 8)").locator("visible=true").wait_for()
+    landing.get_by_text("(1 of 8)").locator("visible=true").first.wait_for()
     expect(landing.get_by_role("dialog", name="Welcome")).to_have_count(0)
     landing.keyboard.press("s")
     landing.get_by_text("They were sent again.").locator("visible=true").first.wait_for()
@@ -52,7 +52,7 @@ def test_a_scene_opens(landing):
 def test_a_lesson_opens_in_the_scene_that_it_speaks_of(landing):
     """That of calibration needs photographs of a board, which only one scene has."""
     landing.get_by_role("button", name="How good is my calibration?").click()
-    landing.get_by_text("(1 of 7)").locator("visible=true").wait_for()
+    landing.get_by_text("(1 of 7)").locator("visible=true").first.wait_for()
     landing.wait_for_url("**scene=uncalibrated**")
     landing.get_by_text("Up to date").wait_for()
     expect(landing.get_by_text("without photographs of a board").locator("visible=true")).to_have_count(0)
