@@ -122,7 +122,7 @@ def test_a_single_node_stands_at_its_true_pose_with_its_own_truth():
 def test_an_unknown_name_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match="C10"):
         list(run_claims(["C99"]))
-    with pytest.raises(InputError, match="reconstruct"):
+    with pytest.raises(InputError, match="chain: a rig of three"):
         list(run_benchmarks(["nothing"]))
 
 
