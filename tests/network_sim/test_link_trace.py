@@ -39,7 +39,7 @@ def test_a_file_is_read_in_its_units_from_its_first_time(tmp_path):
 @pytest.mark.parametrize(
     ("text", "names"),
     [
-        ("", "has no rows"),
+        ("", "is empty"),
         ("# only a comment\n\n", "has no rows"),
         ("0 1 2\n", "line 1 has 3 columns; try 4"),
         ("0 1 2 0 9\n", "line 1 has 5 columns"),
@@ -66,12 +66,14 @@ def test_what_cannot_be_a_recording_is_one_sentence(tmp_path, text, names):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("content", [None, b"\xff\xfe\x00binary\x80"])
-def test_what_is_no_text_file_is_one_sentence(tmp_path, content):
+@pytest.mark.parametrize(
+    ("content", "said"), [(None, "does not exist"), (b"\xff\xfe\x00binary\x80", "is not a text file")]
+)
+def test_what_is_no_text_file_is_one_sentence(tmp_path, content, said):
     path = tmp_path / "link.bin"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(InputError, match=r"link\.bin cannot be read"):
+    with pytest.raises(InputError, match=rf"link\.bin {said}"):
         read_link_trace(path)
 
 

@@ -248,8 +248,8 @@ def test_a_kinect_sized_image_crosses_every_recording(shared_data):
     [
         (["mac.kind=replay"], "mac.trace=FILE"),
         (["scenario=street-grid", "mac.kind=replay", "mac.trace=x"], "vehicles have no link"),
-        (["mac.kind=replay", "mac.trace=/nowhere/link.txt"], "/nowhere/link.txt cannot be read"),
-        (["mac.kind=ideal", "uplink.trace=/nowhere/link.txt"], "/nowhere/link.txt cannot be read"),
+        (["mac.kind=replay", "mac.trace=/nowhere/link.txt"], "/nowhere/link.txt does not exist"),
+        (["mac.kind=ideal", "uplink.trace=/nowhere/link.txt"], "/nowhere/link.txt does not exist"),
     ],
 )
 def test_a_recording_that_is_not_there_is_one_sentence(changes, names):
