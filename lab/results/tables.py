@@ -272,7 +272,7 @@ def registration_speed(numbers: Row) -> str:
         }
         rows: list[Sequence[Cell]] = [
             (
-                *(name, value, float(np.percentile(times[name], 95.0))),
+                *(name, value, float(np.percentile(times[name], 95.0)) if times[name] else None),
                 *(1000.0 * result["errors_m"][name], memory[name] / 1e6),
             )
             for name, value in seconds.items()
@@ -349,10 +349,9 @@ def ns3_throughput(numbers: Row) -> str:
 def chain_speed(numbers: Row) -> str:
     """The whole chain, warm."""
     rows = [(case, result["ours_s"], result["peak_memory_bytes"] / 1e6) for case, result in numbers.items()]
+    whole = table(("case", "seconds, warm", "peak memory, MB"), rows)
     stages = [run["stage"] for run in next(iter(numbers.values()))["runs"]]
+    if not stages:  # of an older record
+        return whole
     by_stage = [(case, *(run["elapsed_s"] for run in result["runs"])) for case, result in numbers.items()]
-    return f"""{table(("case", "seconds, warm", "peak memory, MB"), rows)}
-
-Seconds of each stage:
-
-{table(("case", *stages), by_stage)}"""
+    return f"{whole}\n\nSeconds of each stage:\n\n{table(('case', *stages), by_stage)}"
