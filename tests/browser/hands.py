@@ -88,3 +88,10 @@ def arrow(page):
     y, x = np.nonzero((red > 180) & (red - green > 100) & (blue > green) & (blue < 160))
     assert len(x) > 20
     return box["x"] + float(np.median(x)), box["y"] + float(np.median(y))
+
+
+def afresh(page):
+    """Open the app as a new browser does: nothing of before in the address, no folder left open."""
+    page.evaluate("sessionStorage.clear()")
+    page.goto(f"{page.url.partition('?')[0]}?fixedDpr=1")
+    page.get_by_text("Up to date").wait_for()

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import expect
 
 from app.screens.depth.labels import COLORINGS, EVERYWHERE, FILLS, PICTURES
-from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, press, slider, unfold
+from tests.browser.hands import ALIKE, afresh, canvas, changed_from, differing, go, press, slider, unfold
 
 BY_CONFIDENCE = next(name for name, coloring in COLORINGS.items() if coloring == "confidence")
 
@@ -16,7 +16,7 @@ BY_CONFIDENCE = next(name for name, coloring in COLORINGS.items() if coloring ==
 @pytest.fixture
 def depth(tab):
     """The Depth step with everything computed, as a fresh session has it."""
-    tab.reload()
+    afresh(tab)
     go(tab, "Depth")
     tab.get_by_role("row", name="Network ran on").wait_for()
     tab.get_by_text("Up to date").wait_for()

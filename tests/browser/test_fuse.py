@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hands import canvas, changed_from, go, pick, slider, unfold
+from tests.browser.hands import afresh, canvas, changed_from, go, pick, slider, unfold
 from tests.browser.hands import press as press_button
 
 
 @pytest.fixture
 def fuse(tab):
     """The Fuse step with its race done, as a fresh session has it."""
-    tab.reload()
-    tab.get_by_text("Up to date").wait_for()
+    afresh(tab)
     go(tab, "Fuse")
     tab.locator(".packetmesh-board .number").first.wait_for()
     return tab

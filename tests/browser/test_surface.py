@@ -11,7 +11,18 @@ from playwright.sync_api import expect
 
 from app import acknowledgement
 from app.screens.surface.labels import BOTH, COLORINGS, POISSON
-from tests.browser.hands import ALIKE, canvas, changed_from, differing, go, pick, press, slider, unfold
+from tests.browser.hands import (
+    ALIKE,
+    afresh,
+    canvas,
+    changed_from,
+    differing,
+    go,
+    pick,
+    press,
+    slider,
+    unfold,
+)
 
 SOURCE = next(name for name, coloring in COLORINGS.items() if coloring == "source")
 
@@ -19,7 +30,7 @@ SOURCE = next(name for name, coloring in COLORINGS.items() if coloring == "sourc
 @pytest.fixture
 def surface(tab):
     """The Surface step with everything computed, as a fresh session has it."""
-    tab.reload()
+    afresh(tab)
     go(tab, "Surface")
     tab.get_by_role("row", name="No-hit rays").wait_for(timeout=180_000)
     tab.get_by_text("Up to date").wait_for()
