@@ -67,7 +67,9 @@ def test_a_reload_and_back_give_back_screen_setting_and_what_the_screen_adds(pag
     page.goto(link(app, wanted))
     for way in (page.reload, page.go_back):
         wait_for_address(page, wanted)
-        page.get_by_text(SEEN.get(screen, TEXTS[screen.capitalize()])).first.wait_for()
+        page.get_by_text(SEEN.get(screen, TEXTS[screen.capitalize()])).locator(
+            "visible=true"
+        ).first.wait_for()
         expect(page.get_by_text("Not all of the address")).to_have_count(0)
         if way == page.go_back:
             other = "Depth" if screen == "scene" else "Scene"
