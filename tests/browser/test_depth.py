@@ -133,7 +133,7 @@ def test_the_lesson_sets_the_controls(depth):
     unfold(depth, "Lesson: Can a picture measure?")
     for stop in range(1, 8):
         depth.get_by_role("button", name="Next", exact=True).locator("visible=true").first.click()
-        depth.get_by_text(f"({stop} of 7)").first.wait_for()
+        depth.get_by_text(f"({stop} of 7)").locator("visible=true").first.wait_for()
         press(depth, "Skip")
         expect(depth.get_by_text("Take a guess").locator("visible=true")).to_have_count(0)
         if stop == 3:

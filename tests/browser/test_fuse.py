@@ -197,7 +197,7 @@ def test_the_lesson_walks_ten_stops_and_sets_the_controls(fuse):
     starts, lanes = set(), set()
     for stop in range(1, 11):
         fuse.get_by_role("button", name="Next", exact=True).click()
-        fuse.get_by_text(f"({stop} of 10)").first.wait_for()
+        fuse.get_by_text(f"({stop} of 10)").locator("visible=true").first.wait_for()
         fuse.get_by_role("button", name="Skip", exact=True).click()
         expect(fuse.get_by_text("Take a guess").locator("visible=true")).to_have_count(0)
         starts.add(fuse.get_by_label("Start", exact=True).first.input_value())
@@ -209,7 +209,7 @@ def test_the_lesson_walks_ten_stops_and_sets_the_controls(fuse):
     assert fuse.get_by_label("Show", exact=True).first.input_value() == "race: inferred on sensor"
     assert re.search("of .* m?s$", clock(fuse))
     fuse.get_by_role("button", name="Back", exact=True).click()
-    fuse.get_by_text("(9 of 10)").first.wait_for()
+    fuse.get_by_text("(9 of 10)").locator("visible=true").first.wait_for()
 
 
 def test_the_capture_map_is_computed_and_a_cell_starts_a_race(fuse):

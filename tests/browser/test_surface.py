@@ -216,12 +216,12 @@ def test_the_sweep_plots_every_radius_and_says_what_it_means(surface):
 def test_the_lesson_sets_the_controls(surface):
     unfold(surface, "Lesson: Which ball radius?")
     press(surface, "Next")
-    surface.get_by_text("(1 of 10)").first.wait_for()
+    surface.get_by_text("(1 of 10)").locator("visible=true").first.wait_for()
     expect(surface.get_by_label("Radii").first).to_have_value("one radius (slider)")
     for stop in range(2, 9):
         press(surface, "Skip")
         expect(surface.get_by_text("Take a guess").locator("visible=true")).to_have_count(0)
         press(surface, "Next")
-        surface.get_by_text(f"({stop} of 10)").first.wait_for()
+        surface.get_by_text(f"({stop} of 10)").locator("visible=true").first.wait_for()
     expect(surface.get_by_label("Show", exact=True).first).to_have_value(BOTH)
     surface.get_by_text("Up to date").wait_for()
