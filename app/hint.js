@@ -8,6 +8,7 @@
   const note = Object.assign(document.createElement("div"), {className: "packetmesh-hint"});
   note.setAttribute("role", "note");
   let about = null; // whose meaning is shown
+  let stood = 0; // where that name stood then
   let waiting = false;
 
   // viser keeps the hint of a control in what its page is made of.
@@ -38,6 +39,7 @@
     note.textContent = one.dataset.hint;
     document.body.append(note);
     const at = one.getBoundingClientRect(), {width, height} = note.getBoundingClientRect();
+    stood = at.top;
     const below = at.bottom + GAP_PX + height < innerHeight;
     note.style.left = `${Math.max(8, Math.min(at.left, innerWidth - width - 8))}px`;
     note.style.top = `${below ? at.bottom + GAP_PX : Math.max(8, at.top - GAP_PX - height)}px`;
@@ -52,7 +54,8 @@
     show(one);
   }, true);
   window.addEventListener("keydown", event => event.key === "Escape" && close(), true);
-  window.addEventListener("scroll", close, true);
+  // A scroll's event comes a frame late, so after the click that followed it.
+  window.addEventListener("scroll", () => about?.getBoundingClientRect().top !== stood && close(), true);
 
   new MutationObserver(() => {
     if (waiting) return;

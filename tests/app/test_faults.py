@@ -27,7 +27,7 @@ from app.screens.calibrate.uploads import keep_photographs
 from app.server import build_server
 from app.session import Session
 from app.stepper import MARKS
-from app.ui import keep_upload
+from app.uploads import keep_upload
 from packetmesh.errors import InputError
 from tests.paths import ROOT
 
@@ -85,7 +85,7 @@ def test_a_worker_killed_at_any_stage_is_one_sentence_and_the_stage_can_be_asked
 
 def test_a_worker_killed_beside_the_chain_costs_only_that_answer(running, page):
     wait_for(lambda: up_to_date(page), LONG_S)
-    page.set("Whole", "Run folder")
+    page.set("Numbers", "Run folder")
     kill_worker_of(running, "export.job:export_job")
     wait_for(lambda: f"That did not work: {DIED}" in page.notices, LONG_S)
     page.go("Depth")
@@ -141,7 +141,7 @@ def test_a_disk_without_room_for_another_session_is_one_sentence_and_others_go_o
 
 
 UPLOADS = {
-    "pair": lambda file, folder: keep_upload(file, folder, "color", 1 << 20, "use the command line"),
+    "pair": lambda file, folder: keep_upload(file, folder, 1 << 20, "use the command line"),
     "photographs": lambda file, folder: keep_photographs(file, folder, "node_00"),
 }
 

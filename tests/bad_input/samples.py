@@ -22,11 +22,12 @@ from PIL import Image
 
 from network_sim.link_trace import read_link_trace
 from packetmesh.files import write_json
+from packetmesh.progress import drain
 from packetmesh.settings import config_named, settings
 from pipeline.calibration.shots import read_board
 from pipeline.config import PRESETS
 from pipeline.depth.inference import DepthNetwork
-from pipeline.importing.bag import read_bag
+from pipeline.importing.bag import iterate_bag
 from pipeline.importing.colmap import read_depth_map
 from pipeline.importing.numbered import read_trajectory_log
 from pipeline.importing.tum import listed
@@ -203,7 +204,7 @@ NETWORK = "infer-depth DIR/good.png --model FILE --out OUT"
 
 
 def _read_bag(path: Path) -> Any:
-    return read_bag(path, 1, None)
+    return drain(iterate_bag(path, 1, None))
 
 
 def _read_config(path: Path) -> Any:

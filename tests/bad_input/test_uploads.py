@@ -87,7 +87,7 @@ def test_a_bad_recording_is_one_sentence_and_touches_nothing_else(name, folder):
     path, before = folder / "recording_000.zip", outside(folder)
     path.write_bytes(RECORDINGS[name]())
     with pytest.raises(PacketMeshError) as caught:
-        drain(recording_job(None, None, path, "rig-000"))
+        drain(recording_job(None, None, path, "rig-000", None, 3))
     assert "\n" not in str(caught.value)
     assert [one.name for one in folder.iterdir()] == ["recording_000.zip"]
     assert outside(folder) == before
@@ -118,5 +118,7 @@ def test_photographs_stay_in_their_folder_whatever_they_are_called(folder, name)
 )
 def test_an_address_opens_no_file(setting):
     start = Place(Spec(Demo("office")), "Scene")
-    with pytest.raises(InputError, match="names a file"):
-        place_of(urlencode({"set": setting}), start, ("Scene",), {name: Demo(name) for name in DEMO_SCENES})
+    sources = {name: Demo(name) for name in DEMO_SCENES}
+    place, wrong = place_of(urlencode({"set": setting}), start, ("Scene",), sources)
+    assert place == start
+    assert len(wrong) == 1 and "names a file" in wrong[0]
