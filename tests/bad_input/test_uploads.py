@@ -121,4 +121,5 @@ def test_an_address_opens_no_file(setting):
     sources = {name: Demo(name) for name in DEMO_SCENES}
     place, wrong = place_of(urlencode({"set": setting}), start, ("Scene",), sources)
     assert place == start
-    assert len(wrong) == 1 and "names a file" in wrong[0]
+    assert len(wrong) == 1
+    assert "names a file" in wrong[0]
