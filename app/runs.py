@@ -82,7 +82,7 @@ def iterate_run(
     Raises:
         PacketMeshError: images, settings or a folder that cannot be used.
     """
-    rig, report = yield from _imported(source, out)
+    rig, report = yield from iterate_imported(source, out)
     spec, cache = Spec(rig, preset, config), RunCache()
     drain(run(spec, cache, ["rig"]))
     writable_folder(out)
@@ -97,12 +97,17 @@ def iterate_run(
     return result, metrics
 
 
-def _imported(
+def iterate_imported(
     source: FileSource, out: Path
 ) -> Generator[Progress, None, tuple[FileSource, ImportReport | None]]:
-    """The source itself, or the rig that a recording is imported to, with what was found in it."""
+    """The source itself, or the rig in ``out/imported`` that a recording is imported to, with what was found
+    in it.
+
+    Raises:
+        PacketMeshError: a recording or a folder that cannot be used.
+    """
     if isinstance(source, Calibrated):
-        inner, report = yield from _imported(source.source, out)
+        inner, report = yield from iterate_imported(source.source, out)
         assert not isinstance(inner, Calibrated)
         return replace(source, source=inner), report
     if not isinstance(source, RigFolder) or is_rig(Path(source.path)) or not is_recording(Path(source.path)):

@@ -43,6 +43,12 @@ from pipeline.sources import Demo, RigFolder
 PANEL_WIDTH_PX = 440
 ANYWHERE = "0.0.0.0"
 """As a host: all addresses of this machine."""
+MOST_SESSIONS = 64
+"""At once; in a lecture all browsers share one."""
+FULL = (
+    f"{MOST_SESSIONS} browsers are here already, each with a reconstruction of its own; come again when one "
+    "has left, or share one with `packetmesh serve --lecture`."
+)
 PANELS = (ScenePanel, CalibratePanel, DepthPanel, FusePanel, SurfacePanel, NetworkPanel, ExportPanel)
 """The steps of the app, in their order."""
 
@@ -170,6 +176,9 @@ def _let_in(app: AppServer, begin: Callable[[Target, int], Session]) -> None:
                 session.post(session.notify, "That did not work", sentence)
 
         limit_uploads(client._websock_connection, tell)
+        if len(app.sessions) >= MOST_SESSIONS:
+            client.add_notification("You cannot come in", FULL, color="red", auto_close_seconds=None)
+            return
         try:
             begin(client, client.client_id)
         except OSError as error:

@@ -33,6 +33,7 @@ def calibrate(
     without: tuple[str, ...] = (),
     board_warp: bool = False,
     like: Path | None = None,
+    depth_scale: float | None = None,
     json: bool = False,
 ) -> None:
     """Estimate cameras from images of a board, with how sure each number is.
@@ -59,6 +60,8 @@ def calibrate(
         board_warp: One camera: whether to estimate the board's shape, too, and to use it if that predicts
             images better.
         like: Several cameras: a rig in whose world they are placed, by the pose of its first node.
+        depth_scale: Depth units in a metre in depth images beside the photographs; without it whole numbers
+            are millimetres and floating-point numbers metres.
         json: Print everything as one JSON object.
     """
     from app.reports.calibration import write_calibration_report
@@ -81,16 +84,17 @@ def calibrate(
         )
     if nodes:
         accuracy_m = accuracy_mm / 1000.0
-        calibrate_cameras(nodes, out, board, lens, held_out, range_m, accuracy_m, without, like, json)
+        how = board, lens, held_out, range_m, accuracy_m, without, like, depth_scale
+        calibrate_cameras(nodes, out, *how, json)
         return
     files = image_files(images)
     report = drain(iterate_calibration(files, board, lens, held_out, without, board_warp), say_progress)
-    report = with_depth(report, depth_beside(files))
+    report = with_depth(report, depth_beside(files), depth_scale=depth_scale)
     trust = assess(report.calibration, report.views, board, range_m, accuracy_mm / 1000.0)
     writable_folder(out)
+    write_calibration_report(report, trust, out / "report.html")
     for sentence in write_camera_folder(report, out, trust):
         say(sentence)
-    write_calibration_report(report, trust, out / "report.html")
     if json:
         print_json(metrics(report, trust))
     else:

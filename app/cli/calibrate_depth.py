@@ -10,7 +10,8 @@ if TYPE_CHECKING:
 
 
 def depth_lines(report: CameraReport) -> Iterator[str]:
-    """What the depth sensor is off by."""
+    """What the depth sensor is off by, and what is doubtful about its scale."""
+    yield from report.depth_notes
     if report.depth is None:
         if report.depth_reason:
             yield f"The depth sensor's bias is not known. {report.depth_reason}"

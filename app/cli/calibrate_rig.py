@@ -49,6 +49,7 @@ def calibrate_cameras(
     accuracy_m: float,
     without: Sequence[str],
     like: Path | None,
+    depth_scale: float | None,
     json: bool,
 ) -> None:
     """Estimate all lenses and poses together, and write a folder that is laid over a rig.
@@ -63,6 +64,7 @@ def calibrate_cameras(
         accuracy_m: Within what a point must be placed there.
         without: Images to leave out, as node_01/color_03.png.
         like: A rig in whose world the cameras are placed, by the pose of its first node.
+        depth_scale: Depth units in a metre; None takes whole numbers as millimetres.
         json: Print everything as one JSON object.
     """
     from app.reports.calibration import write_calibration_report
@@ -72,16 +74,17 @@ def calibrate_cameras(
     from pipeline.calibration.rig_report import pose_like, rig_metrics, write_rig_folder
 
     T_world_first = pose_like(like, nodes[0].name)
-    report = drain(iterate_rig_calibration(nodes, board, lens, held_out, without), say_progress)
+    steps = iterate_rig_calibration(nodes, board, lens, held_out, without, depth_scale)
+    report = drain(steps, say_progress)
     trust = {
         name: assess(one.calibration, one.views, board, range_m, accuracy_m)
         for name, one in report.cameras.items()
     }
     writable_folder(out)
-    for sentence in write_rig_folder(report, out, T_world_first, trust):
-        say(sentence)
     for name, one in report.cameras.items():
         write_calibration_report(one, trust[name], out / name / "report.html")
+    for sentence in write_rig_folder(report, out, T_world_first, trust):
+        say(sentence)
     if json:
         print_json(rig_metrics(report, trust))
     else:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.cli.options import Images, PresetName, Settings
-from app.cli.text import print_json, say
+from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
 
 if TYPE_CHECKING:
@@ -45,9 +45,12 @@ def deliver(
             `--set nodes.retransmit=false loss.share=0.1 loss.burst_packets=8`.
         json: Print the moments as one JSON object.
     """
-    source = images.source()
+    named = images.source()
+    network, config = _settings(preset, chain, set)
 
+    from app.cli.reconstruct import imported_notes
     from app.reports.hand_out_of import write_hand_out
+    from app.runs import iterate_imported
     from packetmesh.files import writable_folder
     from pipeline.deliver import iterate_delivery
     from pipeline.delivery.folder import delivery_metrics, summary, write_delivery_folder
@@ -55,7 +58,7 @@ def deliver(
     from pipeline.run_folder import clear_run_folder
     from pipeline.spec import Spec
 
-    network, config = _settings(preset, chain, set)
+    source, imported = drain(iterate_imported(named, out), say_progress)
     if link_trace is not None:
         network = replace(network, mac=replace(network.mac, kind="replay", trace=str(link_trace)))
     asked = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
@@ -64,12 +67,13 @@ def deliver(
     writable_folder(out)
     _say_moment(first)
     delivery = drain(steps, _say_moment)
-    metrics = delivery_metrics(delivery)
+    report = None if imported is None else asdict(imported)
+    metrics = delivery_metrics(delivery) | ({} if report is None else {"import": report})
     clear_run_folder(out)
     page = write_hand_out(delivery, out)
     write_delivery_folder(delivery, metrics, preset, out)
     say(f"100%  {summary(delivery)}; see {page}")
-    for note in delivery.lossless.rig.notes:
+    for note in (*imported_notes(report), *delivery.lossless.rig.notes):
         say(note)
     if json:
         print_json(metrics)

@@ -103,14 +103,18 @@ def reasons() -> str:
 def trust(claim: Row) -> str:
     """Said against true, of the pixels said to be right with 80 to 90 %."""
     (bins,) = (found for found in claim["tables"] if found["title"] == "Confidence in bins")
-    shares = {group: true for group, span, _, _, true in bins["rows"] if span == SAID}
+    rows = [row for row in bins["rows"] if row[1] == SAID]
+    shares = {group: true for group, _, _, _, true in rows}
+    pixels = [int(str(row[2]).replace(",", "")) for row in rows]
+    right = sum(count * _share(true) for count, true in zip(pixels, shares.values(), strict=True))
     low, high = SAID_SHARES
     modest = [group for group, true in shares.items() if _share(true) > high]
     sure = [group for group, true in shares.items() if _share(true) < low]
     measured = "; ".join(f"{group}: {_share(true):.1f} %" for group, true in shares.items())
     return (
         f"**Its confidence.** Of pixels said to be right with {low:.0f} to {high:.0f} %, so many are: "
-        f"{measured}. Too modest: {'; '.join(modest) or 'none'}. Too sure: {'; '.join(sure) or 'none'}. A "
+        f"{measured}; of all of them together {right / sum(pixels):.1f} %. "
+        f"Too modest: {'; '.join(modest) or 'none'}. Too sure: {'; '.join(sure) or 'none'}. A "
         "sensor's own holes are where it fails: dark, shiny and far things, unlike what surrounds them. "
         "Hidden shapes lie where it measured, on things that are easier to continue."
     )

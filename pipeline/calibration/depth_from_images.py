@@ -12,7 +12,7 @@ from pipeline.calibration.depth_bias import DepthFit, fit_depth
 from pipeline.calibration.depth_samples import board_depth_samples
 from pipeline.calibration.estimate import Calibration
 from pipeline.calibration.from_images import CameraReport
-from pipeline.io.images import read_depth
+from pipeline.io.images import ReadDepth, read_depth_noted
 
 
 def depth_beside(images: Iterable[Path]) -> dict[str, Path]:
@@ -22,19 +22,26 @@ def depth_beside(images: Iterable[Path]) -> dict[str, Path]:
 
 
 def with_depth(
-    report: CameraReport, depths: Mapping[str, Path], depth_camera: CameraReport | None = None
+    report: CameraReport,
+    depths: Mapping[str, Path],
+    depth_camera: CameraReport | None = None,
+    depth_scale: float | None = None,
 ) -> CameraReport:
     """A report to which the depth sensor's bias is added, or why it is not known.
 
     Args:
         report: of the camera to which the depth belongs.
-        depths: 16-bit images in millimetres, by the name of the photograph of the same moment.
+        depths: images of depth, by the name of the photograph of the same moment.
         depth_camera: the camera on whose pixels the depth is, if another; ``depths`` has its images' names.
+        depth_scale: depth units in a metre; without it whole numbers are millimetres.
     """
     if not depths:
         return report
+    calibration = (depth_camera or report).calibration
     try:
-        found = depth_fit((depth_camera or report).calibration, depths, report.board)
+        images = _read(calibration, depths, depth_scale)
+        report = replace(report, depth_notes=_doubts(images))
+        found = _fit(calibration, images, report.board)
     except InputError as error:
         return replace(report, depth_reason=str(error))
     return replace(report, depth=found)
@@ -51,5 +58,24 @@ def depth_fit(calibration: Calibration, depths: Mapping[str, Path], board: Board
     Raises:
         InputError: images that cannot be read, are not on the camera's pixels or show no board, or too few.
     """
-    measured = [read_depth(depths[view.name]) if view.name in depths else None for view in calibration.views]
+    return _fit(calibration, _read(calibration, depths, None), board)
+
+
+def _read(
+    calibration: Calibration, depths: Mapping[str, Path], depth_scale: float | None
+) -> dict[str, ReadDepth]:
+    """The depth images of a camera's views, by the view's name."""
+    names = [view.name for view in calibration.views if view.name in depths]
+    return {name: read_depth_noted(depths[name], depth_scale) for name in names}
+
+
+def _fit(calibration: Calibration, images: Mapping[str, ReadDepth], board: Board) -> DepthFit:
+    measured = [images[view.name].depth if view.name in images else None for view in calibration.views]
     return fit_depth(board_depth_samples(calibration, measured, board))
+
+
+def _doubts(images: Mapping[str, ReadDepth]) -> tuple[str, ...]:
+    """What is doubtful about the scale of depth, of the first image with which anything is."""
+    doubtful = ((name, read.notes) for name, read in images.items() if read.notes)
+    name, notes = next(doubtful, ("", ()))
+    return tuple(f"Depth beside {name}: {note}" for note in notes)

@@ -52,6 +52,8 @@ class CameraReport:
     """The bias of the depth sensor, where there are depth images."""
     depth_reason: str = ""
     """Why that is not known, though there are depth images."""
+    depth_notes: tuple[str, ...] = ()
+    """What is doubtful about the scale of those, a sentence each."""
 
     @property
     def held_out_rms_px(self) -> float | None:

@@ -22,7 +22,8 @@ def metrics(report: CameraReport, trust: Trust | None = None) -> dict[str, Any]:
 
 
 def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None = None) -> list[str]:
-    """Write metrics.json, intrinsics.json, depth_correction.json if there is one, and other programs' files.
+    """Write intrinsics.json, depth_correction.json if there is one, other programs' files, and metrics.json
+    last: where it is, everything is.
 
     Returns:
         A sentence for each file that cannot hold the lens.
@@ -30,8 +31,13 @@ def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None 
     Raises:
         InputError: the folder cannot be written.
     """
+    missing = _write_cameras(report, folder)
     with atomic_path(folder / "metrics.json") as sibling:
         sibling.write_text(json.dumps(finite(metrics(report, trust)), indent=1, allow_nan=False) + "\n")
+    return missing
+
+
+def _write_cameras(report: CameraReport, folder: Path) -> list[str]:
     if report.depth is not None:
         write_depth_correction(folder / DEPTH_CORRECTION, report.depth.correction)
     found = report.calibration

@@ -92,6 +92,7 @@ def iterate_rig_calibration(
     lens: Lens = "thesis",
     folds: int = 0,
     without: Sequence[str] = (),
+    depth_scale: float | None = None,
 ) -> Generator[Progress, None, RigReport]:
     """Find the board in every image, estimate each camera, then all lenses and poses together.
 
@@ -101,6 +102,7 @@ def iterate_rig_calibration(
         lens: which distortions the cameras may have.
         folds: in how many turns moments are held out; 0 holds none out.
         without: images to leave out, as node_01/color_03.png.
+        depth_scale: depth units in a metre; without it whole numbers are millimetres.
 
     Yields:
         Progress, before each image.
@@ -128,7 +130,7 @@ def iterate_rig_calibration(
     yield Progress("placing the cameras", ALONE)
     together = cameras_together(nodes, reports, board, folds)
     yield Progress("comparing depth with the board", DEPTH)
-    measured = {node.name: node_with_depth(node, together.cameras) for node in nodes}
+    measured = {node.name: node_with_depth(node, together.cameras, depth_scale) for node in nodes}
     return replace(together, cameras={**together.cameras, **measured})
 
 
@@ -161,12 +163,15 @@ def cameras_together(
     return RigReport(board, together, rig)
 
 
-def node_with_depth(node: NodeShots, reports: Mapping[str, CameraReport]) -> CameraReport:
+def node_with_depth(
+    node: NodeShots, reports: Mapping[str, CameraReport], depth_scale: float | None = None
+) -> CameraReport:
     """A node's own report with the bias of its depth sensor, or why that is not known.
 
     Args:
         node: its images.
         reports: by camera, the node's and, if its depth has a camera of its own, that one's.
+        depth_scale: depth units in a metre; without it whole numbers are millimetres.
     """
     report, own = reports[node.name], reports.get(node.name + INFRARED)
     if own is None and any(shot.infrared is not None for shot in node.shots):
@@ -174,7 +179,7 @@ def node_with_depth(node: NodeShots, reports: Mapping[str, CameraReport]) -> Cam
         return replace(report, depth_reason=reason)
     grids = ((shot.color if own is None else shot.infrared, shot.depth) for shot in node.shots)
     depths = {image.name: depth for image, depth in grids if image is not None and depth is not None}
-    return with_depth(report, depths, own)
+    return with_depth(report, depths, own, depth_scale)
 
 
 def _seen(report: CameraReport, files: Mapping[Path, str]) -> dict[str, Seen]:

@@ -38,8 +38,8 @@ def write_rig_folder(
     T_world_first: FloatArray = LEVEL_POSE,
     trust: Mapping[str, Trust] = NO_TRUST,
 ) -> list[str]:
-    """Write metrics.json, and of every node what ``load_rig(..., calibration=folder)`` reads and its camera
-    in the files of other programs.
+    """Write of every node what ``load_rig(..., calibration=folder)`` reads and its camera in the files of
+    other programs, and metrics.json last.
 
     Args:
         report: of all cameras.
@@ -53,14 +53,14 @@ def write_rig_folder(
     Raises:
         InputError: the folder cannot be written.
     """
-    with atomic_path(folder / "metrics.json") as sibling:
-        sibling.write_text(json.dumps(finite(rig_metrics(report, trust)), indent=1, allow_nan=False) + "\n")
     sentences = []
     for name, one in report.cameras.items():
         if not name.endswith(INFRARED):
             told = write_camera_folder(one, folder / name, trust.get(name))
             sentences += [f"{name}: {sentence}" for sentence in told]
     write_calibration(folder, report.nodes(T_world_first))
+    with atomic_path(folder / "metrics.json") as sibling:
+        sibling.write_text(json.dumps(finite(rig_metrics(report, trust)), indent=1, allow_nan=False) + "\n")
     return sentences
 
 

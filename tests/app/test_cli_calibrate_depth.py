@@ -55,3 +55,20 @@ def test_depth_that_cannot_be_used_is_told_and_the_camera_is_calibrated_anyway(f
     assert "The depth sensor's bias is not known. The depth image of color_00.png" in capsys.readouterr().err
     assert (tmp_path / "camera" / "intrinsics.json").exists()
     assert not (tmp_path / "camera" / "depth_correction.json").exists()
+
+
+def test_a_doubtful_scale_of_depth_is_said_and_can_be_stated(folder, tmp_path, capsys):
+    session = tmp_path / "session"
+    session.mkdir()
+    for path in folder.glob("*.png"):
+        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        cv2.imwrite(str(session / path.name), 5 * image if path.name.startswith("depth") else image)
+    words = ["calibrate", str(session), *ASKED, "--out", str(tmp_path / "camera")]
+    main(words)
+    told = capsys.readouterr().err
+    assert "Depth beside color_00.png: All depth values are multiples of 5" in told
+    assert "try --depth-scale 5000" in told
+    main([*words, "--depth-scale", "5000"])
+    told = capsys.readouterr().err
+    assert "multiples of 5" not in told
+    assert "Depth is off by" in told

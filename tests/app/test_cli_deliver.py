@@ -8,6 +8,7 @@ import pytest
 from pipeline.io.rigs import save_rig
 from tests.app.commands import check_one_sentence, run
 from tests.pipeline.delivery.small import small_rig
+from tests.pipeline.importing.bags import write_bag
 
 pytestmark = pytest.mark.xdist_group("cli_deliver")  # one worker makes the shared run once
 FEW = ("--set", "surface.max_points=2500")
@@ -117,3 +118,15 @@ def test_a_recorded_link_carries_the_images(capsys, rig_folder, tmp_path):
     assert (
         sending_s + 0.01 <= moment["t_s"] <= 1.03 * sending_s + 0.021
     )  # half a round trip; begun within 10 ms
+
+
+def test_a_recording_is_imported_and_sent(capsys, tmp_path):
+    write_bag(tmp_path / "recording", small_rig(), "mcap", moments=1)
+    (bag,) = (tmp_path / "recording").glob("*.mcap")
+    words = ("--rig", bag, "--out", tmp_path / "out", "--moments", 1, "--coding", "jpeg", "--json", *FEW)
+    code, out, err = run(capsys, "deliver", *words)
+    assert code == 0
+    assert f"{bag} is a recording (bag), imported as" in err
+    (moment,) = json.loads(out)["moments"]
+    assert moment["surface"]["triangles"] > 100
+    assert json.loads(out)["import"]["kind"] == "bag"

@@ -24,7 +24,7 @@ from app.load.connection import Connection, wait_for
 from app.own_folder import LOCK, PREFIX, delete_abandoned, own_folder
 from app.pool import DIED
 from app.screens.calibrate.uploads import keep_photographs
-from app.server import build_server
+from app.server import FULL, build_server
 from app.session import Session
 from app.stepper import MARKS
 from app.uploads import keep_upload
@@ -230,3 +230,13 @@ def test_only_what_nobody_uses_is_deleted(tmp_path, monkeypatch):
     assert {path.name for path in tmp_path.iterdir()} == {used.path.name, f"{PREFIX}of-somebody"}
     used.delete()
     assert not used.path.exists()
+
+
+def test_a_browser_too_many_is_told_so_and_gets_no_session(running, page, monkeypatch):
+    wait_for(lambda: len(running.sessions) == 1)
+    monkeypatch.setattr(app.server, "MOST_SESSIONS", 1)
+    with contextlib.closing(Connection(running.url)) as one:
+        wait_for(lambda: f"You cannot come in: {FULL}" in one.notices, LONG_S)
+        assert len(running.sessions) == 1
+    page.go("Depth")
+    wait_for(lambda: page.current == "Depth")

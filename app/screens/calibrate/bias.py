@@ -77,17 +77,18 @@ def _bias(node: NodeShots, cameras: CamerasFound) -> DepthFound | str:
         return f"{node.name} has no lens yet, and depth is judged through it; {reason}"
     report = node_with_depth(node, cameras.reports)
     if report.depth is not None:
-        return DepthFound(report.depth.correction, _view(report.depth))
+        note = " ".join((*report.depth_notes, report.depth.note)).strip()
+        return DepthFound(report.depth.correction, _view(report.depth, note))
     return report.depth_reason or (
         f"There are no depth images beside the photographs of {node.name}; add depth_00.png beside "
         "color_00.png and so on"
     )
 
 
-def _view(fit: DepthFit) -> BiasView:
+def _view(fit: DepthFit, note: str) -> BiasView:
     """What the panel shows of it."""
     rows = _rows(fit.correction)
-    return BiasView(fit.terms, rows, fit.rms_before_m, fit.rms_after_m, bias_curve(fit), fit.note)
+    return BiasView(fit.terms, rows, fit.rms_before_m, fit.rms_after_m, bias_curve(fit), note)
 
 
 def _rows(correction: DepthCorrection) -> tuple[tuple[str, float, float, float, str], ...]:

@@ -91,8 +91,9 @@ def test_what_completion_is_worth_is_said_of_the_target_the_hidden_and_the_own_h
 
 
 def test_confidence_is_too_modest_above_what_it_says_and_too_sure_below():
-    rows = [[group, "80% to 90%", 9, "85.0%", f"{true}% [1%, 2%]"] for group, true in (("a", 93), ("b", 71))]
+    found = (("a", 9, 93), ("b", 27, 71))
+    rows = [[group, "80% to 90%", pixels, "85.0%", f"{true}% [1%, 2%]"] for group, pixels, true in found]
     said = trust(
         {"tables": [{"title": "Confidence in bins", "rows": [*rows, ["a", "0% to 10%", 1, "", ""]]}]}
     )
-    assert "a: 93.0 %; b: 71.0 %. Too modest: a. Too sure: b." in said
+    assert "a: 93.0 %; b: 71.0 %; of all of them together 76.5 %. Too modest: a. Too sure: b." in said
