@@ -15,6 +15,18 @@ hypothesis.settings.register_profile("untimed", deadline=None)
 hypothesis.settings.load_profile("untimed")
 
 
+LONGEST_ID = 60
+
+
+def pytest_make_parametrize_id(val):
+    """Long texts and files are called by their beginning: every worker is sent all names of tests, and one
+    had 65 MB.
+    """
+    if isinstance(val, bytes | str) and len(val) > LONGEST_ID:
+        return f"{val[:20]!a} and so on"
+    return None
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The folder with real frames, which lies outside the repository."""

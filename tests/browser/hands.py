@@ -6,7 +6,9 @@ import re
 
 import cv2
 import numpy as np
+from playwright.sync_api import TimeoutError
 
+TRIES, TRY_MS = 12, 5000
 STEPS = ("Scene", "Calibrate", "Depth", "Fuse", "Surface", "Network", "Export")
 TEXTS = {
     "Scene": "Each camera node delivers",
@@ -71,9 +73,21 @@ def unfold(page, folder):
     page.wait_for_timeout(400)
 
 
+def visible(page, label):
+    """The input of that label on the step that is shown."""
+    return page.get_by_label(label, exact=True).locator("visible=true").first
+
+
 def pick(page, label, option):
-    page.get_by_label(label, exact=True).first.click()
-    page.get_by_role("option", name=option, exact=True).click()
+    """Open a list and take an option, again if what draws the panel anew has closed the list."""
+    entry = page.get_by_role("option", name=option, exact=True).locator("visible=true")
+    for _ in range(TRIES):
+        visible(page, label).click()
+        try:
+            return entry.click(timeout=TRY_MS)
+        except TimeoutError:
+            continue
+    raise AssertionError(f"{option} is never offered under {label}")
 
 
 def press(page, name):

@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 
 from app.screens.calibrate.labels import AROUND, HALVES
 from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import canvas, changed_from, go, press, slider, unfold
+from tests.browser.hands import canvas, changed_from, go, pick, press, slider, unfold
 
 LONG_MS = 240_000
 """For the cameras and their depth on a busy machine."""
@@ -33,16 +33,6 @@ def calibrated(browser, app):
     dismiss_notifications(page)
     yield page
     context.close()
-
-
-def visible(page, label):
-    """The input of that label on the step that is shown."""
-    return page.get_by_label(label, exact=True).locator("visible=true").first
-
-
-def pick(page, label, option):
-    visible(page, label).click()
-    page.get_by_role("option", name=option, exact=True).locator("visible=true").click()
 
 
 def f_scores(page):

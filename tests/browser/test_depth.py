@@ -8,7 +8,19 @@ import pytest
 from playwright.sync_api import expect
 
 from app.screens.depth.labels import COLORINGS, EVERYWHERE, FILLS, PICTURES
-from tests.browser.hands import ALIKE, afresh, canvas, changed_from, differing, go, press, slider, unfold
+from tests.browser.hands import (
+    ALIKE,
+    afresh,
+    canvas,
+    changed_from,
+    differing,
+    go,
+    pick,
+    press,
+    slider,
+    unfold,
+    visible,
+)
 
 BY_CONFIDENCE = next(name for name, coloring in COLORINGS.items() if coloring == "confidence")
 
@@ -21,16 +33,6 @@ def depth(tab):
     tab.get_by_role("row", name="Network ran on").wait_for()
     tab.get_by_text("Up to date").wait_for()
     return tab
-
-
-def visible(page, label):
-    """The input of that label on the step that is shown."""
-    return page.get_by_label(label, exact=True).locator("visible=true").first
-
-
-def pick(page, label, option):
-    visible(page, label).click()
-    page.get_by_role("option", name=option, exact=True).locator("visible=true").click()
 
 
 def picture(page):

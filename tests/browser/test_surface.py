@@ -155,6 +155,7 @@ def all_answered(page, asked):
 def test_a_clicked_hole_says_why_it_is_there(surface):
     picture = surface.locator("canvas").first.bounding_box()
     notice = surface.locator(".mantine-Notification-root")
+    answer = notice.filter(has_text=re.compile("mm|cm|camera|view"))
     for row in range(3, 9):
         for column in range(3, 9):
             spot = (picture["width"] * column / 12, picture["height"] * row / 12)
@@ -162,7 +163,7 @@ def test_a_clicked_hole_says_why_it_is_there(surface):
             surface.wait_for_timeout(150)
             if notice.filter(has_text=re.compile("mm|cm|camera|view")).count():
                 return
-    raise AssertionError("no click met a hole")
+    answer.first.wait_for()  # of one of them; a busy machine answers late
 
 
 def test_small_holes_are_filled_on_demand_and_given_back(surface):
