@@ -29,7 +29,7 @@ from app.screens.calibrate.uploads import UploadFolder
 from app.screens.calibrate.use import WRITING, UseRow
 from app.screens.calibrate.view import CalibrationView, CameraView, RigView, TrustView
 from app.state import BoardViews, Spec, Step
-from app.ui import STOP, Panel
+from app.ui import STOP, Awaited, Panel
 from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_SCENES, board_views_of
 from pipeline.sources import Calibrated, Demo
@@ -60,7 +60,6 @@ class CalibratePanel(Panel):
         gui.add_markdown(TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, CalibrateLook(), NUMBERS)
         self._lesson = LessonFolder(ui, lesson, self._take_look, self._lesson_numbers)
-        self.in_address[STOP] = self._lesson
         self._status = gui.add_markdown("")
         self._open = ui.buttons(
             "Open",
@@ -70,11 +69,13 @@ class CalibratePanel(Panel):
         )
         self._verdict = gui.add_html("")
         self._use = UseRow(ui, self._use_it, self._as_before)
-        self._camera = gui.add_dropdown("Camera", ["node_00"], hint="Whose views are shown.", visible=False)
-        ui.when_changed(self._camera, self._picked_camera)
+        self._cameras = gui.add_dropdown("Camera", ["node_00"], hint="Whose views are shown.", visible=False)
+        self._camera = Awaited(ui, self._cameras, self._picked_camera)
         self._photographs = Photographs(
             ui, self._answers, self._pick, self._show_view, self._drop, self._keep_all
         )
+        self.in_address |= {STOP: self._lesson, "node": self._camera}
+        self.in_address |= {"photo": self._photographs, "pictures": self._photographs.area}
         self._around = gui.add_dropdown(
             "In space", list(AROUND), hint="What stays in its place in the 3-D scene."
         )
@@ -143,7 +144,7 @@ class CalibratePanel(Panel):
     def on_partial(self, view: Any) -> None:
         """Show the cameras as they come."""
         if isinstance(view, CalibrationView):
-            self._take(view)
+            self._take(view, all_there=False)
 
     def on_view(self, step: Step, view: Any) -> None:
         """Show all cameras; and what becomes of the surface."""
@@ -157,7 +158,7 @@ class CalibratePanel(Panel):
         if step == "surface" and self.session.results.fresh("surface", self.session.spec):
             self._use.surface(view.after, isinstance(self.session.spec.source, Calibrated))
         if step == "calibrate":
-            self._take(view)
+            self._take(view, all_there=True)
             self._show_look()
 
     def on_failure(self, step: Step, sentence: str) -> None:
@@ -167,13 +168,10 @@ class CalibratePanel(Panel):
             self._show_camera()
             self._status.content = sentence
 
-    def _take(self, view: CalibrationView) -> None:
+    def _take(self, view: CalibrationView, all_there: bool) -> None:
         self._view = view
-        names = tuple(camera.name for camera in view.cameras)
-        if names != self._camera.options:
-            chosen = self._camera.value
-            self._camera.options = names
-            self._camera.value = chosen if chosen in names else names[0]
+        if view.cameras:
+            self._camera.offer(tuple(camera.name for camera in view.cameras), all_there)
         self._whole |= {camera.name: camera for camera in view.cameras if not camera.dropped}
         self._show_camera()
 
@@ -191,7 +189,7 @@ class CalibratePanel(Panel):
         camera = self._shown()
         with self.ui.atomic():
             self._around.visible = camera is not None
-            self._camera.visible = self._view is not None and len(self._view.cameras) > 1
+            self._cameras.visible = self._view is not None and len(self._view.cameras) > 1
             self._use.show(camera is not None and camera.calibration is not None)
             nothing = camera is None and self.session.spec.views is None
             self._open.visible = nothing

@@ -70,6 +70,14 @@ class Photographs:
             )
         self.area.load(pictures | self._answers.pictures_of(camera, self.chosen))
 
+    def place(self) -> str:
+        """The name of the view that is shown, for the address; empty for the first."""
+        return "" if self.chosen in self._names[:1] else self.chosen
+
+    def take(self, place: str) -> None:
+        """Show the view of that name, at once or when it is there."""
+        self._on_pick(place or next(iter(self._names), ""))
+
     def _go(self, count: int) -> None:
         if self._names:
             self._on_pick(self._names[(self._names.index(self.chosen) + count) % len(self._names)])
