@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from app.lesson_file import NUMBER
 from app.records import Picture
 from app.tables import bar_html
 from app.ui import Ui
+from packetmesh.errors import InputError
 from pipeline.types import ByteArray
 
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
@@ -61,6 +64,7 @@ class CompareArea:
         self._captions = ui.gui.add_html("", visible=visible)
         for handle in (self._left, self._right, self._split):
             ui.when_changed(handle, self._draw)
+        self._start = (left, right, 50.0)
 
     def load(self, pictures: Mapping[Any, Picture] | None) -> None:
         """Show others of one size, by their names; None shows nothing."""
@@ -82,6 +86,23 @@ class CompareArea:
         self._split.value = round(100.0 * split_share)
         self._draw()
 
+    def place(self) -> str:
+        """Both pictures by their names and the line in %, for the address; empty as at the start."""
+        left, right = (self._names[handle.value] for handle in (self._left, self._right))
+        now = (left, right, float(self._split.value))
+        return "" if now == self._start else place_text(*now)
+
+    def take(self, place: str) -> None:
+        """Show such pictures.
+
+        Raises:
+            InputError: there are none like them.
+        """
+        left, right, percent = place_of(place, self._start)
+        if not {left, right} <= self._labels.keys():
+            raise no_pictures(place, self._start)
+        self.set(left, right, percent / 100.0)
+
     def _draw(self) -> None:
         """Only what has changed: a dragged slider asks more often than it moves."""
         if not self._pictures:
@@ -94,6 +115,33 @@ class CompareArea:
             self._captions.content = captions_html(left, right)
         self._drawn = wanted
         self._image.image = split(left.rgb, right.rgb, wanted[2] / 100.0)
+
+
+def place_text(left: str, right: str, percent: float) -> str:
+    """What an address says of two pictures, by their names, and the line between them."""
+    return f"{left},{right},{percent:g}"
+
+
+def place_of(text: str, start: tuple[str, str, float]) -> tuple[str, str, float]:
+    """The pictures and the line of such a text; those of the start if it is empty.
+
+    Raises:
+        InputError: it is no such text.
+    """
+    if not text:
+        return start
+    found = re.fullmatch(rf"([a-z-]+),([a-z-]+),{NUMBER}", text)
+    if found is None or float(found[3]) > 100.0:
+        raise no_pictures(text, start)
+    return found[1], found[2], float(found[3])
+
+
+def no_pictures(text: str, start: tuple[str, str, float]) -> InputError:
+    """Says that an address names no two pictures."""
+    return InputError(
+        f"The address has pictures={text[:40]}; try two pictures and where the line is in %, such as "
+        f"{place_text(*start)}"
+    )
 
 
 def split(left: ByteArray, right: ByteArray, share: float) -> ByteArray:

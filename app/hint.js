@@ -50,7 +50,7 @@
     const again = one === about;
     close();
     if (!one || again) return;
-    if (one.matches("label") && !document.getElementById(one.htmlFor)?.matches("[type=checkbox]")) event.preventDefault();
+    if (one.matches("label")) event.preventDefault(); // to ask changes nothing
     show(one);
   }, true);
   window.addEventListener("keydown", event => event.key === "Escape" && close(), true);

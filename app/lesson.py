@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Generic
 
-from app.lesson_file import CHOICES, FIELD, SCENE, Lesson, Look, Numbers, Question
+from app.lesson_file import CHOICES, FIELD, SCENE, Lesson, Look, Numbers, Question, settled
 from app.page import running
 from app.ui import Ui
 from packetmesh.errors import InputError
@@ -19,6 +19,7 @@ SKIP, SKIPPED = "Skip", -1
 GUESS = f"Take a guess: 1, 2 or 3. Or press **{SKIP}**."
 FIRST = "**Guess before you go on: 1, 2 or 3.** A wrong guess costs nothing. Or press **Skip**."
 VOTING = f"The class votes: 1, 2 or 3. A guess of the teacher's, or **{SKIP}**, shows the answer."
+COMPUTING = "The answer depends on the scene: it comes when the numbers of this stop are computed."
 FIRST_OF_ALL = -1.0
 """Order of a lesson's folder in the panel of its screen."""
 BAR = 12
@@ -196,8 +197,11 @@ class LessonFolder(Generic[Look]):
         stop = self._lesson.stops[index]
         lines = [f"**{stop.title}** ({index + 1} of {len(self._names)})", stop.text]
         if stop.question is not None:
-            asked = with_votes(stop.question, self._votes.get(index, {}).values())
-            lines += [f"**{stop.question.text}**", *told(asked, self._guesses.get(index), waiting)]
+            guess, question = self._guesses.get(index), settled(stop.question, self._numbers())
+            if guess is not None and question is None:
+                guess, waiting = None, COMPUTING
+            asked = with_votes(question or stop.question, self._votes.get(index, {}).values())
+            lines += [f"**{stop.question.text}**", *told(asked, guess, waiting)]
         text = self._filled("\n\n".join(lines), index)
         if text != self._text.content:
             self._text.content = text

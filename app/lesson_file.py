@@ -12,6 +12,9 @@ Behind the text a section asks::
     - [x] Time.
     - [ ] Energy. | The reason here, too.
     reveal: What there is to know, which is shown when a person has guessed.
+
+Where the right choice depends on the scene, each has a reason and names what must be computed for it to be
+right: ``- [more=plane] The plane. | Why it is wrong where it is.``
 """
 
 from __future__ import annotations
@@ -53,6 +56,8 @@ class Choice:
     """Markdown."""
     reason: str = ""
     """Why it is wrong; empty for the one that is right."""
+    when: tuple[str, str] | None = None
+    """The name of something computed, and what that is where this choice is right; None if it is fixed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +69,20 @@ class Question:
     choices: tuple[Choice, ...]
     reveal: str
     """Markdown, shown after a guess."""
+
+
+def settled(question: Question, numbers: Numbers) -> Question | None:
+    """The question with the choice that is right in the scene that is shown; None while that is not known."""
+    if all(choice.when is None for choice in question.choices):
+        return question
+    rights = [choice.when is not None and choice.when in numbers.items() for choice in question.choices]
+    if not any(rights):
+        return None
+    choices = (
+        replace(choice, reason="" if right else choice.reason)
+        for choice, right in zip(question.choices, rights, strict=True)
+    )
+    return replace(question, choices=tuple(choices))
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +141,15 @@ def read_lesson(
                 f"The lesson {path.name} has the field {stop and f'{stop}:'}{name}, no number of its "
                 f"screen; try one of {', '.join(numbers) or 'none'}."
             )
-    stops = (_stop(section, path.name, settings, default) for section in sections)
-    return Lesson(title[1].strip(), tuple(stops), default)
+    stops = tuple(_stop(section, path.name, settings, default) for section in sections)
+    asked = [choice for stop in stops if stop.question for choice in stop.question.choices]
+    for name in (choice.when[0] for choice in asked if choice.when is not None):
+        if name not in numbers:
+            raise InputError(
+                f"The lesson {path.name} has a choice that is right by {name}, which its screen does not "
+                f"compute; try one of {', '.join(numbers) or 'none'}."
+            )
+    return Lesson(title[1].strip(), stops, default)
 
 
 def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: Look) -> Stop[Look]:
@@ -157,13 +183,21 @@ def _question(parts: list[str], where: str) -> Question:
         raise InputError(
             f"{where} must ask with 'ask:', 'choices:' and 'reveal:', in this order, each with text."
         )
-    _, *items = re.split(r"^- \[([ x])\] ", choices, flags=re.MULTILINE)
+    _, *items = re.split(r"^- \[( |x|[a-z_]+=[a-z]+)\] ", choices, flags=re.MULTILINE)
     marks, texts = items[::2], [" ".join(item.split()) for item in items[1::2]]
-    if len(texts) != CHOICES or marks.count("x") != 1:
+    whens = [(name, word) if word else None for name, _, word in (mark.partition("=") for mark in marks)]
+    computed = [when for when in whens if when is not None]
+    of_one = len(set(computed)) == CHOICES and len({name for name, _ in computed}) == 1
+    if len(texts) != CHOICES or not (of_one or (not computed and marks.count("x") == 1)):
         raise InputError(
-            f"{where} needs {CHOICES} choices: '- [x] choice' once, else '- [ ] choice | why it is wrong'."
+            f"{where} needs {CHOICES} choices: '- [x] choice' once, else '- [ ] choice | why it is wrong'; "
+            "or all of them such as '- [name=word] choice | why it is wrong where it is'."
         )
-    found = tuple(Choice(*(part.strip() for part in text.partition(" | ")[::2])) for text in texts)
+    parted = (text.partition(" | ") for text in texts)
+    found = tuple(
+        Choice(text.strip(), reason.strip(), when)
+        for (text, _, reason), when in zip(parted, whens, strict=True)
+    )
     for mark, one in zip(marks, found, strict=True):
         if (mark == "x") == bool(one.reason):
             fault = "is right but has a reason why not" if one.reason else "has no reason why it is wrong"

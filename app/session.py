@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import viser
 
 from app import jobs
-from app.drawing.cameras import look, stage_of
+from app.framing import Framing
 from app.header import Header
 from app.lane import LatestWins, Track
 from app.lecture import Lecture
@@ -69,16 +69,16 @@ class Session:
             Track(LatestWins(pool, object()), ("network",)),
         )
         self._side, self._quick = LatestWins(pool, self), LatestWins(pool, object(), urgent=True)
-        self._wide = self._closed = False
-        self._shape = self._seen_shape = 0.0
+        self._closed = False
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="session")
         self.panels = [panel(self) for panel in panels]
         self.current = self.panels[0]
         self.views = Views(target) if isinstance(target, viser.ClientHandle) else None
+        self._framing = Framing(self)
         self.places = Places(self)
         self._thread.submit(self._guarded, self._build_in_turn)
         if isinstance(target, viser.ClientHandle):
-            target.camera.on_update(lambda _: self._look_at_window())
+            target.camera.on_update(lambda _: self._framing.follow_window())
 
     # What others ask of it, from any thread.
 
@@ -329,36 +329,7 @@ class Session:
 
     def frame_view(self, anew: bool = False, keep: bool = False) -> None:
         """Turn the view to what is shown; ``keep`` leaves it where a person has turned it."""
-        if self.views is None:
-            self._turn_view(anew)
-        else:
-            self.views.frame(lambda: self._turn_view(anew), keep)
-
-    def _turn_view(self, anew: bool) -> str:
-        """Turn it, and name what is looked at."""
-        if self.current.look():
-            self._shape = 0.0
-            return self.current.drawn_below
-        below = self.current.drawn_below
-        wide = any(panel.wide for panel in self.panels if panel.drawn_below == below)
-        scene = self.results.view("scene")
-        shape = self._window()
-        if scene is not None and (anew or wide != self._wide or shape != self._shape):
-            look(self.clients(), stage_of(scene.nodes), wide)
-            self._wide, self._shape = wide, shape
-        return "both" if wide else "scene"
-
-    def _window(self) -> float:
-        """Width over height of the picture, roughly; that of a shared session is nobody's own."""
-        if isinstance(self.target, viser.ViserServer):
-            return 1.0
-        return round(self.target.camera.aspect, 1)
-
-    def _look_at_window(self) -> None:
-        """Fit the view anew when the picture has another shape, as when the dock comes or goes."""
-        if self._window() != self._seen_shape:
-            self._seen_shape = self._window()
-            self.post(self.frame_view, False, True)
+        self._framing.frame(anew, keep)
 
     def _act(self, action: str) -> None:
         for panel in self.panels:

@@ -154,6 +154,50 @@ class Picked:
             self.action()
 
 
+class Awaited:
+    """A list whose names come with what is computed; an address may ask for one of them before."""
+
+    def __init__(self, ui: Ui, handle: viser.GuiDropdownHandle[str], action: Callable[[], object]) -> None:
+        """Take care of a list; ``action`` answers a change."""
+        self._handle, self._action, self._asked = handle, action, ""
+        ui.when_changed(handle, self._picked)
+
+    @property
+    def value(self) -> str:
+        """The name that is picked."""
+        return self._handle.value
+
+    def _picked(self) -> None:
+        self._asked = ""
+        self._action()
+
+    def offer(self, names: tuple[str, ...], all_there: bool = True) -> None:
+        """Have the list hold these names; the one that was picked or asked for is picked if it is there."""
+        chosen = self._asked or self.value
+        if names != self._handle.options:
+            self._handle.options = names
+        if chosen not in names:
+            chosen = names[0]
+        elif chosen == self._asked:
+            self._asked = ""
+        if chosen != self.value:
+            self._handle.value = chosen
+        if all_there:
+            self._asked = ""
+
+    def place(self) -> str:
+        """The name that is picked or asked for, unless it is the first."""
+        return self._asked or ("" if self.value == self._handle.options[0] else self.value)
+
+    def take(self, place: str) -> None:
+        """Pick it, at once or when it is there."""
+        name = place or self._handle.options[0]
+        self._asked = "" if name in self._handle.options else name
+        if not self._asked and name != self.value:
+            self._handle.value = name
+            self._action()
+
+
 @dataclass(frozen=True, slots=True)
 class Offer:
     """A file to take along."""

@@ -138,6 +138,41 @@ def test_every_photograph_has_a_bar_and_a_click_shows_it(screen):
     assert f"View {BLANK}" in screen.gui.text()
 
 
+def test_the_address_says_whose_which_photograph_and_pictures_are_shown(screen):
+    parts, gui = screen.panel.in_address, screen.gui
+    keys = ("node", "photo", "pictures")
+    assert [parts[key].place() for key in keys] == ["", "", ""]
+    gui.set("Camera", "node_01")
+    gui.press("View", "Next")
+    gui.set("Compare", COVERAGE)
+    gui.set("Split (%)", 30.0)
+    said = [parts[key].place() for key in keys]
+    assert said == ["node_01", "1", "photo,coverage,30"]
+    for places in (["", "", ""], said):
+        for key, place in zip(keys, places, strict=True):
+            parts[key].take(place)
+        assert [parts[key].place() for key in keys] == places
+    assert "View 1" in gui.text()
+    with pytest.raises(InputError, match="such as photo,straightened,50"):
+        parts["pictures"].take("photo,halves,50")
+
+
+def test_what_an_address_asks_for_is_shown_once_the_cameras_are_there(
+    server, store, rig, boards, tmp_path, monkeypatch
+):
+    built = CalibratePanel.build
+
+    def build(panel):
+        built(panel)
+        for key, place in (("node", "node_01"), ("photo", "2")):
+            panel.in_address[key].take(place)
+
+    monkeypatch.setattr(CalibratePanel, "build", build)
+    bench = screen.__wrapped__(server, store, rig, boards, tmp_path)
+    assert bench.gui.find("Camera").value == "node_01"
+    assert bench.panel.in_address["photo"].place() == "2"
+
+
 def test_a_dropped_view_is_compared_with_all_views_and_comes_back(screen):
     gui = screen.gui
     gui.press("View", "Next")

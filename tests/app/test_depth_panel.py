@@ -13,6 +13,7 @@ from app.screens.depth.lesson import NUMBERS, SETTINGS, SHIPPED, DepthLook
 from app.screens.depth.model import SHIPPED as SHIPPED_NETWORK
 from app.screens.depth.panel import DepthPanel
 from app.screens.depth.view import Disc
+from packetmesh.errors import InputError
 from pipeline.depth.inference import SHIPPED_MODEL
 from pipeline.sources import Demo
 from tests.app.fakes import Bench, ui_of
@@ -49,6 +50,38 @@ def test_the_screen_begins_with_photo_beside_sensor_and_the_filled_points(sessio
     (histogram,) = session.gui.all("plotly")
     assert histogram.figure.data[0].y.sum() == node.residuals.counts.sum()
     assert node.provider in session.gui.text()
+
+
+def test_the_address_says_which_pictures_and_whose_are_shown_and_is_followed(session):
+    parts, gui = session.panel.in_address, session.gui
+    assert (parts["pictures"].place(), parts["node"].place()) == ("", "")
+    gui.set("Right", PICTURES["difference"])
+    gui.set("Split (%)", 25.0)
+    said = parts["pictures"].place()
+    assert said == "photo,difference,25"
+    parts["pictures"].take("")
+    assert [gui.find(name).value for name in ("Right", "Split (%)")] == [PICTURES["sensor"], 50.0]
+    parts["pictures"].take(said)
+    assert parts["pictures"].place() == said
+    for wrong in ("photo", "photo,attic,20", "photo,sensor,120", "photo,sensor,nan"):
+        with pytest.raises(InputError, match="such as photo,sensor,50"):
+            parts["pictures"].take(wrong)
+    assert parts["pictures"].place() == said
+    parts["pictures"].take("")
+
+
+def test_a_node_that_an_address_asks_for_is_shown_once_it_is_there(session):
+    node, view = session.panel.in_address["node"], session.results.view("depth")
+    node.take("node_07")
+    assert node.place() == "node_07"
+    seventh = replace(view, nodes=(*view.nodes, replace(view.nodes[0], name="node_07")))
+    session.panel.on_view("depth", seventh)
+    assert session.gui.find("Node").value == node.place() == "node_07"
+    session.panel.on_view("depth", view)
+    assert node.place() == ""
+    node.take("node_99")
+    session.panel.on_view("depth", view)
+    assert node.place() == ""
 
 
 def test_inferred_points_are_drawn_where_and_as_wanted(session):

@@ -2,12 +2,13 @@
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from app import jobs
-from app.lesson import BEGIN, FIRST, OFF, SKIP, SKIPPED, LessonFolder, told
-from app.lesson_file import FIELD, LESSONS, SCENE, read_lesson
+from app.lesson import BEGIN, COMPUTING, FIRST, OFF, SKIP, SKIPPED, LessonFolder, told
+from app.lesson_file import FIELD, LESSONS, SCENE, read_lesson, settled
 from app.screens.calibrate import lesson as calibrate
 from app.screens.depth import lesson as depth
 from app.screens.fuse import lesson as fuse
@@ -77,7 +78,8 @@ def test_every_stop_that_ships_differs_and_asks_what_cannot_be_guessed_by_its_pl
         assert "set:" not in stop.text
         assert "Answer" not in stop.text + stop.question.reveal
         rights += [i for i, choice in enumerate(stop.question.choices) if not choice.reason]
-    assert len(rights) == len(shipped.stops)
+    computed = [stop for stop in shipped.stops if stop.question.choices[0].when]
+    assert len(rights) + len(computed) == len(shipped.stops)
     assert set(rights) == {0, 1, 2}
 
 
@@ -198,6 +200,70 @@ def test_the_numbers_of_a_lesson_are_those_of_the_scene(scene, store):
     assert told[fuse]["turn"] == "3°"
 
 
+def right_of(screen, path, look, name, numbers):
+    """The choice that is marked right at the stop whose question is settled by that name."""
+    stops = read_lesson(path, screen.SETTINGS, look, screen.NUMBERS).stops
+    (asked,) = [stop.question for stop in stops if (stop.question.choices[0].when or [""])[0] == name]
+    (right,) = [one.text for one in settled(asked, numbers).choices if not one.reason]
+    return right
+
+
+@pytest.mark.parametrize("scene", ["box-on-table", "office"])
+def test_the_choice_that_is_marked_right_is_so_by_the_numbers_of_the_scene(scene, store):
+    spec = Spec(Demo(scene))
+    views = {step: drain(jobs.run_step(step, store, spec)) for step in CHAIN}
+    stops = read_lesson(SHIPPED, SETTINGS, RaceLook(), fuse.NUMBERS).stops
+
+    def raced(name, title):
+        race = next(stop.look.race for stop in stops if stop.title == title)
+        view = drain(jobs.run("fuse.race_job:race_job", store, spec, race))
+        right = right_of(fuse, SHIPPED, RaceLook(), name, fuse.numbers(scene, race, view))
+        return [100.0 * lane.steps[-1].off_m for lane in view.lanes], right
+
+    (_, plane_cm, weights_cm, _), right = raced("more", "Plane or point?")
+    assert right.startswith("The weights") == (weights_cm < plane_cm - 0.5)
+    assert right.startswith("The plane") == (plane_cm < weights_cm - 0.5)
+    ends_cm, right = raced("others", "Is entropy the reason?")
+    assert ("close" in right) == (abs(min(ends_cm[:2]) - min(ends_cm[2:])) <= 0.5)
+    poisson = drain(jobs.run("surface.baselines_job:baseline_job", store, spec, "poisson"))
+    told = surface.numbers(scene, views["surface"], {"poisson": poisson})
+    right = right_of(surface, surface.SHIPPED, surface.SurfaceLook(), "better", told)
+    ball, other = (mesh.truth["f_score_5cm"] for mesh in (views["surface"].after, poisson.mesh))
+    assert right.startswith("No" if ball >= other else "Yes")
+
+
+def test_the_mark_of_a_choice_follows_what_is_computed(tmp_path):
+    path = tmp_path / "lesson.md"
+    text = ASKED.replace("- [ ] Red", "- [sky=red] Red").replace("- [ ] Grey", "- [sky=grey] Grey")
+    path.write_text(text.replace("- [x] Blue.", "- [sky=blue] Blue. | by day."))
+    shipped, ui, shown = read_lesson(path, SETTINGS, RaceLook(), ("sky",)), ui_of(), {}
+    folder = LessonFolder(ui, shipped, lambda look: None, lambda: dict(shown))
+    ui.gui.press("Go", "Next")
+    ui.gui.press("Your guess", "1")
+    assert COMPUTING in ui.gui.text()
+    assert "✓" not in ui.gui.text()
+    shown.update({SCENE: "evening", "sky": "red"})
+    folder.refresh()
+    assert "✓ Red." in ui.gui.text()
+    assert "**Right.** Air scatters blue." in ui.gui.text()
+    shown.update({SCENE: "noon", "sky": "blue"})
+    folder.refresh()
+    assert "✓ Blue." in ui.gui.text()
+    assert "✗ Red." in ui.gui.text()
+    assert "**Not quite, and many think so.** green." in ui.gui.text()
+
+
+def test_what_a_lost_packet_costs_is_told_by_what_is_left_of_the_cameras():
+    def cost(depth_shares, missed):
+        view = SimpleNamespace(lossless=SimpleNamespace(no_hit_share=0.1))
+        nodes = [SimpleNamespace(depth_share=share) for share in depth_shares]
+        return network._cost(view, SimpleNamespace(nodes=nodes, no_hit_share=missed))
+
+    assert cost([1.0, 0.0, 1.0], 0.4) == "camera"
+    assert cost([0.9, 0.8], 0.2) == "spread"
+    assert cost([0.9, 0.8], 0.1) == "nothing"
+
+
 @pytest.mark.parametrize(
     ("path", "screen"),
     [
@@ -246,6 +312,8 @@ def test_a_start_in_numbers_and_the_end(tmp_path):
         ("# A\n## One\nx\nreveal: So.", "must ask with"),
         ("# A\n## One\nx\nask:\nchoices:\n- [x] a\nreveal: So.", "must ask with"),
         ("# A\n## One\nx\nask: Why?\nchoices:\n- [x] a\n- [ ] b | c\nreveal: So.", "needs 3 choices"),
+        (ASKED.replace("[x] Blue.", "[sky=blue] Blue. | no."), "or all of them such as"),
+        (ASKED.replace("[ ]", "[sky=blue]").replace("[x]", "[sky=red]"), "or all of them such as"),
         (ASKED.replace("[x]", "[ ]"), "needs 3 choices: '- \\[x\\] choice' once"),
         (ASKED.replace(" | green.", ""), "'Red.' has no reason why it is wrong"),
         (ASKED.replace("Blue.", "Blue. | no."), "'Blue.' is right but has a reason why not"),

@@ -179,7 +179,7 @@ def test_picking_a_frame_tells_of_it_and_lights_its_pixels(screen):
     frames = pieces.where(pieces.what == What.AIR)
     item = int(np.flatnonzero((frames.peer == 3) & (frames.first_byte > 20_000))[0])
     screen.dock.seek(screen.view.moments[-1].t_ns)
-    screen.panel._picked(0, item)
+    screen.panel._inspector.pick(0, item)
     text = screen.gui.text("Packet")
     assert "→ sink" in text
     assert "Attempt" in text
@@ -188,7 +188,7 @@ def test_picking_a_frame_tells_of_it_and_lights_its_pixels(screen):
     nodes = screen.spec.sent.network.nodes
     assert (last - first + 1, first % (last - first + 1)) == (nodes.payload_bytes - nodes.header_bytes, 0)
     assert "lit" in screen.names()
-    screen.panel._picked(0, -1)
+    screen.panel._inspector.pick(0, -1)
     assert PICK in screen.gui.text("Packet")
     assert "lit" not in screen.names()
 

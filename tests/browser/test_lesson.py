@@ -1,4 +1,4 @@
-"""Lessons led through by keys alone, and what of them is in view; names explained by a click."""
+"""Lessons led through by keys alone, and what of them is in view."""
 
 from __future__ import annotations
 
@@ -134,13 +134,3 @@ def test_large_text_has_no_more_than_a_room_needs_and_what_it_speaks_of_is_in_vi
     assert float(card.evaluate("one => parseFloat(getComputedStyle(one).fontSize)")) >= 17.0
     go(page, "Scene")
     expect(card).to_have_count(0, timeout=LONG_MS)
-
-
-def test_a_name_is_explained_by_a_click_on_it(page):
-    go(page, "Surface")
-    seen(page, "Up to date").wait_for()
-    page.get_by_role("button", name="Area of holes").click()
-    note = page.locator(".packetmesh-hint")
-    expect(note).to_contain_text("as seen by the cameras")
-    page.keyboard.press("Escape")
-    expect(note).to_have_count(0)

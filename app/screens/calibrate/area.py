@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from app.compare import captions_html, split
+from app.compare import captions_html, no_pictures, place_of, place_text, split
 from app.records import Picture
 from app.screens.calibrate.labels import PAIRS, STRAIGHTENED
 from app.ui import Ui
@@ -14,6 +14,8 @@ from app.ui import Ui
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 QUALITY = 92
 MISSING = "not there for this view"
+START = (PAIRS[STRAIGHTENED].left, PAIRS[STRAIGHTENED].right, 50.0)
+"""Two pictures and the line between them in %."""
 
 
 class PictureArea:
@@ -22,6 +24,7 @@ class PictureArea:
     def __init__(self, ui: Ui, on_pair: Callable[[], None]) -> None:
         """Add the area to the current container; ``on_pair`` is called when others are wanted."""
         self._pictures: Mapping[str, Picture] = {}
+        self._on_pair = on_pair
         self._drawn: tuple[object, ...] = ()
         self._pair = ui.gui.add_dropdown(
             "Compare", list(PAIRS), hint="What stands left and right of the line."
@@ -50,6 +53,25 @@ class PictureArea:
         """Choose for the person."""
         self._pair.value, self._split.value = pair, round(100.0 * split_share)
         self._draw()
+
+    def place(self) -> str:
+        """The pair by its pictures' names and the line in %, for the address; empty as at the start."""
+        pair = PAIRS[self.wanted]
+        now = (pair.left, pair.right, float(self._split.value))
+        return "" if now == START else place_text(*now)
+
+    def take(self, place: str) -> None:
+        """Show such a pair.
+
+        Raises:
+            InputError: there is none like it.
+        """
+        left, right, percent = place_of(place, START)
+        names = [name for name, pair in PAIRS.items() if (pair.left, pair.right) == (left, right)]
+        if not names:
+            raise no_pictures(place, START)
+        self.set(names[0], percent / 100.0)
+        self._on_pair()
 
     def _draw(self) -> None:
         """Only what has changed: a dragged slider asks more often than it moves."""

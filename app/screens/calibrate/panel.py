@@ -9,10 +9,8 @@ from typing import Any, ClassVar
 
 from app.lesson import LessonFolder
 from app.lesson_file import Numbers, read_lesson
-from app.records import Picture, SceneView
+from app.records import SceneView
 from app.screens.calibrate.answers import Answers
-from app.screens.calibrate.area import PictureArea
-from app.screens.calibrate.bars import Bars, bars_of
 from app.screens.calibrate.depth import DepthFolder
 from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of, stand_before
 from app.screens.calibrate.labels import AROUND, DEPTH, NOTHING, TEXT
@@ -22,7 +20,8 @@ from app.screens.calibrate.noise import NoiseFolder
 from app.screens.calibrate.noise_view import NoiseRequest
 from app.screens.calibrate.numbers import summary_table
 from app.screens.calibrate.parameters import ParameterFolder
-from app.screens.calibrate.photograph import found_picture, picture_of, straightened_picture
+from app.screens.calibrate.photograph import picture_of
+from app.screens.calibrate.photographs import Photographs
 from app.screens.calibrate.request import calibrate_command, inner, several, views_in, with_boards
 from app.screens.calibrate.rig import RigFolder
 from app.screens.calibrate.trust import TrustFolder, verdict_html
@@ -30,7 +29,7 @@ from app.screens.calibrate.uploads import UploadFolder
 from app.screens.calibrate.use import WRITING, UseRow
 from app.screens.calibrate.view import CalibrationView, CameraView, RigView, TrustView
 from app.state import BoardViews, Spec, Step
-from app.ui import STOP, Panel
+from app.ui import STOP, Awaited, Panel
 from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_SCENES, board_views_of
 from pipeline.sources import Calibrated, Demo
@@ -52,7 +51,7 @@ class CalibratePanel(Panel):
         self._view: CalibrationView | None = None
         self._whole: dict[str, CameraView] = {}
         """Every camera before a view of it was dropped."""
-        self._chosen, self._uses = "", 0
+        self._uses = 0
         self._answers = Answers(self.session, self._judged, self._show_view)
         self._framed: tuple[Hashable, ...] = ()
         self._look: CalibrateLook | None = None
@@ -61,7 +60,6 @@ class CalibratePanel(Panel):
         gui.add_markdown(TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, CalibrateLook(), NUMBERS)
         self._lesson = LessonFolder(ui, lesson, self._take_look, self._lesson_numbers)
-        self.in_address[STOP] = self._lesson
         self._status = gui.add_markdown("")
         self._open = ui.buttons(
             "Open",
@@ -71,22 +69,13 @@ class CalibratePanel(Panel):
         )
         self._verdict = gui.add_html("")
         self._use = UseRow(ui, self._use_it, self._as_before)
-        self._camera = gui.add_dropdown("Camera", ["node_00"], hint="Whose views are shown.", visible=False)
-        ui.when_changed(self._camera, self._picked_camera)
-        self._bars = Bars(ui, self._pick)
-        self._row = ui.buttons(
-            "View",
-            {
-                "Back": partial(self._go, -1),
-                "Next": partial(self._go, 1),
-                "Drop": self._drop,
-                "All": self._keep_all,
-            },
-            "Back, Next: the view before or after. Drop: leave this one out, or take it in again. All: leave "
-            "none out.",
-            visible=False,
+        self._cameras = gui.add_dropdown("Camera", ["node_00"], hint="Whose views are shown.", visible=False)
+        self._camera = Awaited(ui, self._cameras, self._picked_camera)
+        self._photographs = Photographs(
+            ui, self._answers, self._pick, self._show_view, self._drop, self._keep_all
         )
-        self._area = PictureArea(ui, self._show_view)
+        self.in_address |= {STOP: self._lesson, "node": self._camera}
+        self.in_address |= {"photo": self._photographs, "pictures": self._photographs.area}
         self._around = gui.add_dropdown(
             "In space", list(AROUND), hint="What stays in its place in the 3-D scene."
         )
@@ -155,7 +144,7 @@ class CalibratePanel(Panel):
     def on_partial(self, view: Any) -> None:
         """Show the cameras as they come."""
         if isinstance(view, CalibrationView):
-            self._take(view)
+            self._take(view, all_there=False)
 
     def on_view(self, step: Step, view: Any) -> None:
         """Show all cameras; and what becomes of the surface."""
@@ -169,7 +158,7 @@ class CalibratePanel(Panel):
         if step == "surface" and self.session.results.fresh("surface", self.session.spec):
             self._use.surface(view.after, isinstance(self.session.spec.source, Calibrated))
         if step == "calibrate":
-            self._take(view)
+            self._take(view, all_there=True)
             self._show_look()
 
     def on_failure(self, step: Step, sentence: str) -> None:
@@ -179,13 +168,10 @@ class CalibratePanel(Panel):
             self._show_camera()
             self._status.content = sentence
 
-    def _take(self, view: CalibrationView) -> None:
+    def _take(self, view: CalibrationView, all_there: bool) -> None:
         self._view = view
-        names = tuple(camera.name for camera in view.cameras)
-        if names != self._camera.options:
-            chosen = self._camera.value
-            self._camera.options = names
-            self._camera.value = chosen if chosen in names else names[0]
+        if view.cameras:
+            self._camera.offer(tuple(camera.name for camera in view.cameras), all_there)
         self._whole |= {camera.name: camera for camera in view.cameras if not camera.dropped}
         self._show_camera()
 
@@ -202,9 +188,8 @@ class CalibratePanel(Panel):
     def _show_camera(self) -> None:
         camera = self._shown()
         with self.ui.atomic():
-            for handle in (self._row, self._around):
-                handle.visible = camera is not None
-            self._camera.visible = self._view is not None and len(self._view.cameras) > 1
+            self._around.visible = camera is not None
+            self._cameras.visible = self._view is not None and len(self._view.cameras) > 1
             self._use.show(camera is not None and camera.calibration is not None)
             nothing = camera is None and self.session.spec.views is None
             self._open.visible = nothing
@@ -233,47 +218,27 @@ class CalibratePanel(Panel):
     def _show_view(self) -> None:
         """Show the chosen view, and what is known of its pixels."""
         camera = self._shown()
-        if camera is None:
-            self._area.load({})
-            self._bars.show((), "")
-            return
-        if self._chosen not in [one.name for one in camera.photographs]:
-            self._chosen = camera.photographs[0].name
-        trust = self._answers.trust_in(camera)
-        self._parameters.relate(None if trust is None else trust.together)
-        photograph = picture_of(camera, self._chosen)
-        pictures: dict[str, Picture] = {"photo": found_picture(photograph, camera.fitted(photograph.name))}
-        if camera.calibration is not None:
-            pictures["straightened"] = straightened_picture(
-                pictures["photo"], camera.calibration, photograph.zoom
-            )
-        pictures |= self._answers.pictures_of(camera, self._chosen)
-        self._area.load(pictures)
-        self._bars.show(bars_of(camera, () if trust is None else trust.outliers), self._chosen)
-        self._ask()
+        self._photographs.load(camera)
+        if camera is not None:
+            trust = self._answers.trust_in(camera)
+            self._parameters.relate(None if trust is None else trust.together)
+            self._ask()
 
     def _pick(self, name: str) -> None:
         """Show another view."""
-        self._chosen = name
+        self._photographs.chosen = name
         with self.ui.atomic():
             self._show_view()
             self._drawing.choose(name)
 
-    def _go(self, count: int) -> None:
-        camera = self._shown()
-        if camera is not None:
-            names = [one.name for one in camera.photographs]
-            self._pick(names[(names.index(self._chosen) + count) % len(names)])
-
     def _drop(self) -> None:
         """Leave the chosen view out, or take it in again."""
-        camera, views = self._shown(), self.session.spec.views
+        camera, views, chosen = self._shown(), self.session.spec.views, self._photographs.chosen
         if camera is None or views is None:
             return
-        if not picture_of(camera, self._chosen).found:
-            raise InputError(f"In view {self._chosen} no board was found, so it is left out already.")
-        left = set(views.dropped) ^ {(camera.name, self._chosen)}
-        self._want(replace(views, dropped=tuple(sorted(left))))
+        if not picture_of(camera, chosen).found:
+            raise InputError(f"In view {chosen} no board was found, so it is left out already.")
+        self._want(replace(views, dropped=tuple(sorted(set(views.dropped) ^ {(camera.name, chosen)}))))
 
     def _keep_all(self) -> None:
         if (views := self.session.spec.views) is not None:
@@ -290,7 +255,7 @@ class CalibratePanel(Panel):
         camera = self._shown()
         if camera is not None and camera.calibration is not None:
             request = self._judge.request(camera.name)
-            self._answers.ask(request, self._chosen, self._area.wanted == DEPTH)
+            self._answers.ask(request, self._photographs.chosen, self._photographs.area.wanted == DEPTH)
 
     def _judged(self, view: TrustView | None) -> None:
         with self.ui.atomic():
@@ -342,7 +307,7 @@ class CalibratePanel(Panel):
     def _take_look(self, look: CalibrateLook) -> None:
         """Set the controls as a stop says; what needs the cameras waits for them."""
         with self.ui.atomic():
-            self._area.set(look.pair, look.split_share)
+            self._photographs.area.set(look.pair, look.split_share)
             self._around.value = next(name for name, key in AROUND.items() if key == look.around)
             self._judge.set(look.range_m)
             if self._lens.set(look.lens):
@@ -391,9 +356,9 @@ class CalibratePanel(Panel):
             if view is None or camera is None or camera.calibration is None:
                 self._drawing.draw_scene(scene)
             elif around == "rig" and isinstance(view.rig, RigView):
-                self._drawing.draw_rig(view, view.rig, scene, self._came, self._chosen)
+                self._drawing.draw_rig(view, view.rig, scene, self._came, self._photographs.chosen)
             else:
-                self._drawing.draw_camera(camera, view.board, around, self._chosen)
+                self._drawing.draw_camera(camera, view.board, around, self._photographs.chosen)
         if self._here:
             self.session.frame_view()
 

@@ -24,7 +24,7 @@ from app.screens.depth.residuals import residual_figure
 from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_model
 from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
 from app.state import Spec, Step
-from app.ui import STOP, Panel, Picked
+from app.ui import STOP, Awaited, Panel, Picked
 
 TEXT = """**What you see.** Blue: points the sensor measured. Violet: points that are inferred: from the
 colour image, made metric where the sensor knows a depth too; in its holes from colours and measured depth
@@ -53,8 +53,8 @@ class DepthPanel(Panel):
         gui.add_markdown(TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, DepthLook(), NUMBERS)
         self._lesson = LessonFolder(self.ui, lesson, self._take_look, self._lesson_numbers)
-        self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images and numbers are shown below.")
-        self.ui.when_changed(self._node, self._picked_node)
+        nodes = gui.add_dropdown("Node", ["node_00"], hint="Whose images and numbers are shown below.")
+        self._node = Awaited(self.ui, nodes, self._picked_node)
         self._area = CompareArea(self.ui, PICTURES, "photo", "sensor")
         self._controls = [self._fields(FIRST)]
         self._coloring = gui.add_dropdown(
@@ -64,6 +64,7 @@ class DepthPanel(Panel):
         self._numbers = gui.add_html("")
         colors: dict[str, str] = {coloring: label for label, coloring in COLORINGS.items()}
         self.in_address |= {STOP: self._lesson, "color": Picked(self._coloring, colors, self._draw)}
+        self.in_address |= {"node": self._node, "pictures": self._area}
         self._build_folders()
 
     def _build_folders(self) -> None:
@@ -111,9 +112,7 @@ class DepthPanel(Panel):
         """Draw new clouds."""
         if step != "depth":
             return
-        names = tuple(node.name for node in view.nodes)
-        if names != self._node.options:
-            self._node.options = names
+        self._node.offer(tuple(node.name for node in view.nodes))
         self._draw()
         self._show_node()
         self._show_look()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -84,9 +84,11 @@ SETTINGS: dict[str, Setting[RaceLook]] = {
 PER_LANE = ("end", "iterations", "time")
 NUMBERS = (
     *(f"{name}_{lane}" for name in PER_LANE for lane in range(1, MOST_LANES + 1)),
-    *("begin", "turn", "shift", "holes", "bias", "noise"),
+    *("begin", "turn", "shift", "holes", "bias", "noise", "more", "others"),
 )
-"""Fields of the texts; those of a lane end with its number."""
+"""Fields of the texts and of choices; those of a lane end with its number."""
+ALIKE_M = 0.005
+"""Ends no farther apart are about the same."""
 
 
 def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
@@ -104,4 +106,27 @@ def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
         "bias": number(race.depth_bias, 0, "%", 100.0),
         "noise": number(race.noise_m, 0, "cm", 100.0),
     }
-    return {SCENE: scene, **told}
+    ends_m = {lane.rival: lane.steps[-1].off_m for lane in view.lanes}
+    return {SCENE: scene, **told, **_verdicts(ends_m)}
+
+
+def _verdicts(ends_m: Mapping[Rival, float]) -> dict[str, str]:
+    """What brings more, the plane or the weights, and how far those end that know no entropy; by words."""
+    told = {}
+    plane_m, weights_m = ends_m.get(("icp", "plane")), ends_m.get(("ceicp-a", "point"))
+    if plane_m is not None and weights_m is not None:
+        told["more"] = _which(weights_m, plane_m, ("weights", "alike", "plane"))
+    own_m, others_m = (
+        min((end_m for (method, _), end_m in ends_m.items() if method in methods), default=None)
+        for methods in (("ceicp-n", "ceicp-a"), ("trimmed-icp", "ficp"))
+    )
+    if own_m is not None and others_m is not None:
+        told["others"] = _which(own_m, others_m, ("far", "close", "nearer"))
+    return told
+
+
+def _which(one_m: float, other_m: float, words: tuple[str, str, str]) -> str:
+    """The first word if the one is less by more than ``ALIKE_M``, the last if the other is."""
+    if abs(one_m - other_m) <= ALIKE_M:
+        return words[1]
+    return words[0] if one_m < other_m else words[2]

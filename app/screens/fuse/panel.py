@@ -3,31 +3,29 @@
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
-import viser
 
 from app.controls import Controls
 from app.drawing.cameras import Stage, stage_of
-from app.drawing.clouds import add_cloud, clear
-from app.drawing.poses import move, place
+from app.drawing.clouds import clear
+from app.drawing.poses import place
 from app.lesson import LessonFolder
-from app.lesson_file import NUMBER, Numbers, read_lesson
+from app.lesson_file import Numbers, read_lesson
 from app.records import DepthView
 from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
 from app.screens.fuse.draw import RaceDrawing, gizmo_pose
 from app.screens.fuse.export import race_offers
+from app.screens.fuse.framing import RaceFraming
 from app.screens.fuse.labels import (
     ADVANCED,
     BEFORE,
     MARKS,
-    MS,
     RACE_NAMES,
     RACES,
     RESULT,
@@ -38,13 +36,13 @@ from app.screens.fuse.labels import (
 )
 from app.screens.fuse.lesson import NUMBERS, SETTINGS, SHIPPED, RaceLook, numbers
 from app.screens.fuse.numbers import places_table, race_table, verdict
-from app.screens.fuse.place import race_of, race_text
+from app.screens.fuse.place import moment_of, moment_text, race_of, race_text
 from app.screens.fuse.player import END, RacePlayer
+from app.screens.fuse.result import NodesDrawing
 from app.screens.fuse.setup import RaceSetup
 from app.screens.fuse.view import CaptureView, FuseView, Race, RaceView, Start
 from app.state import Spec, Step
 from app.ui import STOP, Offers, Panel, Picked, Said
-from packetmesh.errors import InputError
 
 _Wanted: TypeAlias = tuple[tuple[Hashable, ...], Race]
 """A race of the clouds with this key."""
@@ -73,12 +71,11 @@ class FusePanel(Panel):
         self._gizmo: Any = None
         self._seek_at: float | None = 0.0
         """Where the next race is to stand when it comes; None is its end."""
-        self._framed: tuple[tuple[int, float, int], ...] = ()
-        self._fov_rad: float | None = None
+        self._framing = RaceFraming()
         self._here = False
         self._seen: tuple[int, ...] = ()
         """The step of each lane that is shown."""
-        self._placed: list[viser.PointCloudHandle] = []
+        self._result = NodesDrawing(self.scene, "/fuse/result")
         gui.add_markdown(TEXT)
         self._single = gui.add_markdown(SINGLE, visible=False)
         lesson = read_lesson(SHIPPED, SETTINGS, RaceLook(), NUMBERS)
@@ -136,7 +133,8 @@ class FusePanel(Panel):
 
     def on_show(self) -> None:
         """Start the race if none has run yet."""
-        self._here, self._framed = True, ()
+        self._here = True
+        self._framing.anew()
         self._show_parts()
         self._start()
 
@@ -144,7 +142,7 @@ class FusePanel(Panel):
         """Leave the picture to others, seen as they see it."""
         self._here = False
         self._show_parts()
-        self._widen()
+        self._framing.widen(self.session.clients())
 
     def on_action(self, action: str) -> None:
         """Go back to the race of the start, once the session has gone back to its settings."""
@@ -234,18 +232,13 @@ class FusePanel(Panel):
 
     def _moment(self) -> str:
         """Iteration or millisecond, unless it is the start."""
-        if self._seek_at != 0.0:
-            at = END if self._seek_at is None else f"{self._seek_at:.6g}"
-        else:
-            at = self._player.rest if self._racing else ""
-        return "" if at in ("", "0") else f"{at}{MS if self._player.in_ms else ''}"
+        waiting = END if self._seek_at is None else f"{self._seek_at:.6g}"
+        at = waiting if waiting != "0" else self._player.rest if self._racing else ""
+        return moment_text(at, self._player.in_ms)
 
     def _take_moment(self, text: str) -> None:
-        number = text.removesuffix(MS)
-        if re.fullmatch(rf"{NUMBER}|{END}|", number) is None:
-            raise InputError(f"The address has t={text[:20]}; try an iteration, such as 12ms or {END}")
-        self._player.choose(text.endswith(MS))
-        self._seek_at = None if number == END else float(number or 0.0)
+        self._seek_at, in_ms = moment_of(text)
+        self._player.choose(in_ms)
         if not self._start() and self._view is not None:
             self._take_race(self._view)
 
@@ -291,7 +284,8 @@ class FusePanel(Panel):
         with self.ui.atomic():
             self._drawing = RaceDrawing(self.scene, "/fuse/race", view, self._stage())
             self._gizmo = None
-            self._framed, self._seen = (), ()
+            self._framing.anew()
+            self._seen = ()
             self._place_gizmo()
             self._board.load(view)
             self._verdict.content, self._table.content = RUNNING, ""
@@ -371,37 +365,17 @@ class FusePanel(Panel):
     def look(self) -> bool:
         """Have all lanes in the picture, once for each shape of the window; the session sees to the rest."""
         if self._drawing is None or not self._racing:
-            self._widen()
+            self._framing.widen(self.session.clients())
             return False
-        clients = list(self.session.clients())
-        shape = tuple(
-            (client.client_id, round(client.camera.aspect, 2), client.camera.image_height)
-            for client in clients
-        )
-        if shape != self._framed and clients:
-            if self._fov_rad is None:
-                self._fov_rad = clients[0].camera.fov
-            self._framed = shape
-            self._drawing.look(clients)
+        self._framing.frame(self._drawing, self.session.clients())
         return True
-
-    def _widen(self) -> None:
-        """Give the view back the angle that a race narrows."""
-        if self._fov_rad is not None:
-            for client in self.session.clients():
-                client.camera.fov = self._fov_rad
-            self._fov_rad, self._framed = None, ()
 
     def _draw_result(self, view: FuseView) -> None:
         depth: DepthView | None = self.session.results.view("depth")
         if depth is None or len(depth.nodes) != len(view.registered):
             return
         with self.ui.atomic():
-            clear(self.scene, "/fuse/result")
-            self._placed = [
-                add_cloud(self.scene, f"/fuse/result/{node.name}", node.fused, T)
-                for node, T in zip(depth.nodes, view.registered, strict=True)
-            ]
+            self._result.draw(depth, view)
             self._arrange()
 
     def _arrange(self) -> None:
@@ -413,11 +387,7 @@ class FusePanel(Panel):
             if frame is not None:
                 frame.visible = visible
         self.session.frame_view()
-        view: FuseView | None = self.session.results.view("fuse")
-        if view is not None:
-            poses = view.believed if self._shown.value == BEFORE else view.registered
-            for handle, T in zip(self._placed, poses, strict=False):
-                move(handle, T)
+        self._result.place(before=self._shown.value == BEFORE)
 
 
 def _anywhere(wanted: _Wanted) -> _Wanted:

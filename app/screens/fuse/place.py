@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
-from app.lesson_file import choice
-from app.screens.fuse.labels import DEGRADATIONS, MOST_LANES, MOST_SEED, RIVALS, SLIGHTLY, STARTS
+from app.lesson_file import NUMBER, choice
+from app.screens.fuse.labels import DEGRADATIONS, MOST_LANES, MOST_SEED, MS, RIVALS, SLIGHTLY, STARTS
+from app.screens.fuse.player import END
 from app.screens.fuse.view import Race, Rival, Start
 from packetmesh.errors import InputError
 from packetmesh.settings import settings, with_settings
@@ -41,6 +43,28 @@ def race_of(text: str) -> Race:
             raise InputError(f"The address has the methods {rivals[:60]}; {error}") from None
     _check(race)
     return race
+
+
+def moment_text(at: str, in_ms: bool) -> str:
+    """``12``, ``12ms`` or ``end``; empty at the start.
+
+    Args:
+        at: iteration, millisecond or ``END``; empty or 0 is the start.
+        in_ms: whether the race is played in milliseconds.
+    """
+    return "" if at in ("", "0") else f"{at}{MS if in_ms else ''}"
+
+
+def moment_of(text: str) -> tuple[float | None, bool]:
+    """Where the race of such a text stands, None for its end, and whether in milliseconds.
+
+    Raises:
+        InputError: it is no moment.
+    """
+    number = text.removesuffix(MS)
+    if re.fullmatch(rf"{NUMBER}|{END}|", number) is None:
+        raise InputError(f"The address has t={text[:20]}; try an iteration, such as 12ms or {END}")
+    return None if number == END else float(number or 0.0), text.endswith(MS)
 
 
 def _settings(race: Race) -> dict[str, str]:

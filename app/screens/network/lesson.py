@@ -140,8 +140,11 @@ NUMBERS = (
     ),
     *("tries", "collisions", "lost", "last", "bytes_time", "radio", "energy", "other", "worst", "verdict"),
     *SHARES,
+    "cost",
 )
-"""Fields of the texts of both lessons."""
+"""Fields of the texts and choices of both lessons."""
+LEFT_SHARE, SEEN_SHARE = 0.05, 0.005
+"""Of its depth with which a camera is as good as gone, and of the rays, from which on more of them miss."""
 
 
 def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
@@ -172,6 +175,7 @@ def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
         "energy": number(end.energy_j, 1, "J"),
         "other": number(end.energy_j - end.radio_j, 1, "J"),
         "worst": _worst(view, end),
+        "cost": _cost(view, end),
     }
 
 
@@ -207,6 +211,15 @@ def _worst(view: DeliveryView, end: MomentView) -> str:
         zip((one.name for one in view.nodes), end.nodes, strict=True), key=lambda one: one[1].depth_share
     )
     return f"Of {name} {number(node.depth_share, 1, '%', 100.0)} of the measured pixels are there."
+
+
+def _cost(view: DeliveryView, end: MomentView) -> str:
+    """What is missing of the surface, by a word."""
+    if min(node.depth_share for node in end.nodes) < LEFT_SHARE:
+        return "camera"
+    if view.lossless is None or end.no_hit_share is None:
+        return UNKNOWN
+    return "spread" if end.no_hit_share - view.lossless.no_hit_share > SEEN_SHARE else "nothing"
 
 
 def street_numbers(scene: str, runs: tuple[NetworkView, ...]) -> Numbers:

@@ -16,10 +16,11 @@ from app.lesson_file import Numbers, read_lesson
 from app.screens.network.delivery_draw import DeliveryDrawing
 from app.screens.network.delivery_legend import legend, most_j
 from app.screens.network.delivery_numbers import changes, difference, moment_table, more_rows, summary
-from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
+from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
 from app.screens.network.export import delivery_offers, network_offers
-from app.screens.network.labels import NETWORKS, ORIGIN, PICK, RUNNING, STREET_TEXT, TEXT
+from app.screens.network.inspector import Inspector
+from app.screens.network.labels import NETWORKS, ORIGIN, RUNNING, STREET_TEXT, TEXT
 from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_names, stops_ns
 from app.screens.network.lesson import (
     CROSSING,
@@ -33,7 +34,7 @@ from app.screens.network.lesson import (
 )
 from app.screens.network.numbers import metric_tables, runs_summary, verdict
 from app.screens.network.packets import Frames
-from app.screens.network.packets_told import legend_html, told
+from app.screens.network.packets_told import legend_html
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import NetworkView
 from app.state import Spec, Step
@@ -93,15 +94,13 @@ class NetworkPanel(Panel):
         self._table = gui.add_html("")
         with gui.add_folder("What if"):
             self._setup.add_what_if(f"{self.drawn_below}/what-if")
-        self._inspector = gui.add_folder("Packet")
-        with self._inspector:
-            self._packet = gui.add_markdown(PICK)
+        self._inspector = Inspector(ui, self.session)
         self._legend = gui.add_html("")
         with gui.add_folder("All other numbers", expand_by_default=False):
             self._others = gui.add_html("")
         with gui.add_folder("Advanced", expand_by_default=False):
             self._setup.add_advanced()
-        self._dock = Dock(ui, self._moved, self._picked)
+        self._dock = Dock(ui, self._moved, self._inspector.pick)
         self.in_address |= self._lessons
         self.in_address["net"] = Said(self._setup.place, self._take_place)
         self.in_address["t"] = Said(self._moment, self._take_moment)
@@ -237,7 +236,7 @@ class NetworkPanel(Panel):
         if self._setup.grant():
             self.ui.post(self._run)
         self._legend.content = legend_html(legend(view))
-        self._packet.content = PICK
+        self._inspector.load(self._frames, view, drawing)
         self._load(view.run.start_ns, view.run.end_ns, stops_ns(view.run))
         self._dock.seek(view.run.end_ns if now_ns is None else now_ns)
         self._grow(view)
@@ -260,7 +259,7 @@ class NetworkPanel(Panel):
         self._status.content = runs_summary(runs)
         self._table.content, self._others.content = metric_tables(runs)
         self._difference.content, self._legend.content = verdict(runs), road_legend(runs)
-        self._packet.content = PICK
+        self._inspector.load(self._frames)
         self._drawing = NetworkDrawing(self.scene, self._next_name(), runs)
         start_ns, end_ns = min(run.start_ns for run in runs), max(run.end_ns for run in runs)
         self._load(start_ns, end_ns, stops_ns(*runs))
@@ -333,7 +332,7 @@ class NetworkPanel(Panel):
         span_ns = run.end_ns - run.start_ns if look.window_s is None else round(1e9 * look.window_s)
         self._dock.look(t_ns - span_ns // 2, t_ns + span_ns // 2)
         self._dock.seek(t_ns)
-        self._picked(0, item)
+        self._inspector.pick(0, item)
 
     def _load(self, start_ns: int, end_ns: int, stops: Any) -> None:
         self._framed = ()
@@ -358,6 +357,7 @@ class NetworkPanel(Panel):
         self._runs, self._delivery, self._drawing, self._streaming = (), None, None, False
         self._before = None
         self._setup.what_if.clear()
+        self._inspector.load(())
         self._dock.show(False)
         for html in (self._table, self._others, self._difference, self._legend):
             html.content = ""
@@ -386,35 +386,3 @@ class NetworkPanel(Panel):
             drawing.show_moment(moment, most_j(view))
             self._table.content = moment_table(view, moment, self._dock.now_ns)
             self._others.content = more_rows(view, moment) + metric_tables((view.run,))[1]
-
-    # The inspector.
-
-    def _picked(self, lane: int, item: int) -> None:
-        """Tell of a frame, and light up what it carried."""
-        if isinstance(self._drawing, DeliveryDrawing):
-            self._drawing.light(None)
-        if item < 0 or lane >= len(self._frames):
-            self._packet.content = PICK
-            return
-        frames, view = self._frames[lane], self._delivery
-        story = frames.story(item)
-        self._packet.content = story
-        if view is None or not frames.carries_image(item):
-            return
-        source = next(
-            (row for row, node in enumerate(view.nodes) if node.row == frames.camera_of(item)), None
-        )
-        if source is not None:
-            first, count = frames.bytes_of(item)
-
-            def came(packet: PacketView | None) -> None:
-                self._light(story, packet)
-
-            self.session.quick_job("network.delivery_job:packet_job", source, first, count, on_end=came)
-
-    def _light(self, story: str, packet: PacketView | None) -> None:
-        if packet is None or not isinstance(self._drawing, DeliveryDrawing):
-            return
-        self._packet.content = f"{story}\n\n{told(packet)}"
-        with self.ui.atomic():
-            self._drawing.light(packet)

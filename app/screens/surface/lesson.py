@@ -90,8 +90,9 @@ MEASURES = ("missed", "unused", "f_score", "guessed")
 NUMBERS = (
     *(f"{measure}{which}" for which in SURFACES for measure in MEASURES),
     *("r_f", "sigma_d", "ball", "ball_width", "cut_off", "thesis_ball", "largest_ball", "hole_area"),
+    "better",
 )
-"""Fields of the texts."""
+"""Fields of the texts and of choices."""
 
 
 def numbers(scene: str, view: SurfaceView, baselines: Mapping[BaselineName, BaselineView]) -> Numbers:
@@ -106,7 +107,15 @@ def numbers(scene: str, view: SurfaceView, baselines: Mapping[BaselineName, Base
     lengths |= {"cut_off": ball_m / 2.0**0.5, "thesis_ball": r_F_m + sigma_D_m}
     lengths |= {"largest_ball": r_F_m + 4.0 * sigma_D_m}
     told |= {name: number(length_m, 0, "mm", 1000.0) for name, length_m in lengths.items()}
+    told["better"] = UNKNOWN if poisson is None else _better(view.after, poisson.mesh)
     return {**told, "hole_area": number(view.after.quality.hole_area_m2, 3, "m²")}
+
+
+def _better(ball: MeshView, poisson: MeshView) -> str:
+    """Which of them has the higher F-score, by a word."""
+    if not ball.truth or not poisson.truth:
+        return "untold"
+    return "poisson" if poisson.truth["f_score_5cm"] > ball.truth["f_score_5cm"] else "ball"
 
 
 def _measures(mesh: MeshView | None) -> dict[str, str]:

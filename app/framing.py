@@ -1,0 +1,59 @@
+"""What a session turns the view to: what its screen draws, or else the scene, fitted to the window."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import viser
+
+from app.drawing.cameras import look, stage_of
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+
+class Framing:
+    """Turns the view of a session when another thing is shown, or the same in another shape of the window."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._wide = False
+        self._shape = self._seen_shape = 0.0
+
+    def frame(self, anew: bool, keep: bool) -> None:
+        """Turn the view to what is shown.
+
+        Args:
+            anew: whether the scene is another one.
+            keep: whether the view stays where a person has turned it.
+        """
+        if self._session.views is None:
+            self._turn(anew)
+        else:
+            self._session.views.frame(lambda: self._turn(anew), keep)
+
+    def follow_window(self) -> None:
+        """Fit the view anew when the picture has another shape, as when the dock comes or goes."""
+        if self._window() != self._seen_shape:
+            self._seen_shape = self._window()
+            self._session.post(self._session.frame_view, False, True)
+
+    def _turn(self, anew: bool) -> str:
+        """Turn it, and name what is looked at."""
+        session = self._session
+        below = session.current.drawn_below
+        if session.current.look():
+            self._shape = 0.0
+            return below
+        wide = any(panel.wide for panel in session.panels if panel.drawn_below == below)
+        scene = session.results.view("scene")
+        shape = self._window()
+        if scene is not None and (anew or wide != self._wide or shape != self._shape):
+            look(session.clients(), stage_of(scene.nodes), wide)
+            self._wide, self._shape = wide, shape
+        return "both" if wide else "scene"
+
+    def _window(self) -> float:
+        """Width over height of the picture, roughly; that of a shared session is nobody's own."""
+        target = self._session.target
+        return 1.0 if isinstance(target, viser.ViserServer) else round(target.camera.aspect, 1)

@@ -1,0 +1,75 @@
+"""Tells of the frame that was picked on the timeline, and lights up what it carried."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from app.screens.network.delivery_draw import DeliveryDrawing
+from app.screens.network.delivery_view import DeliveryView, PacketView
+from app.screens.network.labels import PICK
+from app.screens.network.packets import Frames
+from app.screens.network.packets_told import told
+from app.ui import Ui
+
+if TYPE_CHECKING:
+    from app.session import Session
+
+
+class Inspector:
+    """The folder of one packet."""
+
+    def __init__(self, ui: Ui, session: Session) -> None:
+        """Add it to the current container."""
+        self._ui, self._session = ui, session
+        self._frames: Sequence[Frames] = ()
+        self._view: DeliveryView | None = None
+        self._drawing: DeliveryDrawing | None = None
+        with ui.gui.add_folder("Packet"):
+            self._text = ui.gui.add_markdown(PICK)
+
+    def load(
+        self,
+        frames: Sequence[Frames],
+        view: DeliveryView | None = None,
+        drawing: DeliveryDrawing | None = None,
+    ) -> None:
+        """There are other frames, of none of which anything is told yet.
+
+        Args:
+            frames: of each lane of the timeline.
+            view: the delivery that they are of, unless they are of vehicles.
+            drawing: where its pixels and points light up.
+        """
+        self._frames, self._view, self._drawing = frames, view, drawing
+        self._text.content = PICK
+
+    def pick(self, lane: int, item: int) -> None:
+        """Tell of a frame, and light up what it carried; a negative ``item`` is none."""
+        if self._drawing is not None:
+            self._drawing.light(None)
+        if item < 0 or lane >= len(self._frames):
+            self._text.content = PICK
+            return
+        frames, view = self._frames[lane], self._view
+        story = frames.story(item)
+        self._text.content = story
+        if view is None or not frames.carries_image(item):
+            return
+        source = next(
+            (row for row, node in enumerate(view.nodes) if node.row == frames.camera_of(item)), None
+        )
+        if source is not None:
+            first, count = frames.bytes_of(item)
+
+            def came(packet: PacketView | None) -> None:
+                self._light(story, packet)
+
+            self._session.quick_job("network.delivery_job:packet_job", source, first, count, on_end=came)
+
+    def _light(self, story: str, packet: PacketView | None) -> None:
+        if packet is None or self._drawing is None:
+            return
+        self._text.content = f"{story}\n\n{told(packet)}"
+        with self._ui.atomic():
+            self._drawing.light(packet)

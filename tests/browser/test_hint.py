@@ -1,0 +1,50 @@
+"""What names mean: of numbers and of controls, by a click on them."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.hands import STEPS, go
+
+
+@pytest.fixture
+def note(page):
+    return page.locator(".packetmesh-hint")
+
+
+def named(page, label):
+    return page.locator("label", has_text=label).locator("visible=true").first
+
+
+def test_a_number_is_explained_by_a_click_on_its_name(page, note):
+    go(page, "Surface")
+    page.get_by_text("Up to date").wait_for()
+    page.get_by_role("button", name="Area of holes").click()
+    expect(note).to_contain_text("as seen by the cameras")
+    page.keyboard.press("Escape")
+    expect(note).to_have_count(0)
+
+
+def test_a_control_is_explained_by_a_click_on_its_label_which_changes_nothing(page, note):
+    go(page, "Surface")
+    page.get_by_text("Up to date").wait_for()
+    rims = page.get_by_label("Hole rims", exact=True)
+    drawn = rims.is_checked()
+    for label, meaning in (("Radius (mm)", "Radius of the ball"), ("Hole rims", "one triangle only")):
+        expect(named(page, label)).to_have_css("border-bottom-style", "dotted")
+        named(page, label).click()
+        expect(note).to_contain_text(meaning)
+        page.wait_for_timeout(300)  # a click on the label of a checkbox is one on the box, too
+        expect(note).to_contain_text(meaning)
+    assert rims.is_checked() == drawn
+    named(page, "Hole rims").click()
+    expect(note).to_have_count(0)
+
+
+def test_every_control_that_is_seen_has_a_meaning(page):
+    for step in STEPS:
+        go(page, step)
+        page.wait_for_timeout(500)
+        labels = page.locator("label[data-plain]").locator("visible=true").all_inner_texts()
+        assert labels == [], step
