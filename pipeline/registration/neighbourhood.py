@@ -32,13 +32,16 @@ class Normals:
 
     def at(self, rows: IntArray) -> FloatArray:
         """(N, 3), of which those at the ``rows`` are found."""
-        missing = np.unique(rows[~self._found[rows]])
-        if len(missing):
-            places_m = self._points_m[missing]
-            normals = patch_normals(self._tree, places_m, NORMAL_NEIGHBOURS)
-            away = np.einsum("ni,ni->n", normals, places_m) > 0
-            self._normals[missing] = np.where(away[:, None], -normals, normals)
-            self._found[missing] = True
+        if not self._found.all():
+            missing = np.zeros(len(self._found), dtype=bool)
+            missing[rows] = True
+            missing &= ~self._found
+            places = np.flatnonzero(missing[self._tree.order])
+            at = self._tree.order[places]
+            normals = patch_normals(self._tree, NORMAL_NEIGHBOURS, places)
+            away = np.einsum("ni,ni->n", normals, self._points_m[at]) > 0
+            self._normals[at] = np.where(away[:, None], -normals, normals)
+            self._found[at] = True
         return self._normals
 
     @cached_property
