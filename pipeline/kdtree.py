@@ -6,6 +6,7 @@ of an old neighbour), which is what iterations ask for, and keeps the points of 
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -70,6 +71,18 @@ class KdTree:
 
         in_parts(search, len(places_m))
         return np.sqrt(squared), self.order[rows]
+
+
+def tree_of(points_m: FloatArray) -> KdTree:
+    """The tree of (N, 3) points that nobody changes: built once, and kept as long as they are."""
+    tree = _trees.get(id(points_m))
+    if tree is None:
+        tree = _trees[id(points_m)] = KdTree(points_m)
+        weakref.finalize(points_m, _trees.pop, id(points_m), None)
+    return tree
+
+
+_trees: dict[int, KdTree] = {}
 
 
 def levels_of(count: int) -> int:
