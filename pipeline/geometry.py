@@ -1,5 +1,7 @@
 """Rigid motions, the pinhole camera, and what the points of one cloud are to each other."""
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,8 +36,8 @@ def rotation_exp(omega_rad: FloatArray) -> FloatArray:
 def rotation_angle_rad(rotation: FloatArray) -> float:
     """Angle of a (3, 3) rotation, accurate near zero and near pi."""
     skew = rotation - rotation.T
-    sine = 0.5 * np.linalg.norm([skew[2, 1], skew[0, 2], skew[1, 0]])
-    return float(np.arctan2(sine, 0.5 * (np.trace(rotation) - 1.0)))
+    sine = 0.5 * math.hypot(skew[2, 1], skew[0, 2], skew[1, 0])
+    return math.atan2(sine, 0.5 * (rotation[0, 0] + rotation[1, 1] + rotation[2, 2] - 1.0))
 
 
 def look_at(eye_m: ArrayLike, target_m: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> FloatArray:

@@ -6,6 +6,7 @@ of an old neighbour), which is what iterations ask for, and keeps the points of 
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -23,6 +24,7 @@ SERIAL_POINTS = 512
 CORES = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 """Of this machine, or fewer where ``NUMBA_NUM_THREADS`` says so, as for processes that work side by side."""
 _MOST_LEVELS = 64
+_MOST_GUESSES = 64
 compiled = numba.njit(cache=True, nogil=True)
 
 
@@ -69,6 +71,18 @@ class KdTree:
 
         in_parts(search, len(places_m))
         return np.sqrt(squared), self.order[rows]
+
+
+def tree_of(points_m: FloatArray) -> KdTree:
+    """The tree of (N, 3) points that nobody changes: built once, and kept as long as they are."""
+    tree = _trees.get(id(points_m))
+    if tree is None:
+        tree = _trees[id(points_m)] = KdTree(points_m)
+        weakref.finalize(points_m, _trees.pop, id(points_m), None)
+    return tree
+
+
+_trees: dict[int, KdTree] = {}
 
 
 def levels_of(count: int) -> int:
@@ -197,37 +211,9 @@ def search(
         stack, bounds: working space.
     """
     worst = len(squared) - 1
-    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, 0, len(points), levels
-    bounds[0, 0] = bounds[0, 1] = bounds[0, 2] = bounds[0, 3] = 0.0
-    size = 1
+    size = _begin(len(points), levels, stack, bounds)
     while size:
-        size -= 1
-        apart = bounds[size, 3]
-        if apart >= squared[worst]:
-            continue
-        node, start, end, level = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
-        along_0, along_1, along_2 = bounds[size, 0], bounds[size, 1], bounds[size, 2]
-        while level:
-            axis = axes[node]
-            middle = (start + end) // 2
-            offset = place[axis] - splits[node]
-            level -= 1
-            old = along_0 if axis == 0 else along_1 if axis == 1 else along_2
-            far = apart + offset * offset - old
-            if far < squared[worst]:
-                bounds[size, 0], bounds[size, 1], bounds[size, 2] = along_0, along_1, along_2
-                bounds[size, axis] = offset * offset
-                bounds[size, 3] = far
-                stack[size, 3] = level
-                if offset < 0:
-                    stack[size, 0], stack[size, 1], stack[size, 2] = 2 * node + 2, middle, end
-                else:
-                    stack[size, 0], stack[size, 1], stack[size, 2] = 2 * node + 1, start, middle
-                size += 1
-            if offset < 0:
-                node, end = 2 * node + 1, middle
-            else:
-                node, start = 2 * node + 2, middle
+        start, end, size = _next_leaf(axes, splits, place, squared[worst], stack, bounds, size)
         for j in range(start, end):
             distance = squared_distance(points[j], place)
             if distance < squared[worst]:
@@ -236,6 +222,146 @@ def search(
                     squared[k], rows[k] = squared[k - 1], rows[k - 1]
                     k -= 1
                 squared[k], rows[k] = distance, j
+
+
+@compiled
+def search_many(
+    points: FloatArray,
+    axes: ByteArray,
+    splits: FloatArray,
+    levels: int,
+    place: FloatArray,
+    count: int,
+    limit: float,
+    squared: FloatArray,
+    rows: IntArray,
+    stack: IntArray,
+    bounds: FloatArray,
+) -> float:
+    """Fill in the ``count`` nearest points of a place in any order, which costs less than in order.
+
+    Args:
+        points, axes, splits, levels: of the tree.
+        place: (3,).
+        count: at most N.
+        limit: so many are nearer than its root.
+        squared, rows: (``room_for(count)``,) squared distances and rows in the tree's own order after it.
+        stack, bounds: working space.
+
+    Returns:
+        The squared distance of the farthest of them.
+    """
+    have = 0
+    size = _begin(len(points), levels, stack, bounds)
+    while size:
+        start, end, size = _next_leaf(axes, splits, place, limit, stack, bounds, size)
+        if have + end - start >= len(squared):
+            limit = min(limit, _keep_least(squared, rows, have, count))
+            have = count
+        for j in range(start, end):  # what does not count is overwritten: no branch to mispredict
+            distance = squared_distance(points[j], place)
+            squared[have], rows[have] = distance, j
+            have += distance < limit
+    if have > count:
+        _keep_least(squared, rows, have, count)
+    farthest = 0.0
+    for k in range(count):
+        farthest = max(farthest, squared[k])
+    return farthest
+
+
+@compiled
+def room_for(count: int) -> int:
+    """Points that ``search_many`` holds at a time, and one more."""
+    return 2 * count + 24
+
+
+@compiled
+def _keep_least(squared: FloatArray, rows: IntArray, have: int, count: int) -> float:
+    """Move the ``count`` least of the first ``have`` to the front; gives what none of them exceeds.
+
+    A number that parts them from the others is guessed from how many lie below two earlier ones; of equal
+    ones that no number parts, the first are taken. Loops without branches, as there is no telling.
+    """
+    low, high, below, above = 0.0, 0.0, 0, have
+    for k in range(have):
+        if squared[k] > high:
+            high = squared[k]
+    squared[have:] = np.inf
+    for step in range(_MOST_GUESSES):
+        if above == count:
+            break
+        share = (count - below + 0.5) / (above - below + 1.0) if step < _MOST_GUESSES // 4 else 0.5
+        middle = low + share * (high - low)
+        within = 0
+        for k in range(len(squared)):
+            within += squared[k] <= middle
+        if within >= count:
+            high, above = middle, within
+        else:
+            low, below = middle, within
+    kept = 0
+    for k in range(have):
+        value = squared[k]
+        squared[kept], rows[kept] = value, rows[k]
+        kept += value <= high
+    if kept > count:
+        left, kept = count - below, 0
+        for k in range(above):
+            if squared[k] <= low or left > 0:
+                left -= squared[k] > low
+                squared[kept], rows[kept] = squared[k], rows[k]
+                kept += 1
+    return high
+
+
+@compiled
+def _begin(count: int, levels: int, stack: IntArray, bounds: FloatArray) -> int:
+    """Put the whole tree of ``count`` points on the stack; gives its size."""
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, 0, count, levels
+    bounds[0, 0] = bounds[0, 1] = bounds[0, 2] = bounds[0, 3] = 0.0
+    return 1
+
+
+@compiled
+def _next_leaf(
+    axes: ByteArray,
+    splits: FloatArray,
+    place: FloatArray,
+    limit: float,
+    stack: IntArray,
+    bounds: FloatArray,
+    size: int,
+) -> tuple[int, int, int]:
+    """Where the points of the next leaf within the root of ``limit`` start and end, and the stack's size."""
+    size -= 1
+    apart = bounds[size, 3]
+    if apart >= limit:
+        return 0, 0, size
+    node, start, end, level = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
+    along_0, along_1, along_2 = bounds[size, 0], bounds[size, 1], bounds[size, 2]
+    while level:
+        axis = axes[node]
+        middle = (start + end) // 2
+        offset = place[axis] - splits[node]
+        level -= 1
+        old = along_0 if axis == 0 else along_1 if axis == 1 else along_2
+        far = apart + offset * offset - old
+        if far < limit:
+            bounds[size, 0], bounds[size, 1], bounds[size, 2] = along_0, along_1, along_2
+            bounds[size, axis] = offset * offset
+            bounds[size, 3] = far
+            stack[size, 3] = level
+            if offset < 0:
+                stack[size, 0], stack[size, 1], stack[size, 2] = 2 * node + 2, middle, end
+            else:
+                stack[size, 0], stack[size, 1], stack[size, 2] = 2 * node + 1, start, middle
+            size += 1
+        if offset < 0:
+            node, end = 2 * node + 1, middle
+        else:
+            node, start = 2 * node + 2, middle
+    return start, end, size
 
 
 @compiled

@@ -4,23 +4,45 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.kdtree import KdTree, compiled, in_parts, search, working_space
+from pipeline.kdtree import (
+    KdTree,
+    compiled,
+    in_parts,
+    room_for,
+    search_many,
+    squared_distance,
+    working_space,
+)
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 _SWEEPS = 10
 """Of Jacobi's rotations at most; a matrix of three rows needs four or five."""
+_LEAST_GAP = 1e-2
+"""Between the two smallest eigenvalues, over that between the outer two, for the closed form."""
 
 
-def patch_normals(tree: KdTree, places_m: FloatArray, neighbours: int) -> FloatArray:
-    """(M, 3) unit normals, of either sign, of the planes through the nearest points of (M, 3) places."""
-    places_m = np.ascontiguousarray(places_m, dtype=np.float64)
-    normals = np.empty_like(places_m)
+def patch_normals(tree: KdTree, neighbours: int, places: IntArray | None = None) -> FloatArray:
+    """Unit normals, of either sign, of the planes through the nearest points of a tree's own.
+
+    Args:
+        tree: of N points.
+        neighbours: of a point, itself included.
+        places: (M,) of the points in the tree's order, best ascending: neighbours then follow each other;
+            None for all.
+
+    Returns:
+        (M, 3), or (N, 3) in the points' own order for all.
+    """
+    asked = np.arange(len(tree)) if places is None else places
+    normals = np.empty((len(asked), 3))
     count = min(neighbours, len(tree))
 
     def work(first: int, last: int) -> None:
-        _normals(*tree.parts, places_m, first, last, count, normals)
+        _normals(*tree.parts, asked, first, last, count, normals)
 
-    in_parts(work, len(places_m))
+    in_parts(work, len(asked))
+    if places is None:
+        normals[tree.order] = normals.copy()
     return normals
 
 
@@ -51,19 +73,23 @@ def _normals(
     axes: ByteArray,
     splits: FloatArray,
     levels: int,
-    places: FloatArray,
+    asked: IntArray,
     first: int,
     last: int,
     count: int,
     normals: FloatArray,
 ) -> None:
     stack, bounds = working_space()
-    squared, near = np.empty(count), np.zeros(count, dtype=np.intp)
-    weights, center, spread = np.ones(count), np.empty(3), np.empty((3, 3))
+    squared, rows = np.empty(room_for(count)), np.zeros(room_for(count), dtype=np.intp)
+    near, weights, center, spread = rows[:count], np.ones(count), np.empty(3), np.empty((3, 3))
+    farthest = np.inf
     for i in range(first, last):
-        squared[:] = np.inf
-        search(points, axes, splits, levels, places[i], squared, near, stack, bounds)
-        _scatter(points, near, weights, places[i], center, spread)
+        place = points[asked[i]]
+        limit = _reach(points[asked[max(first, i - 1)]], place, farthest)
+        farthest = search_many(
+            points, axes, splits, levels, place, count, limit, squared, rows, stack, bounds
+        )
+        _scatter(points, near, weights, place, center, spread)
         _thinnest(spread, normals[i])
 
 
@@ -82,13 +108,16 @@ def _move(
     normals: FloatArray,
 ) -> None:
     stack, bounds = working_space()
-    squared, near = np.empty(count), np.zeros(count, dtype=np.intp)
-    weights, center, spread = np.empty(count), np.empty(3), np.empty((3, 3))
+    squared, rows = np.empty(room_for(count)), np.zeros(room_for(count), dtype=np.intp)
+    near, weights, center, spread = rows[:count], np.empty(count), np.empty(3), np.empty((3, 3))
+    farthest = np.inf
     for i in range(first, last):
         place, row = points[i], order[i]
-        squared[:] = np.inf
-        search(points, axes, splits, levels, place, squared, near, stack, bounds)
-        reach = max(kernel_share * np.sqrt(squared[count - 1]), 1e-12)
+        limit = _reach(points[max(first, i - 1)], place, farthest)
+        farthest = search_many(
+            points, axes, splits, levels, place, count, limit, squared, rows, stack, bounds
+        )
+        reach = max(kernel_share * np.sqrt(farthest), 1e-12)
         for k in range(count):
             weights[k] = np.exp(-0.5 * squared[k] / (reach * reach))
         _scatter(points, near, weights, place, center, spread)
@@ -98,6 +127,13 @@ def _move(
             offset += center[a] * normals[row, a]
         for a in range(3):
             moved[row, a] = place[a] + offset * normals[row, a]
+
+
+@compiled
+def _reach(before: FloatArray, place: FloatArray, farthest: float) -> float:
+    """A squared distance within which a place has as many points as another one has within ``farthest``."""
+    reach = np.sqrt(squared_distance(before, place)) + np.sqrt(farthest)
+    return reach * reach * (1.0 + 1e-12) + 1e-300
 
 
 @compiled
@@ -128,7 +164,45 @@ def _scatter(
 
 @compiled
 def _thinnest(spread: FloatArray, axis: FloatArray) -> None:
-    """Write the unit eigenvector of a symmetric matrix's smallest eigenvalue; spoils the matrix."""
+    """Write the unit eigenvector of a symmetric matrix's smallest eigenvalue; spoils the matrix.
+
+    The eigenvalue by Smith 1961; its vector is across two rows of the matrix less that value. Where the next
+    eigenvalue is near, which leaves too few digits, Jacobi's rotations find both.
+    """
+    mean = (spread[0, 0] + spread[1, 1] + spread[2, 2]) / 3.0
+    a, b, c = spread[0, 0] - mean, spread[1, 1] - mean, spread[2, 2] - mean
+    d, e, f = spread[0, 1], spread[0, 2], spread[1, 2]
+    scale = np.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
+    if scale > 0.0:
+        half = (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / (2.0 * scale**3)
+        angle = np.arccos(min(1.0, max(-1.0, half))) / 3.0
+        largest, least = 2.0 * scale * np.cos(angle), 2.0 * scale * np.cos(angle + 2.0 * np.pi / 3.0)
+        if -largest - 2.0 * least > _LEAST_GAP * (largest - least):
+            _across(a - least, b - least, c - least, d, e, f, axis)
+            return
+    _jacobi(spread, axis)
+
+
+@compiled
+def _across(a: float, b: float, c: float, d: float, e: float, f: float, axis: FloatArray) -> None:
+    """Write the unit vector across all rows of ((a, d, e), (d, b, f), (e, f, c)), a matrix of rank two."""
+    longest = 0.0
+    for x, y, z in (
+        (d * f - e * b, e * d - a * f, a * b - d * d),
+        (d * c - e * f, e * e - a * c, a * f - d * e),
+        (b * c - f * f, f * e - d * c, d * f - b * e),
+    ):
+        squared = x * x + y * y + z * z
+        if squared > longest:
+            longest, axis[0], axis[1], axis[2] = squared, x, y, z
+    length = np.sqrt(longest)
+    for k in range(3):
+        axis[k] /= length
+
+
+@compiled
+def _jacobi(spread: FloatArray, axis: FloatArray) -> None:
+    """As ``_thinnest``, whatever the eigenvalues."""
     axes = np.eye(3)
     for _ in range(_SWEEPS):
         off = abs(spread[0, 1]) + abs(spread[0, 2]) + abs(spread[1, 2])

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.config import Direction
-from pipeline.kdtree import KdTree, compiled, in_parts, search, squared_distance, working_space
+from pipeline.kdtree import KdTree, compiled, in_parts, search, squared_distance, tree_of, working_space
 from pipeline.registration.sample import random_keys
 from pipeline.types import ByteArray, FloatArray, IntArray, PointCloud
 
@@ -112,7 +112,8 @@ class _Subset:
 
     def __init__(self, cloud: _Cloud, rows: IntArray) -> None:
         self.cloud, self.rows = cloud, rows
-        self.points_m = np.ascontiguousarray(cloud.points_m[rows])
+        whole = len(rows) == len(cloud.points_m)
+        self.points_m = np.ascontiguousarray(cloud.points_m if whole else cloud.points_m[rows])
 
     @cached_property
     def features(self) -> FloatArray | None:
@@ -139,7 +140,7 @@ class _Subset:
     @cached_property
     def tree(self) -> KdTree:
         """Of these points, whose order it keeps."""
-        return KdTree(self.points_m)
+        return tree_of(self.points_m)
 
     @cached_property
     def _any_tree(self) -> cKDTree:

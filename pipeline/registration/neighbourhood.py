@@ -7,7 +7,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from pipeline.kdtree import KdTree
+from pipeline.kdtree import KdTree, tree_of
 from pipeline.patches import patch_normals
 from pipeline.points import neighbour_distances_m
 from pipeline.types import FloatArray, IntArray
@@ -25,20 +25,23 @@ class Normals:
         self, points_m: FloatArray, known: FloatArray | None = None, tree: Callable[[], KdTree] | None = None
     ) -> None:
         """Of (N, 3) points; ``known`` are their normals if they have some, ``tree`` gives their tree."""
-        self._points_m, self._tree_of = points_m, tree or partial(KdTree, points_m)
+        self._points_m, self._tree_of = points_m, tree or partial(tree_of, points_m)
         self._found = np.full(len(points_m), known is not None)
         given = np.empty((len(points_m), 3)) if known is None else known
         self._normals = np.ascontiguousarray(given, dtype=np.float64)
 
     def at(self, rows: IntArray) -> FloatArray:
         """(N, 3), of which those at the ``rows`` are found."""
-        missing = np.unique(rows[~self._found[rows]])
-        if len(missing):
-            places_m = self._points_m[missing]
-            normals = patch_normals(self._tree, places_m, NORMAL_NEIGHBOURS)
-            away = np.einsum("ni,ni->n", normals, places_m) > 0
-            self._normals[missing] = np.where(away[:, None], -normals, normals)
-            self._found[missing] = True
+        missing = np.zeros(len(self._found), dtype=bool)
+        missing[rows] = True
+        missing &= ~self._found
+        if missing.any():
+            places = np.flatnonzero(missing[self._tree.order])
+            at = self._tree.order[places]
+            normals = patch_normals(self._tree, NORMAL_NEIGHBOURS, places)
+            away = np.einsum("ni,ni->n", normals, self._points_m[at]) > 0
+            self._normals[at] = np.where(away[:, None], -normals, normals)
+            self._found |= missing
         return self._normals
 
     @cached_property
@@ -53,7 +56,7 @@ def pca_normals(points_m: FloatArray) -> FloatArray:
 
 def median_spacing_m(points_m: FloatArray) -> float:
     """Median distance of (N, 3) points to their nearest other point."""
-    return float(np.median(neighbour_distances_m(points_m, 1)))
+    return float(np.median(tree_of(points_m).nearest(points_m, min(2, len(points_m)))[0][:, 1:]))
 
 
 def local_spacing_m(points_m: FloatArray) -> FloatArray:

@@ -96,7 +96,7 @@ def _with_normals(cloud: PointCloud, neighbours: int) -> PointCloud:
         raise InputError(
             f"Normals need at least 3 points and 3 neighbours, not {len(cloud)} and {neighbours}; try more"
         )
-    return replace(cloud, normals=patch_normals(KdTree(cloud.points_m), cloud.points_m, neighbours))
+    return replace(cloud, normals=patch_normals(KdTree(cloud.points_m), neighbours))
 
 
 def _off_lines(points_m: FloatArray, normals: FloatArray) -> FloatArray:

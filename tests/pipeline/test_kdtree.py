@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.kdtree import SERIAL_POINTS, KdTree
+from pipeline.kdtree import SERIAL_POINTS, KdTree, room_for, search_many, working_space
 
 
 def _all_distances_m(places_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
@@ -37,6 +37,15 @@ def test_neighbours_are_those_of_a_search_of_all_points(seed, count, neighbours,
     np.testing.assert_allclose(distances_m, np.sort(truth_m, axis=1)[:, :neighbours], atol=1e-12)
     np.testing.assert_allclose(distances_m, np.take_along_axis(truth_m, rows, axis=1), atol=1e-12)
     assert all(len(set(some)) == neighbours for some in rows.tolist())
+    tree = KdTree(points_m)
+    squared, many = np.empty(room_for(neighbours)), np.zeros(room_for(neighbours), dtype=np.intp)
+    for place_m, nearest_m, all_m in zip(places_m, distances_m, truth_m, strict=True):
+        farthest = search_many(*tree.parts, place_m, neighbours, np.inf, squared, many, *working_space())
+        some = tree.order[many[:neighbours]]
+        np.testing.assert_allclose(np.sort(all_m[some]), nearest_m, atol=1e-12)
+        np.testing.assert_allclose(np.sqrt(squared[:neighbours]), all_m[some], atol=1e-12)
+        assert farthest == squared[:neighbours].max()
+        assert len(set(some.tolist())) == neighbours
 
 
 def test_a_search_on_all_cores_gives_each_place_its_own():
