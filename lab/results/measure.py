@@ -37,12 +37,14 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "bench_chain": ("packetmesh", "bench", "--only", "chain"),
     "bench_surface": ("packetmesh", "bench", "--only", "surface"),
     "bench_registration": ("packetmesh", "bench", "--only", "registration"),
+    "bench_problems": ("packetmesh", "bench", "--problems", "runs/problems"),
     "bench_depth": ("packetmesh", "bench", "--only", "depth"),
     "bench_network": ("packetmesh", "bench", "--only", "network"),
     "real_frames": ("python", "-m", "lab.benchmarks.real_frames"),
     "ns3_saturation": ("python", "tests/benchmarks/ns3_saturation.py"),
 }
-"""What is run for a record; the last one needs ns-3."""
+"""What is run for a record; ``bench_problems`` needs lists in runs/problems, written there by
+``python -m lab.benchmarks.problem_lists runs/problems --lidar DATA``, and the last one ns-3."""
 RECONSTRUCT = "reconstruct"
 RECORDS = (RECONSTRUCT, *COMMANDS)
 PROGRAMS = {"packetmesh": (sys.executable, "-m", "app.cli"), "python": (sys.executable,)}
@@ -75,6 +77,8 @@ def measure(name: str, runs: Path = Path("runs/results")) -> Record:
     answer = _run(words)
     if "reproduce" in words:
         answer = {claim: _verdict(verdict) for claim, verdict in answer.items()}
+    elif "--problems" in words:
+        answer = {"summary": answer["summary"]}
     elif "bench" in words:
         answer = {case: {k: v for k, v in result.items() if k != "notes"} for case, result in answer.items()}
     return new_record(name, shlex.join(words), commit, answer)

@@ -33,6 +33,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "fill_claims": ("Filling holes: how far its confidence can be trusted", completion.fill_claims),
     "registration_claims": ("Registration: the thesis's claims", tables.registration_claims),
     "bench_registration": ("Registration: speed", tables.registration_speed),
+    "bench_problems": ("Registration: problems in the form of a public benchmark", tables.problems),
     "surface_claims": ("Ball pivoting: the thesis's claims", tables.claims),
     "bench_surface": ("Ball pivoting: speed", tables.rolling_speed),
     "network_claims": ("The camera network: the thesis's claims", tables.claims),
