@@ -360,7 +360,7 @@ def problems(numbers: Row) -> str:
     return (
         f"{table(header, rows)}\n\nError: displacement of the points over their distance to the centroid "
         "(arXiv 2003.12841); solved: below 0.05. All start alike, turned by up to 45° and shifted by up to a "
-        "fifth of the cloud's size, with the same gate. box-rooms: five rooms that no claim uses, seen by two "
+        "fifth of the cloud's size, with the same gate. box-rooms: five rooms that no claim uses, of two "
         "cameras; lidar: the pair in small_gicp's source archive; each moved ten ways. Lists: `python -m "
         "lab.benchmarks.problem_lists runs/problems --lidar DATA`."
     )
