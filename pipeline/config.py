@@ -214,8 +214,9 @@ class SurfaceConfig:
     """thesis: r_F + {0, 1/4, 1/2, 1} sigma_D; thesis+: r_F + {0, 1, 2, 4} sigma_D; manual."""
     radii_m: tuple[float, ...] = ()
     """Ball radii of the manual rule."""
-    max_points: int = 30_000
-    """The clouds are voxel-averaged to about this many points before the ball rolls."""
+    max_points: int = 50_000
+    """The clouds are voxel-averaged to about this many points before the ball rolls, or to the fewer that
+    voxels of twice the sensors' noise leave."""
     smoothing_passes: int = 2
     """How often every thinned point is moved onto the plane of its neighbours; 0 leaves the noise in."""
 
@@ -252,7 +253,7 @@ PRESETS: dict[str, PipelineConfig] = {
         inferred_registration=RegistrationConfig(method="ceicp-n", metric="point"),
         node_registration=RegistrationConfig(method="ceicp-n", metric="point"),
         fusion=FusionConfig(mode="union", align_nodes_with="fused", register_inferred=True),
-        surface=SurfaceConfig(radius_rule="thesis", smoothing_passes=0),
+        surface=SurfaceConfig(radius_rule="thesis", max_points=30_000, smoothing_passes=0),
     ),
 }
 """The two ways through the chain: ours (the default) and the thesis's own."""

@@ -21,6 +21,9 @@ from pipeline.surface import (
 )
 from pipeline.types import FloatArray, PointCloud, PointSource, RgbdFrame
 
+NOISE_VOXELS = 2.0
+"""Least edge of a voxel over the median noise of what is averaged: finer ones only copy the noise."""
+
 
 @dataclass(frozen=True, slots=True)
 class FusedCloud:
@@ -65,20 +68,26 @@ def merge_fused(
         T_world_camera: (4, 4) registered pose of each node.
         mode: ``fill`` drops inferred points that another node's sensor can judge, and those beside
             measured ones, so that no measurement is averaged with a guess.
-        max_points: it is averaged over the voxels that leave about so many points.
+        max_points: it is averaged over the voxels that leave about so many points, fewer where the sensors'
+            noise deserves no more.
         smoothing_passes: how often every point is moved onto the plane of its neighbours.
     """
     joint = [node.fused for node in nodes]
     if mode == "fill":
         joint = without_guesses_in_view(frames, nodes, T_world_camera)
     everything = PointCloud.concatenate(_placed(joint, T_world_camera))
-    voxel_m = voxel_for_count(everything.points_m, max_points)
+    voxel_m = max(voxel_for_count(everything.points_m, max_points), NOISE_VOXELS * noise_m(nodes))
     whole = thinned(joint, T_world_camera, voxel_m)
     fused, measured = smooth(whole, smoothing_passes), None
     if mode == "fill":
         own = thinned([node.sensor for node in nodes], T_world_camera, voxel_m)
         fused, measured = with_guesses_around(own, whole, fused, voxel_m, smoothing_passes), len(own)
     return FusedCloud(fused, voxel_m, *spacing(fused.points_m), measured)
+
+
+def noise_m(nodes: Sequence[NodeClouds]) -> float:
+    """The median standard deviation of what the sensors measured along their rays."""
+    return float(np.median(np.concatenate([node.sensor.sigma_m for node in nodes])))
 
 
 def with_guesses_around(

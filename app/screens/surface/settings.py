@@ -17,7 +17,8 @@ ADVANCED = (
         2_000,
         60_000,
         1_000,
-        hint="The clouds are voxel-averaged to about this many points before the ball rolls.",
+        hint="The clouds are voxel-averaged to about this many points before the ball rolls, or to the fewer "
+        "that voxels of twice the sensors' noise leave.",
     ),
     Number(
         "Smoothing passes",
