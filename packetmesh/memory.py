@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -39,16 +40,31 @@ def at_most_further(size_bytes: int) -> Iterator[None]:
         return
     import resource
 
-    before, most = resource.getrlimit(resource.RLIMIT_AS)
-    limit = psutil.Process().memory_info().vms + size_bytes
-    for known in (before, most):
-        limit = limit if known == resource.RLIM_INFINITY else min(limit, known)
-    with suppress(ValueError, OSError):  # a system that knows no such limit
-        resource.setrlimit(resource.RLIMIT_AS, (limit, most))
+    def limit_to(sizes_bytes: list[int]) -> None:
+        most = resource.getrlimit(resource.RLIMIT_AS)[1]
+        known = [size for size in (*sizes_bytes, most) if size != resource.RLIM_INFINITY]
+        with suppress(ValueError, OSError):  # a system that knows no such limit
+            resource.setrlimit(resource.RLIMIT_AS, (min(known, default=resource.RLIM_INFINITY), most))
+
+    mine = psutil.Process().memory_info().vms + size_bytes
+    with _limits_change:
+        if not _limits_bytes:
+            _limits_bytes.append(resource.getrlimit(resource.RLIMIT_AS)[0])
+        _limits_bytes.append(mine)
+        limit_to(_limits_bytes)
     try:
         yield
     finally:
-        resource.setrlimit(resource.RLIMIT_AS, (before, most))
+        with _limits_change:
+            _limits_bytes.remove(mine)
+            limit_to(_limits_bytes)
+            if len(_limits_bytes) == 1:
+                _limits_bytes.clear()
+
+
+_limits_bytes: list[int] = []
+"""What the process could take before the first who limits it, then what each of them lets it take."""
+_limits_change = threading.Lock()
 
 
 def share_arenas(count: int = 2) -> None:

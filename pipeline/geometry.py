@@ -92,6 +92,12 @@ def project(intrinsics: CameraIntrinsics, points_m: FloatArray) -> FloatArray:
     """(N, 2) image positions of (N, 3) camera-frame points in front of the camera (eq. 3.1-3.3)."""
     if not len(points_m):
         return np.empty((0, 2))
+    if not np.any(intrinsics.distortion):  # OpenCV would find fifty derivatives of a point as well
+        depth_m = points_m[:, 2]
+        nearness = np.divide(1.0, depth_m, out=np.ones_like(depth_m), where=depth_m != 0.0)
+        u_px = points_m[:, 0] * nearness * intrinsics.fx_px + intrinsics.cx_px
+        v_px = points_m[:, 1] * nearness * intrinsics.fy_px + intrinsics.cy_px
+        return np.stack([u_px, v_px], axis=1)
     return cv2.projectPoints(
         np.ascontiguousarray(points_m, dtype=np.float64),
         np.zeros(3),

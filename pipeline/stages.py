@@ -8,7 +8,8 @@ result only (a screen, a moment of a delivery) asks for that stage.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Hashable, Iterable
+from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, Protocol, TypeVar
@@ -53,6 +54,8 @@ from pipeline.texture import Texture
 from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult
 
 Result = TypeVar("Result")
+_NODES_AT_A_TIME = 2
+"""More would need more memory, and each works on several cores where it takes long."""
 Steps = Generator[Progress, None, Result]
 
 
@@ -140,11 +143,8 @@ def infer_depths(depth: DepthConfig, rig: Rig) -> Steps[tuple[InferredDepth, ...
 
 def acquired_depths(acquisition: AcquisitionConfig, rig: Rig) -> Steps[tuple[Acquired, ...]]:
     """Every node's measured depth and its outliers; colour has no say in it."""
-    acquired = []
-    for index, frame in enumerate(rig.frames):
-        yield Progress(f"outliers of {frame.name}", 0.2 + 0.1 * index / len(rig.frames))
-        acquired.append(acquire(frame, acquisition))
-    return tuple(acquired)
+    work = [partial(acquire, frame, acquisition) for frame in rig.frames]
+    return (yield from _side_by_side(work, rig, "outliers of", 0.2, 0.3))
 
 
 def prepare_nodes(
@@ -156,11 +156,25 @@ def prepare_nodes(
     acquired: tuple[Acquired, ...],
 ) -> Steps[tuple[NodeClouds, ...]]:
     """The clouds of every node."""
-    nodes = []
-    for index, (frame, answer, depths) in enumerate(zip(rig.frames, inferred, acquired, strict=True)):
-        yield Progress(f"clouds of {frame.name}", 0.3 + 0.15 * index / len(rig.frames))
-        nodes.append(prepare_node(frame, answer, depths, depth, mode, registration))
-    return tuple(nodes)
+    parts = zip(rig.frames, inferred, acquired, strict=True)
+    work = [partial(prepare_node, *part, depth, mode, registration) for part in parts]
+    return (yield from _side_by_side(work, rig, "clouds of", 0.3, 0.45))
+
+
+def _side_by_side(
+    work: Sequence[Callable[[], Result]], rig: Rig, what: str, begin: float, end: float
+) -> Steps[tuple[Result, ...]]:
+    """What each node's work gives, two nodes at a time: most of it leaves Python's lock to the other."""
+    results = []
+    with ThreadPoolExecutor(_NODES_AT_A_TIME) as threads:
+        begun = [threads.submit(part) for part in work]
+        try:
+            for index, (frame, part) in enumerate(zip(rig.frames, begun, strict=True)):
+                yield Progress(f"{what} {frame.name}", begin + (end - begin) * index / len(begun))
+                results.append(part.result())
+        finally:
+            threads.shutdown(wait=False, cancel_futures=True)
+    return tuple(results)
 
 
 def register_nodes(

@@ -60,14 +60,14 @@ def _fills(sensor: PointCloud, inferred: PointCloud, measured: BoolArray | None)
 
 def _inferred_sigma_m(sensor: PointCloud, inferred: PointCloud) -> FloatArray | None:
     """(N,) robust relative depth error at the shared pixels, times depth; None without shared pixels."""
-    if sensor.pixels is None or inferred.pixels is None:
+    if sensor.pixels is None or inferred.pixels is None or not len(sensor) or not len(inferred):
         return None
-    _, of_sensor, of_inferred = np.intersect1d(
-        _pixel_keys(sensor.pixels), _pixel_keys(inferred.pixels), return_indices=True
-    )
-    if not len(of_sensor):
+    sensor_m = np.full(np.maximum(sensor.pixels.max(axis=0), inferred.pixels.max(axis=0)) + 1, np.nan)
+    sensor_m[tuple(sensor.pixels.T)] = sensor.points_m[:, 2]
+    ratio = inferred.points_m[:, 2] / sensor_m[tuple(inferred.pixels.T)]
+    ratio = ratio[~np.isnan(ratio)]
+    if not len(ratio):
         return None
-    ratio = inferred.points_m[of_inferred, 2] / sensor.points_m[of_sensor, 2]
     return MAD_TO_SIGMA * float(np.median(np.abs(ratio - 1.0))) * inferred.points_m[:, 2]
 
 
