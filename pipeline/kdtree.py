@@ -9,7 +9,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 
 import numba
@@ -46,7 +46,19 @@ class KdTree:
         self.levels = levels
         """How often the points are halved."""
         if count:
-            _build(self.points_m, self.order, self.axes, self.splits_m, levels)
+            self._build()
+
+    def _build(self) -> None:
+        """Sort the points into leaves; two halves of many points beside each other."""
+        count, levels = len(self), self.levels
+        build = partial(_build, self.points_m, self.order, self.axes, self.splits_m)
+        if count < 4 * SERIAL_POINTS or CORES == 1:
+            build(0, 0, count, levels, 0)
+            return
+        build(0, 0, count, levels, levels - 1)
+        other = _threads().submit(build, 2, count // 2, count, levels - 1, 0)
+        build(1, 0, count // 2, levels - 1, 0)
+        other.result()
 
     @property
     def parts(self) -> tuple[FloatArray, ByteArray, FloatArray, int]:
@@ -112,15 +124,25 @@ def _threads() -> ThreadPoolExecutor:
 
 
 @compiled
-def _build(points: FloatArray, order: IntArray, axes: ByteArray, splits: FloatArray, levels: int) -> None:
-    """Sort the points into leaves, and their rows with them."""
+def _build(
+    points: FloatArray,
+    order: IntArray,
+    axes: ByteArray,
+    splits: FloatArray,
+    root: int,
+    begin: int,
+    end: int,
+    levels: int,
+    last_level: int,
+) -> None:
+    """Sort the points of a node into those below it, down to a level, and their rows with them."""
     stack = np.empty((_MOST_LEVELS, 4), dtype=np.int64)
-    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, 0, len(points), levels
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = root, begin, end, levels
     size = 1
     while size:
         size -= 1
         node, first, last, level = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
-        if level == 0:
+        if level == last_level:
             continue
         axis = _longest_axis(points, first, last)
         middle = (first + last) // 2

@@ -2,7 +2,8 @@
 
 A node waits a random number of backoff periods, assesses the channel (CCA), turns its radio round and sends.
 During the turnaround it is deaf: a frame that starts then collides. Nothing is computed per slot: an attempt
-costs one event for backoff and assessment, and one for each part of the exchange.
+costs one event for backoff and assessment, and one for each part of the exchange; where nothing else happens
+meanwhile, one up to the end of the frame and one for its acknowledgement.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ MIN_BE = 3
 MAX_BE = 5
 MAX_CSMA_BACKOFFS = 4
 MAX_FRAME_RETRIES = 3
+_NONE = Cause.NONE
+"""An enumeration is slow to look up, and this is for every frame."""
 
 
 def spacing_ns(frame_bytes: int) -> int:
@@ -50,10 +53,12 @@ class Ieee802154:
     def __init__(self, context: MacContext) -> None:
         self._env = context.env
         self._medium = context.medium
+        self._next_ns = context.env.peek if context.medium.places.static else lambda: 0
+        """When the next event is; who moves is always about to."""
         self._ack = context.config.mac.ack
         retries = context.config.mac.retries
         self._attempts = 1 + (MAX_FRAME_RETRIES if retries is None else retries) if self._ack else 1
-        self._recorder = context.recorder
+        self._add = context.recorder.add_packet
         self._up = context.up
         self._receive = context.receive
         self._lost = LinkLosses(context.config.loss, context.config.run.seed).lost
@@ -69,15 +74,15 @@ class Ieee802154:
             ``ok`` is what the sender knows, ``cause`` what happened: without acknowledgements a packet that
             did not arrive is ``ok`` with a cause; one that was dropped although it arrived has ``ACK_LOST``.
         """
-        arrived = False
+        arrived, air_ns = False, (PHY_BYTES + HEADER_BYTES + packet.size_bytes) * BYTE_NS
         for attempt in range(self._attempts):
-            refusal = yield from self._access(packet, sender, receiver)
+            refusal, ahead_ns = yield from self._access(packet, sender, receiver, air_ns)
             if refusal:
                 return Delivery(False, Cause.ACK_LOST if arrived else refusal, attempt)
-            cause = yield from self._transmit(packet, sender, receiver)
+            cause = yield from self._transmit(packet, sender, receiver, ahead_ns)
             if not cause and not arrived:
                 arrived = True
-                self._record(EventKind.DELIVER, packet, sender, receiver, packet.size_bytes)
+                self._add(int(self._env.now), EventKind.DELIVER, packet, sender, receiver, packet.size_bytes)
                 self._receive(packet, receiver)
             if not self._ack:
                 self._begin_interframe_space(packet, sender)
@@ -85,24 +90,40 @@ class Ieee802154:
             acknowledged = yield from self._acknowledge(packet, sender, receiver, cause)
             if acknowledged:
                 self._begin_interframe_space(packet, sender)
-                return Delivery(True, Cause.NONE, attempt + 1)
+                return Delivery(True, _NONE, attempt + 1)
         return Delivery(False, Cause.ACK_LOST if arrived else Cause.RETRIES, self._attempts)
 
-    def _access(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Cause]:
-        """CSMA/CA: wait for an idle channel; returns why the sender may not send now, ``NONE`` if it may."""
+    def _access(
+        self, packet: Packet, sender: int, receiver: int, air_ns: int
+    ) -> Generator[simpy.Event, Any, tuple[Cause, int]]:
+        """CSMA/CA: wait for an idle channel, as far as anything can happen meanwhile.
+
+        Returns:
+            Why the sender may not send, or ``NONE``, and in how many ns its frame of ``air_ns`` begins.
+        """
         env = self._env
-        wait_ns = max(self._ready_ns.get(sender, 0) - env.now, 0)
+        wait_ns = max(self._ready_ns.get(sender, 0) - int(env.now), 0)
         for busy_assessments in range(MAX_CSMA_BACKOFFS + 1):
             slots = next(self._backoffs) & ((1 << min(MIN_BE + busy_assessments, MAX_BE)) - 1)
-            yield env.timeout(wait_ns + slots * BACKOFF_NS + CCA_NS)
+            wait_ns += slots * BACKOFF_NS + CCA_NS
+            then_ns = int(env.now) + wait_ns
+            if self._next_ns() > then_ns + TURNAROUND_NS + air_ns and self._idle_at(sender, then_ns):
+                return _NONE, wait_ns + TURNAROUND_NS
+            yield env.timeout(wait_ns)
             wait_ns = 0
             if not self._up(sender):
-                return Cause.NODE_DOWN
+                return Cause.NODE_DOWN, 0
             if not self._busy(sender):
                 yield env.timeout(TURNAROUND_NS)
-                return Cause.NONE if self._up(sender) else Cause.NODE_DOWN
+                return (_NONE if self._up(sender) else Cause.NODE_DOWN), 0
         self._record(EventKind.LOSS, packet, sender, receiver, packet.size_bytes, Cause.CHANNEL)
-        return Cause.CHANNEL
+        return Cause.CHANNEL, 0
+
+    def _idle_at(self, sender: int, then_ns: int) -> bool:
+        """Whether an assessment that ends then finds the channel idle, if nothing happens until then."""
+        return (
+            self._medium.undisturbed and self._acking_until_ns.get(sender, 0) <= then_ns and self._up(sender)
+        )
 
     def _busy(self, node: int) -> bool:
         """Whether an assessment that ends now finds the channel busy, or the node has to acknowledge.
@@ -114,15 +135,18 @@ class Ieee802154:
             node, now_ns - 1, now_ns
         )
 
-    def _transmit(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Cause]:
-        """Put the frame on the air; returns why it did not arrive."""
+    def _transmit(
+        self, packet: Packet, sender: int, receiver: int, ahead_ns: int
+    ) -> Generator[simpy.Event, Any, Cause]:
+        """Put the frame on the air, ``ahead_ns`` from now; returns why it did not arrive."""
         size_bytes = PHY_BYTES + HEADER_BYTES + packet.size_bytes
         duration_ns = size_bytes * BYTE_NS
-        self._record(EventKind.AIR, packet, sender, receiver, size_bytes, duration_ns=duration_ns)
-        transmission = self._medium.start(sender, duration_ns, receiver, size_bytes, "oqpsk")
-        yield self._env.timeout(duration_ns)
+        begins_ns = int(self._env.now) + ahead_ns
+        self._add(begins_ns, EventKind.AIR, packet, sender, receiver, size_bytes, _NONE, duration_ns)
+        transmission = self._medium.start(sender, duration_ns, receiver, size_bytes, "oqpsk", begins_ns)
+        yield self._env.timeout(ahead_ns + duration_ns)
         lost = self._lost(sender, receiver)
-        cause = self._medium.finish(transmission) or (Cause.LINK if lost else Cause.NONE)
+        cause = self._medium.finish(transmission) or (Cause.LINK if lost else _NONE)
         if not (self._up(sender) and self._up(receiver)):
             cause = Cause.NODE_DOWN
         if cause:
@@ -137,17 +161,21 @@ class Ieee802154:
         if cause:
             yield env.timeout(ACK_WAIT_NS)
             return False
-        self._acking_until_ns[receiver] = int(env.now) + TURNAROUND_NS + ACK_NS
-        yield env.timeout(TURNAROUND_NS)
+        begins_ns = int(env.now) + TURNAROUND_NS
+        self._acking_until_ns[receiver] = begins_ns + ACK_NS
+        rest_ns = TURNAROUND_NS + ACK_NS
+        if self._next_ns() <= begins_ns + ACK_NS:
+            yield env.timeout(TURNAROUND_NS)
+            rest_ns = ACK_NS
         heard = False
         if self._up(receiver):
-            self._record(EventKind.ACK, packet, receiver, sender, ACK_BYTES, duration_ns=ACK_NS)
-            transmission = self._medium.start(receiver, ACK_NS, sender, ACK_BYTES, "oqpsk")
-            yield env.timeout(ACK_NS)
+            self._add(begins_ns, EventKind.ACK, packet, receiver, sender, ACK_BYTES, _NONE, ACK_NS)
+            transmission = self._medium.start(receiver, ACK_NS, sender, ACK_BYTES, "oqpsk", begins_ns)
+            yield env.timeout(rest_ns)
             failure = self._medium.finish(transmission)
             heard = not failure and self._up(sender)
         else:
-            yield env.timeout(ACK_NS)
+            yield env.timeout(rest_ns)
         if not heard:
             self._record(EventKind.LOSS, packet, sender, receiver, packet.size_bytes, Cause.ACK_LOST)
             yield env.timeout(ACK_WAIT_NS - TURNAROUND_NS - ACK_NS)
@@ -165,7 +193,5 @@ class Ieee802154:
         peer: int,
         size_bytes: int,
         cause: Cause = Cause.NONE,
-        duration_ns: int = 0,
     ) -> None:
-        now_ns = int(self._env.now)
-        self._recorder.add_packet(now_ns, kind, packet, node, peer, size_bytes, cause, duration_ns)
+        self._add(int(self._env.now), kind, packet, node, peer, size_bytes, cause, 0)

@@ -163,11 +163,9 @@ def entropy_weights(distances_m: FloatArray, sigma_m: float) -> tuple[FloatArray
     if not len(distances_m):
         return np.empty(0), sigma_m, float("nan")
     variance_m2 = max(sigma_m**2, np.finfo(float).tiny)
-    exponents = -0.5 / variance_m2 * distances_m**2
-    kernel = np.exp(exponents)
-    total = kernel.sum()
-    p = kernel / total
-    information = p * (np.log(total) - exponents)
+    kernel = np.exp(-0.5 * distances_m**2 / variance_m2)
+    p = kernel / kernel.sum()
+    information = -p * np.log(p)
     entropy_nat = float(information.sum())
     weights = information / entropy_nat if entropy_nat > 0 else p
     return weights, sigma_m, entropy_nat

@@ -117,7 +117,7 @@ def test_five_per_cent_decide(ratio, strict, verdict):
 def test_the_kernel_has_twice_the_events_in_twice_the_time():
     short, long = (saturation(NetworkConfig(), 1, seconds, seed=0).kernel_events for seconds in (2.0, 4.0))
     assert long == pytest.approx(2 * short, rel=0.02)
-    assert short > 1000
+    assert short > 500
 
 
 def test_the_real_ns3_carries_about_as_much():
