@@ -9,7 +9,7 @@ import viser
 from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, css
 from app.state import StepStatus
 
-MARKS: dict[StepStatus, str] = {"fresh": "✓", "stale": "↻", "running": "…", "failed": "✗", "missing": "·"}
+MARKS: dict[StepStatus, str] = {"fresh": "✓", "stale": "↻", "running": "…", "failed": "✗", "missing": ""}
 COLORS: dict[StepStatus, str] = {
     "fresh": css(DELIVERED),
     "stale": "#b26a00",
@@ -36,7 +36,8 @@ class Stepper:
     def show(self, current: str, statuses: Mapping[str, StepStatus]) -> None:
         """Mark the current step and the state of all."""
         labels = tuple(
-            f"{title} {MARKS[statuses[title]]}" if title in statuses else title for title in self._titles
+            f"{title} {MARKS[statuses[title]]}".rstrip() if title in statuses else title
+            for title in self._titles
         )
         if labels != self._labels:
             self._labels = labels

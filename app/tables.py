@@ -30,10 +30,11 @@ TRUTH_ROWS = (
         "Depth error",
         "Median depth error of the rays that hit, against the truth.",
         "median_depth_error_m",
-        "cm",
+        "mm",
     ),
 )
 """Of a surface beside the true one: names, what they mean, where they are in the comparison, and units."""
+PER_UNIT = {"%": 100.0, "mm": 1000.0}
 
 
 def term(name: str, hint: str) -> str:
@@ -105,7 +106,7 @@ def truth_rows(meshes: Sequence[MeshView | None], missing: str = WAITING) -> lis
     def value(mesh: MeshView | None, key: str, unit: str) -> str:
         if mesh is None:
             return missing
-        return WAITING if mesh.truth is None else number(mesh.truth.get(key), 1, unit, 100.0)
+        return WAITING if mesh.truth is None else number(mesh.truth.get(key), 1, unit, PER_UNIT[unit])
 
     return [
         (name, hint, *(value(mesh, key, unit) for mesh in meshes)) for name, hint, key, unit in TRUTH_ROWS

@@ -18,7 +18,7 @@ from pipeline.types import FloatArray
 def add_camera(
     scene: viser.SceneApi, name: str, node: SceneNode, T_world_camera: FloatArray, with_image: bool = True
 ) -> viser.CameraFrustumHandle:
-    """A frustum with the node's picture on it and its name above."""
+    """A frustum with the node's picture on it and its name below, which covers neither picture nor scene."""
     frustum = scene.add_camera_frustum(
         name,
         fov=node.fov_rad,
@@ -29,7 +29,7 @@ def add_camera(
         image=node.color.rgb[::4, ::4] if with_image else None,
     )
     place(frustum, T_world_camera)
-    scene.add_label(f"{name}/name", node.name, position=(0.0, -0.14, 0.1), font_screen_scale=0.9)
+    scene.add_label(f"{name}/name", node.name, font_screen_scale=0.9, anchor="top-center")
     return frustum
 
 

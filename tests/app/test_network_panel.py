@@ -163,6 +163,16 @@ def test_the_more_a_node_has_used_the_nearer_is_its_ball_to_orange(screen):
     assert f"{used_j[0]:.3g} J" in screen.handle("name-node_00").text
 
 
+def test_in_a_narrow_window_the_cameras_have_short_names_below_them(screen):
+    drawing, names = screen.panel._drawing, [screen.handle(f"name-node_0{row}") for row in range(3)]
+    drawing.spread_names(0.9, 1.7, 230.0)
+    assert [name.text for name in names] == ["node_00", "node_01", "node_02"]
+    for name, node in zip(names, screen.view.nodes, strict=True):
+        assert name.position[2] < node.T_world_camera[2, 3]
+    drawing.spread_names(0.9, 1.7, 600.0)
+    assert all(" J" in name.text for name in names)
+
+
 def test_packets_move_and_losses_name_their_cause(screen):
     pieces = screen.view.run.pieces
     frame = int(np.flatnonzero(pieces.what == What.AIR)[50])

@@ -11,7 +11,7 @@ from app.drawing.poses import place
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import MOST_PACKETS, ON_THE_WAY, Flights
 from app.screens.network.labels import CAUSES
-from app.screens.network.name_lifts import lifts
+from app.screens.network.name_lifts import LINE_PX, lifts
 from app.screens.network.view import What
 from network_sim.types import Cause
 from pipeline.types import FloatArray
@@ -25,8 +25,10 @@ FILLED = 0.8
 """Share of the window that all of it takes."""
 PACKET_M, POINT_M = 0.011, 0.008
 """Sizes over the same distance, and of a point."""
-NAME_ABOVE = 0.07
-"""Of a camera, over the same distance."""
+NAME_BELOW = 0.05
+"""A camera, over the same distance: between room and viewer, where it covers neither pictures nor mesh."""
+NARROW_PX = 600.0
+"""Width of a picture that has room for the cameras' names only, not for what they have sent and used."""
 LONGEST = 8
 """Letters that may still come behind a node's name and share: its energy."""
 LIT = (255, 230, 0)
@@ -54,7 +56,8 @@ class DeliveryDrawing:
         self._marks: dict[str, viser.LabelHandle] = {}
         """Names of the sink, the cloud and the client."""
         self._lifts_m: list[FloatArray] = [np.zeros(3)] * len(view.nodes)
-        """(3,) how much higher the name of each node stands, so that it covers no other."""
+        """(3,) how much farther down the name of each node stands, so that it covers no other."""
+        self._narrow = False
         self._batteries: list[viser.IcosphereHandle] = []
         self._clouds: list[viser.PointCloudHandle | None] = [None] * len(view.nodes)
         self._meshes: list[viser.GlbHandle] = []
@@ -97,7 +100,8 @@ class DeliveryDrawing:
         return middle_m, middle_m + distance_m * away
 
     def spread_names(self, fov_rad: float, aspect: float, height_px: float) -> None:
-        """Have no name cover another one, as a window so wide and high shows them."""
+        """Have no name cover another one, as a window so wide and high shows them; short ones if narrow."""
+        self._narrow = aspect * height_px < NARROW_PX
         middle_m, stand_m = self.viewpoint(fov_rad, aspect)
         forward = (middle_m - stand_m) / np.linalg.norm(middle_m - stand_m)
         right = self._view.stage.right
@@ -109,11 +113,13 @@ class DeliveryDrawing:
         from_m = np.array([label.position for label in labels]) - stand_m
         px_m = 2.0 * np.tan(0.5 * fov_rad) * (from_m @ forward) / max(height_px, 1.0)
         letters = [len(label.text) for label in self._marks.values()]
-        letters += [len(node.name) + len(" · 100 %") + LONGEST for node in self._view.nodes]
-        at_px = np.column_stack([from_m @ right, from_m @ up]) / px_m[:, None]
-        lifts_px = lifts(at_px, np.array(letters), len(self._marks))
+        more = len(" · off") if self._narrow else len(" · 100 %") + LONGEST
+        letters += [len(node.name) + more for node in self._view.nodes]
+        down_px = np.column_stack([from_m @ right, -(from_m @ up)]) / px_m[:, None]
+        down_px[: len(self._marks), 1] -= LINE_PX  # they stand above their places, the others below
+        lifts_px = lifts(down_px, np.array(letters), len(self._marks))
         self._lifts_m = [
-            lift_px * one_m * up for lift_px, one_m in zip(lifts_px, px_m[len(self._marks) :], strict=True)
+            -lift_px * one_m * up for lift_px, one_m in zip(lifts_px, px_m[len(self._marks) :], strict=True)
         ]
         for row in range(len(self._names)):
             self._stand(row, self._pose(row, self._shown))
@@ -157,9 +163,6 @@ class DeliveryDrawing:
         for row, node in enumerate(self._view.nodes):
             now = None if moment is None else moment.nodes[row]
             share = 0.0 if now is None else now.delivered_bytes / max(node.total_bytes, 1)
-            used = "" if now is None else f" · {now.energy_j:.3g} J"
-            state = "off" if node.row < 0 else f"{100.0 * share:.0f} %{used}"
-            self._names[row].text = f"{node.name} · {state}"
             self._stand(row, self._pose(row, moment))
             self._show_picture(row)
             self._frusta[row].color = _state_color(node.row < 0, share)
@@ -169,8 +172,20 @@ class DeliveryDrawing:
     def _stand(self, row: int, T_world_camera: FloatArray) -> None:
         """The camera where its cloud is: a rig may not know its poses before they are found."""
         place(self._frusta[row], T_world_camera)
-        above_m = np.array((0.0, 0.0, NAME_ABOVE * self._size_m))
-        self._names[row].position = T_world_camera[:3, 3] + above_m + self._lifts_m[row]
+        below_m = np.array((0.0, 0.0, NAME_BELOW * self._size_m))
+        self._names[row].position = T_world_camera[:3, 3] - below_m + self._lifts_m[row]
+        self._names[row].text = self._name(row)
+
+    def _name(self, row: int) -> str:
+        """A camera's name, and what it has sent and used."""
+        node, shown = self._view.nodes[row], self._shown
+        if node.row < 0:
+            return f"{node.name} · off"
+        if self._narrow or shown is None:
+            return node.name
+        now = shown.nodes[row]
+        percent = 100.0 * now.delivered_bytes / max(node.total_bytes, 1)
+        return f"{node.name} · {percent:.0f} % · {now.energy_j:.3g} J"
 
     def _show_picture(self, row: int) -> None:
         """What has arrived of a node's picture."""
@@ -297,10 +312,11 @@ class DeliveryDrawing:
             )
             place(frustum, node.T_world_camera)
             self._frusta.append(frustum)
-            above_m = node.T_world_camera[:3, 3] + (0.0, 0.0, NAME_ABOVE * self._size_m)
             battery = f"battery-{node.name}"
             self._batteries.append(self._mark(battery, self.place_m(node.name), FULL, 0.5))
-            self._names.append(self._label(f"name-{node.name}", f"{node.name} · 0 %", above_m, 0.9))
+            camera_m = node.T_world_camera[:3, 3]
+            self._names.append(self._label(f"name-{node.name}", node.name, camera_m, 0.9))
+            self._names[-1].anchor = "top-center"
 
     def _add_moved(self, cameras_m: FloatArray) -> None:
         """Radios that do not stand at their cameras."""

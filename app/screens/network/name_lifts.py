@@ -11,10 +11,10 @@ LETTER_PX, LINE_PX = 6.2, 20.0
 
 
 def lifts(at_px: FloatArray, letters: IntArray, fixed: int) -> FloatArray:
-    """How far labels have to go up so that none covers another one, the lowest staying lowest.
+    """How far labels have to go so that none covers another one, the first on that way staying first.
 
     Args:
-        at_px: (N, 2) middle of each label's lower edge, to the right and up.
+        at_px: (N, 2) middle of each label's edge, to the right and the way they may go: up or down.
         letters: (N,) in each label.
         fixed: so many, the first, stay where they are.
 
