@@ -79,7 +79,7 @@ def _boundary_successors(triangles: IntArray) -> dict[int, list[int]]:
     directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     on_rim = np.isin(np.sort(directed, axis=1) @ [vertices, 1], rims)
     following: dict[int, list[int]] = {}
-    for start, end in directed[on_rim].tolist():
+    for start, end in zip(*directed[on_rim].T.tolist(), strict=True):  # not a list for each edge
         following.setdefault(start, []).append(end)
         following.setdefault(end, [])
     return following
