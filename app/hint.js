@@ -9,6 +9,7 @@
   note.setAttribute("role", "note");
   let about = null; // whose meaning is shown
   let stood = 0; // where that name stood then
+  let passedOn = null; // the box that a click on its label clicks next
   let waiting = false;
 
   // viser keeps the hint of a control in what its page is made of.
@@ -47,10 +48,16 @@
 
   window.addEventListener("click", event => {
     const one = event.target.closest?.("[data-hint]");
+    if (passedOn && event.target === passedOn) { // the browser's own click on the box of a label
+      passedOn = null;
+      return;
+    }
     const again = one === about;
     close();
+    const control = one?.matches("label") ? document.getElementById(one.htmlFor) : null;
+    passedOn = control?.matches("[type=checkbox]") ? control : null; // its label ticks it, as everywhere
     if (!one || again) return;
-    if (one.matches("label")) event.preventDefault(); // to ask changes nothing
+    if (control && !passedOn) event.preventDefault(); // to ask opens no list
     show(one);
   }, true);
   window.addEventListener("keydown", event => event.key === "Escape" && close(), true);
