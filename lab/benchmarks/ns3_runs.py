@@ -195,7 +195,7 @@ def run(
 
 
 def median(runs: list[dict]) -> dict:
-    """The run that took the median time; all count the same."""
+    """The run that took the median time."""
     return sorted(runs, key=lambda one: one["wall_s"])[len(runs) // 2]
 
 
