@@ -95,12 +95,22 @@ def process_pool(processes: int, begin: Callable[..., None] | None = None, *give
     """
     heeded = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
     threads = max(1, (os.cpu_count() or 1) // processes)
-    return ProcessPoolExecutor(
+    return _Pool(
         processes,
         mp_context=multiprocessing.get_context("spawn"),
         initializer=_begin,
         initargs=(heeded, threads, pickle.dumps((begin, given))),
     )
+
+
+class _Pool(ProcessPoolExecutor):
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """When a process is killed while another starts, Python (3.11 to 3.13) does not end the new one, and
+        waits for it for ever."""
+        if self._broken:
+            for process in list((self._processes or {}).values()):
+                process.terminate()
+        super().shutdown(wait, cancel_futures=cancel_futures)
 
 
 def _begin(heeded: bool, threads: int, pickled: bytes) -> None:

@@ -1,10 +1,12 @@
 """Tasks on this machine's cores or on a cluster: each is done once, and only a few are handed out ahead."""
 
 import math
+import multiprocessing.connection
 import os
 import signal
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -91,6 +93,27 @@ def test_a_killed_process_fails_only_the_task_that_killed_it():
     tasks = [KILLED if index in (1, 5) else str(index) for index in range(9)]
     answers = dict(run_batch(eval, tasks, processes=2, killed=killed))
     assert answers == {index: "killed" if index in (1, 5) else index for index in range(9)}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+def test_a_process_that_starts_when_another_is_killed_ends_with_it(monkeypatch):
+    """Starting the second takes until the first was killed."""
+    started = []
+    start = multiprocessing.context.SpawnProcess.start
+
+    def start_slowly(process):
+        start(process)
+        started.append(process)
+        for first in started[:-1]:
+            multiprocessing.connection.wait([first.sentinel])
+            time.sleep(0.5)
+
+    monkeypatch.setattr(multiprocessing.context.SpawnProcess, "start", start_slowly)
+    with pytest.raises(PacketMeshError, match="ended unexpectedly"):
+        list(run_batch(eval, [KILLED] + [PROCESS] * 3, processes=2))
+    assert len(started) == 2
+    for process in started:
+        assert process.exitcode in {-signal.SIGKILL, -signal.SIGTERM}
 
 
 def test_stopping_early_drops_what_has_not_begun(tmp_path):
