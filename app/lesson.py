@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Generic
 
-from app.lesson_file import CHOICES, FIELD, SCENE, Lesson, Look, Numbers, Question, settled
+from app.lesson_file import CHOICES, CLAUSE, FIELD, SCENE, Lesson, Look, Numbers, Question, settled
 from app.page import running
 from app.ui import Ui
 from packetmesh.errors import InputError
@@ -208,17 +208,22 @@ class LessonFolder(Generic[Look]):
         self._guess.visible = self._waits()
 
     def _filled(self, text: str, index: int) -> str:
-        """The text with its numbers: of this stop, or as they were at another in the same scene."""
+        """The text with its numbers: of this stop, or as they were at another in the same scene. What it says
+        of stops where nobody was is left out."""
         now = self._numbers()
         if now:
             same = {at: known for at, known in self._known.items() if known[SCENE] == now[SCENE]}
             self._known = {index: now, **same}
 
-        def value(field: re.Match[str]) -> str:
-            known = now if field[1] is None else self._known.get(int(field[1]) - 1)
-            return f"(see stop {field[1]})" if known is None else known.get(field[2], TO_COME)
+        def clause(found: re.Match[str]) -> str:
+            stops = {int(stop) - 1 for stop, _ in FIELD.findall(found[1]) if stop}
+            return found[1] if stops <= self._known.keys() else ""
 
-        return FIELD.sub(value, text)
+        def value(field: re.Match[str]) -> str:
+            known = self._known[int(field[1]) - 1] if field[1] else now
+            return known.get(field[2], TO_COME)
+
+        return FIELD.sub(value, CLAUSE.sub(clause, text))
 
 
 def with_votes(question: Question, votes: Collection[int]) -> Question:

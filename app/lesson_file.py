@@ -3,7 +3,8 @@
 A lesson is a ``# title`` and sections. A section is a ``## title``, lines ``set: name = value``, lines
 ``open: folder or tab``, lines ``see: control or number`` and its text. What a section does not set is at its
 default, so that every stop can be shown by itself; what it speaks of is opened, framed and in view. Numbers
-are not typed: ``{name}`` is computed of what the screen shows, ``{3:name}`` is what it was at the third stop.
+are not typed: ``{name}`` is computed of what the screen shows. ``{{, and was {3:name}}}`` says what it was at
+the third stop, and nothing to those who were not there.
 Behind the text a section asks::
 
     ask: What does it cost?
@@ -37,6 +38,7 @@ CHOICES = 3
 PARTS = ("ask", "choices", "reveal")
 POINTING = ("open:", "see:")
 FIELD = re.compile(r"\{(?:(\d+):)?([a-z_0-9]+)\}")
+CLAUSE = re.compile(r"\{\{((?:[^{}]|\{[^{}]*\})*)\}\}")
 SCENE = "scene"
 """The number by which those of another scene are told apart; not for a text."""
 Numbers: TypeAlias = Mapping[str, str]
@@ -140,6 +142,12 @@ def read_lesson(
             raise InputError(
                 f"The lesson {path.name} has the field {stop and f'{stop}:'}{name}, no number of its "
                 f"screen; try one of {', '.join(numbers) or 'none'}."
+            )
+    for stop, name in FIELD.findall(CLAUSE.sub("", text)):
+        if stop:
+            raise InputError(
+                f"The lesson {path.name} has the field {stop}:{name} outside of double braces; put all that "
+                f"says it inside, for those who were not at stop {stop}."
             )
     stops = tuple(_stop(section, path.name, settings, default) for section in sections)
     asked = [choice for stop in stops if stop.question for choice in stop.question.choices]

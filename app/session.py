@@ -343,6 +343,9 @@ class Session:
         elif action == "Reset":
             for reset in self.ui.resets:
                 reset()
+            for part in (part for panel in self.panels for part in panel.in_address.values()):
+                if part.place():
+                    part.take("")
             self.want(self._start)
         else:
             self.ui.show_command(self.current.command)

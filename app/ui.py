@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
@@ -159,7 +159,7 @@ class Awaited:
 
     def __init__(self, ui: Ui, handle: viser.GuiDropdownHandle[str], action: Callable[[], object]) -> None:
         """Take care of a list; ``action`` answers a change."""
-        self._handle, self._action, self._asked = handle, action, ""
+        self._ui, self._handle, self._action, self._asked = ui, handle, action, ""
         ui.when_changed(handle, self._picked)
 
     @property
@@ -182,8 +182,9 @@ class Awaited:
             self._asked = ""
         if chosen != self.value:
             self._handle.value = chosen
-        if all_there:
-            self._asked = ""
+        if all_there and self._asked:
+            unknown, self._asked = self._asked, ""
+            self._ui.post(tell_unknown, unknown, names)
 
     def place(self) -> str:
         """The name that is picked or asked for, unless it is the first."""
@@ -196,6 +197,15 @@ class Awaited:
         if not self._asked and name != self.value:
             self._handle.value = name
             self._action()
+
+
+def tell_unknown(asked: str, names: Collection[str]) -> None:
+    """Say that an address asks for a name that is not there.
+
+    Raises:
+        InputError: always; a session tells it.
+    """
+    raise InputError(f"The address has {asked[:40]}, which is not here; try one of {', '.join(names)}")
 
 
 @dataclass(frozen=True, slots=True)

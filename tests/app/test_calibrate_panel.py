@@ -155,6 +155,8 @@ def test_the_address_says_whose_which_photograph_and_pictures_are_shown(screen):
     assert "View 1" in gui.text()
     with pytest.raises(InputError, match="such as photo,straightened,50"):
         parts["pictures"].take("photo,halves,50")
+    with pytest.raises(InputError, match="77, which is not here; try one of 0, 1"):
+        parts["photo"].take("77")
 
 
 def test_what_an_address_asks_for_is_shown_once_the_cameras_are_there(

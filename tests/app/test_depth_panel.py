@@ -80,7 +80,8 @@ def test_a_node_that_an_address_asks_for_is_shown_once_it_is_there(session):
     session.panel.on_view("depth", view)
     assert node.place() == ""
     node.take("node_99")
-    session.panel.on_view("depth", view)
+    with pytest.raises(InputError, match="node_99, which is not here; try one of node_00"):
+        session.panel.on_view("depth", view)
     assert node.place() == ""
 
 

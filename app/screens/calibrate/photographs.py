@@ -11,7 +11,7 @@ from app.screens.calibrate.area import PictureArea
 from app.screens.calibrate.bars import Bars, bars_of
 from app.screens.calibrate.photograph import found_picture, picture_of, straightened_picture
 from app.screens.calibrate.view import CameraView
-from app.ui import Ui
+from app.ui import Ui, tell_unknown
 
 
 class Photographs:
@@ -36,10 +36,11 @@ class Photographs:
             on_drop: leaves the chosen view out, or takes it in again.
             on_all: leaves none out.
         """
-        self._answers, self._on_pick = answers, on_pick
+        self._ui, self._answers, self._on_pick = ui, answers, on_pick
         self._names: tuple[str, ...] = ()
         self.chosen = ""
         """Name of the view that is shown, or is to be shown once it is there."""
+        self._asked = ""
         self._bars = Bars(ui, on_pick)
         self._row = ui.buttons(
             "View",
@@ -58,7 +59,10 @@ class Photographs:
             self._bars.show((), "")
             return
         self._names = tuple(one.name for one in camera.photographs)
+        asked, self._asked = self._asked, ""
         if self.chosen not in self._names:
+            if asked and self.chosen == asked:
+                self._ui.post(tell_unknown, asked, self._names)
             self.chosen = self._names[0]
         trust = self._answers.trust_in(camera)
         self._bars.show(bars_of(camera, () if trust is None else trust.outliers), self.chosen)
@@ -76,6 +80,7 @@ class Photographs:
 
     def take(self, place: str) -> None:
         """Show the view of that name, at once or when it is there."""
+        self._asked = place
         self._on_pick(place or next(iter(self._names), ""))
 
     def _go(self, count: int) -> None:

@@ -139,6 +139,7 @@ NUMBERS = (
         "least",
     ),
     *("tries", "collisions", "lost", "last", "bytes_time", "radio", "energy", "other", "worst", "verdict"),
+    *("relayed", "crossings"),
     *SHARES,
     "cost",
 )
@@ -190,6 +191,7 @@ def _frame_numbers(view: DeliveryView, frames: Frames) -> dict[str, str]:
     packets = sum(-(-node.total_bytes // payload) for node in view.nodes)
     frame_ns = int(air.end_ns[first] - air.start_ns[first])
     collisions = int(np.count_nonzero(air.cause[images] == Cause.COLLISION))
+    crossings = {(frames.camera_of(item), int(air.node[item])) for item in images}
     digit = 10 ** (len(str(packets)) - 1)
     return {
         "payload": f"{payload:,} bytes",
@@ -199,6 +201,8 @@ def _frame_numbers(view: DeliveryView, frames: Frames) -> dict[str, str]:
         "frame_time": time_text(frame_ns),
         "least": time_text(packets * frame_ns),
         "bytes_time": time_text(round(8e9 * view.total_bytes / view.run.config.mac.rate_bps)),
+        "relayed": str(len({camera for camera, sender in crossings if sender != camera})),
+        "crossings": str(len(crossings)),
         "tries": f"{len(images):,}",
         "collisions": f"{collisions:,}",
         "collided": number(collisions / len(images), 1, "%", 100.0),
