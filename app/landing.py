@@ -47,13 +47,13 @@ def landing_html(lecture: bool = False) -> str:
     )
     scenes = "".join(_card(name, scene.title, f"scene={name}") for name, scene in DEMO_SCENES.items())
     shared = " data-lecture" if lecture else ""
-    others = "" if lecture else f"<h2>Or a scene to explore</h2><section>{scenes}</section>"
+    others = "" if lecture else f"<div><h2>Or a scene to explore</h2><section>{scenes}</section></div>"
     return (
         f'<style>{_STYLE}</style><main id="packetmesh-landing"{shared} role="dialog" aria-label="Welcome">'
         "<header><div><h1>PacketMesh</h1><p>From a camera network's packets to a surface mesh.</p></div>"
         '<button type="button" data-explore>Explore <kbd>Esc</kbd></button></header>'
-        f"<h2>Six lessons, each of one question</h2><section>{lessons}</section>"
-        f"{others}</main><script>{_SCRIPT}</script>"
+        f"<article><div><h2>Six lessons, each of one question</h2><section>{lessons}</section></div>{others}"
+        f"</article></main><script>{_SCRIPT}</script>"
     )
 
 

@@ -1,13 +1,14 @@
-"""Make pictures of docs/ again: ``python tests/browser/pictures.py [fuse] [surface] [kinect]``.
+"""Make pictures of docs/ again: ``python tests/browser/pictures.py [fuse] [surface] [network] ...``.
 
-``fuse`` and ``surface`` open the app in Chromium; ``kinect`` reconstructs the two real frames of
-``--frames``, a folder with ``kinect_desk`` and ``kinect_basket``.
+``fuse``, ``surface``, ``network`` and ``calibrate`` open the app in Chromium; ``kinect`` reconstructs the two
+real frames of ``--frames``, a folder with ``kinect_desk`` and ``kinect_basket``.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from conftest import ARGUMENTS, chromium_path
-from hands import canvas, go
+from hands import canvas, go, press, unfold
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
@@ -50,12 +51,35 @@ def surface(frames: Path) -> Image.Image:
     return _screen("Surface", lambda page: None)
 
 
-def _screen(step: str, prepare: Callable[[Page], None]) -> Image.Image:
-    app = build_server("living-room", port=0)
+def network(frames: Path) -> Image.Image:
+    """The Network screen two thirds of the way through."""
+
+    def there(page: Page) -> None:
+        page.locator(".packetmesh-dock-row").get_by_text(re.compile(r"^3\.9\d* s of")).wait_for()
+
+    return _screen("Network", there, address="screen=network&t=3.9")
+
+
+def calibrate(frames: Path) -> Image.Image:
+    """The Calibrate screen with the scatter of noisier points."""
+
+    def scatter(page: Page) -> None:
+        unfold(page, "What if the points were noisier?")
+        press(page, "Replay")
+        page.get_by_text("All trials").wait_for(timeout=120_000)
+        page.get_by_text("Lesson: How good").scroll_into_view_if_needed()
+
+    return _screen("Calibrate", scatter, "uncalibrated")
+
+
+def _screen(
+    step: str, prepare: Callable[[Page], None], scene: str = "living-room", address: str = "explore"
+) -> Image.Image:
+    app = build_server(scene, port=0)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium_path(), args=ARGUMENTS)
         page = browser.new_page(viewport=WINDOW_PX)
-        page.goto(f"{app.url}?explore")
+        page.goto(f"{app.url}?{address}")
         go(page, step)
         page.get_by_text("Up to date").wait_for(timeout=120_000)
         prepare(page)
@@ -98,7 +122,7 @@ def _panel(title: str, rgb: np.ndarray) -> np.ndarray:
     return panel
 
 
-PICTURES = {"fuse": fuse, "surface": surface, "kinect": kinect}
+PICTURES = {"fuse": fuse, "surface": surface, "network": network, "calibrate": calibrate, "kinect": kinect}
 
 
 def main() -> None:
