@@ -49,6 +49,8 @@ class HoleCase:
     """(H, W) pixels to be filled and judged."""
     truth_m: FloatArray
     """(H, W) what judges there."""
+    measured: bool = True
+    """Whether the sensor had measured the hole; else it is one of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +94,7 @@ def hidden_cases(site: Site, seed: int = 0) -> Iterator[HoleCase]:
         if site.truth:
             hole = np.isfinite(example.truth_m) & ~example.sensor.valid
             yield HoleCase(
-                place, f"{site.group}, own holes", example.rgb, example.sensor, hole, example.truth_m
+                place, f"{site.group}, own holes", example.rgb, example.sensor, hole, example.truth_m, False
             )
 
 

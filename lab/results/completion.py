@@ -110,13 +110,14 @@ def trust(claim: Row) -> str:
     low, high = SAID_SHARES
     modest = [group for group, true in shares.items() if _share(true) > high]
     sure = [group for group, true in shares.items() if _share(true) < low]
-    measured = "; ".join(f"{group}: {_share(true):.1f} %" for group, true in shares.items())
+    measured = "; ".join(f"{group}: {true}" for group, true in shares.items())
     return (
         f"**Its confidence.** Of pixels said to be right with {low:.0f} to {high:.0f} %, so many are: "
         f"{measured}; of all of them together {right / sum(pixels):.1f} %. "
         f"Too modest: {'; '.join(modest) or 'none'}. Too sure: {'; '.join(sure) or 'none'}. A "
         "sensor's own holes are where it fails: dark, shiny and far things, unlike what surrounds them. "
-        "Hidden shapes lie where it measured, on things that are easier to continue."
+        "Hidden shapes lie where it measured, on things that are easier to continue, so there its "
+        "confidence follows other odds; both were fitted on validation rooms, hole pixels counting alike."
     )
 
 

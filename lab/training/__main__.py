@@ -105,7 +105,7 @@ def export_completion(checkpoint: Path, out: Path) -> None:
     print(f"{out}: {export_completion(checkpoint, out) / 1e6:.1f} MB")
 
 
-def fit_confidence(rooms: int = 60) -> None:
+def fit_confidence(rooms: int = 120) -> None:
     """Fit how sure completed depth is, on validation rooms, and print how well that holds.
 
     Args:

@@ -19,9 +19,12 @@ from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 COMPLETED_FROM = 0.0125
 """Distance from a rim at which completed and aligned depth weigh the same, in shares of the diagonal; of 0,
 5, 10, 20 and 40 px at 640 x 480 the best on validation rooms (``fit_confidence`` prints the errors)."""
-COMPLETED_ODDS = (-1.17, -1.27, 0.33, 0.10, -0.78)
-"""The same odds of completed depth: constant, and per feature of ``features_of_completion``.
-``python -m lab.training fit_confidence`` fits them on validation rooms."""
+COMPLETED_ODDS = (-1.92, -1.24, 0.20, -0.08, -0.68)
+"""The same odds of completed depth in the sensor's own holes: constant, and per feature of
+``features_of_completion``. ``python -m lab.training fit_confidence`` fits them on validation rooms."""
+HIDDEN_ODDS = (-4.22, -1.78, 0.24, -0.67, -0.92)
+"""And where the sensor had measured: what is dark, shiny or far is not there, and the rest is easier to
+continue. Fitted with them, on hidden depth."""
 TYPICAL_LOG_SCALE = -2.7
 LEAST_DIFFERENCE = 0.005
 RELIEF_APART = 0.02
@@ -40,7 +43,7 @@ FLYING_MEASURED = 0.02
 """Logarithmic depths: the step in the window, the least one within 3 x 3 pixels, and how near to a measured
 depth a pixel continues that surface; between them the share of the step off either side. On hidden depth
 seven of ten pixels that this removes are more than 5 % wrong, of the others one in twelve."""
-ALIGNED_ODDS = (-7.64, -0.76, -1.70)
+ALIGNED_ODDS = (-10.20, -1.06, -1.83)
 """Log odds of aligned depth being within 5 % of the truth: constant, and per feature of
 ``features_of_alignment``. ``python -m lab.training fit_confidence`` fits them on validation rooms."""
 
@@ -66,6 +69,7 @@ def judge(
     reach: float,
     least_confidence: float,
     completed: CompletedDepth | None = None,
+    hidden: BoolArray | None = None,
 ) -> JudgedDepth:
     """Join aligned depth to the rims of the sensor's holes and drop what cannot be relied on.
 
@@ -77,6 +81,7 @@ def judge(
         least_confidence: lowest confidence that stays, 0 to 1.
         completed: (H, W) takes the aligned depth's place in the sensor's holes, the more the farther from
             their rims.
+        hidden: (H, W) holes where the sensor had measured, which are known to be easier; none if left out.
 
     Raises:
         InputError: images of different sizes, a negative reach, or a confidence outside 0 to 1.
@@ -95,7 +100,7 @@ def judge(
     distance = distance_to_measured(measured)
     depth, believed = meet_rims(alignment, sensor, rgb), confidence_of(alignment, sensor, distance)
     if completed is not None:
-        odds = odds_of_completion(depth, completed, distance)
+        odds = odds_of_completion(depth, completed, distance, hidden)
         believed = np.where(measured, believed, 1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0))))
         depth = joined(depth, completed, measured, distance)
     usable = positive(depth.z_m)
@@ -175,9 +180,13 @@ def joined(
     return DepthMap(np.where(measured, aligned.z_m, both_m).astype(np.float32))
 
 
-def odds_of_completion(aligned: DepthMap, completed: CompletedDepth, distance: FloatArray) -> FloatArray:
-    """(H, W) log odds of completed depth."""
-    return _odds(COMPLETED_ODDS, features_of_completion(aligned, completed, distance))
+def odds_of_completion(
+    aligned: DepthMap, completed: CompletedDepth, distance: FloatArray, hidden: BoolArray | None = None
+) -> FloatArray:
+    """(H, W) log odds of completed depth; in (H, W) ``hidden`` the sensor had measured."""
+    features = features_of_completion(aligned, completed, distance)
+    own = _odds(COMPLETED_ODDS, features)
+    return own if hidden is None else np.where(hidden, _odds(HIDDEN_ODDS, features), own)
 
 
 def features_of_completion(aligned: DepthMap, completed: CompletedDepth, distance: FloatArray) -> FloatArray:

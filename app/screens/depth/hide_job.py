@@ -41,7 +41,9 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
     frame, node = rig.frames[request.node], nodes[request.node]
     hidden = hidden_pixels(frame.depth, request.discs)
     rest = DepthMap(np.where(hidden, np.float32(np.nan), frame.depth.z_m))
-    filled_by = partial(believed, node.network.depth, rest, frame.rgb, disparity=node.alignment.disparity)
+    filled_by = partial(
+        believed, node.network.depth, rest, frame.rgb, disparity=node.alignment.disparity, hidden=hidden
+    )
     ways: dict[str, Callable[[], DepthMap]] = {
         "ours": partial(filled_by, spec.config.depth),
         "network": partial(filled_by, replace(spec.config.depth, fill="network")),
@@ -78,12 +80,17 @@ def hidden_pixels(sensor: DepthMap, discs: Sequence[Disc]) -> BoolArray:
 
 
 def believed(
-    inferred: DepthMap, rest: DepthMap, rgb: ByteArray, config: DepthConfig, disparity: bool = False
+    inferred: DepthMap,
+    rest: DepthMap,
+    rgb: ByteArray,
+    config: DepthConfig,
+    disparity: bool = False,
+    hidden: BoolArray | None = None,
 ) -> DepthMap:
-    """The depth that these settings believe without knowing what is hidden."""
+    """The depth that these settings believe without knowing what was measured in (H, W) ``hidden``."""
     alignment = align_depth(inferred, rest, config.alignment, disparity)
     completed = complete(rest, rgb) if config.completes else None
-    return judge(alignment, rest, rgb, config.reach, config.least_confidence, completed).depth
+    return judge(alignment, rest, rgb, config.reach, config.least_confidence, completed, hidden).depth
 
 
 def fill_row(name: str, filled_m: FloatArray, measured_m: FloatArray, elapsed_s: float) -> FillRow:

@@ -109,7 +109,8 @@ def confidence_trial(site: Site) -> list[dict[str, Any]]:
     for case in hidden_cases(site):
         aligned = align_depth(network.infer(case.rgb), case.sensor, config.alignment)
         completed = complete(case.sensor, case.rgb)
-        judged = judge(aligned, case.sensor, case.rgb, float("inf"), 0.0, completed)
+        hidden = case.hole if case.measured else None
+        judged = judge(aligned, case.sensor, case.rgb, float("inf"), 0.0, completed, hidden)
         answered = case.hole & judged.depth.valid
         truth_m = case.truth_m[answered]
         right = np.abs(judged.depth.z_m[answered] - truth_m) <= CLOSE * truth_m

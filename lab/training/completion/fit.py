@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import expit
 
+from lab.benchmarks.hidden_depth import hide
 from lab.training.dataset import FIRST_SEED
 from lab.training.evaluate import Example, held_out_rooms
 from pipeline.depth import DepthNetwork, align_depth, complete
@@ -23,12 +24,10 @@ from pipeline.depth.confidence import (
 from pipeline.types import BoolArray, DepthMap, FloatArray
 
 VIEWS = 2
-RADII_PX = (10.0, 120.0)
-"""Smallest and largest disc that is hidden, at 640 pixels width; every size as often."""
-PIXELS = 400
-"""Judged of each view and kind of hole."""
-
-
+HIDDEN_SHARE = 0.15
+"""Of the measured pixels of each view."""
+ONE_IN = 25
+"""Hole pixels of which one is judged: a large hole counts for more than a small one."""
 TAKEOVERS_PX = (0.0, 5.0, 10.0, 20.0, 40.0)
 """Distances from a rim that are tried for ``COMPLETED_FROM``, at 640 x 480."""
 DIAGONAL_PX = 800.0
@@ -53,42 +52,51 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """Hole pixels of one room."""
+    """Hole pixels of one kind."""
 
     aligned: Evidence
     completed: Evidence
     errors: FloatArray
     """(5, N) AbsRel of both joined at each of the ``TAKEOVERS_PX``."""
 
+    @staticmethod
+    def joined(parts: list[Judged]) -> Judged:
+        """All of them in one."""
+        return Judged(
+            Evidence.joined([part.aligned for part in parts]),
+            Evidence.joined([part.completed for part in parts]),
+            np.concatenate([part.errors for part in parts], axis=1),
+        )
+
 
 def fit_confidence(rooms: int) -> Iterator[str]:
     """Lines: errors by the takeover; the coefficients from every other room, of the rest said and true."""
     network = DepthNetwork()
     judged = [judged_room(FIRST_SEED["validation"] + k, network) for k in range(rooms)]
-    errors = np.concatenate([room.errors for room in judged], axis=1).mean(axis=1)
+    errors = np.concatenate([kind.errors for room in judged for kind in room], axis=1).mean(axis=1)
     yield "COMPLETED_FROM in px | AbsRel"
     for takeover_px, error in zip(TAKEOVERS_PX, errors, strict=True):
         yield f"{takeover_px:g} | {error:.4f}"
-    for name, of in (("ALIGNED", lambda room: room.aligned), ("COMPLETED", lambda room: room.completed)):
+    for name, of in (
+        ("ALIGNED", lambda room: room[0].aligned),
+        ("COMPLETED", lambda room: room[0].completed),
+        ("HIDDEN", lambda room: room[1].completed),
+    ):
         fitted = fit(Evidence.joined([of(room) for room in judged[::2]]))
         yield f"{name}_ODDS = " + ", ".join(f"{value:.2f}" for value in fitted)
         yield "said | true | pixels"
         yield from calibration(fitted, Evidence.joined([of(room) for room in judged[1::2]]))
 
 
-def judged_room(seed: int, network: DepthNetwork) -> Judged:
-    """Pixels of the sensor's own holes and of hidden discs, in every view of one room."""
+def judged_room(seed: int, network: DepthNetwork) -> tuple[Judged, Judged]:
+    """Pixels of the sensor's own holes and of hidden depth, in every view of one room."""
     rng = np.random.default_rng(seed)
-    parts = [
-        judged_view(example, hidden & example.sensor.valid, network, rng)
-        for example in held_out_rooms(range(seed, seed + 1), VIEWS)
-        for hidden in (np.zeros(example.truth_m.shape, bool), disc(example.truth_m.shape, rng))
-    ]
-    return Judged(
-        Evidence.joined([part.aligned for part in parts]),
-        Evidence.joined([part.completed for part in parts]),
-        np.concatenate([part.errors for part in parts], axis=1),
-    )
+    own, measured = [], []
+    for example in held_out_rooms(range(seed, seed + 1), VIEWS):
+        hidden = hide(example.sensor, rng, HIDDEN_SHARE)
+        own.append(judged_view(example, np.zeros_like(hidden), network, rng))
+        measured.append(judged_view(example, hidden, network, rng))
+    return Judged.joined(own), Judged.joined(measured)
 
 
 def judged_view(
@@ -101,7 +109,8 @@ def judged_view(
     rims = meet_rims(alignment, sensor, example.rgb)
     completed = complete(sensor, example.rgb)
     holes = hidden if hidden.any() else ~measured & np.isfinite(example.truth_m)
-    chosen = rng.permutation(np.flatnonzero(holes & rims.valid))[:PIXELS]
+    inside = np.flatnonzero(holes & rims.valid)
+    chosen = rng.permutation(inside)[: -(-len(inside) // ONE_IN)]
 
     def errors(depth: DepthMap) -> FloatArray:
         return np.abs(depth.z_m.ravel()[chosen] / example.truth_m.ravel()[chosen] - 1.0)
@@ -120,13 +129,6 @@ def judged_view(
         evidence(features_of_completion(rims, completed, distance), filled),
         np.stack(takeovers),
     )
-
-
-def disc(shape: tuple[int, int], rng: np.random.Generator) -> BoolArray:
-    """(H, W) a disc anywhere."""
-    radius_px = np.exp(rng.uniform(*np.log(RADII_PX))) * shape[1] / 640.0
-    y, x = np.indices(shape) - (rng.random(2) * shape)[:, None, None]
-    return np.hypot(y, x) < radius_px
 
 
 def fit(evidence: Evidence) -> FloatArray:
