@@ -96,4 +96,7 @@ def test_confidence_is_too_modest_above_what_it_says_and_too_sure_below():
     said = trust(
         {"tables": [{"title": "Confidence in bins", "rows": [*rows, ["a", "0% to 10%", 1, "", ""]]}]}
     )
-    assert "a: 93.0 %; b: 71.0 %; of all of them together 76.5 %. Too modest: a. Too sure: b." in said
+    assert (
+        "a: 93% [1%, 2%]; b: 71% [1%, 2%]; of all of them together 76.5 %. Too modest: a. Too sure: b."
+        in said
+    )
