@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,13 +77,17 @@ def merge_fused(
     if mode == "fill":
         joint = without_guesses_in_view(frames, nodes, T_world_camera)
     everything = PointCloud.concatenate(_placed(joint, T_world_camera))
-    voxel_m = max(voxel_for_count(everything.points_m, max_points), NOISE_VOXELS * noise_m(nodes))
-    whole = thinned(joint, T_world_camera, voxel_m)
-    fused, measured = smooth(whole, smoothing_passes), None
-    if mode == "fill":
-        own = thinned([node.sensor for node in nodes], T_world_camera, voxel_m)
-        fused, measured = with_guesses_around(own, whole, fused, voxel_m, smoothing_passes), len(own)
-    return FusedCloud(fused, voxel_m, *spacing(fused.points_m), measured)
+    voxel_m = voxel_for_count(everything.points_m, max_points, NOISE_VOXELS * noise_m(nodes))
+    if mode != "fill":
+        fused = merge(joint, T_world_camera, voxel_m, smoothing_passes)
+        return FusedCloud(fused, voxel_m, *spacing(fused.points_m), None)
+    with ThreadPoolExecutor(1) as beside:
+        sensors = beside.submit(thinned, [node.sensor for node in nodes], T_world_camera, voxel_m)
+        own = beside.submit(lambda: smooth(sensors.result(), smoothing_passes))
+        whole = thinned(joint, T_world_camera, voxel_m)
+        smoothed = smooth(whole, smoothing_passes)
+    fused = with_guesses_around(own.result(), sensors.result(), whole, smoothed, voxel_m)
+    return FusedCloud(fused, voxel_m, *spacing(fused.points_m), len(own.result()))
 
 
 def noise_m(nodes: Sequence[NodeClouds]) -> float:
@@ -91,7 +96,7 @@ def noise_m(nodes: Sequence[NodeClouds]) -> float:
 
 
 def with_guesses_around(
-    own: PointCloud, whole: PointCloud, smoothed: PointCloud, voxel_m: float, smoothing_passes: int
+    own: PointCloud, sensors: PointCloud, whole: PointCloud, smoothed: PointCloud, voxel_m: float
 ) -> PointCloud:
     """The measured points as without any guess, then the inferred ones in voxels where nothing was measured.
 
@@ -99,15 +104,15 @@ def with_guesses_around(
     loose from what was measured, by as much as the guess is off.
 
     Args:
-        own: the sensors' points, thinned.
+        own: the sensors' points, thinned and smoothed.
+        sensors: the same before they were smoothed.
         whole: those and the inferred ones, thinned alike.
         smoothed: the same points after smoothing; inferred ones may follow measured ones.
         voxel_m: that both were thinned to.
-        smoothing_passes: of the sensors' points alone.
     """
     guessed = np.flatnonzero(whole.source == PointSource.INFERRED)
-    free = guessed[~in_cubes_of(own.points_m, whole.points_m[guessed], voxel_m)]
-    measured = replace(smooth(own, smoothing_passes), source=np.full(len(own), PointSource.SENSOR, np.uint8))
+    free = guessed[~in_cubes_of(sensors.points_m, whole.points_m[guessed], voxel_m)]
+    measured = replace(own, source=np.full(len(own), PointSource.SENSOR, np.uint8))
     return PointCloud.concatenate([measured, smoothed.select(free)])
 
 

@@ -8,15 +8,16 @@ from pipeline.config import RegistrationConfig
 from pipeline.registration import register
 from pipeline.surface.pivoting import compile_all
 from pipeline.surface.smooth import smooth
+from pipeline.surface.voxel import voxel_average
 from pipeline.types import PointCloud
 
 
 def warm_up() -> None:
-    """Roll a ball, register and smooth, each once; what is compiled is kept on the disk."""
+    """Roll a ball, register, thin and smooth, each once; what is compiled is kept on the disk."""
     compile_all()
     grid_m = np.stack(np.meshgrid(np.arange(8.0), np.arange(8.0), [0.0, 1.0]), axis=-1).reshape(-1, 3)
     cloud = PointCloud(grid_m, normals=np.tile([0.0, 0.0, 1.0], (len(grid_m), 1)))
-    smooth(cloud, 1)
+    smooth(voxel_average(cloud, 0.5), 1)
     for direction in ("q2p", "p2q"):
         register(cloud, PointCloud(grid_m + 0.1), RegistrationConfig(direction=direction, gate_m=1.0))
 

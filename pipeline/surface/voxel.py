@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from packetmesh.errors import InputError
@@ -25,7 +26,7 @@ def voxel_average(cloud: PointCloud, voxel_m: float) -> PointCloud:
     Raises:
         InputError: ``voxel_m`` is not positive, or too small for the extent of the cloud.
     """
-    first, cell, count = _cubes(_cube_keys(_columns(cloud.points_m), voxel_m))
+    first, cell, count = _cubes(_cube_keys(cloud.points_m, voxel_m))
 
     def mean(column: FloatArray | ByteArray) -> FloatArray:
         sums = [np.bincount(cell, weights=part, minlength=len(count)) for part in column.T]
@@ -42,14 +43,15 @@ def voxel_average(cloud: PointCloud, voxel_m: float) -> PointCloud:
 
 def in_cubes_of(points_m: FloatArray, others_m: FloatArray, voxel_m: float) -> BoolArray:
     """(M,) True for those of (M, 3) others in a cube of edge ``voxel_m`` with one of (N, 3) points."""
-    keys = _cube_keys(_columns(np.concatenate([points_m, others_m])), voxel_m)
+    keys = _cube_keys(np.concatenate([points_m, others_m]), voxel_m)
     return np.isin(keys[len(points_m) :], keys[: len(points_m)])
 
 
-def voxel_for_count(points_m: FloatArray, count: int) -> float:
-    """The voxel edge, metres, that thins (N, 3) points to about ``count``; tiny if there are no more.
+def voxel_for_count(points_m: FloatArray, count: int, least_m: float = 0.0) -> float:
+    """The voxel edge, metres, that thins (N, 3) points to about ``count``, but at least ``least_m``.
 
-    Bisection that first guesses by the rule of surfaces, count ~ 1 / voxel^2.
+    Tiny if there are no more points. Bisection that first guesses by the rule of surfaces, count ~ 1 /
+    voxel^2.
 
     Raises:
         InputError: no point, or all in one place.
@@ -61,11 +63,14 @@ def voxel_for_count(points_m: FloatArray, count: int) -> float:
         )
     low_m, high_m = extent_m * _FINEST, extent_m
     if len(points_m) <= count:
-        return low_m
-    columns_m, voxel_m = _columns(points_m), extent_m / np.sqrt(count)
+        return max(low_m, least_m)
+    if least_m > low_m:
+        if _occupied(points_m, least_m) <= count:
+            return least_m
+        low_m = least_m
+    voxel_m = min(max(extent_m / np.sqrt(count), low_m), high_m)
     for _ in range(_MAX_TRIALS):
-        keys = np.sort(_cube_keys(columns_m, voxel_m))
-        occupied = 1 + int(np.count_nonzero(np.diff(keys)))
+        occupied = _occupied(points_m, voxel_m)
         if abs(occupied - count) <= _COUNT_TOLERANCE * count:
             break
         low_m, high_m = (voxel_m, high_m) if occupied > count else (low_m, voxel_m)
@@ -74,26 +79,46 @@ def voxel_for_count(points_m: FloatArray, count: int) -> float:
     return float(voxel_m)
 
 
-def _columns(points_m: FloatArray) -> FloatArray:
-    """(3, N), each coordinate in one piece: its least and greatest are found ten times as fast."""
-    return np.ascontiguousarray(points_m.T)
+def _occupied(points_m: FloatArray, voxel_m: float) -> int:
+    """How many cubes hold one of (N, 3) points."""
+    return 1 + int(np.count_nonzero(np.diff(np.sort(_cube_keys(points_m, voxel_m)))))
 
 
-def _cube_keys(columns_m: FloatArray, voxel_m: float) -> IntArray:
-    """(N,) one integer a cube of (3, N) columns, ascending in x, then y, then z."""
+def _cube_keys(points_m: FloatArray, voxel_m: float) -> IntArray:
+    """(N,) one integer a cube of (N, 3) points, ascending in x, then y, then z."""
     if not voxel_m > 0.0:
         raise InputError(f"The voxel size is {voxel_m} m; try a positive one, for example 0.01")
-    if not columns_m.size:
+    if not len(points_m):
         return np.empty(0, dtype=np.int64)
-    first = np.floor(columns_m.min(axis=1) / voxel_m)
-    sizes = np.floor(columns_m.max(axis=1) / voxel_m) - first + 1.0
+    points_m = np.ascontiguousarray(points_m, np.float64)
+    least_m, most_m = _bounds(points_m)
+    first = np.floor(least_m / voxel_m)
+    sizes = np.floor(most_m / voxel_m) - first + 1.0
     if not np.prod(sizes) < 2.0**63:
         raise InputError(f"The voxel size {voxel_m:.3g} m is too small for this cloud; try a larger one")
-    keys, steps = np.zeros(columns_m.shape[1], dtype=np.int64), np.empty(columns_m.shape[1])
-    for column_m, low, size in zip(columns_m, first, sizes, strict=True):
-        np.floor(np.divide(column_m, voxel_m, out=steps), out=steps)
-        keys *= int(size)
-        keys += (steps - low).astype(np.int64)
+    return _keys(points_m, voxel_m, first, sizes.astype(np.int64))
+
+
+@numba.njit(cache=True, nogil=True)
+def _bounds(points_m):  # type: ignore[no-untyped-def]
+    """(3,) least and (3,) greatest coordinates of (N, 3) points; NaN takes no part."""
+    least_m, most_m = np.full(3, np.inf), np.full(3, -np.inf)
+    for row in range(len(points_m)):
+        for axis in range(3):
+            least_m[axis] = min(least_m[axis], points_m[row, axis])
+            most_m[axis] = max(most_m[axis], points_m[row, axis])
+    return least_m, most_m
+
+
+@numba.njit(cache=True, nogil=True)
+def _keys(points_m, voxel_m, first, sizes):  # type: ignore[no-untyped-def]
+    """(N,) the cube of each of (N, 3) points in a grid of ``sizes`` that begins at cube ``first``."""
+    keys = np.empty(len(points_m), np.int64)
+    for row in range(len(points_m)):
+        key = 0
+        for axis in range(3):
+            key = key * sizes[axis] + int(np.floor(points_m[row, axis] / voxel_m) - first[axis])
+        keys[row] = key
     return keys
 
 
