@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 import os
 import signal
@@ -86,14 +87,15 @@ def _serve(pipe: Connection, scene: str) -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     app = build_server(scene, port=0)
-    numbers: dict[object, int] = {}
+    unused, numbers = itertools.count(), dict[object, int]()  # only of those that run: it keeps them alive
     try:
         pipe.send(app.url)
         while pipe.recv() == "look":
             there = {id(owner) for session in list(app.sessions.values()) for owner in session.owners}
             gone = [owner for owner in app.pool.running() if id(owner) not in there]
             sizes = list(_sizes(app.folder.path))
-            strays = tuple(numbers.setdefault(owner, len(numbers)) for owner in gone)
+            numbers = {owner: numbers[owner] if owner in numbers else next(unused) for owner in gone}
+            strays = tuple(numbers.values())
             pipe.send((len(app.sessions), threading.active_count(), len(sizes), sum(sizes), strays))
     except EOFError:
         pass
