@@ -164,7 +164,7 @@ def test_r_F_uses_nine_points_in_ten_and_leaves_much_open_and_the_thesis_closes_
     look = stop_named("A ball of r_F")
     least = room.roll(look, room.fused)
     assert 0.07 < unused(least, room.fused) < 0.12
-    assert 0.38 < missed(least) < 0.42
+    assert 0.35 < missed(least) < 0.42
     look = stop_named("The thesis's radii")
     thesis = room.roll(look, room.fused)
     largest_m = room.r_F_m + room.sigma_D_m

@@ -72,7 +72,7 @@ def test_larger_balls_leave_fewer_rays_until_they_no_longer_fit(sweep):
     points = sweep[1].points
     missed = [one.no_hit_ray_share for one in points]
     best = int(np.argmin(missed))
-    assert max(np.diff(missed[: best + 1])) < 0.002  # a few triangles of a plateau come and go
+    assert max(np.diff(missed[: best + 1])) < 0.01  # a few triangles of a plateau come and go
     assert missed[0] > 0.9
     assert missed[best] < 0.5
     for one in points:
