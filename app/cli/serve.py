@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-import threading
+import time
 import webbrowser
 
 from app.cli.options import PresetName
@@ -11,6 +11,8 @@ from app.cli.text import say
 from packetmesh.settings import config_named
 from pipeline.config import PRESETS
 
+HEED_S = 0.2
+"""Between two looks whether somebody wants it to stop."""
 ALONE = ", from this machine only; --host 0.0.0.0 lets others in"
 
 
@@ -38,9 +40,9 @@ def serve(
     from app.entrance import is_loopback
     from app.server import build_server
 
-    stopped = threading.Event()
+    stops = list[int]()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stopped.set())
+        signal.signal(number, lambda number, _: stops.append(number))
     app = build_server(scene, config_named(preset, PRESETS), host, port, lecture, not no_token)
     try:
         if lecture:
@@ -54,6 +56,7 @@ def serve(
             say("Whoever reaches this address comes in")
         if open:
             webbrowser.open(app.teacher_url if lecture else app.link)
-        stopped.wait()
+        while not stops:  # to wait without an end is to sleep through a signal that another thread gets
+            time.sleep(HEED_S)
     finally:
         app.stop()
