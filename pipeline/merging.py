@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -81,13 +80,12 @@ def merge_fused(
     if mode != "fill":
         fused = merge(joint, T_world_camera, voxel_m, smoothing_passes)
         return FusedCloud(fused, voxel_m, *spacing(fused.points_m), None)
-    with ThreadPoolExecutor(1) as beside:
-        sensors = beside.submit(thinned, [node.sensor for node in nodes], T_world_camera, voxel_m)
-        own = beside.submit(lambda: smooth(sensors.result(), smoothing_passes))
-        whole = thinned(joint, T_world_camera, voxel_m)
-        smoothed = smooth(whole, smoothing_passes)
-    fused = with_guesses_around(own.result(), sensors.result(), whole, smoothed, voxel_m)
-    return FusedCloud(fused, voxel_m, *spacing(fused.points_m), len(own.result()))
+    whole = thinned(joint, T_world_camera, voxel_m)
+    smoothed = smooth(whole, smoothing_passes)
+    sensors = thinned([node.sensor for node in nodes], T_world_camera, voxel_m)
+    own = smooth(sensors, smoothing_passes)
+    fused = with_guesses_around(own, sensors, whole, smoothed, voxel_m)
+    return FusedCloud(fused, voxel_m, *spacing(fused.points_m), len(own))
 
 
 def noise_m(nodes: Sequence[NodeClouds]) -> float:
