@@ -101,10 +101,12 @@ def _cube_keys(points_m: FloatArray, voxel_m: float) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)
 def _bounds(points_m):  # type: ignore[no-untyped-def]
-    """(3,) least and (3,) greatest coordinates of (N, 3) points; NaN takes no part."""
+    """(3,) least and (3,) greatest coordinates of (N, 3) points; NaN if any is not finite."""
     least_m, most_m = np.full(3, np.inf), np.full(3, -np.inf)
     for row in range(len(points_m)):
         for axis in range(3):
+            if not np.isfinite(points_m[row, axis]):
+                return np.full(3, np.nan), np.full(3, np.nan)
             least_m[axis] = min(least_m[axis], points_m[row, axis])
             most_m[axis] = max(most_m[axis], points_m[row, axis])
     return least_m, most_m

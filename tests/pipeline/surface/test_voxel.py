@@ -110,3 +110,18 @@ def test_cubes_are_shared_by_points_of_two_clouds():
     assert in_cubes_of(points_m, others_m, 1.0).tolist() == [True, False, True, False]
     assert in_cubes_of(points_m[:0], others_m, 1.0).tolist() == [False] * 4
     assert not len(in_cubes_of(points_m, others_m[:0], 1.0))
+
+
+def test_no_finer_voxel_than_the_least():
+    points_m = np.random.default_rng(0).random((20_000, 3)) * (1.0, 1.0, 0.0)
+    voxel_m = voxel_for_count(points_m, 2000)
+    assert voxel_for_count(points_m, 2000, 2.0 * voxel_m) == 2.0 * voxel_m
+    assert voxel_for_count(points_m, 2000, 0.5 * voxel_m) == pytest.approx(voxel_m, rel=0.02)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_points_that_are_nowhere_have_no_voxel(value):
+    points_m = np.random.default_rng(0).random((20, 3))
+    points_m[7, 1] = value
+    with pytest.raises(InputError):
+        voxel_average(PointCloud(points_m), 0.1)
