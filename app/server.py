@@ -13,6 +13,7 @@ from pathlib import Path
 
 import viser
 
+from app.any_thread import queue_from_any_thread
 from app.drawing.colors import BRAND
 from app.entrance import Entrance, Token, is_loopback
 from app.headers import strict_headers
@@ -133,6 +134,7 @@ def build_server(
     if port and server.get_port() != port:
         app.stop()
         raise InputError(_taken(port))
+    queue_from_any_thread(server._websock_server)
     _dress(server)
     store, uploads, shared = Store(str(folder.path)), Uploads(folder.path), SharedViews()
 
@@ -175,6 +177,7 @@ def _let_in(app: AppServer, begin: Callable[[Target, int], Session]) -> None:
             if session is not None:
                 session.post(session.notify, "That did not work", sentence)
 
+        queue_from_any_thread(client._websock_connection)
         limit_uploads(client._websock_connection, tell)
         if len(app.sessions) >= MOST_SESSIONS:
             client.add_notification("You cannot come in", FULL, color="red", auto_close_seconds=None)
