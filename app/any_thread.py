@@ -10,6 +10,8 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+import viser
+
 
 class AnyThreadEvent(asyncio.Event):
     """An event that other threads set, too; whoever waits is woken by the loop's own call that follows."""
@@ -23,13 +25,14 @@ class AnyThreadEvent(asyncio.Event):
                     waiter.set_result(True)
 
 
-def queue_from_any_thread(connection: Any) -> None:
-    """Have a connection's messages queued safely from all threads.
+def queue_from_any_thread(server: viser.ViserServer) -> None:
+    """Have messages to all browsers, and to each that will come, queued safely from all threads."""
 
-    Args:
-        connection: viser's, to a browser or to all.
-    """
-    connection.get_message_buffer().message_event.__class__ = AnyThreadEvent
+    def queue_to(connection: Any) -> None:
+        connection.get_message_buffer().message_event.__class__ = AnyThreadEvent
+
+    queue_to(server._websock_server)
+    server._websock_server.on_client_connect(queue_to)
 
 
 def _on_loop() -> bool:

@@ -134,7 +134,7 @@ def build_server(
     if port and server.get_port() != port:
         app.stop()
         raise InputError(_taken(port))
-    queue_from_any_thread(server._websock_server)
+    queue_from_any_thread(server)
     _dress(server)
     store, uploads, shared = Store(str(folder.path)), Uploads(folder.path), SharedViews()
 
@@ -177,7 +177,6 @@ def _let_in(app: AppServer, begin: Callable[[Target, int], Session]) -> None:
             if session is not None:
                 session.post(session.notify, "That did not work", sentence)
 
-        queue_from_any_thread(client._websock_connection)
         limit_uploads(client._websock_connection, tell)
         if len(app.sessions) >= MOST_SESSIONS:
             client.add_notification("You cannot come in", FULL, color="red", auto_close_seconds=None)

@@ -4,8 +4,10 @@ from collections import deque
 
 import pytest
 import viser
+from websockets.sync.client import connect
 
-from app.any_thread import AnyThreadEvent, queue_from_any_thread
+from app.any_thread import AnyThreadEvent
+from app.server import build_server
 
 
 class _Changing(deque):
@@ -44,11 +46,20 @@ def test_the_loops_own_call_wakes_who_waits_after_another_thread_has_set():
     assert asyncio.run(wait())
 
 
-def test_viser_queues_with_it():
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+@pytest.mark.parametrize("lecture", [False, True], ids=["a session each", "lecture"])
+def test_the_app_queues_with_it_to_all_and_to_each_browser(lecture):
+    app = build_server("box-on-table", port=0, lecture=lecture)
+    server = app.viser_server
     try:
-        queue_from_any_thread(server._websock_server)
-        assert isinstance(server._websock_server.get_message_buffer().message_event, AnyThreadEvent)
-        server.gui.add_markdown("queued")
+        address = f"ws://127.0.0.1:{server.get_port()}"
+        with connect(address, subprotocols=[f"viser-v{viser.__version__}"], proxy=None) as browser:
+            assert browser.recv(timeout=30.0)
+            states = list(server._websock_server._client_state_from_id.values())
+            buffers = [
+                server._websock_server.get_message_buffer(),
+                *(state.message_buffer for state in states),
+            ]
+            assert len(buffers) == 2
+            assert all(isinstance(buffer.message_event, AnyThreadEvent) for buffer in buffers)
     finally:
-        server.stop()
+        app.stop()
