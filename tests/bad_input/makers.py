@@ -29,11 +29,13 @@ def evil_npy() -> bytes:
     return npy_header((1, 3), "|O") + pickle.dumps(Evil())
 
 
-def zipped(files: dict[str, bytes]) -> bytes:
+def zipped(files: dict[str | zipfile.ZipInfo, bytes]) -> bytes:
+    """The same bytes whenever it is called: all is of 1980."""
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(stream, "w") as archive:
         for name, data in files.items():
-            archive.writestr(name, data)
+            item = zipfile.ZipInfo(name) if isinstance(name, str) else name
+            archive.writestr(item, data, zipfile.ZIP_DEFLATED)
     return stream.getvalue()
 
 

@@ -64,8 +64,9 @@ def chromium():
 @pytest.fixture(scope="module")
 def browser(chromium):
     """Chromium, closed at the end: what drives it keeps an event loop that other tests must not meet."""
-    from playwright.sync_api import sync_playwright
+    from playwright.sync_api import expect, sync_playwright
 
+    expect.set_options(timeout=30_000)  # five seconds are few on a slow machine
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
         yield browser
