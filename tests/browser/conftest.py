@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Error
 
+from tests.browser.hands import PATIENCE_MS
+
 ARGUMENTS = [
     "--no-sandbox",
     "--disable-quic",
@@ -88,7 +90,7 @@ def tab(browser, app):
     """A tab with the app, small so that drawing in software is quick."""
     context = browser.new_context(viewport={"width": 900, "height": 640}, accept_downloads=True)
     page = context.new_page()
-    page.set_default_timeout(60_000)
+    page.set_default_timeout(PATIENCE_MS)
     page.goto(f"{app.url}?fixedDpr=1")
     yield page
     context.close()

@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 from playwright.sync_api import TimeoutError
 
+PATIENCE_MS = 200_000
+"""How long a page may take to show what it was asked for, on a slow machine that does other things, too."""
 TRIES, TRY_MS = 12, 5000
 STEPS = ("Scene", "Calibrate", "Depth", "Fuse", "Surface", "Network", "Export")
 TEXTS = {

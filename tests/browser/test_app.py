@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hands import ALIKE, STEPS, canvas, changed_from, differing, go, slider
+from tests.browser.hands import ALIKE, PATIENCE_MS, STEPS, canvas, changed_from, differing, go, slider
 
 
 def test_all_of_these_run_on_one_worker(request):
@@ -54,7 +54,7 @@ def test_the_dock_steps_through_the_race(page):
 
     def press(name, expected):
         page.get_by_role("button", name=name, exact=True).click()
-        expect(clock).to_have_text(re.compile(f"^iteration {expected} of"), timeout=60_000)
+        expect(clock).to_have_text(re.compile(f"^iteration {expected} of"), timeout=PATIENCE_MS)
         return canvas(page, still=8)
 
     expect(clock).to_have_text(re.compile("^iteration 0 of"))
@@ -115,7 +115,7 @@ def test_a_browser_answers_while_another_one_meshes(page, browser, app):
     go(page, "Surface")
     context = browser.new_context(viewport={"width": 620, "height": 240})
     other = context.new_page()
-    other.set_default_timeout(60_000)
+    other.set_default_timeout(PATIENCE_MS)
     other.goto(f"{app.url}?explore")
     other.get_by_text("Up to date").wait_for()
     handle = slider(page, "Radius")

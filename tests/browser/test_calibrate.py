@@ -10,9 +10,8 @@ from playwright.sync_api import expect
 
 from app.screens.calibrate.labels import AROUND, HALVES
 from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import canvas, changed_from, go, pick, press, slider, unfold
+from tests.browser.hands import PATIENCE_MS, canvas, changed_from, go, pick, press, slider, unfold
 
-LONG_MS = 240_000
 """For the cameras and their depth on a busy machine."""
 BARS = ".packetmesh-views [data-view]"
 DOCK = ".packetmesh-dock-row"
@@ -23,7 +22,7 @@ def calibrated(browser, app):
     """The step with the scene whose cameras need calibration, opened as the screen proposes."""
     context = browser.new_context(viewport={"width": 900, "height": 640})
     page = context.new_page()
-    page.set_default_timeout(LONG_MS)
+    page.set_default_timeout(PATIENCE_MS)
     page.goto(f"{app.url}?fixedDpr=1")
     go(page, "Calibrate")
     page.get_by_text("without photographs of a board").wait_for()
@@ -57,7 +56,7 @@ def test_a_dropped_view_is_left_out_and_comes_back(calibrated):
     calibrated.get_by_text("all views", exact=True).wait_for()
     expect(row).to_have_text(re.compile("10 of 14.*11 of 14"))
     press(calibrated, "All")
-    expect(row).to_have_text(before.replace("\t", ""), timeout=LONG_MS)
+    expect(row).to_have_text(before.replace("\t", ""), timeout=PATIENCE_MS)
     calibrated.get_by_text("Up to date").wait_for()
 
 
@@ -121,7 +120,7 @@ def test_a_stop_of_the_lesson_unfolds_what_it_speaks_of(calibrated):
 def test_on_a_phone_nothing_covers_anything(browser, app):
     context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
     page = context.new_page()
-    page.set_default_timeout(LONG_MS)
+    page.set_default_timeout(PATIENCE_MS)
     page.goto(f"{app.url}?fixedDpr=1")
     go(page, "Network")
     page.locator(DOCK).wait_for()
@@ -148,7 +147,7 @@ def test_the_mesh_is_another_with_the_calibration_and_the_same_again_without(cal
     calibrated.get_by_text("In use").wait_for()
     calibrated.get_by_text("Up to date").wait_for()
     row = calibrated.get_by_role("row", name="F-score 5 cm").locator("visible=true").first
-    expect(row).to_have_text(re.compile(r"\d %.*\d %"), timeout=LONG_MS)
+    expect(row).to_have_text(re.compile(r"\d %.*\d %"), timeout=PATIENCE_MS)
     came, calibrated_share = f_scores(calibrated)
     assert calibrated_share > came + 10.0
     go(calibrated, "Surface")

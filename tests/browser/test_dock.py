@@ -16,6 +16,7 @@ from app.drawing.colors import LOSS, TARGET
 from app.levels import levels_of
 from app.timeline import Curve, CurvesLane, FramesLane
 from app.ui import Ui
+from tests.browser.hands import PATIENCE_MS
 
 END_NS = 10_000_000_000
 
@@ -73,7 +74,7 @@ def opened(browser, docks):
     server, stages = docks
     context = browser.new_context(viewport={"width": 1000, "height": 600})
     page = context.new_page()
-    page.set_default_timeout(60_000)
+    page.set_default_timeout(PATIENCE_MS)
     page.errors = []
     page.on("pageerror", lambda error: page.errors.append(str(error)))
     page.goto(f"http://127.0.0.1:{server.get_port()}?fixedDpr=1")
@@ -319,7 +320,7 @@ def test_two_browsers_have_clocks_of_their_own(browser, docks, page, stage):
     server, stages = docks
     context = browser.new_context(viewport={"width": 800, "height": 500})
     other = context.new_page()
-    other.set_default_timeout(60_000)
+    other.set_default_timeout(PATIENCE_MS)
     other.goto(f"http://127.0.0.1:{server.get_port()}?fixedDpr=1")
     other.locator(".packetmesh-dock-field").wait_for()
     until(other, lambda: stages[-1] is not stage)

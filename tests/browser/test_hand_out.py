@@ -10,6 +10,7 @@ import pytest
 
 from app.reports.delivery import delivery_page
 from tests.app.hand_outs import END_S, frames, hand_out
+from tests.browser.hands import PATIENCE_MS
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +20,7 @@ def opened(browser, tmp_path_factory):
     path.write_text(delivery_page(hand_out(on_air=frames(4000))), encoding="utf-8")
     context = browser.new_context(viewport={"width": 1000, "height": 700}, offline=True)
     page = context.new_page()
-    page.set_default_timeout(30_000)
+    page.set_default_timeout(PATIENCE_MS)
     asked, wrong = [], []
     page.on("request", lambda request: asked.append(request.url))
     page.on("pageerror", lambda error: wrong.append(str(error)))

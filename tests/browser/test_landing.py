@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from playwright.sync_api import expect
 
-LONG_MS = 60_000
+from tests.browser.hands import PATIENCE_MS
 
 
 @pytest.fixture
@@ -13,7 +13,7 @@ def landing(browser, app):
     """A new browser at the bare address, as soon as anything is there."""
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     page = context.new_page()
-    page.set_default_timeout(LONG_MS)
+    page.set_default_timeout(PATIENCE_MS)
     page.goto(app.url, wait_until="commit")
     page.get_by_role("dialog", name="Welcome").wait_for()
     yield page
@@ -45,7 +45,7 @@ def test_a_lesson_opens_at_its_first_stop(landing):
 
 def test_a_scene_opens(landing):
     landing.get_by_role("button", name="Office").click()
-    expect(landing.get_by_label("Scene", exact=True).first).to_have_value("Office", timeout=LONG_MS)
+    expect(landing.get_by_label("Scene", exact=True).first).to_have_value("Office", timeout=PATIENCE_MS)
     expect(landing.get_by_role("dialog", name="Welcome")).to_have_count(0)
 
 

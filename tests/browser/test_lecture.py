@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import ALIKE, TEXTS, canvas, differing, go, press, unfold
+from tests.browser.hands import ALIKE, PATIENCE_MS, TEXTS, canvas, differing, go, press, unfold
 
 STEERS = "You see what the teacher sees"
 
@@ -28,7 +28,7 @@ def come(browser):
     def come(url):
         contexts.append(browser.new_context(viewport={"width": 900, "height": 640}))
         page = contexts[-1].new_page()
-        page.set_default_timeout(60_000)
+        page.set_default_timeout(PATIENCE_MS)
         page.goto(url)
         page.get_by_text("Up to date").wait_for()
         if page.get_by_role("dialog", name="Welcome").count():

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import TimeoutError, expect
 
 from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import go, press, unfold
+from tests.browser.hands import PATIENCE_MS, go, press, unfold
 
 LESSONS = {
     "How good is my calibration?": ("Calibrate", 7),
@@ -19,7 +19,7 @@ LESSONS = {
     "How images cross a sensor network": ("Network", 10),
     "What one lost packet costs": ("Network", 8),
 }
-LONG_MS = 20_000
+NEXT_MS = 20_000
 """For the next stop on a busy machine."""
 WAITS, FIRST, RIGHT = "Take a guess", "Guess before you go on", "Right."
 
@@ -29,7 +29,7 @@ def page(browser, app):
     """A session of its own: a lesson goes on where somebody left it."""
     context = browser.new_context(viewport={"width": 900, "height": 640})
     page = context.new_page()
-    page.set_default_timeout(120_000)
+    page.set_default_timeout(PATIENCE_MS)
     page.goto(f"{app.url}?fixedDpr=1")
     page.get_by_text("Up to date").wait_for()
     dismiss_notifications(page)
@@ -72,10 +72,10 @@ def test_five_stops_are_led_through_by_keys_alone(page, lesson):
         seen(page, WAITS).wait_for()
         press_until(page, "ArrowRight", FIRST)
         page.keyboard.press("s" if stop == 5 else str(1 + stop % 3))
-        expect(page.get_by_text(FIRST).locator("visible=true")).to_have_count(0, timeout=LONG_MS)
-        expect(page.get_by_text("✓").locator("visible=true").first).to_be_visible(timeout=LONG_MS)
-        press_until(page, "ArrowRight" if stop % 2 else "Space", f"({stop + 1} of {stops})", LONG_MS)
-    press_until(page, "ArrowLeft", f"(5 of {stops})", LONG_MS)
+        expect(page.get_by_text(FIRST).locator("visible=true")).to_have_count(0, timeout=PATIENCE_MS)
+        expect(page.get_by_text("✓").locator("visible=true").first).to_be_visible(timeout=PATIENCE_MS)
+        press_until(page, "ArrowRight" if stop % 2 else "Space", f"({stop + 1} of {stops})", NEXT_MS)
+    press_until(page, "ArrowLeft", f"(5 of {stops})", NEXT_MS)
     assert page.get_by_text(WAITS).locator("visible=true").count() == 0
     unfold(page, f"Lesson: {lesson}")
 
@@ -133,4 +133,4 @@ def test_large_text_has_no_more_than_a_room_needs_and_what_it_speaks_of_is_in_vi
     expect(ball).to_be_in_viewport()
     assert float(card.evaluate("one => parseFloat(getComputedStyle(one).fontSize)")) >= 17.0
     go(page, "Scene")
-    expect(card).to_have_count(0, timeout=LONG_MS)
+    expect(card).to_have_count(0, timeout=PATIENCE_MS)

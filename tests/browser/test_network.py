@@ -13,7 +13,7 @@ from pipeline.delivery.sending import DeliverySpec, received_at, send
 from pipeline.sources import Demo
 from pipeline.spec import Spec
 from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import ALIKE, arrow, canvas, changed_from, differing, go, pick, press
+from tests.browser.hands import ALIKE, PATIENCE_MS, arrow, canvas, changed_from, differing, go, pick, press
 
 ALL = re.compile(r"^\d cameras sent [\d.]+ MB in [\d,]+ packets; simulated in [\d.]+ s\.$")
 
@@ -29,7 +29,7 @@ def few():
 @pytest.fixture(scope="module")
 def network(few, tab):
     """The Network step with the first delivery done."""
-    tab.set_default_timeout(240_000)
+    tab.set_default_timeout(PATIENCE_MS)
     tab.get_by_text("Up to date").wait_for()
     go(tab, "Network")
     tab.get_by_text(ALL).wait_for()

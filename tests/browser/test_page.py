@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.browser.hands import go, slider
+from tests.browser.hands import PATIENCE_MS, go, slider
 
 WATCH = """
 (() => {
@@ -44,7 +44,7 @@ def page(browser, app):
     page.add_init_script(WATCH)
     page.goto(f"{app.url}?fixedDpr=1")
     go(page, "Surface")
-    page.get_by_text("Up to date").wait_for(timeout=60_000)
+    page.get_by_text("Up to date").wait_for(timeout=PATIENCE_MS)
     page.wait_for_timeout(2000)
     yield page
     context.close()

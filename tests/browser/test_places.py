@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from pipeline.io.demos import SCENES
-from tests.browser.hands import TEXTS, go, press, unfold
+from tests.browser.hands import PATIENCE_MS, TEXTS, go, press, unfold
 
 ADDED = {
     "scene": {"set": "depth.reach=0.125"},
@@ -28,7 +28,7 @@ FILES = {
     "depth.png": "Depth image …",
     "intrinsics.json": "Intrinsics …",
 }
-PATIENCE_MS, STEP_MS = 120_000, 400
+STEP_MS = 400
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.browser.hands import go
+from tests.browser.hands import PATIENCE_MS, go
 
 WATCH = """
 window.forbidden = [];
@@ -17,7 +17,7 @@ SEND = "fetch('https://example.org/').then(() => 'sent', () => 'not sent')"
 def page(browser, app):
     context = browser.new_context(viewport={"width": 900, "height": 640})
     page = context.new_page()
-    page.set_default_timeout(120_000)
+    page.set_default_timeout(PATIENCE_MS)
     page.add_init_script(WATCH)
     page.goto(f"{app.url}?fixedDpr=1")
     yield page

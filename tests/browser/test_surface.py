@@ -13,6 +13,7 @@ from app import acknowledgement
 from app.screens.surface.labels import BOTH, COLORINGS, POISSON
 from tests.browser.hands import (
     ALIKE,
+    PATIENCE_MS,
     afresh,
     canvas,
     changed_from,
@@ -57,7 +58,7 @@ def test_a_dragged_radius_is_shown_at_once_and_measured_when_it_rests(surface):
         handle.press("ArrowLeft")
     quick.wait_for()
     assert numbers(surface, "Triangles") == triangles
-    expect(quick).to_have_count(0, timeout=60_000)
+    expect(quick).to_have_count(0, timeout=PATIENCE_MS)
     surface.get_by_text("Up to date").wait_for()
     assert numbers(surface, "Triangles") != triangles
     assert changed_from(surface, before)
@@ -79,7 +80,7 @@ def test_where_the_ball_falls_through_the_points_stay_and_old_numbers_are_dimmed
     handle.press("Home")
     old.wait_for(state="attached")
     expect(table).to_have_css("opacity", "0.3")
-    expect(old).to_have_count(0, timeout=60_000)
+    expect(old).to_have_count(0, timeout=PATIENCE_MS)
     surface.get_by_text("Up to date").wait_for()
     expect(table).to_have_css("opacity", "1")
     assert min(numbers(surface, "No-hit rays")) > 90.0
@@ -126,7 +127,7 @@ def test_no_answer_is_lost_beside_a_fast_hand(browser, app, monkeypatch):
     page = context.new_page()
     page.goto(f"{app.url}?fixedDpr=1")
     go(page, "Surface")
-    page.get_by_text("Up to date").wait_for(timeout=60_000)
+    page.get_by_text("Up to date").wait_for(timeout=PATIENCE_MS)
     handle = slider(page, "Radius (mm)").bounding_box()
     x, y = handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2
     page.mouse.move(x, y)
@@ -211,7 +212,7 @@ def test_the_sweep_plots_every_radius_and_says_what_it_means(surface):
     unfold(surface, "Which radius?")
     press(surface, "Sweep the radius")
     surface.get_by_text(re.compile(r"[1-9]\d* of \d+ balls have rolled")).wait_for()
-    surface.get_by_text(re.compile(r"larger balls close|the widest")).wait_for(timeout=120_000)
+    surface.get_by_text(re.compile(r"larger balls close|the widest")).wait_for(timeout=PATIENCE_MS)
 
 
 def test_the_lesson_sets_the_controls(surface):

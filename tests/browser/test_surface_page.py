@@ -11,6 +11,7 @@ from app.drawing.legend import Legend
 from app.reports.hand_out import viewpoint_of
 from app.reports.surface_page import Side, SurfacePage, surface_page
 from tests.app.hand_outs import wall
+from tests.browser.hands import PATIENCE_MS
 
 RED, GREEN = (220, 40, 40), (40, 160, 60)
 
@@ -32,7 +33,7 @@ def page(browser, tmp_path_factory):
     path.write_text(surface_page(told), encoding="utf-8")
     context = browser.new_context(viewport={"width": 390, "height": 844}, offline=True)
     page = context.new_page()
-    page.set_default_timeout(30_000)
+    page.set_default_timeout(PATIENCE_MS)
     page.wrong = []
     page.on("pageerror", lambda error: page.wrong.append(str(error)))
     page.goto(path.as_uri())
