@@ -7,13 +7,14 @@ import functools
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
-
-import viser
+from typing import TYPE_CHECKING, Any, Literal
 
 from app.ui import Ui
 from packetmesh.settings_help import field_docs
 from pipeline.config import PipelineConfig
+
+if TYPE_CHECKING:
+    import viser
 
 
 @dataclass(frozen=True, slots=True)

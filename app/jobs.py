@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from collections.abc import Iterator
 from typing import Any
 
 SCREENS = "app.screens"
@@ -24,11 +25,13 @@ def run_step(step: str, *arguments: Any) -> Any:
     return run(f"{step}.job:{step}_job", *arguments)
 
 
-def warm_up() -> None:
-    """Import every screen's jobs, and load or compile what is compiled, before the first job comes."""
+def warm_up() -> Iterator[None]:
+    """Import every screen's jobs, yield, and go on to load what is compiled, a little at a time."""
     screens = importlib.import_module(SCREENS)
     for screen in pkgutil.iter_modules(screens.__path__, f"{SCREENS}."):
         for module in pkgutil.iter_modules(importlib.import_module(screen.name).__path__, f"{screen.name}."):
             if module.name.endswith("job"):
                 importlib.import_module(module.name)
-    importlib.import_module("pipeline.warm").warm_up()
+    warm = importlib.import_module("pipeline.warm")
+    yield
+    yield from warm.warm_up()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import viser
+if TYPE_CHECKING:
+    import viser
 
 PARTS = ("page", "hint", "lesson")
 _SCRIPT, _STYLE = (

@@ -14,7 +14,7 @@ import os
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -75,6 +75,10 @@ class _Slot:
     ready: bool = False
 
 
+def _nothing() -> Iterator[None]:
+    yield from ()
+
+
 class ComputePool:
     """Spawned processes that take jobs in the order of submission, one at a time for each owner.
 
@@ -82,8 +86,12 @@ class ComputePool:
     """
 
     def __init__(
-        self, size: int = 2, warm_up: Callable[[], None] | None = None, patience_s: float = PATIENCE_S
+        self,
+        size: int = 2,
+        warm_up: Callable[[], Iterator[None]] = _nothing,
+        patience_s: float = PATIENCE_S,
     ) -> None:
+        """``warm_up`` runs in each process: to its first yield before any job, on while none waits."""
         self._context = multiprocessing.get_context("spawn")
         self._warm_up = warm_up
         self._patience_s = patience_s
@@ -294,7 +302,7 @@ def _memory_bytes(process: BaseProcess | None) -> int:
         return 0
 
 
-def _child(connection: Connection, warm_up: Callable[[], None] | None, threads: int) -> None:
+def _child(connection: Connection, warm_up: Callable[[], Iterator[None]], threads: int) -> None:
     """Main function of a computing process: take a job, report, repeat until the server is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_server, daemon=True).start()
@@ -303,18 +311,29 @@ def _child(connection: Connection, warm_up: Callable[[], None] | None, threads: 
     for name in THREAD_LIMITS:
         os.environ.setdefault(name, str(threads))
     try:
-        if warm_up is not None:
-            try:
-                warm_up()
-            except Exception:  # it goes wrong again, and is reported, in the first job
-                traceback.print_exc()
+        warming = warm_up()
+        warmer = _goes_on(warming)
         connection.send(("ready", None))
         while True:
+            while warmer and not connection.poll():
+                warmer = _goes_on(warming)
             kind, job = connection.recv()
             if kind == "job":
                 connection.send(_answer(connection, *job))
     except (EOFError, OSError):
         return
+
+
+def _goes_on(warming: Iterator[None]) -> bool:
+    """Warm up a little; whether there is more to do."""
+    try:
+        next(warming)
+    except StopIteration:
+        return False
+    except Exception:  # it goes wrong again, and is reported, in the first job
+        traceback.print_exc()
+        return False
+    return True
 
 
 def _end_with_server() -> None:

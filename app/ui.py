@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
-import viser
 
 from app.debounce import Debounce
 from app.state import Spec, Step
@@ -19,6 +18,8 @@ from packetmesh.errors import InputError
 from pipeline.types import FloatArray
 
 if TYPE_CHECKING:
+    import viser
+
     from app.lecture import Lecture
     from app.session import Session
 

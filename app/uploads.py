@@ -14,12 +14,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-
-import viser
+from typing import TYPE_CHECKING
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path
 from pipeline.sources import Source
+
+if TYPE_CHECKING:
+    import viser
 
 PREFIX = "upload-"
 KEPT_S = 2 * 3600.0

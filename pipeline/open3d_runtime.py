@@ -1,7 +1,12 @@
-"""Open3D, importable on a bare Linux: its shared library wants libusb, which pip brings."""
+"""Open3D, importable on a bare Linux: its shared library wants libusb, which pip brings.
+
+Its plots in a notebook, which are not used here, import dash, a sixth of the time until a computing process
+takes its first job; while Open3D is imported something empty stands in for it.
+"""
 
 import ctypes
 import sys
+from types import ModuleType
 
 if sys.platform == "linux":
     import libusb_package
@@ -10,7 +15,14 @@ if sys.platform == "linux":
     if _libusb is not None:
         ctypes.CDLL(str(_libusb), mode=ctypes.RTLD_GLOBAL)
 
-import open3d as o3d
+_dash = ModuleType("dash")
+_dash.html = _dash.dcc = _dash.Dash = None  # type: ignore[attr-defined]
+_stands_in = sys.modules.setdefault("dash", _dash) is _dash
+
+import open3d as o3d  # noqa: E402
+
+if _stands_in:
+    del sys.modules["dash"]
 
 o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
 

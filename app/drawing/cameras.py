@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import viser
 
 from app.drawing.colors import NEUTRAL
 from app.drawing.poses import place
 from app.records import SceneNode
 from pipeline.geometry import apply
 from pipeline.types import FloatArray
+
+if TYPE_CHECKING:
+    import viser
 
 
 def add_camera(

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from viser import transforms
 
 from pipeline.types import FloatArray
 
 
 def wxyz_of(T: FloatArray) -> FloatArray:
     """Unit quaternion, w first, of a (4, 4) rigid transform."""
+    from viser import transforms  # half a second, which computing processes, who never draw, need not wait
+
     return transforms.SO3.from_matrix(np.asarray(T[:3, :3], dtype=np.float64)).wxyz
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import null_space
-from scipy.stats import t as student
+from scipy.special import stdtrit  # student's t; scipy.stats takes a second to import
 
 from pipeline.calibration.depth_samples import DepthSamples
 from pipeline.io.depth_correction import MAP_SHAPE, map_basis, map_means
@@ -180,7 +180,7 @@ class Problem:
 
     def wide(self, together: int = 1) -> float:
         """Standard errors of a 95 % interval of so many parameters together, by Student."""
-        return float(student.ppf(1.0 - 0.025 / together, len(self.views) - 1))
+        return float(stdtrit(len(self.views) - 1, 1.0 - 0.025 / together))
 
     def residuals_m(self, columns: IntArray) -> FloatArray:
         """(N,) true less corrected depth."""

@@ -72,3 +72,24 @@ def crash() -> None:
 
 def process_id() -> int:
     return os.getpid()
+
+
+WARMED = []
+
+
+def warm_up_without_end():
+    WARMED.append("before the first job")
+    yield
+    while True:
+        WARMED.append("while none waits")
+        time.sleep(0.01)
+        yield
+
+
+def warm_up_that_fails():
+    yield
+    raise RuntimeError("a library is broken")
+
+
+def warmed():
+    return len(WARMED), WARMED[0]

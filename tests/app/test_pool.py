@@ -3,6 +3,7 @@
 import functools
 import multiprocessing
 import queue
+import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -194,6 +195,41 @@ def test_what_is_urgent_goes_before_all_that_waits(tmp_path):
         assert [order.get(timeout=TIMEOUT_S) for _ in range(3)] == ["urgent", "first", "second"]
     finally:
         pool.close()
+
+
+def test_a_process_warms_up_while_no_job_waits():
+    pool = ComputePool(size=1, warm_up=jobs.warm_up_without_end)
+    try:
+        counts = []
+        for _ in range(2):
+            inbox = Inbox()
+            pool.submit("a", jobs.warmed, **inbox.callbacks())
+            count, first = inbox.end().value
+            assert first == "before the first job"
+            counts.append(count)
+            threading.Event().wait(0.3)
+        assert counts[0] < counts[1]
+    finally:
+        pool.close()
+
+
+def test_a_warm_up_that_fails_leaves_a_process_that_works():
+    pool, inbox = ComputePool(size=1, warm_up=jobs.warm_up_that_fails), Inbox()
+    try:
+        threading.Event().wait(0.3)
+        pool.submit("a", jobs.count, 1, **inbox.callbacks())
+        assert inbox.end() == Outcome("result", 1)
+    finally:
+        pool.close()
+
+
+def test_computing_processes_import_nothing_slow_that_they_do_not_need():
+    slow = ("viser", "dash", "scipy.stats", "torch", "matplotlib", "pandas")
+    script = (
+        f"import sys; from app.jobs import warm_up; next(warm_up()); print(set({slow}) & set(sys.modules))"
+    )
+    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == "set()"
 
 
 def test_a_process_that_cannot_be_started_is_tried_again(monkeypatch):
