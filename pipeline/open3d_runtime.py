@@ -1,7 +1,7 @@
 """Open3D, importable on a bare Linux: its shared library wants libusb, which pip brings.
 
-Its plots in a notebook, which are not used here, import dash, a sixth of the time until a computing process
-takes its first job; while Open3D is imported something empty stands in for it.
+Its plots in a notebook, which are not used here, import dash, for which every command and computing process
+would wait (``python -X importtime -m pipeline.open3d_runtime``); something empty stands in for it meanwhile.
 """
 
 import ctypes

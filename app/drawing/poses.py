@@ -11,7 +11,7 @@ from pipeline.types import FloatArray
 
 def wxyz_of(T: FloatArray) -> FloatArray:
     """Unit quaternion, w first, of a (4, 4) rigid transform."""
-    from viser import transforms  # half a second, which computing processes, who never draw, need not wait
+    from viser import transforms  # here, as computing processes, which never draw, need not wait for it
 
     return transforms.SO3.from_matrix(np.asarray(T[:3, :3], dtype=np.float64)).wxyz
 

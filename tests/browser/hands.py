@@ -10,6 +10,8 @@ from playwright.sync_api import TimeoutError
 
 PATIENCE_MS = 200_000
 """How long a page may take to show what it was asked for, on a slow machine that does other things, too."""
+DRAG_S = 500.0
+"""How long a hand may have to drag a slider until enough has been drawn there."""
 TRIES, TRY_MS = 12, 5000
 STEPS = ("Scene", "Calibrate", "Depth", "Fuse", "Surface", "Network", "Export")
 TEXTS = {

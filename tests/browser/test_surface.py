@@ -15,6 +15,7 @@ from app import acknowledgement
 from app.screens.surface.labels import BOTH, COLORINGS, POISSON
 from tests.browser.hands import (
     ALIKE,
+    DRAG_S,
     PATIENCE_MS,
     afresh,
     canvas,
@@ -117,6 +118,7 @@ def test_a_hole_is_chosen_from_the_list_and_explained(surface):
     assert surface.get_by_text(re.compile(r"^(Gap|Normals|No points|Outside view)\.")).count()
 
 
+@pytest.mark.timeout(900)
 def test_no_answer_is_lost_beside_a_fast_hand(browser, app, monkeypatch):
     monkeypatch.setattr(acknowledgement, "TIMEOUT_S", 600.0)
     asked, ask = [], acknowledgement.DrawAcknowledgement.ask
@@ -137,12 +139,12 @@ def test_no_answer_is_lost_beside_a_fast_hand(browser, app, monkeypatch):
     begun_s = time.monotonic()
     for step in itertools.count():
         page.mouse.move(x + 40.0 * np.sin(0.06 * step), y)
-        if (step >= 100 and len(asked) > 10) or time.monotonic() - begun_s > 0.5e-3 * PATIENCE_MS:
+        if (step >= 100 and len(asked) > 10) or time.monotonic() - begun_s > DRAG_S:
             break
     page.mouse.up()
     answered = all_answered(page, asked)
     context.close()
-    assert len(asked) > 3
+    assert len(asked) > 10
     assert answered
 
 
