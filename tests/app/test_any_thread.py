@@ -52,7 +52,8 @@ def test_the_app_queues_with_it_to_all_and_to_each_browser(lecture):
     server = app.viser_server
     try:
         address = f"ws://127.0.0.1:{server.get_port()}"
-        with connect(address, subprotocols=[f"viser-v{viser.__version__}"], proxy=None) as browser:
+        protocols = [f"viser-v{viser.__version__}"]
+        with connect(address, subprotocols=protocols, max_size=None, proxy=None) as browser:
             assert browser.recv(timeout=30.0)
             states = list(server._websock_server._client_state_from_id.values())
             buffers = [
