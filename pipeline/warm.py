@@ -19,7 +19,8 @@ def warm_up() -> Iterator[None]:
     compile_all()
     yield
     grid_m = np.stack(np.meshgrid(np.arange(8.0), np.arange(8.0), [0.0, 1.0]), axis=-1).reshape(-1, 3)
-    cloud = PointCloud(grid_m, normals=np.tile([0.0, 0.0, 1.0], (len(grid_m), 1)))
+    black = np.zeros(grid_m.shape, np.uint8)
+    cloud = PointCloud(grid_m, colors=black, normals=np.tile([0.0, 0.0, 1.0], (len(grid_m), 1)))
     smooth(voxel_average(cloud, 0.5), 1)
     yield
     for direction in ("q2p", "p2q"):

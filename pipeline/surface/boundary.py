@@ -8,18 +8,24 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from pipeline.types import FloatArray, IntArray
+from pipeline.surface.ordering import stable_order
+from pipeline.types import BoolArray, FloatArray, IntArray
 
 LONGEST_HOLE_M = 1.0
 """A boundary loop of this length or more is a rim of the scene, not a hole (SPEC 5)."""
 
 
+def directed_edges(triangles: IntArray) -> IntArray:
+    """(3 F, 2) edges of (F, 3) triangles: row 3 t + k leads from corner k of triangle t to its next."""
+    return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+
+
 def edges_and_faces(triangles: IntArray) -> tuple[IntArray, IntArray]:
     """(E, 2) undirected edges, smaller index first, and (E,) how many faces share each."""
-    vertices = int(triangles.max(initial=-1)) + 1
-    pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
-    keys, faces = np.unique(pairs[:, 0] * vertices + pairs[:, 1], return_counts=True)
-    return np.stack(np.divmod(keys, max(vertices, 1)), axis=1), faces
+    directed = directed_edges(triangles)
+    order, begins = _by_edge(directed)
+    first = np.flatnonzero(begins)
+    return np.sort(directed[order[first]], axis=1), np.diff(first, append=len(order))
 
 
 def boundary_loops(triangles: IntArray) -> list[IntArray]:
@@ -73,16 +79,24 @@ def loop_areas_m2(start_m: FloatArray, end_m: FloatArray, first: IntArray) -> Fl
 
 def _boundary_successors(triangles: IntArray) -> dict[int, list[int]]:
     """Where the boundary's directed edges lead from each of its vertices."""
-    edges, faces = edges_and_faces(triangles)
-    vertices = int(triangles.max(initial=-1)) + 1
-    rims = edges[faces == 1] @ [vertices, 1]
-    directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
-    on_rim = np.isin(np.sort(directed, axis=1) @ [vertices, 1], rims)
+    directed = directed_edges(triangles)
+    order, begins = _by_edge(directed)
+    alone = begins & np.append(begins[1:], True)[: len(begins)]
     following: dict[int, list[int]] = {}
-    for start, end in zip(*directed[on_rim].T.tolist(), strict=True):  # not a list for each edge
+    for start, end in directed[np.sort(order[alone])].tolist():
         following.setdefault(start, []).append(end)
         following.setdefault(end, [])
     return following
+
+
+def _by_edge(directed: IntArray) -> tuple[IntArray, BoolArray]:
+    """(N,) the order of (N, 2) directed edges that brings both directions of an edge side by side, ascending,
+    and (N,) True for the first of each edge in that order.
+    """
+    lower, upper = np.minimum(*directed.T), np.maximum(*directed.T)
+    keys = lower * (upper.max(initial=0) + 1) + upper
+    order = stable_order(keys)
+    return order, np.append(True, np.diff(keys[order]) != 0)[: len(order)]
 
 
 def _walk(start: int, following: dict[int, list[int]]) -> list[IntArray]:

@@ -10,11 +10,13 @@ from pipeline.surface.boundary import (
     LONGEST_HOLE_M,
     boundary_loops,
     connected_parts,
+    directed_edges,
     edges_and_faces,
     loop_areas_m2,
     loop_edges,
     loop_measures,
 )
+from pipeline.surface.ordering import stable_order
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 
@@ -110,9 +112,10 @@ def half_edges(triangles: IntArray, edges: IntArray) -> IntArray:
     if not len(triangles):
         return np.full(len(edges), -1)
     count = int(max(triangles.max(), edges.max(initial=0))) + 1
-    keys = (triangles.astype(np.int64) * count + np.roll(triangles, -1, axis=1)).ravel()
+    start, end = directed_edges(triangles).T
+    keys = start * count + end
     wanted = edges.astype(np.int64) @ [count, 1]
-    order = np.argsort(keys)
+    order = stable_order(keys)
     found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(order) - 1)]
     return np.where(keys[found] == wanted, found, -1)
 

@@ -6,6 +6,7 @@ import numba
 import numpy as np
 
 from packetmesh.errors import InputError
+from pipeline.surface.ordering import stable_order
 from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray, PointCloud
 
 _COUNT_TOLERANCE = 0.02
@@ -29,8 +30,7 @@ def voxel_average(cloud: PointCloud, voxel_m: float) -> PointCloud:
     first, cell, count = _cubes(_cube_keys(cloud.points_m, voxel_m))
 
     def mean(column: FloatArray | ByteArray) -> FloatArray:
-        sums = [np.bincount(cell, weights=part, minlength=len(count)) for part in column.T]
-        return np.stack(sums, axis=1) / count[:, None]
+        return _sums(np.ascontiguousarray(column), cell, len(count)) / count[:, None]
 
     return PointCloud(
         points_m=mean(cloud.points_m),
@@ -81,7 +81,8 @@ def voxel_for_count(points_m: FloatArray, count: int, least_m: float = 0.0) -> f
 
 def _occupied(points_m: FloatArray, voxel_m: float) -> int:
     """How many cubes hold one of (N, 3) points."""
-    return 1 + int(np.count_nonzero(np.diff(np.sort(_cube_keys(points_m, voxel_m)))))
+    keys = _cube_keys(points_m, voxel_m)
+    return 1 + int(np.count_nonzero(np.diff(keys[stable_order(keys)])))
 
 
 def _cube_keys(points_m: FloatArray, voxel_m: float) -> IntArray:
@@ -126,13 +127,22 @@ def _keys(points_m, voxel_m, first, sizes):  # type: ignore[no-untyped-def]
 
 def _cubes(keys: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     """(V,) first row of each cube by ascending key, (N,) each row's cube, and (V,) how many rows each has."""
-    order = np.argsort(keys)
+    order = stable_order(keys)
     begins = np.append(True, np.diff(keys[order]) != 0)[: len(keys)]
     starts = np.flatnonzero(begins)
     cell = np.empty(len(keys), dtype=np.int64)
     cell[order] = np.cumsum(begins) - 1
-    first = np.minimum.reduceat(order, starts) if len(starts) else order
-    return first, cell, np.diff(starts, append=len(keys))
+    return order[starts], cell, np.diff(starts, append=len(keys))
+
+
+@numba.njit(cache=True, nogil=True)
+def _sums(column, cell, cells):  # type: ignore[no-untyped-def]
+    """(cells, K) float64 sums of the rows of an (N, K) column that are in each cell."""
+    sums = np.zeros((cells, column.shape[1]))
+    for row in range(len(column)):
+        for part in range(column.shape[1]):
+            sums[cell[row], part] += column[row, part]
+    return sums
 
 
 def _unit(vectors: FloatArray, fallback: FloatArray) -> FloatArray:
