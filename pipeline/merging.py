@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from pipeline.surface import (
     voxel_average,
     voxel_for_count,
 )
-from pipeline.types import FloatArray, PointCloud, PointSource, RgbdFrame
+from pipeline.types import FloatArray, IntArray, PointCloud, PointSource, RgbdFrame
 
 NOISE_VOXELS = 2.0
 """Least edge of a voxel over the median noise of what is averaged: finer ones only copy the noise."""
@@ -75,17 +76,22 @@ def merge_fused(
     joint = [node.fused for node in nodes]
     if mode == "fill":
         joint = without_guesses_in_view(frames, nodes, T_world_camera)
-    everything = PointCloud.concatenate(_placed(joint, T_world_camera))
-    voxel_m = voxel_for_count(everything.points_m, max_points, NOISE_VOXELS * noise_m(nodes))
+    parts_m = [part.points_m for part in joint]
+    points_m = np.concatenate(list(map(geometry.apply, T_world_camera, parts_m)))
+    voxel_m = voxel_for_count(points_m, max_points, NOISE_VOXELS * noise_m(nodes))
     if mode != "fill":
         fused = merge(joint, T_world_camera, voxel_m, smoothing_passes)
         return FusedCloud(fused, voxel_m, *spacing(fused.points_m), None)
-    whole = thinned(joint, T_world_camera, voxel_m)
-    smoothed = smooth(whole, smoothing_passes)
-    sensors = thinned([node.sensor for node in nodes], T_world_camera, voxel_m)
-    own = smooth(sensors, smoothing_passes)
-    fused = with_guesses_around(own, sensors, whole, smoothed, voxel_m)
-    return FusedCloud(fused, voxel_m, *spacing(fused.points_m), len(own))
+    with ThreadPoolExecutor(1) as beside:
+        own = beside.submit(thinned, [node.sensor for node in nodes], T_world_camera, voxel_m)
+        whole = thinned(joint, T_world_camera, voxel_m)
+        sensors = own.result()
+        smoothed = beside.submit(smooth, sensors, smoothing_passes)
+        guesses = smooth(whole, smoothing_passes, guessed_alone(sensors, whole, voxel_m))
+        measured = smoothed.result()
+    labelled = replace(measured, source=np.full(len(measured), PointSource.SENSOR, np.uint8))
+    fused = PointCloud.concatenate([labelled, guesses])
+    return FusedCloud(fused, voxel_m, *spacing(fused.points_m), len(measured))
 
 
 def noise_m(nodes: Sequence[NodeClouds]) -> float:
@@ -93,25 +99,20 @@ def noise_m(nodes: Sequence[NodeClouds]) -> float:
     return float(np.median(np.concatenate([node.sensor.sigma_m for node in nodes])))
 
 
-def with_guesses_around(
-    own: PointCloud, sensors: PointCloud, whole: PointCloud, smoothed: PointCloud, voxel_m: float
-) -> PointCloud:
-    """The measured points as without any guess, then the inferred ones in voxels where nothing was measured.
+def guessed_alone(sensors: PointCloud, whole: PointCloud, voxel_m: float) -> IntArray:
+    """The rows of ``whole`` that were inferred and are in voxels where nothing was measured.
 
     At the rim of a hole, a voxel and the planes that smooth it would mix both: the surface there would come
-    loose from what was measured, by as much as the guess is off.
+    loose from what was measured, by as much as the guess is off. So the measured points are thinned and
+    smoothed as without any guess, and of the rest only these come to them; while they are smoothed, they may
+    follow measured ones.
 
     Args:
-        own: the sensors' points, thinned and smoothed.
-        sensors: the same before they were smoothed.
+        sensors: the measured points, thinned to ``voxel_m``.
         whole: those and the inferred ones, thinned alike.
-        smoothed: the same points after smoothing; inferred ones may follow measured ones.
-        voxel_m: that both were thinned to.
     """
     guessed = np.flatnonzero(whole.source == PointSource.INFERRED)
-    free = guessed[~in_cubes_of(sensors.points_m, whole.points_m[guessed], voxel_m)]
-    measured = replace(own, source=np.full(len(own), PointSource.SENSOR, np.uint8))
-    return PointCloud.concatenate([measured, smoothed.select(free)])
+    return guessed[~in_cubes_of(sensors.points_m, whole.points_m[guessed], voxel_m)]
 
 
 def merge(
@@ -142,11 +143,11 @@ def without_guesses_in_view(
     for index, node in enumerate(nodes):
         keep = np.ones(len(node.fused), dtype=bool)
         inferred = np.flatnonzero(node.fused.source == PointSource.INFERRED)
+        guesses = PointCloud(node.fused.points_m[inferred])
         for other, frame in enumerate(frames):
             if other != index:
                 T_other_node = geometry.inverse(T_world_camera[other]) @ T_world_camera[index]
-                cloud = node.fused.select(inferred)
-                keep[inferred] &= hidden_from(cloud, T_other_node, frame.intrinsics, frame.depth)
+                keep[inferred] &= hidden_from(guesses, T_other_node, frame.intrinsics, frame.depth)
         clouds.append(node.fused.select(keep))
     return clouds
 

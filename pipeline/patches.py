@@ -46,25 +46,31 @@ def patch_normals(tree: KdTree, neighbours: int, places: IntArray | None = None)
     return normals
 
 
-def onto_patches(points_m: FloatArray, neighbours: int, kernel_share: float) -> tuple[FloatArray, FloatArray]:
+def onto_patches(
+    points_m: FloatArray, neighbours: int, kernel_share: float, rows: IntArray
+) -> tuple[FloatArray, FloatArray]:
     """Points moved along the normals of the planes that fit their neighbours best, nearer ones counting more.
 
     Args:
         points_m: (N, 3).
         neighbours: of a point, itself included; at most N.
         kernel_share: standard deviation of the Gaussian weight over the distance of the farthest of them.
+        rows: (M,) of the points to move.
 
     Returns:
-        (N, 3) points, and (N, 3) unit normals of either sign.
+        (M, 3) where these move to, and (M, 3) unit normals there, of either sign.
     """
     tree = KdTree(points_m)
+    place = np.empty(len(tree), np.int64)
+    place[tree.order] = np.arange(len(tree))
+    asked = np.sort(place[rows])
     moved_m, normals = np.empty((len(tree), 3)), np.empty((len(tree), 3))
 
     def work(first: int, last: int) -> None:
-        _move(*tree.parts, tree.order, first, last, neighbours, kernel_share, moved_m, normals)
+        _move(*tree.parts, tree.order, asked[first:last], neighbours, kernel_share, moved_m, normals)
 
-    in_parts(work, len(tree))
-    return moved_m, normals
+    in_parts(work, len(asked))
+    return moved_m[rows], normals[rows]
 
 
 @compiled
@@ -100,8 +106,7 @@ def _move(
     splits: FloatArray,
     levels: int,
     order: IntArray,
-    first: int,
-    last: int,
+    asked: IntArray,
     count: int,
     kernel_share: float,
     moved: FloatArray,
@@ -110,10 +115,10 @@ def _move(
     stack, bounds = working_space()
     squared, rows = np.empty(room_for(count)), np.zeros(room_for(count), dtype=np.intp)
     near, weights, center, spread = rows[:count], np.empty(count), np.empty(3), np.empty((3, 3))
-    farthest = np.inf
-    for i in range(first, last):
+    farthest, before = np.inf, points[0]
+    for i in asked:
         place, row = points[i], order[i]
-        limit = _reach(points[max(first, i - 1)], place, farthest)
+        limit = _reach(before, place, farthest)
         farthest = search_many(
             points, axes, splits, levels, place, count, limit, squared, rows, stack, bounds
         )
@@ -127,6 +132,7 @@ def _move(
             offset += center[a] * normals[row, a]
         for a in range(3):
             moved[row, a] = place[a] + offset * normals[row, a]
+        before = place
 
 
 @compiled

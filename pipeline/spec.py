@@ -95,9 +95,13 @@ NEEDS: dict[StageName, Needs] = {
 """All stages; ``pipeline.stages`` has what they do."""
 REBUILD: tuple[StageName, ...] = ("rig", "inferred", "outliers", "nodes", "placement", "fused", "after")
 """The stages from the images to the surface, in their order."""
-CHAIN: tuple[StageName, ...] = (*REBUILD, "clouds", "before", "truth")
+CHAIN: tuple[StageName, ...] = (*REBUILD[:-1], "clouds", "after", "before", "truth")
 """The stages of a reconstruction, which compares it with what was measured and true; the others are baselines
 beside it."""
+SIDE_BY_SIDE: frozenset[tuple[StageName, StageName]] = frozenset(
+    {("inferred", "outliers"), ("after", "before")}
+)
+"""Stages that follow each other in the chain, do not wait for each other and take about as long."""
 
 
 def key(spec: Spec, stage: StageName) -> tuple[Hashable, ...]:

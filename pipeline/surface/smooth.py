@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.patches import onto_patches
-from pipeline.types import PointCloud
+from pipeline.types import IntArray, PointCloud
 
 NEIGHBOURS = 20
 KERNEL_SHARE = 0.5
 """Standard deviation of the Gaussian weight over the distance of the farthest neighbour."""
 
 
-def smooth(cloud: PointCloud, passes: int) -> PointCloud:
+def smooth(cloud: PointCloud, passes: int, rows: IntArray | None = None) -> PointCloud:
     """Move every point along its normal onto the plane that fits its neighbours best.
 
     The first-order moving least squares of Alexa et al. 2003, with 20 neighbours. Where the noise is
@@ -24,15 +24,20 @@ def smooth(cloud: PointCloud, passes: int) -> PointCloud:
     Args:
         cloud: points with normals; the new normals keep their side.
         passes: how often; 0 changes nothing.
+        rows: (M,) of the points to return; None for all.
     """
-    for _ in range(passes):
-        cloud = _pass(cloud)
-    return cloud
+    for _ in range(passes - 1):
+        cloud = _pass(cloud, np.arange(len(cloud)))
+    if passes:
+        return _pass(cloud, np.arange(len(cloud)) if rows is None else rows)
+    return cloud if rows is None else cloud.select(rows)
 
 
-def _pass(cloud: PointCloud) -> PointCloud:
-    if cloud.normals is None or len(cloud) < 4:
-        return cloud
-    points_m, normals = onto_patches(cloud.points_m, min(NEIGHBOURS, len(cloud)), KERNEL_SHARE)
-    normals *= np.where(np.sum(normals * cloud.normals, axis=1, keepdims=True) < 0, -1.0, 1.0)
-    return replace(cloud, points_m=points_m, normals=normals)
+def _pass(cloud: PointCloud, rows: IntArray) -> PointCloud:
+    """Of the points at (M,) rows; the others only lie around them."""
+    kept = cloud.select(rows)
+    if kept.normals is None or len(cloud) < 4:
+        return kept
+    points_m, normals = onto_patches(cloud.points_m, min(NEIGHBOURS, len(cloud)), KERNEL_SHARE, rows)
+    normals *= np.where(np.sum(normals * kept.normals, axis=1, keepdims=True) < 0, -1.0, 1.0)
+    return replace(kept, points_m=points_m, normals=normals)
