@@ -22,6 +22,9 @@ ARGUMENTS = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--webgl-antialiasing-mode=none",  # half the time of a frame, and nobody looks at single pixels
+    "--disable-gpu-compositing",  # only the 3-D picture needs a GPU, and there is none
+    "--disable-gpu-rasterization",
 ]
 
 
