@@ -15,7 +15,7 @@ import signal
 import threading
 import traceback
 from collections.abc import Callable, Hashable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, Literal
@@ -73,6 +73,8 @@ class _Slot:
     connection: Connection | None = None
     ticket: Ticket | None = None
     ready: bool = False
+    tried: threading.Event = field(default_factory=threading.Event)
+    """Set once its process is ready, or has died: the next one starts then, not beside it."""
 
 
 def _nothing() -> Iterator[None]:
@@ -102,8 +104,10 @@ class ComputePool:
         self._closing = threading.Event()
         self._slots = [_Slot() for _ in range(size)]
         self._threads = [
-            threading.Thread(target=self._attend, args=(slot,), name=f"compute-{i}", daemon=True)
-            for i, slot in enumerate(self._slots)
+            threading.Thread(
+                target=self._attend, args=self._slots[i::-1][:2], name=f"compute-{i}", daemon=True
+            )
+            for i in range(size)
         ]
         for thread in self._threads:
             thread.start()
@@ -161,6 +165,7 @@ class ComputePool:
             self._closing.set()
             waiting, self._waiting = self._waiting, []
             for slot in self._slots:
+                slot.tried.set()
                 if slot.process is not None:
                     slot.process.terminate()
         for ticket in waiting:
@@ -195,8 +200,10 @@ class ComputePool:
             slot.ticket = ticket
             _send(slot, ("job", (ticket.function, ticket.arguments)))
 
-    def _attend(self, slot: _Slot) -> None:
-        """Keep one process alive and hand on what it says, until the pool closes."""
+    def _attend(self, slot: _Slot, before: _Slot | None = None) -> None:
+        """Keep one process alive and hand on what it says, until the pool closes; after the one before."""
+        if before is not None:
+            before.tried.wait()
         while not self._closed:
             if not self._start(slot):
                 self._closing.wait(RESPAWN_PAUSE_S)
@@ -244,6 +251,7 @@ class ComputePool:
             return
         with self._lock:
             slot.ready, slot.ticket = True, None
+            slot.tried.set()
             others = self._served(ticket, kind)
             if kind != "ready" and _memory_bytes(slot.process) > MEMORY_LIMIT_BYTES:
                 slot.ready = False
@@ -268,6 +276,7 @@ class ComputePool:
         with self._lock:
             ticket, slot.ticket = slot.ticket, None
             slot.ready = False
+            slot.tried.set()
             if slot.connection is not None:
                 slot.connection.close()
             stopped = self._closed or (ticket is not None and ticket.stopping)
