@@ -22,10 +22,14 @@ ARGUMENTS = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
-    "--webgl-antialiasing-mode=none",  # half the time of a frame, and nobody looks at single pixels
-    "--disable-gpu-compositing",  # only the 3-D picture needs a GPU, and there is none
+]
+"""Of Chromium where there is no graphics card."""
+ROUGH = [
+    "--webgl-antialiasing-mode=none",  # half the time of a frame, and tests look at no single pixel
+    "--disable-gpu-compositing",  # only the 3-D picture needs a GPU
     "--disable-gpu-rasterization",
 ]
+"""Pictures are drawn in half the time, but their edges are not smooth."""
 
 
 def chromium_path() -> str | None:
@@ -71,9 +75,9 @@ def browser(chromium):
     """Chromium, closed at the end: what drives it keeps an event loop that other tests must not meet."""
     from playwright.sync_api import expect, sync_playwright
 
-    expect.set_options(timeout=30_000)  # five seconds are few on a slow machine
+    expect.set_options(timeout=PATIENCE_MS)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=chromium, args=[*ARGUMENTS, *ROUGH])
         yield browser
         browser.close()
 

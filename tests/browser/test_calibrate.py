@@ -56,7 +56,7 @@ def test_a_dropped_view_is_left_out_and_comes_back(calibrated):
     calibrated.get_by_text("all views", exact=True).wait_for()
     expect(row).to_have_text(re.compile("10 of 14.*11 of 14"))
     press(calibrated, "All")
-    expect(row).to_have_text(before.replace("\t", ""), timeout=PATIENCE_MS)
+    expect(row).to_have_text(before.replace("\t", ""))
     calibrated.get_by_text("Up to date").wait_for()
 
 
@@ -147,7 +147,7 @@ def test_the_mesh_is_another_with_the_calibration_and_the_same_again_without(cal
     calibrated.get_by_text("In use").wait_for()
     calibrated.get_by_text("Up to date").wait_for()
     row = calibrated.get_by_role("row", name="F-score 5 cm").locator("visible=true").first
-    expect(row).to_have_text(re.compile(r"\d %.*\d %"), timeout=PATIENCE_MS)
+    expect(row).to_have_text(re.compile(r"\d %.*\d %"))
     came, calibrated_share = f_scores(calibrated)
     assert calibrated_share > came + 10.0
     go(calibrated, "Surface")

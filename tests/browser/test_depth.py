@@ -10,7 +10,6 @@ from playwright.sync_api import expect
 from app.screens.depth.labels import COLORINGS, EVERYWHERE, FILLS, PICTURES
 from tests.browser.hands import (
     ALIKE,
-    PATIENCE_MS,
     afresh,
     canvas,
     changed_from,
@@ -88,7 +87,7 @@ def test_a_shorter_reach_lets_in_less(depth):
     handle = slider(depth, "Reach (% of the diagonal)")
     handle.focus()
     handle.press("Home")
-    expect(row).to_have_text(re.compile(r"[1-9]\d\.\d %"), timeout=PATIENCE_MS)
+    expect(row).to_have_text(re.compile(r"[1-9]\d\.\d %"))
     depth.get_by_text("Up to date").wait_for()
 
 

@@ -72,7 +72,7 @@ def test_five_stops_are_led_through_by_keys_alone(page, lesson):
         seen(page, WAITS).wait_for()
         press_until(page, "ArrowRight", FIRST)
         page.keyboard.press("s" if stop == 5 else str(1 + stop % 3))
-        expect(page.get_by_text(FIRST).locator("visible=true")).to_have_count(0, timeout=PATIENCE_MS)
+        expect(page.get_by_text(FIRST).locator("visible=true")).to_have_count(0)
         expect(page.get_by_text("✓").locator("visible=true").first).to_be_visible(timeout=PATIENCE_MS)
         press_until(page, "ArrowRight" if stop % 2 else "Space", f"({stop + 1} of {stops})", NEXT_MS)
     press_until(page, "ArrowLeft", f"(5 of {stops})", NEXT_MS)
@@ -133,4 +133,4 @@ def test_large_text_has_no_more_than_a_room_needs_and_what_it_speaks_of_is_in_vi
     expect(ball).to_be_in_viewport()
     assert float(card.evaluate("one => parseFloat(getComputedStyle(one).fontSize)")) >= 17.0
     go(page, "Scene")
-    expect(card).to_have_count(0, timeout=PATIENCE_MS)
+    expect(card).to_have_count(0)

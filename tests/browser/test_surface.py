@@ -61,7 +61,7 @@ def test_a_dragged_radius_is_shown_at_once_and_measured_when_it_rests(surface):
         handle.press("ArrowLeft")
     quick.wait_for()
     assert numbers(surface, "Triangles") == triangles
-    expect(quick).to_have_count(0, timeout=PATIENCE_MS)
+    expect(quick).to_have_count(0)
     surface.get_by_text("Up to date").wait_for()
     assert numbers(surface, "Triangles") != triangles
     assert changed_from(surface, before)
@@ -83,7 +83,7 @@ def test_where_the_ball_falls_through_the_points_stay_and_old_numbers_are_dimmed
     handle.press("Home")
     old.wait_for(state="attached")
     expect(table).to_have_css("opacity", "0.3")
-    expect(old).to_have_count(0, timeout=PATIENCE_MS)
+    expect(old).to_have_count(0)
     surface.get_by_text("Up to date").wait_for()
     expect(table).to_have_css("opacity", "1")
     assert min(numbers(surface, "No-hit rays")) > 90.0
