@@ -34,6 +34,15 @@ def crash_when_told(folder: str) -> None:
     os._exit(3)
 
 
+def warm_up_when_told():
+    """Be ready once the file ``go`` is there; a numbered file for each start holds the process."""
+    folder = Path(os.environ["STARTED"])
+    Path(folder, str(1 + len(list(folder.glob("[0-9]"))))).write_text(str(os.getpid()))
+    while not Path(folder, "go").exists():
+        time.sleep(0.005)
+    yield
+
+
 def count(n: int):
     """Report n times, return n."""
     for i in range(n):

@@ -213,6 +213,27 @@ def test_a_process_warms_up_while_no_job_waits():
         pool.close()
 
 
+@pytest.mark.parametrize("first_dies", [False, True])
+def test_processes_start_one_after_the_other_even_if_one_dies(first_dies, monkeypatch, tmp_path):
+    """The second would take a core from the imports of the first, whose job is waited for."""
+    monkeypatch.setenv("STARTED", str(tmp_path))
+    pool, inboxes = ComputePool(size=2, warm_up=jobs.warm_up_when_told), (Inbox(), Inbox())
+    try:
+        for owner, inbox in zip("ab", inboxes, strict=True):
+            pool.submit(owner, jobs.count, 1, **inbox.callbacks())
+        wait_for(tmp_path / "1")
+        threading.Event().wait(0.5)
+        (first,) = tmp_path.iterdir()
+        if first_dies:
+            psutil.Process(int(first.read_text())).kill()
+            wait_for(tmp_path / "2")
+        (tmp_path / "go").touch()
+        assert [inbox.end() for inbox in inboxes] == 2 * [Outcome("result", 1)]
+        wait_for(tmp_path / "2")
+    finally:
+        pool.close()
+
+
 def test_a_warm_up_that_fails_leaves_a_process_that_works():
     pool, ids = ComputePool(size=1, warm_up=jobs.warm_up_that_fails), []
     try:
