@@ -104,10 +104,8 @@ class ComputePool:
         self._closing = threading.Event()
         self._slots = [_Slot() for _ in range(size)]
         self._threads = [
-            threading.Thread(
-                target=self._attend, args=self._slots[i::-1][:2], name=f"compute-{i}", daemon=True
-            )
-            for i in range(size)
+            threading.Thread(target=self._attend, args=pair, name=f"compute-{i}", daemon=True)
+            for i, pair in enumerate(zip(self._slots, [None, *self._slots[:-1]], strict=True))
         ]
         for thread in self._threads:
             thread.start()
@@ -200,7 +198,7 @@ class ComputePool:
             slot.ticket = ticket
             _send(slot, ("job", (ticket.function, ticket.arguments)))
 
-    def _attend(self, slot: _Slot, before: _Slot | None = None) -> None:
+    def _attend(self, slot: _Slot, before: _Slot | None) -> None:
         """Keep one process alive and hand on what it says, until the pool closes; after the one before."""
         if before is not None:
             before.tried.wait()
