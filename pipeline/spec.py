@@ -98,10 +98,10 @@ REBUILD: tuple[StageName, ...] = ("rig", "inferred", "outliers", "nodes", "place
 CHAIN: tuple[StageName, ...] = (*REBUILD[:-1], "clouds", "after", "before", "truth")
 """The stages of a reconstruction, which compares it with what was measured and true; the others are baselines
 beside it."""
-SIDE_BY_SIDE: frozenset[tuple[StageName, StageName]] = frozenset(
-    {("inferred", "outliers"), ("after", "before")}
-)
-"""Stages that follow each other in the chain, do not wait for each other and take about as long."""
+SIDE_BY_SIDE: frozenset[tuple[StageName, StageName]] = frozenset({("after", "before")})
+"""Stages that follow each other in the chain, do not wait for each other and take about as long. Network and
+outlier filter beside each other would save less than .1 s, and take 0.2 GB more with three nodes.
+"""
 
 
 def key(spec: Spec, stage: StageName) -> tuple[Hashable, ...]:
