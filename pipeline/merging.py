@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline import geometry
+from pipeline.beside import threads
 from pipeline.config import FusionMode
 from pipeline.nodes import NodeClouds
 from pipeline.registration import hidden_from
@@ -82,13 +82,13 @@ def merge_fused(
     if mode != "fill":
         fused = merge(joint, T_world_camera, voxel_m, smoothing_passes)
         return FusedCloud(fused, voxel_m, *spacing(fused.points_m), None)
-    with ThreadPoolExecutor(1) as beside:
-        own = beside.submit(thinned, [node.sensor for node in nodes], T_world_camera, voxel_m)
-        whole = thinned(joint, T_world_camera, voxel_m)
-        sensors = own.result()
-        smoothed = beside.submit(smooth, sensors, smoothing_passes)
-        guesses = smooth(whole, smoothing_passes, guessed_alone(sensors, whole, voxel_m))
-        measured = smoothed.result()
+    beside = threads("merging", 1)
+    own = beside.submit(thinned, [node.sensor for node in nodes], T_world_camera, voxel_m)
+    whole = thinned(joint, T_world_camera, voxel_m)
+    sensors = own.result()
+    smoothed = beside.submit(smooth, sensors, smoothing_passes)
+    guesses = smooth(whole, smoothing_passes, guessed_alone(sensors, whole, voxel_m))
+    measured = smoothed.result()
     labelled = replace(measured, source=np.full(len(measured), PointSource.SENSOR, np.uint8))
     fused = PointCloud.concatenate([labelled, guesses])
     return FusedCloud(fused, voxel_m, *spacing(fused.points_m), len(measured))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import wait
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, Protocol, TypeVar
@@ -18,6 +18,7 @@ import numpy as np
 
 from packetmesh.progress import Progress, drain
 from pipeline.acquisition import Acquired, acquire
+from pipeline.beside import threads
 from pipeline.config import (
     AcquisitionConfig,
     DepthConfig,
@@ -121,10 +122,12 @@ def run(
         if stage in results:
             continue
         if following and (stage, following) in SIDE_BY_SIDE and _ready(following, results):
-            with ThreadPoolExecutor(1) as thread:
-                beside = thread.submit(drain, compute(spec, following, cache))
+            beside = threads("stage", 1).submit(drain, compute(spec, following, cache))
+            try:
                 results[stage] = yield from compute(spec, stage, cache)
-                results[following] = beside.result()
+            finally:
+                wait([beside])
+            results[following] = beside.result()
         else:
             results[stage] = yield from compute(spec, stage, cache)
     return results
@@ -181,14 +184,14 @@ def _side_by_side(
 ) -> Steps[tuple[Result, ...]]:
     """What each node's work gives, two nodes at a time: most of it leaves Python's lock to the other."""
     results = []
-    with ThreadPoolExecutor(_NODES_AT_A_TIME) as threads:
-        begun = [threads.submit(part) for part in work]
-        try:
-            for index, (frame, part) in enumerate(zip(rig.frames, begun, strict=True)):
-                yield Progress(f"{what} {frame.name}", begin + (end - begin) * index / len(begun))
-                results.append(part.result())
-        finally:
-            threads.shutdown(wait=False, cancel_futures=True)
+    begun = [threads("nodes", _NODES_AT_A_TIME).submit(part) for part in work]
+    try:
+        for index, (frame, part) in enumerate(zip(rig.frames, begun, strict=True)):
+            yield Progress(f"{what} {frame.name}", begin + (end - begin) * index / len(begun))
+            results.append(part.result())
+    finally:
+        for part in begun:
+            part.cancel()
     return tuple(results)
 
 
