@@ -95,21 +95,26 @@ def test_a_killed_process_fails_only_the_task_that_killed_it():
     assert answers == {index: "killed" if index in (1, 5) else index for index in range(9)}
 
 
-def test_a_process_that_starts_when_another_is_killed_ends_with_it(monkeypatch):
-    """Starting the second takes until the first was killed."""
+def test_a_process_that_starts_when_another_is_killed_ends_with_it(monkeypatch, tmp_path):
+    """Starting the second, once the first has its task, takes until that has killed it."""
+    began, go = tmp_path / "began", tmp_path / "go"
+    task = f"[open({str(began)!r}, 'w'), *iter(lambda: __import__('os').path.exists({str(go)!r}), True), {KILLED}]"
     started = []
     start = multiprocessing.context.SpawnProcess.start
 
     def start_slowly(process):
+        while started and not began.exists():
+            time.sleep(0.01)
         start(process)
         started.append(process)
         for first in started[:-1]:
+            go.touch()
             multiprocessing.connection.wait([first.sentinel])
             time.sleep(0.5)
 
     monkeypatch.setattr(multiprocessing.context.SpawnProcess, "start", start_slowly)
     with pytest.raises(PacketMeshError, match="ended unexpectedly"):
-        list(run_batch(eval, [KILLED] + [PROCESS] * 3, processes=2))
+        list(run_batch(eval, [task] + [PROCESS] * 3, processes=2))
     assert len(started) == 2
     for process in started:
         assert process.exitcode is not None
