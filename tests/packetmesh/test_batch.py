@@ -98,7 +98,8 @@ def test_a_killed_process_fails_only_the_task_that_killed_it():
 def test_a_process_that_starts_when_another_is_killed_ends_with_it(monkeypatch, tmp_path):
     """Starting the second, once the first has its task, takes until that has killed it."""
     began, go = tmp_path / "began", tmp_path / "go"
-    task = f"[open({str(began)!r}, 'w'), *iter(lambda: __import__('os').path.exists({str(go)!r}), True), {KILLED}]"
+    told = f"lambda: __import__('os').path.exists({str(go)!r})"
+    task = f"[open({str(began)!r}, 'w'), *iter({told}, True), {KILLED}]"
     started = []
     start = multiprocessing.context.SpawnProcess.start
 
