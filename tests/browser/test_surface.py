@@ -96,7 +96,7 @@ def test_side_by_side_and_colours_by_source_tell_what_was_guessed(surface):
     assert changed_from(surface, alone)
     both = canvas(surface)
     pick(surface, "Colours", SOURCE)
-    surface.get_by_text("inferred by the network").first.wait_for()  # the points left out have one, too
+    surface.get_by_text("measured by a sensor").wait_for()
     assert changed_from(surface, both)
 
 
