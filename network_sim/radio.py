@@ -257,6 +257,8 @@ class Radio:
         self._shadowing_seed = int(rng.integers(2**63))
         self._shadowing: dict[tuple[int, int], float] = {}
         self._nakagami_m = config.nakagami_m
+        self.fades = config.nakagami_m is not None
+        """Whether ``faded_w`` changes anything."""
         self._walls_m = np.reshape(config.walls_m, (-1, 2, 2))
         self._wall_gain = ratio(-config.wall_db)
         self._rng = rng

@@ -38,8 +38,10 @@ MIN_BE = 3
 MAX_BE = 5
 MAX_CSMA_BACKOFFS = 4
 MAX_FRAME_RETRIES = 3
-_NONE = Cause.NONE
-"""An enumeration is slow to look up, and this is for every frame."""
+_WINDOWS = tuple((1 << min(MIN_BE + busy, MAX_BE)) - 1 for busy in range(MAX_CSMA_BACKOFFS + 1))
+"""The most backoff periods that a node waits, by how many assessments found the channel busy."""
+_AIR, _ACK, _DELIVER, _NONE = EventKind.AIR, EventKind.ACK, EventKind.DELIVER, Cause.NONE
+"""An enumeration is slow to look up, and these are for every frame."""
 
 
 def spacing_ns(frame_bytes: int) -> int:
@@ -74,15 +76,15 @@ class Ieee802154:
             ``ok`` is what the sender knows, ``cause`` what happened: without acknowledgements a packet that
             did not arrive is ``ok`` with a cause; one that was dropped although it arrived has ``ACK_LOST``.
         """
-        arrived, air_ns = False, (PHY_BYTES + HEADER_BYTES + packet.size_bytes) * BYTE_NS
+        arrived, frame_bytes = False, PHY_BYTES + HEADER_BYTES + packet.size_bytes
         for attempt in range(self._attempts):
-            refusal, ahead_ns = yield from self._access(packet, sender, receiver, air_ns)
+            refusal, ahead_ns = yield from self._access(packet, sender, receiver, frame_bytes * BYTE_NS)
             if refusal:
                 return Delivery(False, Cause.ACK_LOST if arrived else refusal, attempt)
-            cause = yield from self._transmit(packet, sender, receiver, ahead_ns)
+            cause = yield from self._transmit(packet, sender, receiver, frame_bytes, ahead_ns)
             if not cause and not arrived:
                 arrived = True
-                self._add(int(self._env.now), EventKind.DELIVER, packet, sender, receiver, packet.size_bytes)
+                self._add(int(self._env.now), _DELIVER, packet, sender, receiver, packet.size_bytes)
                 self._receive(packet, receiver)
             if not self._ack:
                 self._begin_interframe_space(packet, sender)
@@ -101,49 +103,47 @@ class Ieee802154:
         Returns:
             Why the sender may not send, or ``NONE``, and in how many ns its frame of ``air_ns`` begins.
         """
-        env = self._env
-        wait_ns = max(self._ready_ns.get(sender, 0) - int(env.now), 0)
-        for busy_assessments in range(MAX_CSMA_BACKOFFS + 1):
-            slots = next(self._backoffs) & ((1 << min(MIN_BE + busy_assessments, MAX_BE)) - 1)
-            wait_ns += slots * BACKOFF_NS + CCA_NS
-            then_ns = int(env.now) + wait_ns
-            if self._next_ns() > then_ns + TURNAROUND_NS + air_ns and self._idle_at(sender, then_ns):
+        env, now_ns = self._env, int(self._env.now)
+        wait_ns = max(self._ready_ns.get(sender, 0) - now_ns, 0)
+        for window in _WINDOWS:
+            wait_ns += (next(self._backoffs) & window) * BACKOFF_NS + CCA_NS
+            then_ns = now_ns + wait_ns
+            if self._idle_at(sender, then_ns, then_ns + TURNAROUND_NS + air_ns):
                 return _NONE, wait_ns + TURNAROUND_NS
             yield env.timeout(wait_ns)
-            wait_ns = 0
+            wait_ns, now_ns = 0, then_ns
             if not self._up(sender):
                 return Cause.NODE_DOWN, 0
-            if not self._busy(sender):
+            if not self._busy(sender, now_ns):
                 yield env.timeout(TURNAROUND_NS)
                 return (_NONE if self._up(sender) else Cause.NODE_DOWN), 0
         self._record(EventKind.LOSS, packet, sender, receiver, packet.size_bytes, Cause.CHANNEL)
         return Cause.CHANNEL, 0
 
-    def _idle_at(self, sender: int, then_ns: int) -> bool:
-        """Whether an assessment that ends then finds the channel idle, if nothing happens until then."""
+    def _idle_at(self, sender: int, then_ns: int, end_ns: int) -> bool:
+        """Whether an assessment that ends then is sure to find an idle channel: nothing happens before."""
         return (
-            self._medium.undisturbed and self._acking_until_ns.get(sender, 0) <= then_ns and self._up(sender)
+            self._medium.undisturbed
+            and self._next_ns() > end_ns
+            and self._acking_until_ns.get(sender, 0) <= then_ns
+            and self._up(sender)
         )
 
-    def _busy(self, node: int) -> bool:
+    def _busy(self, node: int, now_ns: int) -> bool:
         """Whether an assessment that ends now finds the channel busy, or the node has to acknowledge.
 
         The end of the assessment decides (as in ns-3's lr-wpan): only the turnaround is vulnerable.
         """
-        now_ns = int(self._env.now)
-        return now_ns < self._acking_until_ns.get(node, 0) or self._medium.busy_between(
-            node, now_ns - 1, now_ns
-        )
+        return now_ns < self._acking_until_ns.get(node, 0) or self._medium.busy_until(node, now_ns)
 
     def _transmit(
-        self, packet: Packet, sender: int, receiver: int, ahead_ns: int
+        self, packet: Packet, sender: int, receiver: int, frame_bytes: int, ahead_ns: int
     ) -> Generator[simpy.Event, Any, Cause]:
         """Put the frame on the air, ``ahead_ns`` from now; returns why it did not arrive."""
-        size_bytes = PHY_BYTES + HEADER_BYTES + packet.size_bytes
-        duration_ns = size_bytes * BYTE_NS
+        duration_ns = frame_bytes * BYTE_NS
         begins_ns = int(self._env.now) + ahead_ns
-        self._add(begins_ns, EventKind.AIR, packet, sender, receiver, size_bytes, _NONE, duration_ns)
-        transmission = self._medium.start(sender, duration_ns, receiver, size_bytes, "oqpsk", begins_ns)
+        self._add(begins_ns, _AIR, packet, sender, receiver, frame_bytes, _NONE, duration_ns)
+        transmission = self._medium.start(sender, duration_ns, receiver, frame_bytes, "oqpsk", begins_ns)
         yield self._env.timeout(ahead_ns + duration_ns)
         lost = self._lost(sender, receiver)
         cause = self._medium.finish(transmission) or (Cause.LINK if lost else _NONE)
@@ -169,7 +169,7 @@ class Ieee802154:
             rest_ns = ACK_NS
         heard = False
         if self._up(receiver):
-            self._add(begins_ns, EventKind.ACK, packet, receiver, sender, ACK_BYTES, _NONE, ACK_NS)
+            self._add(begins_ns, _ACK, packet, receiver, sender, ACK_BYTES, _NONE, ACK_NS)
             transmission = self._medium.start(receiver, ACK_NS, sender, ACK_BYTES, "oqpsk", begins_ns)
             yield env.timeout(rest_ns)
             failure = self._medium.finish(transmission)

@@ -107,6 +107,7 @@ class Medium:
         self._listeners: dict[int, Listener] = {}
         self._rows_w: dict[int, list[float]] = {}
         self._rows_end_ns: float = math.inf if places.static else 0
+        self._fades = radio.fades
         self._rx_w = radio.rx_threshold_w
         self._cs_w = radio.cs_threshold_w
 
@@ -162,7 +163,9 @@ class Medium:
         if start_ns >= self._rows_end_ns:
             self._rows_w.clear()
             self._rows_end_ns = start_ns + REFRESH_NS
-        power_w = self.radio.faded_w(self.power_w(sender, receiver))
+        power_w = self.power_w(sender, receiver)
+        if self._fades:
+            power_w = self.radio.faded_w(power_w)
         frame = Transmission(
             sender, receiver, start_ns, end_ns, end_ns + reserve_ns, power_w, size_bytes, modulation, [], []
         )
@@ -199,12 +202,16 @@ class Medium:
     def clear(self, frame: Transmission) -> None:
         """Take a frame off the air at its end and call the listeners whose channel becomes idle."""
         self._active.remove(frame)
-        recent, listeners = self._recent, self._listeners
+        recent = self._recent
         recent.append(frame)
         end_ns = frame.end_ns
         while recent[0].end_ns < end_ns - MEMORY_NS:
             recent.popleft()
-        row_w = self._rows_w.get(frame.sender) or self._new_row_w(frame.sender)
+        if frame.heard:
+            self._notify_idle(frame)
+
+    def _notify_idle(self, frame: Transmission) -> None:
+        row_w, listeners = self._rows_w.get(frame.sender) or self._new_row_w(frame.sender), self._listeners
         least_w, clean = self._rx_w, not frame.overlaps
         for listener in frame.heard:
             listener.busy -= 1
@@ -281,15 +288,16 @@ class Medium:
     def _sensed(self, frame: Transmission, node: int) -> bool:
         return self.power_w(frame.sender, node) >= self._cs_w
 
-    def busy_between(self, node: int, start_ns: int, end_ns: int) -> bool:
-        """Whether somebody else's frame was on the air at this node in part of a window that ends by now.
-
-        The window may reach back ``MEMORY_NS``.
-        """
-        for frames in (self._active, self._recent):
-            for frame in frames:
-                if frame.start_ns < end_ns and frame.end_ns > start_ns and self._sensed(frame, node):
-                    return True
+    def busy_until(self, node: int, now_ns: int) -> bool:
+        """Whether somebody else's frame was on the air at this node in the last instant before now."""
+        for frame in self._active:
+            if frame.start_ns < now_ns and self._sensed(frame, node):
+                return True
+        for frame in reversed(self._recent):
+            if frame.end_ns < now_ns:
+                return False
+            if self._sensed(frame, node):
+                return True
         return False
 
     def last_heard(self, node: int) -> tuple[int, bool]:

@@ -126,27 +126,22 @@ def test_noise_and_fading() -> None:
     assert set(outcomes) == {Cause.NONE, Cause.RANGE}
 
 
-def test_senses_and_looks_back() -> None:
+def test_senses_up_to_now() -> None:
     it = scene(0, 50, 220, 221)
     it.frame(100, 100, 0, 1)
     looks: dict[int, Any] = {}
-    busy = it.medium.busy_between
 
     def look() -> Generator[simpy.Event, Any, None]:
-        for t_us in (99, 150, 201, 300):
+        for t_us in (99, 100, 101, 150, 200, 201, 300):
             yield it.env.timeout(t_us * US - it.env.now)
-            looks[t_us] = [busy(node, it.env.now - 1, it.env.now) for node in range(4)]
-        looks[0] = [busy(1, 0, 100 * US), busy(1, 0, 101 * US), busy(1, 199 * US, 300 * US)]
-        looks[1] = [busy(1, 200 * US, 300 * US), busy(0, 0, 300 * US), busy(3, 0, 300 * US)]
+            looks[t_us] = [it.medium.busy_until(node, int(it.env.now)) for node in range(4)]
 
     it.env.process(look())
     it.run()
-    nobody = [False] * 4
-    assert looks[99] == nobody
-    assert looks[150] == [False, True, True, False]
-    assert looks[201] == nobody
-    assert looks[0] == [False, True, True]
-    assert looks[1] == [False, False, False]
+    nobody, those_near = [False] * 4, [False, True, True, False]
+    assert looks[99] == looks[100] == nobody  # a frame that begins now was not there before
+    assert looks[101] == looks[150] == looks[200] == those_near  # one that ends now was
+    assert looks[201] == looks[300] == nobody
 
 
 def test_listeners_learn_of_busy_and_idle() -> None:

@@ -13,7 +13,9 @@ from network_sim.mac.saturation import saturation
 from packetmesh.errors import PacketMeshError
 
 SCENARIOS = [(mac, nodes) for mac, counts in SATURATED.items() for nodes in counts]
-SMALL_STUDY = partial(benchmark, objects=4, horizon_s=1860.0, runs=1, saturated_s=1.0)
+SMALL_STUDY = partial(
+    benchmark, objects=4, horizon_s=1860.0, runs=1, saturated_s=dict.fromkeys(SATURATED, 1.0)
+)
 STAND_IN = f"""#!{sys.executable}
 import json, sys
 if sys.argv[1] == "-c":

@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pytest
 
-from lab.benchmarks.network import benchmark
+from lab.benchmarks.network import SATURATED, benchmark
 from lab.claims import registry
 from lab.claims.network import link, radio, selection, street, study
 from lab.claims.network.intervals import interval
@@ -201,7 +201,7 @@ def test_an_interval_lies_around_its_mean():
 
 
 def test_the_benchmark_counts_simulated_time_and_events():
-    result = benchmark(objects=4, horizon_s=1860.0, runs=1, saturated_s=1.0)
+    result = benchmark(objects=4, horizon_s=1860.0, runs=1, saturated_s=dict.fromkeys(SATURATED, 1.0))
     total, *runs = (run for run in result.runs if "scheme" in run)
     assert [run["scheme"] for run in runs] == list(study.SCHEMES)
     assert total["simulated_s_per_s"] == pytest.approx(3 * 1860.0 / result.ours_s)
