@@ -162,10 +162,13 @@ def entropy_weights(distances_m: FloatArray, sigma_m: float) -> tuple[FloatArray
     """
     if not len(distances_m):
         return np.empty(0), sigma_m, float("nan")
-    variance_m2 = max(sigma_m**2, np.finfo(float).tiny)
-    kernel = np.exp(-0.5 * distances_m**2 / variance_m2)
-    p = kernel / kernel.sum()
-    information = -p * np.log(p)
-    entropy_nat = float(information.sum())
-    weights = information / entropy_nat if entropy_nat > 0 else p
-    return weights, sigma_m, entropy_nat
+    exponents = distances_m * distances_m
+    exponents *= 0.5 / max(sigma_m**2, np.finfo(float).tiny)
+    kernel = np.exp(-exponents)
+    total = float(kernel.sum())
+    exponents += np.log(total)  # now -log p
+    information = kernel * exponents
+    entropy = float(information.sum())
+    if entropy > 0.0:
+        return information / entropy, sigma_m, entropy / total
+    return kernel / total, sigma_m, 0.0

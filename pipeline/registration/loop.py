@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Generator
 from dataclasses import replace
@@ -12,6 +13,7 @@ from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import drain
 from pipeline.config import RegistrationConfig
 from pipeline.geometry import apply, rotation_angle_rad
+from pipeline.kdtree import compiled
 from pipeline.registration.anderson import Acceleration
 from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.registration.matching import Matcher, Matching
@@ -20,7 +22,7 @@ from pipeline.registration.residual import DegenerateError, residual_for
 from pipeline.registration.sample import Sample, draw
 from pipeline.registration.stop import TRANSLATION_TOLERANCE_OF_GATE, StopRule
 from pipeline.registration.weighting import PairWeighting, PairWeights
-from pipeline.types import FloatArray, PointCloud, RegistrationResult, RegistrationStep
+from pipeline.types import FloatArray, IntArray, PointCloud, RegistrationResult, RegistrationStep
 
 MIN_PAIRS = 6
 MIN_EFFECTIVE_PAIRS = 10.0
@@ -144,10 +146,10 @@ def _iterations(
     center_m = source.points_m.mean(axis=0, keepdims=True)
     for index in range(config.max_iterations):
         try:
-            method, matching, kept = _weigh(method, matcher, T, first=index == 0)
+            method, matching, kept, effective = _weigh(method, matcher, T, first=index == 0)
             if acceleration is not None and (fallback := acceleration.fallback(kept)) is not None:
                 T = fallback
-                method, matching, kept = _weigh(method, matcher, T)
+                method, matching, kept, effective = _weigh(method, matcher, T)
             support = matching.select(kept.rows)
             motion = residual.solve(support, kept.weights)
         except DegenerateError as error:
@@ -159,7 +161,7 @@ def _iterations(
         step = RegistrationStep(
             index=index,
             T_target_source=moved_T,
-            pairs=np.stack([source.rows[support.source_rows], target.rows[support.target_rows]], axis=1),
+            pairs=_side_by_side(source.rows, support.source_rows, target.rows, support.target_rows),
             weights=kept.weights,
             distances_m=support.distances_m,
             sigma_m=kept.sigma_m,
@@ -167,7 +169,7 @@ def _iterations(
             objective=_mean(residual.squared_m2(support, motion), kept.weights),
             rmse_m=float(np.sqrt(_mean(support.distances_m**2, kept.weights))),
             mean_distance_m=_mean(support.distances_m, kept.weights),
-            effective_pairs=_effective(kept.weights),
+            effective_pairs=effective,
             entropy_nat=kept.entropy_nat,
             rotation_step_rad=_turn_rad(motion),
             translation_step_m=float(np.linalg.norm(apply(moved_T - T, center_m))),
@@ -183,8 +185,10 @@ def _iterations(
 
 def _weigh(
     method: PairWeighting, matcher: Matcher, T: FloatArray, first: bool = False
-) -> tuple[PairWeighting, Matching, PairWeights]:
-    """The method, widened if it keeps too few pairs; the pairs that it matches; those that it weighs."""
+) -> tuple[PairWeighting, Matching, PairWeights, float]:
+    """The method, widened if it keeps too few pairs; the pairs that it matches; those that it weighs; how
+    many of the same weight these count for.
+    """
 
     def match(state: PairWeighting) -> Matching:
         return matcher.match(T, state.neighbours, state.source_share, state.target_share, state.gate_m)
@@ -201,9 +205,10 @@ def _weigh(
         )
     if len(kept.rows) < MIN_PAIRS:
         raise DegenerateError(f"only {len(kept.rows)} pairs are close enough")
-    if _effective(kept.weights) < MIN_EFFECTIVE_PAIRS:
-        raise DegenerateError(f"only {_effective(kept.weights):.1f} pairs carry all the weight")
-    return method, matching, kept
+    effective = 1.0 / _mean(kept.weights, kept.weights)
+    if effective < MIN_EFFECTIVE_PAIRS:
+        raise DegenerateError(f"only {effective:.1f} pairs carry all the weight")
+    return method, matching, kept, effective
 
 
 def _mean(values: FloatArray, weights: FloatArray) -> float:
@@ -211,11 +216,17 @@ def _mean(values: FloatArray, weights: FloatArray) -> float:
     return float(np.einsum("m,m->", values, weights))
 
 
-def _effective(weights: FloatArray) -> float:
-    """(sum w)^2 / sum w^2 of weights that sum to one."""
-    return float(1.0 / np.sum(weights**2))
-
-
 def _turn_rad(motion: FloatArray) -> float:
     """Rotation angle of a rigid or similarity motion."""
-    return rotation_angle_rad(motion[:3, :3] / np.cbrt(np.linalg.det(motion[:3, :3])))
+    return rotation_angle_rad(motion[:3, :3] / math.hypot(*motion[:3, 0].tolist()))
+
+
+@compiled
+def _side_by_side(
+    source_rows: IntArray, of_source: IntArray, target_rows: IntArray, of_target: IntArray
+) -> IntArray:
+    """(M, 2) rows of whole clouds, from those of the points that take part."""
+    pairs = np.empty((len(of_source), 2), dtype=np.intp)
+    for m in range(len(pairs)):
+        pairs[m, 0], pairs[m, 1] = source_rows[of_source[m]], target_rows[of_target[m]]
+    return pairs

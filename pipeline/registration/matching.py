@@ -132,8 +132,7 @@ class _Subset:
         if self._partners is None:
             self._partners = _Partners(self.tree, len(queries.cloud.points_m))
         found = self._partners.nearest(queries.rows, places_m, gate_m)
-        near = np.flatnonzero(found >= 0)
-        return near, found[near]
+        return _paired(found)
 
     _partners: _Partners | None = None
 
@@ -174,13 +173,14 @@ class _Partners:
         Returns:
             (n,), -1 where none is within the gate.
         """
-        found = np.empty(len(rows), dtype=np.intp)
         tree, state = (*self._tree.parts, self._tree.order), (self._two, self._places_m, self._clear_m)
+        found, unsure = np.empty((2, len(rows)), dtype=np.intp)
+        count = _still_nearest(tree[0], tree[-1], rows, places_m, gate_m, *state, found, unsure)
 
         def work(first: int, last: int) -> None:
-            _nearest_again(*tree, rows, places_m, first, last, gate_m, *state, found)
+            _nearest_again(*tree, rows, places_m, unsure[first:last], gate_m, *state, found)
 
-        in_parts(work, len(rows))
+        in_parts(work, count)
         return found
 
 
@@ -195,6 +195,34 @@ def _moved(T: FloatArray, points: FloatArray) -> FloatArray:
 
 
 @compiled
+def _still_nearest(
+    points: FloatArray,
+    order: IntArray,
+    rows: IntArray,
+    places: FloatArray,
+    gate: float,
+    two: IntArray,
+    searched_at: FloatArray,
+    clear: FloatArray,
+    found: IntArray,
+    unsure: IntArray,
+) -> int:
+    """Write what is found without a search, and which have to be searched; gives how many those are."""
+    count = 0
+    for i in range(len(rows)):
+        row, place = rows[i], places[i]
+        motion = np.sqrt(squared_distance(place, searched_at[row]))
+        if two[row, 0] >= 0 and 2.0 * motion < clear[row, 1] - clear[row, 0]:
+            found[i] = _within(points, order, place, two[row, 0], gate)
+        elif motion < clear[row, 0] - gate:
+            found[i] = -1
+        else:
+            unsure[count] = i
+            count += 1
+    return count
+
+
+@compiled
 def _nearest_again(
     points: FloatArray,
     axes: ByteArray,
@@ -203,8 +231,7 @@ def _nearest_again(
     order: IntArray,
     rows: IntArray,
     places: FloatArray,
-    first: int,
-    last: int,
+    unsure: IntArray,
     gate: float,
     two: IntArray,
     searched_at: FloatArray,
@@ -213,26 +240,39 @@ def _nearest_again(
 ) -> None:
     stack, bounds = working_space()
     squared, near = np.empty(2), np.empty(2, dtype=np.intp)
-    for i in range(first, last):
+    for i in unsure:
         row, place = rows[i], places[i]
-        motion = np.sqrt(squared_distance(place, searched_at[row]))
-        stays = two[row, 0] >= 0 and 2.0 * motion < clear[row, 1] - clear[row, 0]
-        if not stays and motion >= clear[row, 0] - gate:
-            within = (BEYOND_GATE * gate) ** 2
-            if two[row, 1] >= 0:
-                first_old, second_old = points[two[row, 0]], points[two[row, 1]]
-                farther = max(squared_distance(place, first_old), squared_distance(place, second_old))
-                within = min(within, farther * (1.0 + 1e-12))
-            squared[:], near[:] = within, -1
-            search(points, axes, splits, levels, place, squared, near, stack, bounds)
-            two[row], searched_at[row] = near, place
-            clear[row, 0], clear[row, 1] = np.sqrt(squared[0]), np.sqrt(squared[1])
-            stays = near[0] >= 0
-        partner = two[row, 0]
-        if stays and squared_distance(place, points[partner]) <= gate * gate:
-            found[i] = order[partner]
-        else:
-            found[i] = -1
+        within = (BEYOND_GATE * gate) ** 2
+        if two[row, 1] >= 0:
+            first_old, second_old = points[two[row, 0]], points[two[row, 1]]
+            farther = max(squared_distance(place, first_old), squared_distance(place, second_old))
+            within = min(within, farther * (1.0 + 1e-12))
+        for k in range(2):
+            squared[k], near[k] = within, -1
+        search(points, axes, splits, levels, place, squared, near, stack, bounds)
+        for k in range(2):
+            two[row, k], clear[row, k] = near[k], np.sqrt(squared[k])
+        for k in range(3):
+            searched_at[row, k] = place[k]
+        found[i] = _within(points, order, place, near[0], gate)
+
+
+@compiled
+def _within(points: FloatArray, order: IntArray, place: FloatArray, partner: int, gate: float) -> int:
+    """The row of a tree's point, or -1 where it is none or beyond the gate."""
+    if partner >= 0 and squared_distance(place, points[partner]) <= gate * gate:
+        return order[partner]
+    return -1
+
+
+@compiled
+def _paired(found: IntArray) -> tuple[IntArray, IntArray]:
+    """Those that found a partner, and their partners."""
+    near, count = np.empty((2, len(found)), dtype=np.intp), 0
+    for i in range(len(found)):
+        near[0, count], near[1, count] = i, found[i]
+        count += found[i] >= 0
+    return near[0, :count], near[1, :count]
 
 
 @compiled
@@ -252,7 +292,8 @@ def _pairs(
     for m in range(count):
         i, j = near[m], partners[m]
         rows[0, m], rows[1, m] = source_rows[i], target_rows[j]
-        points[0, m], points[1, m] = moved[i], targets[j]
+        for k in range(3):  # a whole point at a time takes four times as long
+            points[0, m, k], points[1, m, k] = moved[i, k], targets[j, k]
         distances[m] = np.sqrt(squared_distance(moved[i], targets[j]))
     return rows[0], rows[1], points[0], points[1], distances
 
@@ -262,15 +303,19 @@ class _Cloud:
 
     def __init__(self, points_m: FloatArray, features: FloatArray | None) -> None:
         self.points_m, self.features = points_m, features
-        self._order = np.argsort(random_keys(points_m, 0))
         self._subsets: dict[int, _Subset] = {}
 
     def subset(self, share: float) -> _Subset:
         """A random share of the points, in their own order; smaller shares lie within larger ones."""
         count = min(len(self.points_m), max(6, round(share * len(self.points_m))))
         if count not in self._subsets:
-            self._subsets[count] = _Subset(self, np.sort(self._order[:count]))
+            whole = count == len(self.points_m)
+            self._subsets[count] = _Subset(self, np.arange(count) if whole else np.sort(self._order[:count]))
         return self._subsets[count]
+
+    @cached_property
+    def _order(self) -> IntArray:
+        return np.argsort(random_keys(self.points_m, 0))
 
 
 def _stacked(points_m: FloatArray, features: FloatArray | None) -> FloatArray:

@@ -7,10 +7,10 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from pipeline.kdtree import KdTree, tree_of
+from pipeline.kdtree import KdTree, compiled, tree_of
 from pipeline.patches import patch_normals
 from pipeline.points import neighbour_distances_m
-from pipeline.types import FloatArray, IntArray
+from pipeline.types import BoolArray, FloatArray, IntArray
 
 NORMAL_NEIGHBOURS, SPACING_NEIGHBOURS = 20, 4
 
@@ -32,21 +32,45 @@ class Normals:
 
     def at(self, rows: IntArray) -> FloatArray:
         """(N, 3), of which those at the ``rows`` are found."""
-        missing = np.zeros(len(self._found), dtype=bool)
-        missing[rows] = True
-        missing &= ~self._found
-        if missing.any():
-            places = np.flatnonzero(missing[self._tree.order])
-            at = self._tree.order[places]
-            normals = patch_normals(self._tree, NORMAL_NEIGHBOURS, places)
-            away = np.einsum("ni,ni->n", normals, self._points_m[at]) > 0
-            self._normals[at] = np.where(away[:, None], -normals, normals)
-            self._found |= missing
+        missing = _enter(rows, self._found)
+        if len(missing):
+            places = np.sort(self._places[missing])
+            found = patch_normals(self._tree, NORMAL_NEIGHBOURS, places)
+            _enter_facing(found, self._tree.order[places], self._points_m, self._normals)
         return self._normals
+
+    @cached_property
+    def _places(self) -> IntArray:
+        """(N,) of the points in their tree."""
+        places = np.empty_like(self._tree.order)
+        places[self._tree.order] = np.arange(len(places))
+        return places
 
     @cached_property
     def _tree(self) -> KdTree:
         return self._tree_of()
+
+
+@compiled
+def _enter(rows: IntArray, entered: BoolArray) -> IntArray:
+    """Those of the ``rows`` that had not been entered, each once; now they have."""
+    new, count = np.empty_like(rows), 0
+    for row in rows:
+        new[count] = row
+        count += not entered[row]
+        entered[row] = True
+    return new[:count]
+
+
+@compiled
+def _enter_facing(found: FloatArray, rows: IntArray, points: FloatArray, normals: FloatArray) -> None:
+    """Write what was found into the ``rows`` of the normals, turned towards the origin."""
+    for i in range(len(rows)):
+        row, along = rows[i], 0.0
+        for k in range(3):
+            along += found[i, k] * points[row, k]
+        for k in range(3):
+            normals[row, k] = -found[i, k] if along > 0.0 else found[i, k]
 
 
 def pca_normals(points_m: FloatArray) -> FloatArray:
@@ -56,7 +80,8 @@ def pca_normals(points_m: FloatArray) -> FloatArray:
 
 def median_spacing_m(points_m: FloatArray) -> float:
     """Median distance of (N, 3) points to their nearest other point."""
-    return float(np.median(tree_of(points_m).nearest(points_m, min(2, len(points_m)))[0][:, 1:]))
+    tree = tree_of(points_m)
+    return float(np.median(tree.nearest(tree.points_m, min(2, len(tree)))[0][:, 1:]))
 
 
 def local_spacing_m(points_m: FloatArray) -> FloatArray:

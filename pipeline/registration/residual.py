@@ -128,12 +128,11 @@ def solve_plane(
     center_m, spread_m, hessian, gradient = _normal_equations(source_m, target_m, normals, rows, weights)
     if spread_m == 0.0:
         raise DegenerateError("all pairs share one point, which leaves the rotation open")
-    values = np.linalg.eigvalsh(hessian)
+    values, vectors = np.linalg.eigh(hessian)
     if not values[-1] <= _LARGEST_CONDITION * values[0]:
         motions = open_motions(source_m, normals[rows], 1.0 / _LARGEST_CONDITION) or "some motion"
         raise DegenerateError(f"{motions} changes no distance to the target's surfaces")
-    damped = hessian + _DAMPING * np.trace(hessian) / 6.0 * np.eye(6)
-    step = np.linalg.solve(damped, gradient)
+    step = vectors @ (gradient @ vectors / (values + _DAMPING * values.mean()))
     rotation = rotation_exp(step[:3])
     return rigid(rotation, center_m - rotation @ center_m + spread_m * step[3:])
 
