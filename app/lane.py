@@ -15,6 +15,14 @@ CANCEL_S = 1.0
 """How long a cancelled job may go on before its process is ended, which costs everybody a new one."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    """A job that begins when the one before it has ended."""
+
+    start: Callable[[], Ticket]
+    on_end: Callable[[Outcome], None]
+
+
 @dataclass(slots=True)
 class LatestWins:
     """A lane of one running and one waiting job; a newer job replaces the waiting one.
@@ -28,7 +36,7 @@ class LatestWins:
     urgent: bool = False
     """Whether its jobs go before those of other lanes."""
     _running: Ticket | None = None
-    _start_waiting: Callable[[], Ticket] | None = None
+    _waiting: _Waiting | None = None
     _lock: threading.RLock = field(default_factory=threading.RLock)
 
     @property
@@ -58,7 +66,7 @@ class LatestWins:
             if self._running is None:
                 self._running = start()
                 return
-            self._start_waiting, running = start, self._running
+            self._waiting, running = _Waiting(start, on_end), self._running
         self.pool.stop(running)
 
     def stop(self) -> None:
@@ -66,20 +74,31 @@ class LatestWins:
         self._stop(None)
 
     def cancel(self) -> None:
-        """Forget the waiting job and have the running one ended within ``CANCEL_S``."""
-        self._stop(CANCEL_S)
+        """Have the running job ended within ``CANCEL_S``, and tell the waiting one that it does not begin."""
+        waiting = self._stop(CANCEL_S)
+        if waiting is not None:
+            waiting.on_end(Outcome("stopped"))
 
-    def _stop(self, patience_s: float | None) -> None:
+    def _stop(self, patience_s: float | None) -> _Waiting | None:
         with self._lock:
-            self._start_waiting, running = None, self._running
+            waiting, self._waiting, running = self._waiting, None, self._running
         if running is not None:
             self.pool.stop(running, patience_s)
+        return waiting
 
     def _ended(self, on_end: Callable[[Outcome], None], outcome: Outcome) -> None:
         with self._lock:
-            start, self._start_waiting = self._start_waiting, None
-            self._running = None if start is None else start()
+            waiting, self._waiting = self._waiting, None
+            self._running = None if waiting is None else waiting.start()
         on_end(outcome)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Submission:
+    """One time that a step was handed to its lane; the same step may be again, while this one is stopping."""
+
+    step: Step
+    key: tuple[Any, ...]
 
 
 @dataclass(slots=True, eq=False)
@@ -88,6 +107,10 @@ class Track:
 
     lane: LatestWins
     steps: tuple[Step, ...]
-    running: Step | None = None
-    submitted: tuple[Any, ...] | None = None
-    """The key of what is running."""
+    submitted: Submission | None = None
+    """What is running, or waits for the one before it to stop."""
+
+    @property
+    def running(self) -> Step | None:
+        """The step that is computed now."""
+        return None if self.submitted is None else self.submitted.step

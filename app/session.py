@@ -15,7 +15,7 @@ import viser
 from app import jobs
 from app.framing import Framing
 from app.header import Header
-from app.lane import LatestWins, Track
+from app.lane import LatestWins, Submission, Track
 from app.lecture import Lecture
 from app.page import add_script, screen_mark
 from app.places import Places
@@ -221,20 +221,20 @@ class Session:
                 break
             self._take(step, self.spec.key(step), view)
         if step is None:
-            track.running = track.submitted = None
+            track.submitted = None
             return
-        key = self.spec.key(step)
-        if key == track.submitted or self._waits(step):
+        one = Submission(step, self.spec.key(step))
+        if (track.submitted is not None and track.submitted.key == one.key) or self._waits(step):
             return
-        track.running, track.submitted = step, key
+        track.submitted = one
         track.lane.submit(
             jobs.run_step,
             step,
             self.store,
             self.spec,
-            on_progress=lambda value: self._post_in_turn(self._progressed, step, value, key),
-            on_end=lambda outcome: self._post_in_turn(self._ended, track, step, key, outcome),
-            key=key,
+            on_progress=lambda value: self._post_in_turn(self._progressed, step, value, one.key),
+            on_end=lambda outcome: self._post_in_turn(self._ended, track, one, outcome),
+            key=one.key,
         )
 
     def _waits(self, step: Step) -> bool:
@@ -242,10 +242,10 @@ class Session:
         waiting = (panel for panel in self.panels if panel.only_when_shown and panel is not self.current)
         return any(panel.step == step for panel in waiting)
 
-    def _ended(self, track: Track, step: Step, key: tuple[Any, ...], outcome: Outcome) -> None:
-        latest = key == track.submitted
+    def _ended(self, track: Track, one: Submission, outcome: Outcome) -> None:
+        step, key, latest = one.step, one.key, one is track.submitted
         if latest:
-            track.running = track.submitted = None
+            track.submitted = None
         if outcome.kind == "result":
             self._shared.put(key, outcome.value)
             self._take(step, key, outcome.value)
@@ -324,7 +324,7 @@ class Session:
         """Stop what is computed only while somebody looks; it goes on from there when it is shown again."""
         for track in self._tracks:
             if track.running is not None and self._waits(track.running):
-                track.running = track.submitted = None
+                track.submitted = None
                 track.lane.stop()
 
     def frame_view(self, anew: bool = False, keep: bool = False) -> None:

@@ -1,0 +1,82 @@
+"""What a session asks the pool for, and what it makes of the answers; nothing is computed."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import pytest
+
+from app.pool import Outcome
+from app.screens.scene.panel import ScenePanel
+from app.session import CANCELLED, Session
+from app.state import SharedViews
+from app.uploads import Uploads
+from tests.app.fakes import START
+
+LONG_S = 30.0
+OTHER = replace(START, source=replace(START.source, name="office"))
+
+
+@dataclass
+class Pool:
+    """Begins every job and ends none."""
+
+    begun: list[Any] = field(default_factory=list)
+    """What is to be told the end of each."""
+
+    def submit(self, owner, function, *arguments, on_progress, on_end, key, urgent):
+        self.begun.append(on_end)
+        return on_end
+
+    def stop(self, ticket, patience_s=None):
+        """It will stop at its next report."""
+
+
+@pytest.fixture
+def pool():
+    return Pool()
+
+
+@pytest.fixture
+def session(server, store, pool, tmp_path):
+    session = Session(server, pool, store, Uploads(tmp_path), SharedViews(), START, [ScenePanel])
+    with contextlib.closing(session):
+        settle(session)
+        yield session
+
+
+def settle(session):
+    """Wait until the session has done all that was posted, also what waits for its turn to draw."""
+    done = threading.Event()
+    session._post_in_turn(done.set)
+    assert done.wait(LONG_S)
+
+
+def test_the_end_of_what_was_stopped_is_not_that_of_the_same_asked_for_again(session, pool):
+    for spec in (OTHER, START):
+        session.post(session.want, spec)
+    settle(session)
+    assert len(pool.begun) == 1  # it is still asked to stop
+    pool.begun[0](Outcome("stopped"))
+    settle(session)
+    assert len(pool.begun) == 2
+    assert session.results.failure("scene", START) is None
+    assert session._tracks[0].running == "scene"
+
+
+@pytest.mark.parametrize("asked", [[], [OTHER, START]], ids=["running", "waiting"])
+def test_what_a_person_cancels_has_failed_until_it_is_asked_for_again(session, pool, asked):
+    for spec in asked:
+        session.post(session.want, spec)
+    session.post(session._act, "Cancel")
+    settle(session)
+    pool.begun[0](Outcome("stopped"))
+    settle(session)
+    assert session.results.failure("scene", START) == CANCELLED
+    assert session._tracks[0].running is None
+    session.post(session._act, "Retry")
+    settle(session)
+    assert len(pool.begun) == 2
