@@ -7,9 +7,13 @@ behind ``app.screens.``: ``fuse.race_job:race_job``. The job of a step is ``STEP
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 from collections.abc import Iterator
 from typing import Any
+
+from app.pool import ComputePool
+from app.state import CHAIN
 
 SCREENS = "app.screens"
 
@@ -25,13 +29,20 @@ def run_step(step: str, *arguments: Any) -> Any:
     return run(f"{step}.job:{step}_job", *arguments)
 
 
+def start_pool() -> ComputePool:
+    """Computing processes that know every job; the first begins at once."""
+    return ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
+
+
 def warm_up() -> Iterator[None]:
-    """Import every screen's jobs, yield, and go on to load what is compiled, a little at a time."""
+    """Import the first step's job, then all others and what is compiled, a little before each yield."""
+    for step in CHAIN:
+        importlib.import_module(f"{SCREENS}.{step}.job")
+        yield
     screens = importlib.import_module(SCREENS)
     for screen in pkgutil.iter_modules(screens.__path__, f"{SCREENS}."):
         for module in pkgutil.iter_modules(importlib.import_module(screen.name).__path__, f"{screen.name}."):
             if module.name.endswith("job"):
                 importlib.import_module(module.name)
-    warm = importlib.import_module("pipeline.warm")
-    yield
-    yield from warm.warm_up()
+                yield
+    yield from importlib.import_module("pipeline.warm").warm_up()

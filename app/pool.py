@@ -73,8 +73,9 @@ class _Slot:
     connection: Connection | None = None
     ticket: Ticket | None = None
     ready: bool = False
-    tried: threading.Event = field(default_factory=threading.Event)
-    """Set once its process is ready, or has died: the next one starts then, not beside it."""
+    next_may_start: threading.Event = field(default_factory=threading.Event)
+    """Set once its process has nothing more to prepare, has died, or is not enough for the jobs there are:
+    what the next one imports would slow down the first job."""
 
 
 def _nothing() -> Iterator[None]:
@@ -93,7 +94,10 @@ class ComputePool:
         warm_up: Callable[[], Iterator[None]] = _nothing,
         patience_s: float = PATIENCE_S,
     ) -> None:
-        """``warm_up`` runs in each process: to its first yield before any job, on while none waits."""
+        """``warm_up`` runs in each process: to its first yield before any job, on while none waits.
+
+        The first process starts at once, each other one when there is work for it or those before are warm.
+        """
         self._context = multiprocessing.get_context("spawn")
         self._warm_up = warm_up
         self._patience_s = patience_s
@@ -163,7 +167,7 @@ class ComputePool:
             self._closing.set()
             waiting, self._waiting = self._waiting, []
             for slot in self._slots:
-                slot.tried.set()
+                slot.next_may_start.set()
                 if slot.process is not None:
                     slot.process.terminate()
         for ticket in waiting:
@@ -188,20 +192,28 @@ class ComputePool:
         for slot in self._slots:
             if slot.ticket is not None or not slot.ready:
                 continue
-            running = [other.ticket for other in self._slots if other.ticket is not None]
-            owners, keys = {id(one.owner) for one in running}, {one.key for one in running} - {None}
-            free = [one for one in self._waiting if id(one.owner) not in owners and one.key not in keys]
+            free = self._free()
             if not free:
                 return
             ticket = next((one for one in free if one.urgent), free[0])
             self._waiting.remove(ticket)
             slot.ticket = ticket
             _send(slot, ("job", (ticket.function, ticket.arguments)))
+        if self._free():
+            for slot in self._slots:
+                if slot.ready:
+                    slot.next_may_start.set()
+
+    def _free(self) -> list[Ticket]:
+        """The waiting jobs that may run beside those that do; the lock is held."""
+        running = [slot.ticket for slot in self._slots if slot.ticket is not None]
+        owners, keys = {id(one.owner) for one in running}, {one.key for one in running} - {None}
+        return [one for one in self._waiting if id(one.owner) not in owners and one.key not in keys]
 
     def _attend(self, slot: _Slot, before: _Slot | None) -> None:
         """Keep one process alive and hand on what it says, until the pool closes; after the one before."""
         if before is not None:
-            before.tried.wait()
+            before.next_may_start.wait()
         while not self._closed:
             if not self._start(slot):
                 self._closing.wait(RESPAWN_PAUSE_S)
@@ -241,6 +253,9 @@ class ComputePool:
 
     def _hear(self, slot: _Slot, kind: str, value: Any) -> None:
         ticket = slot.ticket
+        if kind == "warm":
+            slot.next_may_start.set()
+            return
         if kind == "progress" and ticket is not None:
             with self._lock:
                 others = self._others(ticket)
@@ -249,7 +264,6 @@ class ComputePool:
             return
         with self._lock:
             slot.ready, slot.ticket = True, None
-            slot.tried.set()
             others = self._served(ticket, kind)
             if kind != "ready" and _memory_bytes(slot.process) > MEMORY_LIMIT_BYTES:
                 slot.ready = False
@@ -274,7 +288,7 @@ class ComputePool:
         with self._lock:
             ticket, slot.ticket = slot.ticket, None
             slot.ready = False
-            slot.tried.set()
+            slot.next_may_start.set()
             if slot.connection is not None:
                 slot.connection.close()
             stopped = self._closed or (ticket is not None and ticket.stopping)
@@ -319,11 +333,14 @@ def _child(connection: Connection, warm_up: Callable[[], Iterator[None]], thread
         os.environ.setdefault(name, str(threads))
     try:
         warming = warm_up()
-        warmer = _goes_on(warming)
+        more, said = _goes_on(warming), False
         connection.send(("ready", None))
         while True:
-            while warmer and not connection.poll():
-                warmer = _goes_on(warming)
+            while more and not connection.poll():
+                more = _goes_on(warming)
+            if not (more or said):
+                connection.send(("warm", None))
+                said = True
             kind, job = connection.recv()
             if kind == "job":
                 connection.send(_answer(connection, *job))

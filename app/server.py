@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import logging
-import os
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from app.any_thread import queue_from_any_thread
 from app.drawing.colors import BRAND
 from app.entrance import Entrance, Token, is_loopback
 from app.headers import strict_headers
-from app.jobs import warm_up
+from app.jobs import start_pool
 from app.landing import landing_first
 from app.lecture import Lecture
 from app.origin import only_own_page
@@ -105,6 +104,7 @@ def build_server(
     port: int = 8080,
     lecture: bool = False,
     with_token: bool = True,
+    pool: ComputePool | None = None,
 ) -> AppServer:
     """Start serving and return at once.
 
@@ -115,6 +115,7 @@ def build_server(
         port: port to listen on; 0 lets the system choose one.
         lecture: share one session among all browsers, steered by those who come by ``teacher_url``.
         with_token: let only those in who come by ``class_link``, where other machines reach the host.
+        pool: one that was started before; None starts one. It ends with the server.
 
     Raises:
         InputError: the port is taken or the address is not this machine's.
@@ -125,7 +126,7 @@ def build_server(
     share_arenas()
     spec = start_spec(scene, config or PipelineConfig())
     folder = own_folder()
-    pool = ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
+    pool = start_pool() if pool is None else pool
     teacher = Token("teacher") if lecture else None
     visitor = Token("token") if with_token and not is_loopback(host) else None
     entrance = Entrance(visitor, teacher)

@@ -37,13 +37,21 @@ def serve(
             votes and looks around.
         no_token: With another --host: let in whoever reaches it, not only who has the link that is printed.
     """
-    from app.entrance import is_loopback
-    from app.server import build_server
+    from app.jobs import start_pool
 
+    config = config_named(preset, PRESETS)
     stops = list[int]()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: stops.append(number))
-    app = build_server(scene, config_named(preset, PRESETS), host, port, lecture, not no_token)
+    pool = start_pool()  # it imports what it needs while this process does
+    try:
+        from app.entrance import is_loopback
+        from app.server import build_server
+
+        app = build_server(scene, config, host, port, lecture, not no_token, pool)
+    except BaseException:
+        pool.close()
+        raise
     try:
         if lecture:
             say(f"You teach at {app.teacher_url} (keep it to yourself; stop with Ctrl-C)")

@@ -1,0 +1,71 @@
+"""All commands by their names, and how a run of one ends."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from typing import Any
+
+import tyro
+
+from app.cli.bench import bench
+from app.cli.calibrate import calibrate
+from app.cli.deliver import deliver
+from app.cli.doctor import doctor
+from app.cli.import_rig import import_rig
+from app.cli.infer_depth import infer_depth
+from app.cli.mesh import mesh
+from app.cli.reconstruct import reconstruct
+from app.cli.register import register
+from app.cli.reproduce import reproduce
+from app.cli.scenes import scenes
+from app.cli.serve import serve
+from app.cli.simulate import simulate
+from app.cli.target import target
+from app.cli.text import say
+from packetmesh.errors import PacketMeshError
+from packetmesh.files import file_trouble
+
+COMMANDS: dict[str, Any] = {
+    "serve": serve,
+    "reconstruct": reconstruct,
+    "import": import_rig,
+    "calibrate": calibrate,
+    "target": target,
+    "register": register,
+    "mesh": mesh,
+    "infer-depth": infer_depth,
+    "simulate": simulate,
+    "deliver": deliver,
+    "reproduce": reproduce,
+    "bench": bench,
+    "scenes": scenes,
+    "doctor": doctor,
+}
+
+
+def run(argv: list[str] | None) -> None:
+    """Run one command, and exit with its code."""
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    try:
+        tyro.extras.subcommand_cli_from_dict(
+            COMMANDS,
+            prog="packetmesh",
+            description="From a camera node's packets to a surface mesh.",
+            args=argv,
+            config=(tyro.conf.FlagCreatePairsOff,),
+        )
+        sys.stdout.flush()
+    except PacketMeshError as error:
+        say(f"packetmesh: {error}")
+        sys.exit(1)
+    except BrokenPipeError:  # whoever read the output has gone, and wants no more of it
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except OSError as error:
+        say(f"packetmesh: {file_trouble(error)}")
+        sys.exit(1)
+    except KeyboardInterrupt:
+        say("packetmesh: stopped")
+        sys.exit(130)
