@@ -80,7 +80,10 @@ class Load:
             f"later than {LATE_S:g} s: {record['late']} of {record['clicks']} answers",
             f"memory: server {record['server_peak_bytes'] / 1e6:.0f} MB, "
             f"workers {record['workers_peak_bytes'] / 1e6:.0f} MB at most; server by quarters "
-            + ", ".join(f"{quarter['server_bytes'] / 1e6:.0f}" for quarter in quarters),
+            + ", ".join(
+                f"{quarter['server_least_bytes'] / 1e6:.0f} to {quarter['server_bytes'] / 1e6:.0f}"
+                for quarter in quarters
+            ),
             "store by quarters: "
             + ", ".join(f"{quarter['files']} files {quarter['bytes'] / 1e6:.0f} MB" for quarter in quarters),
             f"lost: {len(record['lost'])} of {record['browsers']} browsers; jobs of browsers that had left: "
@@ -104,9 +107,14 @@ class Load:
         return {number: times[-1] - times[0] for number, times in seen.items()}
 
     def _part(self, begin_s: float, end_s: float) -> dict[str, float]:
-        """The most of everything in a part of the time."""
+        """The most of everything in a part of the time, and the least memory of the server, which goes up and
+        down with every browser that comes.
+        """
         looks = [_counts(look) for at_s, look in self.looks if begin_s <= at_s <= end_s]
-        return {name: max(look[name] for look in looks) for name in looks[0]} if looks else {}
+        if not looks:
+            return {}
+        least = min(look["server_bytes"] for look in looks)
+        return {name: max(look[name] for look in looks) for name in looks[0]} | {"server_least_bytes": least}
 
 
 def put_load(seconds: float) -> Load:

@@ -32,6 +32,8 @@ def test_the_figures_of_a_load():
     assert record["strays_beyond_patience"] == 1
     assert (record["server_peak_bytes"], record["workers_peak_bytes"]) == (150, 200)
     assert [quarter["files"] for quarter in record["quarters"] if quarter] == [3, 4]
+    first = record["quarters"][0]
+    assert (first["server_least_bytes"], first["server_bytes"]) == (100, 150)
     assert any("lost: 1 of 2" in note for note in load.notes())
 
 
