@@ -5,6 +5,9 @@ BIN    := $(VENV)/bin
 SCENE  ?= living-room
 ARGS   ?=
 
+# Where no bytecode is kept, every process compiles all that it imports: two seconds each.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: run test check bench reproduce results results-record lock scenes clean
 
 run: $(VENV)/.core  ## the app in the browser, with a scene reconstructed

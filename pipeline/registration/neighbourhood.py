@@ -13,10 +13,12 @@ from pipeline.points import neighbour_distances_m
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 NORMAL_NEIGHBOURS, SPACING_NEIGHBOURS = 20, 4
+FEW_POINTS = 20_000
+"""The normals of so few are all found at once, on all cores, rather than some at every iteration."""
 
 
 class Normals:
-    """Unit normals of a cloud's points, each found when it is first asked for.
+    """Unit normals of a cloud's points, found when they are first asked for: of many points, only those.
 
     They are those of the planes through each point's nearest 20, towards a camera at the origin.
     """
@@ -26,12 +28,16 @@ class Normals:
     ) -> None:
         """Of (N, 3) points; ``known`` are their normals if they have some, ``tree`` gives their tree."""
         self._points_m, self._tree_of = points_m, tree or partial(tree_of, points_m)
-        self._found = np.full(len(points_m), known is not None)
+        self._found, self._all = np.full(len(points_m), known is not None), known is not None
         given = np.empty((len(points_m), 3)) if known is None else known
         self._normals = np.ascontiguousarray(given, dtype=np.float64)
 
     def at(self, rows: IntArray) -> FloatArray:
         """(N, 3), of which those at the ``rows`` are found."""
+        if self._all:
+            return self._normals
+        if len(self._found) <= FEW_POINTS:
+            rows, self._all = np.arange(len(self._found)), True
         missing = _enter(rows, self._found)
         if len(missing):
             places = np.sort(self._places[missing])
