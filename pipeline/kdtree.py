@@ -17,7 +17,7 @@ import numpy as np
 
 from pipeline.types import ByteArray, FloatArray, IntArray
 
-LEAF_POINTS = 10
+LEAF_POINTS = 16
 """A node with more points is split."""
 SERIAL_POINTS = 512
 """Fewer points are searched on the calling thread: others would take longer to wake."""

@@ -158,6 +158,7 @@ def _iterations(
         if acceleration is not None:
             moved_T = acceleration.extrapolated(T, moved_T, kept)
             motion = moved_T @ np.linalg.inv(T)
+        mean_m, mean_squared_m2 = _moments(support.distances_m, kept.weights)
         step = RegistrationStep(
             index=index,
             T_target_source=moved_T,
@@ -166,9 +167,9 @@ def _iterations(
             distances_m=support.distances_m,
             sigma_m=kept.sigma_m,
             gate_m=min(method.gate_m, kept.gate_m),
-            objective=_mean(residual.squared_m2(support, motion), kept.weights),
-            rmse_m=float(np.sqrt(_mean(support.distances_m**2, kept.weights))),
-            mean_distance_m=_mean(support.distances_m, kept.weights),
+            objective=residual.mean_squared_m2(support, kept.weights, motion),
+            rmse_m=math.sqrt(mean_squared_m2),
+            mean_distance_m=mean_m,
             effective_pairs=effective,
             entropy_nat=kept.entropy_nat,
             rotation_step_rad=_turn_rad(motion),
@@ -205,15 +206,20 @@ def _weigh(
         )
     if len(kept.rows) < MIN_PAIRS:
         raise DegenerateError(f"only {len(kept.rows)} pairs are close enough")
-    effective = 1.0 / _mean(kept.weights, kept.weights)
+    effective = 1.0 / float(np.einsum("m,m->", kept.weights, kept.weights))
     if effective < MIN_EFFECTIVE_PAIRS:
         raise DegenerateError(f"only {effective:.1f} pairs carry all the weight")
     return method, matching, kept, effective
 
 
-def _mean(values: FloatArray, weights: FloatArray) -> float:
-    """With weights that sum to one; without BLAS, whose threads go on spinning beside the next search."""
-    return float(np.einsum("m,m->", values, weights))
+@compiled
+def _moments(distances: FloatArray, weights: FloatArray) -> tuple[float, float]:
+    """Mean and mean square with weights that sum to one."""
+    mean = mean_squared = 0.0
+    for m in range(len(distances)):
+        mean += weights[m] * distances[m]
+        mean_squared += weights[m] * distances[m] * distances[m]
+    return mean, mean_squared
 
 
 def _turn_rad(motion: FloatArray) -> float:

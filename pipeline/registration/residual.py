@@ -11,7 +11,7 @@ import numpy as np
 
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import apply, rigid, rotation_exp
+from pipeline.geometry import apply, rigid
 from pipeline.kdtree import compiled, squared_distance
 from pipeline.registration.matching import Matcher, Matching
 from pipeline.registration.neighbourhood import Normals
@@ -41,9 +41,10 @@ class PointResidual:
             pairs.moved_m, pairs.target_m, weights, self.with_scale, self.unweighted_centroids
         )
 
-    def squared_m2(self, pairs: Matching, motion: FloatArray) -> FloatArray:
-        """(M,) squared distances after a motion."""
-        return np.sum((apply(motion, pairs.moved_m) - pairs.target_m) ** 2, axis=1)
+    def mean_squared_m2(self, pairs: Matching, weights: FloatArray, motion: FloatArray) -> float:
+        """Weighted mean squared distance after a motion."""
+        apart_m = apply(motion, pairs.moved_m) - pairs.target_m
+        return float(np.einsum("m,mi,mi->", weights, apart_m, apart_m))
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +59,11 @@ class PlaneResidual:
         rows = pairs.target_rows
         return solve_plane(pairs.moved_m, pairs.target_m, self.normals.at(rows), weights, rows)
 
-    def squared_m2(self, pairs: Matching, motion: FloatArray) -> FloatArray:
-        """(M,) squared distances along the normals after a motion."""
+    def mean_squared_m2(self, pairs: Matching, weights: FloatArray, motion: FloatArray) -> float:
+        """Weighted mean squared distance along the normals after a motion."""
         rows = pairs.target_rows
-        return _squared_heights(pairs.moved_m, pairs.target_m, self.normals.at(rows), rows, motion)
+        normals = self.normals.at(rows)
+        return float(_mean_squared_height(pairs.moved_m, pairs.target_m, normals, rows, weights, motion))
 
 
 def residual_for(
@@ -125,16 +127,55 @@ def solve_plane(
         DegenerateError: the planes leave motions free (all parallel, one cylinder, one sphere).
     """
     rows = np.arange(len(normals)) if normal_rows is None else normal_rows
-    center_m, spread_m, hessian, gradient = _normal_equations(source_m, target_m, normals, rows, weights)
+    motion, spread_m, values = _plane_step(source_m, target_m, normals, rows, weights)
     if spread_m == 0.0:
         raise DegenerateError("all pairs share one point, which leaves the rotation open")
-    values, vectors = np.linalg.eigh(hessian)
     if not values[-1] <= _LARGEST_CONDITION * values[0]:
         motions = open_motions(source_m, normals[rows], 1.0 / _LARGEST_CONDITION) or "some motion"
         raise DegenerateError(f"{motions} changes no distance to the target's surfaces")
-    step = vectors @ (gradient @ vectors / (values + _DAMPING * values.mean()))
-    rotation = rotation_exp(step[:3])
-    return rigid(rotation, center_m - rotation @ center_m + spread_m * step[3:])
+    return motion
+
+
+@compiled
+def _plane_step(
+    source: FloatArray, target: FloatArray, normals: FloatArray, rows: IntArray, weights: FloatArray
+) -> tuple[FloatArray, float, FloatArray]:
+    """The (4, 4) motion of ``solve_plane``, the pairs' spread, and the eigenvalues of a step's matrix."""
+    motion = np.eye(4)
+    center, spread, hessian, gradient = _normal_equations(source, target, normals, rows, weights)
+    if spread == 0.0:
+        return motion, spread, gradient
+    values, vectors = np.linalg.eigh(hessian)
+    step, damping = np.zeros(6), _DAMPING * values.mean()
+    for a in range(6):
+        along = 0.0
+        for b in range(6):
+            along += vectors[b, a] * gradient[b]
+        for b in range(6):
+            step[b] += vectors[b, a] * along / (values[a] + damping)
+    rotation = _rotation(step[0], step[1], step[2])
+    for a in range(3):
+        motion[a, 3] = center[a] + spread * step[3 + a]
+        for b in range(3):
+            motion[a, b] = rotation[a, b]
+            motion[a, 3] -= rotation[a, b] * center[b]
+    return motion, spread, values
+
+
+@compiled
+def _rotation(x: float, y: float, z: float) -> FloatArray:
+    """``geometry.rotation_exp``, compiled."""
+    angle = np.sqrt(x * x + y * y + z * z)
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine = np.sin(angle) / angle if angle > 0.0 else 1.0
+    half = np.sin(0.5 * angle) / (0.5 * angle) if angle > 0.0 else 1.0
+    rotation = np.eye(3)
+    for a in range(3):
+        for b in range(3):
+            rotation[a, b] += sine * across[a, b]
+            for k in range(3):
+                rotation[a, b] += 0.5 * half * half * across[a, k] * across[k, b]
+    return rotation
 
 
 @compiled
@@ -176,11 +217,16 @@ def _normal_equations(
 
 
 @compiled
-def _squared_heights(
-    source: FloatArray, target: FloatArray, normals: FloatArray, rows: IntArray, motion: FloatArray
-) -> FloatArray:
-    """(M,) squared distances of moved points from the planes through their partners."""
-    squared = np.empty(len(rows))
+def _mean_squared_height(
+    source: FloatArray,
+    target: FloatArray,
+    normals: FloatArray,
+    rows: IntArray,
+    weights: FloatArray,
+    motion: FloatArray,
+) -> float:
+    """Of moved points over the planes through their partners; the weights sum to one."""
+    mean = 0.0
     for m in range(len(rows)):
         height = 0.0
         for k in range(3):
@@ -188,5 +234,5 @@ def _squared_heights(
             for j in range(3):
                 moved += motion[k, j] * source[m, j]
             height += normals[rows[m], k] * (moved - target[m, k])
-        squared[m] = height * height
-    return squared
+        mean += weights[m] * height * height
+    return mean

@@ -2,8 +2,8 @@
 
 ``python -m tests.benchmarks.first_result`` starts the server as a process of its own, opens Chromium on it as
 soon as it answers, and prints, from the start of the server, when the panels are there, the first scene is
-drawn, its surface is measured, and all of the chain is up to date; the median of several starts after one that
-keeps the bytecode, as ``make run`` does.
+drawn, its surface is measured, and all of the chain is up to date: the median of several starts, after one
+that keeps the bytecode as ``make run`` does.
 """
 
 from __future__ import annotations
