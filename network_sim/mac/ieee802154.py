@@ -34,6 +34,8 @@ HEADER_BYTES = CHECKED_BYTES + 6
 """The same with a network and two short addresses."""
 ACK_BYTES = PHY_BYTES + CHECKED_BYTES
 ACK_NS = ACK_BYTES * BYTE_NS
+ACKNOWLEDGED_NS = TURNAROUND_NS + ACK_NS
+"""From the end of a frame to that of its acknowledgement."""
 MIN_BE = 3
 MAX_BE = 5
 MAX_CSMA_BACKOFFS = 4
@@ -63,7 +65,8 @@ class Ieee802154:
         self._add = context.recorder.add_packet
         self._up = context.up
         self._receive = context.receive
-        self._lost = LinkLosses(context.config.loss, context.config.run.seed).lost
+        loss = context.config.loss
+        self._losses = LinkLosses(loss, context.config.run.seed) if loss.share else None
         self._ready_ns: dict[int, int] = {}
         self._acking_until_ns: dict[int, int] = {}
         """Until when in ns each receiver is busy with an acknowledgement."""
@@ -78,74 +81,72 @@ class Ieee802154:
         """
         arrived, frame_bytes = False, PHY_BYTES + HEADER_BYTES + packet.size_bytes
         for attempt in range(self._attempts):
-            refusal, ahead_ns = yield from self._access(packet, sender, receiver, frame_bytes * BYTE_NS)
+            refusal, begins_ns = yield from self._access(packet, sender, receiver)
             if refusal:
                 return Delivery(False, Cause.ACK_LOST if arrived else refusal, attempt)
-            cause = yield from self._transmit(packet, sender, receiver, frame_bytes, ahead_ns)
+            ends_ns = begins_ns + frame_bytes * BYTE_NS
+            cause = yield from self._transmit(packet, sender, receiver, frame_bytes, begins_ns)
             if not cause and not arrived:
                 arrived = True
-                self._add(int(self._env.now), _DELIVER, packet, sender, receiver, packet.size_bytes)
+                self._add(ends_ns, _DELIVER, packet, sender, receiver, packet.size_bytes)
                 self._receive(packet, receiver)
             if not self._ack:
-                self._begin_interframe_space(packet, sender)
+                self._ready_ns[sender] = ends_ns + spacing_ns(frame_bytes - PHY_BYTES)
                 return Delivery(self._up(sender), cause, 1)
-            acknowledged = yield from self._acknowledge(packet, sender, receiver, cause)
+            acknowledged = yield from self._acknowledge(packet, sender, receiver, cause, ends_ns)
             if acknowledged:
-                self._begin_interframe_space(packet, sender)
+                self._ready_ns[sender] = ends_ns + ACKNOWLEDGED_NS + spacing_ns(frame_bytes - PHY_BYTES)
                 return Delivery(True, _NONE, attempt + 1)
         return Delivery(False, Cause.ACK_LOST if arrived else Cause.RETRIES, self._attempts)
 
     def _access(
-        self, packet: Packet, sender: int, receiver: int, air_ns: int
+        self, packet: Packet, sender: int, receiver: int
     ) -> Generator[simpy.Event, Any, tuple[Cause, int]]:
-        """CSMA/CA: wait for an idle channel, as far as anything can happen meanwhile.
+        """CSMA/CA: wait for an idle channel, without an event wherever nothing else happens before.
 
         Returns:
-            Why the sender may not send, or ``NONE``, and in how many ns its frame of ``air_ns`` begins.
+            Why the sender may not send, or ``NONE``, and when its frame begins.
         """
-        env, now_ns = self._env, int(self._env.now)
-        wait_ns = max(self._ready_ns.get(sender, 0) - now_ns, 0)
+        env, waited_ns = self._env, int(self._env.now)
+        at_ns = max(self._ready_ns.get(sender, 0), waited_ns)
         for window in _WINDOWS:
-            wait_ns += (next(self._backoffs) & window) * BACKOFF_NS + CCA_NS
-            then_ns = now_ns + wait_ns
-            if self._idle_at(sender, then_ns, then_ns + TURNAROUND_NS + air_ns):
-                return _NONE, wait_ns + TURNAROUND_NS
-            yield env.timeout(wait_ns)
-            wait_ns, now_ns = 0, then_ns
+            at_ns += (next(self._backoffs) & window) * BACKOFF_NS + CCA_NS
+            if self._next_ns() <= at_ns:
+                yield env.timeout(at_ns - waited_ns)
+                waited_ns = at_ns
             if not self._up(sender):
-                return Cause.NODE_DOWN, 0
-            if not self._busy(sender, now_ns):
-                yield env.timeout(TURNAROUND_NS)
-                return (_NONE if self._up(sender) else Cause.NODE_DOWN), 0
-        self._record(EventKind.LOSS, packet, sender, receiver, packet.size_bytes, Cause.CHANNEL)
-        return Cause.CHANNEL, 0
+                refusal = Cause.NODE_DOWN
+                break
+            if not self._busy(sender, at_ns):
+                begins_ns = at_ns + TURNAROUND_NS
+                if self._next_ns() <= begins_ns:
+                    yield env.timeout(begins_ns - waited_ns)
+                return (_NONE if self._up(sender) else Cause.NODE_DOWN), begins_ns
+        else:
+            refusal = Cause.CHANNEL
+        if at_ns > waited_ns:
+            yield env.timeout(at_ns - waited_ns)
+        if refusal is Cause.CHANNEL:
+            self._record(EventKind.LOSS, packet, sender, receiver, packet.size_bytes, refusal)
+        return refusal, at_ns
 
-    def _idle_at(self, sender: int, then_ns: int, end_ns: int) -> bool:
-        """Whether an assessment that ends then is sure to find an idle channel: nothing happens before."""
-        return (
-            self._medium.undisturbed
-            and self._next_ns() > end_ns
-            and self._acking_until_ns.get(sender, 0) <= then_ns
-            and self._up(sender)
-        )
+    def _busy(self, node: int, at_ns: int) -> bool:
+        """Whether an assessment that ends then finds the channel busy, or the node has to acknowledge.
 
-    def _busy(self, node: int, now_ns: int) -> bool:
-        """Whether an assessment that ends now finds the channel busy, or the node has to acknowledge.
-
-        The end of the assessment decides (as in ns-3's lr-wpan): only the turnaround is vulnerable.
+        The end of the assessment decides (as in ns-3's lr-wpan): only the turnaround is vulnerable. It ends
+        now, or later if nothing happens before.
         """
-        return now_ns < self._acking_until_ns.get(node, 0) or self._medium.busy_until(node, now_ns)
+        return at_ns < self._acking_until_ns.get(node, 0) or self._medium.busy_until(node, at_ns)
 
     def _transmit(
-        self, packet: Packet, sender: int, receiver: int, frame_bytes: int, ahead_ns: int
+        self, packet: Packet, sender: int, receiver: int, frame_bytes: int, begins_ns: int
     ) -> Generator[simpy.Event, Any, Cause]:
-        """Put the frame on the air, ``ahead_ns`` from now; returns why it did not arrive."""
-        duration_ns = frame_bytes * BYTE_NS
-        begins_ns = int(self._env.now) + ahead_ns
+        """Put the frame on the air at a time, now or later; returns why it did not arrive."""
+        env, duration_ns = self._env, frame_bytes * BYTE_NS
         self._add(begins_ns, _AIR, packet, sender, receiver, frame_bytes, _NONE, duration_ns)
         transmission = self._medium.start(sender, duration_ns, receiver, frame_bytes, "oqpsk", begins_ns)
-        yield self._env.timeout(ahead_ns + duration_ns)
-        lost = self._lost(sender, receiver)
+        yield env.timeout(begins_ns + duration_ns - env.now)
+        lost = self._losses is not None and self._losses.lost(sender, receiver)
         cause = self._medium.finish(transmission) or (Cause.LINK if lost else _NONE)
         if not (self._up(sender) and self._up(receiver)):
             cause = Cause.NODE_DOWN
@@ -154,17 +155,21 @@ class Ieee802154:
         return cause
 
     def _acknowledge(
-        self, packet: Packet, sender: int, receiver: int, cause: Cause
+        self, packet: Packet, sender: int, receiver: int, cause: Cause, ended_ns: int
     ) -> Generator[simpy.Event, Any, bool]:
-        """The acknowledgement, unless the frame failed for ``cause``; returns whether it was received."""
+        """The acknowledgement of a frame that has just ended, unless that failed for ``cause``.
+
+        Returns:
+            Whether its sender has received it.
+        """
         env = self._env
         if cause:
             yield env.timeout(ACK_WAIT_NS)
             return False
-        begins_ns = int(env.now) + TURNAROUND_NS
+        begins_ns = ended_ns + TURNAROUND_NS
         self._acking_until_ns[receiver] = begins_ns + ACK_NS
-        rest_ns = TURNAROUND_NS + ACK_NS
-        if self._next_ns() <= begins_ns + ACK_NS:
+        rest_ns = ACKNOWLEDGED_NS
+        if self._next_ns() <= begins_ns:
             yield env.timeout(TURNAROUND_NS)
             rest_ns = ACK_NS
         heard = False
@@ -178,12 +183,8 @@ class Ieee802154:
             yield env.timeout(rest_ns)
         if not heard:
             self._record(EventKind.LOSS, packet, sender, receiver, packet.size_bytes, Cause.ACK_LOST)
-            yield env.timeout(ACK_WAIT_NS - TURNAROUND_NS - ACK_NS)
+            yield env.timeout(ACK_WAIT_NS - ACKNOWLEDGED_NS)
         return heard
-
-    def _begin_interframe_space(self, packet: Packet, sender: int) -> None:
-        """Keep the sender silent for the interframe space."""
-        self._ready_ns[sender] = int(self._env.now) + spacing_ns(HEADER_BYTES + packet.size_bytes)
 
     def _record(
         self,

@@ -195,7 +195,8 @@ class Medium:
 
     def finish(self, frame: Transmission) -> Cause:
         """``outcome`` and ``clear`` in one."""
-        cause = self.outcome(frame)
+        alone = frame.power_w >= self._rx_w and not frame.overlaps and self.radio.noise_w is None
+        cause = _NONE if alone else self.outcome(frame)
         self.clear(frame)
         return cause
 
@@ -288,13 +289,16 @@ class Medium:
     def _sensed(self, frame: Transmission, node: int) -> bool:
         return self.power_w(frame.sender, node) >= self._cs_w
 
-    def busy_until(self, node: int, now_ns: int) -> bool:
-        """Whether somebody else's frame was on the air at this node in the last instant before now."""
+    def busy_until(self, node: int, at_ns: int) -> bool:
+        """Whether somebody else's frame is on the air at this node in the last instant before a time.
+
+        That is now, or later if nothing happens before.
+        """
         for frame in self._active:
-            if frame.start_ns < now_ns and self._sensed(frame, node):
+            if frame.start_ns < at_ns and self._sensed(frame, node):
                 return True
         for frame in reversed(self._recent):
-            if frame.end_ns < now_ns:
+            if frame.end_ns < at_ns:
                 return False
             if self._sensed(frame, node):
                 return True
