@@ -25,7 +25,9 @@ def inverse(T_a_b: FloatArray) -> FloatArray:
 
 def apply(T_a_b: FloatArray, points_m: FloatArray) -> FloatArray:
     """(N, 3) points in frame a, from points in frame b."""
-    return points_m @ T_a_b[:3, :3].T + T_a_b[:3, 3]
+    moved_m = points_m @ T_a_b[:3, :3].T
+    moved_m += T_a_b[:3, 3]
+    return moved_m
 
 
 def rotation_exp(omega_rad: FloatArray) -> FloatArray:

@@ -181,10 +181,11 @@ class PointCloud:
 
     def select(self, rows: BoolArray | IntArray) -> PointCloud:
         """The points at ``rows``: an (N,) mask or indices."""
+        places = np.flatnonzero(rows) if rows.dtype == bool else rows
         columns: dict[str, Any] = {}
         for column in fields(self):
             values = getattr(self, column.name)
-            columns[column.name] = None if values is None else values[rows]
+            columns[column.name] = None if values is None else values.take(places, axis=0)
         return PointCloud(**columns)
 
     @staticmethod
