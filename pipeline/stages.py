@@ -55,8 +55,8 @@ from pipeline.texture import Texture
 from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult
 
 Result = TypeVar("Result")
-_NODES_AT_A_TIME = 2
-"""More would need more memory, and each works on several cores where it takes long."""
+_NODES_AT_A_TIME = 3
+"""One more than cores are common: of three, the last would work alone. More would need more memory."""
 Steps = Generator[Progress, None, Result]
 
 
@@ -182,7 +182,7 @@ def prepare_nodes(
 def _side_by_side(
     work: Sequence[Callable[[], Result]], rig: Rig, what: str, begin: float, end: float
 ) -> Steps[tuple[Result, ...]]:
-    """What each node's work gives, two nodes at a time: most of it leaves Python's lock to the other."""
+    """What each node's work gives, a few at a time: most of it leaves Python's lock to the others."""
     results = []
     begun = [threads("nodes", _NODES_AT_A_TIME).submit(part) for part in work]
     try:
