@@ -56,7 +56,7 @@ from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult
 
 Result = TypeVar("Result")
 _NODES_AT_A_TIME = 3
-"""One more than cores are common: of three, the last would work alone. More would need more memory."""
+"""Of three on two cores, the last would else work alone; more would need more memory."""
 Steps = Generator[Progress, None, Result]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,10 +66,19 @@ def random_keys(points_m: FloatArray, seed: int) -> FloatArray:
     """(N,) pseudo-random numbers in [0, 1) by which to choose among (N, 3) points.
 
     A key follows from the point's distance to the cloud's centre over the cloud's size alone: it stays with
-    its point when the points come in another order, or when the whole cloud moves or is scaled.
+    its point when the points come in another order, or when the whole cloud moves or is scaled. They are kept
+    as long as the points, which nobody changes: each node of a rig is drawn for every pair that it is in.
     """
+    known = _keys.get((id(points_m), seed))
+    if known is not None:
+        return known
     arms = points_m - points_m.mean(axis=0)
     squared = np.einsum("ni,ni->n", arms, arms)
     periods = np.random.default_rng(seed).uniform(*_KEY_PERIODS)
     phases = periods / max(float(squared.mean()), np.finfo(float).tiny) * squared
-    return phases - np.floor(phases)
+    keys = _keys[id(points_m), seed] = phases - np.floor(phases)
+    weakref.finalize(points_m, _keys.pop, (id(points_m), seed), None)
+    return keys
+
+
+_keys: dict[tuple[int, int], FloatArray] = {}
