@@ -48,7 +48,7 @@ def serve(
         from app.entrance import is_loopback
         from app.server import build_server
 
-        app = build_server(scene, config, host, port, lecture, not no_token, pool)
+        app = build_server(scene, config, host, port, lecture, not no_token, pool=pool)
     except BaseException:
         pool.close()
         raise

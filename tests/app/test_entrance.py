@@ -131,16 +131,19 @@ def test_only_loopback_needs_no_token(host, alone):
 
 @pytest.mark.parametrize("words", [(), ("--no-token",)])
 def test_the_command_passes_on_whether_a_token_is_wanted(monkeypatch, words):
-    asked = []
+    asked, pools = [], []
 
-    def refuse(*arguments):
+    def refuse(*arguments, pool):
         asked.append(arguments[-1])
+        pools.append(pool)
         raise InputError("not now")
 
     monkeypatch.setattr("app.server.build_server", refuse)
     with pytest.raises(SystemExit):
         main(["serve", "--host", "192.0.2.1", *words])
     assert asked == [not words]
+    with pytest.raises(RuntimeError, match="the pool is closed"):
+        pools[0].submit("a", print, on_progress=print, on_end=print)
 
 
 def test_a_file_is_too_large_too_many_or_more_than_it_said():
