@@ -57,7 +57,9 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
     yield from _nodes(result, metrics)
     yield from _registrations(metrics)
     yield "<h2>Time and settings</h2>"
-    yield table(("stage", "seconds"), metrics["timings_s"].items())
+    yield table(
+        ("stage", "seconds"), ((stage, f"{time_s:.3f}") for stage, time_s in metrics["timings_s"].items())
+    )
     memory_mb = metrics["peak_memory_bytes"] / 1e6
     yield (
         f'<p class="note">At most {memory_mb:,.0f} MB of memory. All settings are in '
