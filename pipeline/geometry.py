@@ -1,6 +1,7 @@
 """Rigid motions, the pinhole camera, and what the points of one cloud are to each other."""
 
 import math
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -66,9 +67,29 @@ def scaled(intrinsics: CameraIntrinsics, factor: float) -> CameraIntrinsics:
 
 
 def pixel_rays(intrinsics: CameraIntrinsics) -> FloatArray:
-    """(H, W, 3) camera-frame directions of the pixel centres, scaled to z = 1, undistorted."""
-    u, v = np.meshgrid(np.arange(intrinsics.width_px), np.arange(intrinsics.height_px))
-    return undistorted_rays(intrinsics, np.stack([u, v], axis=-1).reshape(-1, 2)).reshape(*u.shape, 3)
+    """(H, W, 3) camera-frame directions of the pixel centres, scaled to z = 1, undistorted; read-only.
+
+    Those of the last cameras stay: a frame asks for its own five times on the way to its surface.
+    """
+    size = intrinsics.width_px, intrinsics.height_px
+    find = _kept_rays if size[0] * size[1] <= _KEPT_PX else _rays
+    matrix, distortion = (np.asarray(of, np.float64) for of in (intrinsics.matrix, intrinsics.distortion))
+    return find(matrix.tobytes(), distortion.tobytes(), *size)
+
+
+def _rays(matrix: bytes, distortion: bytes, width_px: int, height_px: int) -> FloatArray:
+    """``pixel_rays`` of a camera whose numbers are given as bytes of float64."""
+    numbers = np.frombuffer(matrix).reshape(3, 3), np.frombuffer(distortion)
+    u, v = np.meshgrid(np.arange(width_px), np.arange(height_px))
+    pixels = np.stack([u, v], axis=-1).reshape(-1, 2)
+    rays = undistorted_rays(CameraIntrinsics(*numbers, width_px, height_px), pixels)
+    rays.setflags(write=False)
+    return rays.reshape(height_px, width_px, 3)
+
+
+_kept_rays = lru_cache(maxsize=4)(_rays)
+_KEPT_PX = 1_000_000
+"""Pixels of the largest image whose rays stay: 24 MB."""
 
 
 def undistorted_rays(intrinsics: CameraIntrinsics, pixels: ArrayLike) -> FloatArray:

@@ -134,7 +134,8 @@ def thinned(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], 
 def without_guesses_in_view(
     frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], T_world_camera: Sequence[FloatArray]
 ) -> list[PointCloud]:
-    """Each node's fused cloud, in its own frame, without inferred points that another sensor can judge.
+    """Each node's fused cloud, in its own frame, without inferred points that another sensor can judge, and
+    without pixels.
 
     What one node had to infer, another may have measured: an inferred point stands only where it is
     hidden from every other node's sensor.
@@ -148,7 +149,7 @@ def without_guesses_in_view(
             if other != index:
                 T_other_node = geometry.inverse(T_world_camera[other]) @ T_world_camera[index]
                 keep[inferred] &= hidden_from(guesses, T_other_node, frame.intrinsics, frame.depth)
-        clouds.append(node.fused.select(keep))
+        clouds.append(replace(node.fused, pixels=None).select(keep))
     return clouds
 
 

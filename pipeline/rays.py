@@ -68,8 +68,9 @@ def first_hits(
 def camera_hits(scene: o3d.t.geometry.RaycastingScene, camera: Camera) -> dict[str, o3d.core.Tensor]:
     """Open3D's (H, W) answers to the rays of all pixels, whose camera-frame directions have z = 1."""
     directions = pixel_rays(camera.intrinsics) @ camera.T_world_camera[:3, :3].T
-    origins_m = np.broadcast_to(camera.T_world_camera[:3, 3], directions.shape)
-    return scene.cast_rays(tensor(np.concatenate([origins_m, directions], axis=-1), np.float32))
+    rays = np.empty((*directions.shape[:2], 6), np.float32)
+    rays[..., :3], rays[..., 3:] = camera.T_world_camera[:3, 3], directions
+    return scene.cast_rays(tensor(rays, np.float32))
 
 
 def tensor(array: np.ndarray, dtype: type[np.generic]) -> o3d.core.Tensor:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pipeline.acquisition.averaging import averaged
-from pipeline.acquisition.back_project import back_project
+from pipeline.acquisition.back_project import back_project, pixels_in_front
 from pipeline.acquisition.flying import flying_score
 from pipeline.acquisition.outliers import FilterResult, Outliers, find_outliers, split
 from pipeline.acquisition.planes import FARTHEST_SD, local_planes
@@ -37,12 +37,11 @@ def acquire(frame: RgbdFrame, config: AcquisitionConfig) -> Acquired:
     Raises:
         InputError: no pixel has a depth, or as ``find_outliers``.
     """
-    cloud = back_project(frame)
+    known = pixels_in_front(frame, frame.depth)
     planes = local_planes(frame.depth, frame.intrinsics, frame.noise)
-    if config.outlier_mode == "flying" and cloud.pixels is not None:
-        u, v = cloud.pixels.T
-        score = flying_score(planes)[v, u]
+    if config.outlier_mode == "flying":
+        score = flying_score(planes)[known]
         outliers = Outliers(score <= FARTHEST_SD, score, FARTHEST_SD)
     else:
-        outliers = find_outliers(cloud, config, frame.intrinsics.fx_px)
+        outliers = find_outliers(back_project(frame), config, frame.intrinsics.fx_px)
     return Acquired(averaged(planes) if config.average else frame.depth, outliers)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.acquisition.planes import FARTHEST_SD, LocalPlanes
+from pipeline.kdtree import compiled
 from pipeline.types import DepthMap, FloatArray
 
 
@@ -20,25 +21,39 @@ def averaged(planes: LocalPlanes) -> DepthMap:
         (H, W) metric, known where it was.
     """
     known = planes.known
-    inverse = along(along(planes.inverse, planes.right, planes, 1), planes.down, planes, 0)
     noise = FARTHEST_SD * planes.sd
+    inverse = _along(planes.inverse, planes.right, noise, planes.reach_px, 0, 1)
+    inverse = _along(inverse, planes.down, noise, planes.reach_px, 1, 0)
     inverse = np.clip(inverse, planes.inverse - noise, planes.inverse + noise)
     z_m = np.where(known, 1.0 / np.where(known, inverse, 1.0), np.nan)
     return DepthMap(z_m.astype(np.float32))
 
 
-def along(inverse: FloatArray, slope: FloatArray, planes: LocalPlanes, axis: int) -> FloatArray:
-    """(H, W) 1/z averaged over the pixels within reach along one axis of the image."""
-    reach_px, farthest = planes.reach_px, FARTHEST_SD * planes.sd
-    margin = [(0, 0), (0, 0)]
-    margin[axis] = (reach_px, reach_px)
-    padded = np.pad(inverse, margin)
-    total, count = np.zeros_like(inverse), np.zeros_like(inverse)
-    for apart_px in range(-reach_px, reach_px + 1):
-        start = reach_px + apart_px
-        other = padded[:, start:][:, : inverse.shape[1]] if axis else padded[start:][: inverse.shape[0]]
-        off = other - inverse - np.float32(apart_px) * slope
-        counts = (other > 0) & (np.abs(off) <= farthest)
-        total += np.where(counts, off, np.float32(0.0))
-        count += counts
-    return inverse + total / np.maximum(count, 1.0)
+@compiled
+def _along(
+    inverse: FloatArray, slope: FloatArray, farthest: FloatArray, reach_px: int, down: int, right: int
+) -> FloatArray:
+    """(H, W) 1/z averaged over the pixels within reach along one axis of the image.
+
+    Args:
+        inverse: (H, W) float32 1/z, 0 where unknown.
+        slope: (H, W) its change from a pixel to the next one along the axis.
+        farthest: (H, W) how far off a pixel's plane its neighbours may be.
+        reach_px: how far to go on either side.
+        down: 1 to go down, with ``right`` 0.
+        right: 1 to go to the right, with ``down`` 0.
+    """
+    rows, columns = inverse.shape
+    averaged = np.empty_like(inverse)
+    for row in range(rows):
+        for column in range(columns):
+            here, total, count = inverse[row, column], np.float32(0.0), 0
+            for apart_px in range(-reach_px, reach_px + 1):
+                v, u = row + down * apart_px, column + right * apart_px
+                if 0 <= v < rows and 0 <= u < columns and inverse[v, u] > 0.0:
+                    off = inverse[v, u] - here - np.float32(apart_px) * slope[row, column]
+                    if abs(off) <= farthest[row, column]:
+                        total += off
+                        count += 1
+            averaged[row, column] = here + total / np.float32(max(count, 1))
+    return averaged

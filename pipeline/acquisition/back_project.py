@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.geometry import undistorted_rays
-from pipeline.types import DepthMap, FloatArray, PointCloud, PointSource, RgbdFrame
+from pipeline.geometry import pixel_rays
+from pipeline.types import BoolArray, DepthMap, FloatArray, PointCloud, PointSource, RgbdFrame
 
 
 def back_project(
@@ -30,22 +30,33 @@ def back_project(
     [[-0.02, 0.0, 2.0], [0.0, 0.0, 3.0]]
     """
     depth = frame.depth if depth is None else depth
+    known = pixels_in_front(frame, depth)
+    places = np.flatnonzero(known)
+    z_m = depth.z_m.reshape(-1).take(places).astype(np.float64)
+    points_m = pixel_rays(frame.intrinsics).reshape(-1, 3).take(places, axis=0)
+    points_m *= z_m[:, None]
+    return PointCloud(
+        points_m=points_m,
+        colors=frame.rgb.reshape(-1, 3).take(places, axis=0),
+        pixels=np.stack([places % known.shape[1], places // known.shape[1]], axis=1),
+        sigma_m=_sigma_m(frame, z_m) if source == PointSource.SENSOR else None,
+        source=np.full(len(z_m), source, dtype=np.uint8),
+    )
+
+
+def pixels_in_front(frame: RgbdFrame, depth: DepthMap) -> BoolArray:
+    """(H, W) the pixels that ``back_project`` makes a point of.
+
+    Raises:
+        InputError: as ``back_project``.
+    """
     _check_grid(frame, depth)
     known = depth.valid & (depth.z_m > 0)
     if not known.any():
         raise InputError(
             f"The depth image of {frame.name} has no valid pixel; check the file and the depth scale."
         )
-    v, u = np.nonzero(known)
-    pixels = np.stack([u, v], axis=1)
-    z_m = depth.z_m[v, u].astype(np.float64)
-    return PointCloud(
-        points_m=undistorted_rays(frame.intrinsics, pixels.astype(np.float64)) * z_m[:, None],
-        colors=frame.rgb[v, u],
-        pixels=pixels,
-        sigma_m=_sigma_m(frame, z_m) if source == PointSource.SENSOR else None,
-        source=np.full(len(z_m), source, dtype=np.uint8),
-    )
+    return known
 
 
 def _sigma_m(frame: RgbdFrame, z_m: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from pipeline.acquisition.planes import FARTHEST_SD, LocalPlanes
+from pipeline.kdtree import compiled
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 LEAST_SIDES = 3
@@ -32,14 +33,9 @@ def flying_score(planes: LocalPlanes) -> FloatArray:
         (H, W) float32; 0 where nothing says that a pixel flies. Those above ``FARTHEST_SD`` do.
     """
     score = np.zeros(planes.inverse.shape, np.float32)
-    pixels = np.nonzero(beside_a_step(planes))
-    pad = planes.reach_px
-    padded = LocalPlanes(*(np.pad(x, pad) for x in (planes.inverse, planes.right, planes.down, planes.sd)))
-    sides = [
-        [distance_sd(padded, pixels, way, pad) for way in ((-down, -right), (down, right))]
-        for down, right in LINES
-    ]
-    score[pixels] = judged(np.array(sides))
+    rows, columns = np.nonzero(beside_a_step(planes))
+    parts = planes.inverse, planes.right, planes.down, planes.sd
+    score[rows, columns] = judged(_distances_sd(*parts, rows, columns, planes.reach_px))
     return score
 
 
@@ -50,29 +46,40 @@ def beside_a_step(planes: LocalPlanes) -> BoolArray:
     return planes.known & (apart > FARTHEST_SD * planes.sd)
 
 
-def distance_sd(
-    padded: LocalPlanes, pixels: tuple[IntArray, ...], way: tuple[int, int], reach_px: int
+@compiled
+def _distances_sd(
+    inverse: FloatArray,
+    right: FloatArray,
+    down: FloatArray,
+    sd: FloatArray,
+    rows: IntArray,
+    columns: IntArray,
+    reach_px: int,
 ) -> FloatArray:
-    """(N,) how far pixels are in front of the plane of the next known pixel, in standard deviations.
+    """(lines, 2, N) how far pixels are in front of the planes on either side, in standard deviations.
 
     Args:
-        padded: planes with ``reach_px`` of unknown pixels all around.
-        pixels: (N,) rows and (N,) columns, without them.
-        way: pixels down and to the right of one step.
+        inverse, right, down, sd: (H, W) float32, as in ``LocalPlanes``.
+        rows: (N,) of the pixels.
+        columns: (N,) of the pixels.
         reach_px: steps to go at most; NaN where all of them meet unknown pixels.
     """
-    rows, columns = (at + reach_px for at in pixels)
-    found = np.full(len(rows), np.nan, np.float32)
-    left = np.arange(len(rows))
-    for steps in range(1, reach_px + 1):
-        there = rows[left] + steps * way[0], columns[left] + steps * way[1]
-        hit = padded.inverse[there] > 0
-        there = there[0][hit], there[1][hit]
-        here = rows[left[hit]], columns[left[hit]]
-        slope = way[0] * padded.down[there] + way[1] * padded.right[there]
-        off = padded.inverse[here] - (padded.inverse[there] - steps * slope)
-        found[left[hit]] = off / np.maximum(np.hypot(padded.sd[here], padded.sd[there]), np.float32(1e-9))
-        left = left[~hit]
+    found = np.full((len(LINES), 2, len(rows)), np.nan, np.float32)
+    for line, (below, beside) in enumerate(LINES):
+        for side in range(2):
+            way = 2 * side - 1
+            for i in range(len(rows)):
+                for steps in range(1, reach_px + 1):
+                    v, u = rows[i] + way * steps * below, columns[i] + way * steps * beside
+                    if not (0 <= v < inverse.shape[0] and 0 <= u < inverse.shape[1]):
+                        break
+                    if inverse[v, u] > 0.0:
+                        slope = np.float32(way * below) * down[v, u] + np.float32(way * beside) * right[v, u]
+                        plane = inverse[v, u] - np.float32(steps) * slope
+                        noise = np.hypot(sd[rows[i], columns[i]], sd[v, u])
+                        off = inverse[rows[i], columns[i]] - plane
+                        found[line, side, i] = off / max(noise, np.float32(1e-9))
+                        break
     return found
 
 

@@ -158,7 +158,7 @@ def masked_blur(residual: FloatArray, known: BoolArray) -> FloatArray:
 
 def positive(depth_m: FloatArray) -> BoolArray:
     """True where a depth is finite and in front of the camera."""
-    return np.isfinite(depth_m) & (np.nan_to_num(depth_m) > 0.0)
+    return (depth_m > 0.0) & (depth_m < np.inf)
 
 
 ALIGNMENTS = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from pipeline.kdtree import compiled
 from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray
 
 FILL_WIDTH_PX = 320
@@ -25,18 +26,22 @@ LARGEST_SLOPE = 0.03
 
 
 def extrapolated(field: FloatArray, known: BoolArray, rgb: ByteArray) -> FloatArray:
-    """(H, W) the field where it is known; elsewhere inpainted at ``FILL_WIDTH_PX`` and upsampled."""
+    """(H, W) the field where it is known; elsewhere inpainted at ``FILL_WIDTH_PX`` and upsampled.
+
+    Args:
+        field: (H, W) float32.
+        known: (H, W) where it means something; at least one pixel.
+        rgb: (H, W, 3) uint8.
+    """
     step = max(1, round(known.shape[1] / FILL_WIDTH_PX))
     small = (slice(step // 2, None, step),) * 2
-    colors = cv2.GaussianBlur(rgb, (0, 0), 1.0).transpose(2, 0, 1) / np.float32(COLOR_SIGMA * np.sqrt(6.0))
     if not known[small].any():
         return np.where(known, field, np.float32(np.median(field[known])))
-    coarse = inpainted(field[small], known[small], colors[:, *small])
+    colors = cv2.GaussianBlur(rgb, (0, 0), 1.0) / np.float32(COLOR_SIGMA * np.sqrt(6.0))
+    small_colors = np.ascontiguousarray(colors[small])
+    coarse = inpainted(field[small], known[small], small_colors)
     filled = field.copy()
-    rows, columns = np.nonzero(~known)
-    filled[rows, columns] = upsampled(
-        coarse, colors[:, *small], colors[:, rows, columns], rows, columns, step
-    )
+    _upsample(filled, known, colors, coarse, small_colors, step)
     return filled
 
 
@@ -46,51 +51,84 @@ def inpainted(field: FloatArray, known: BoolArray, colors: FloatArray) -> FloatA
     Args:
         field: (H, W) float32.
         known: (H, W) where it means something; at least one pixel.
-        colors: (3, H, W) in units in which a difference of one leaves 1/e of a weight.
+        colors: (H, W, 3) in units in which a difference of one leaves 1/e of a weight.
     """
-    pad = ((WINDOW_PX, WINDOW_PX),) * 2
-    weight = np.pad(known.astype(np.float32), pad)
-    values = np.pad(np.stack([field, *slopes(field, known)]), ((0, 0), *pad)).reshape(3, -1)
-    color = np.pad(colors, ((0, 0), *pad)).reshape(3, -1)
-    inside = np.pad(np.ones(known.shape, bool), pad)
-    while True:
-        rim = inside & (weight == 0.0) & (cv2.dilate(weight, np.ones((3, 3))) > 0.0)
-        pixels = np.flatnonzero(rim)
-        if not len(pixels):
-            break
-        values[:, pixels] = predicted(values, color, weight.ravel(), pixels, inside.shape[1])
-        weight[rim] = 1.0
-    return values[0].reshape(inside.shape)[WINDOW_PX:-WINDOW_PX, WINDOW_PX:-WINDOW_PX]
-
-
-def predicted(
-    values: FloatArray, colors: FloatArray, known: FloatArray, pixels: IntArray, width_px: int
-) -> FloatArray:
-    """(3, N) field and slopes at ``pixels`` from the known pixels around.
-
-    Args:
-        values: (3, P) field, slope down and slope to the right of an image ``width_px`` wide.
-        colors: (3, P).
-        known: (P,) weights, 0 where unknown.
-        pixels: (N,) indices of the pixels to predict.
-        width_px: of the padded image.
-    """
+    values = np.stack([field, *slopes(field, known)], axis=-1)
     reach_px = np.arange(-WINDOW_PX, WINDOW_PX + 1)
-    down, right = (axis.ravel() for axis in np.meshgrid(reach_px, reach_px, indexing="ij"))
-    there = pixels[:, None] + (down * width_px + right)
-    space = np.exp(-(down**2 + right**2) / (2.0 * SPACE_SIGMA_PX**2)).astype(np.float32)
-    weights = known.take(there) * space * color_weights(colors.take(there, axis=1), colors[:, pixels, None])
-    weights /= weights.sum(axis=1, keepdims=True)
-    field, slope_down, slope_right = values.take(there, axis=1)
-    field -= down.astype(np.float32) * slope_down + right.astype(np.float32) * slope_right
-    total = np.stack([np.einsum("nk,nk->n", weights, v) for v in (field, slope_down, slope_right)])
-    total[1:] *= SLOPE_DECAY
-    return total
+    space = np.exp(-(reach_px[:, None] ** 2 + reach_px**2) / (2.0 * SPACE_SIGMA_PX**2)).astype(np.float32)
+    _inpaint(values, known.copy(), colors, space)
+    return values[..., 0]
 
 
-def color_weights(colors: FloatArray, others: FloatArray) -> FloatArray:
-    """(...) weight of the difference of two (3, ...) arrays of colours, never quite zero."""
-    return np.exp(-np.square(colors - others).sum(axis=0)) + np.float32(LEAST_WEIGHT)
+@compiled
+def _inpaint(values: FloatArray, known: BoolArray, colors: FloatArray, space: FloatArray) -> None:
+    """Fill the unknown pixels of (H, W, 3) field, slope down and slope to the right, ring by ring."""
+    rows, columns = known.shape
+    waiting = np.empty((known.size, 2), np.int64)
+    filled = np.empty((known.size, 3), np.float32)
+    reached = known.copy()
+    count = 0
+    for v in range(rows):
+        for u in range(columns):
+            if known[v, u]:
+                count = _reach_beside(reached, v, u, waiting, count)
+    first = 0
+    while first < count:
+        last = count
+        for i in range(first, last):
+            _predict(values, known, colors, space, waiting[i, 0], waiting[i, 1], filled[i])
+        for i in range(first, last):
+            v, u = waiting[i, 0], waiting[i, 1]
+            known[v, u] = True
+            for part in range(3):
+                values[v, u, part] = filled[i, part]
+            count = _reach_beside(reached, v, u, waiting, count)
+        first = last
+
+
+@compiled
+def _reach_beside(reached: BoolArray, v: int, u: int, waiting: IntArray, count: int) -> int:
+    """Put the pixels beside one that nobody has reached yet into ``waiting``, and return the new count."""
+    for y in range(max(v - 1, 0), min(v + 2, reached.shape[0])):
+        for x in range(max(u - 1, 0), min(u + 2, reached.shape[1])):
+            if not reached[y, x]:
+                reached[y, x] = True
+                waiting[count, 0], waiting[count, 1] = y, x
+                count += 1
+    return count
+
+
+@compiled
+def _predict(
+    values: FloatArray,
+    known: BoolArray,
+    colors: FloatArray,
+    space: FloatArray,
+    v: int,
+    u: int,
+    predicted: FloatArray,
+) -> None:
+    """Write (3,) field and slopes at a pixel from the known pixels around, with (7, 7) weights of places."""
+    total = field = slope_down = slope_right = 0.0
+    for y in range(max(v - WINDOW_PX, 0), min(v + WINDOW_PX + 1, known.shape[0])):
+        for x in range(max(u - WINDOW_PX, 0), min(u + WINDOW_PX + 1, known.shape[1])):
+            if known[y, x]:
+                down, right = y - v, x - u
+                weight = space[down + WINDOW_PX, right + WINDOW_PX] * _likeness(colors[y, x], colors[v, u])
+                total += weight
+                field += weight * (values[y, x, 0] - down * values[y, x, 1] - right * values[y, x, 2])
+                slope_down += weight * values[y, x, 1]
+                slope_right += weight * values[y, x, 2]
+    predicted[0] = field / total
+    predicted[1] = SLOPE_DECAY * slope_down / total
+    predicted[2] = SLOPE_DECAY * slope_right / total
+
+
+@compiled
+def _likeness(color: FloatArray, other: FloatArray) -> float:
+    """Weight of the difference of two colours, never quite zero."""
+    red, green, blue = color[0] - other[0], color[1] - other[1], color[2] - other[2]
+    return np.exp(-(red * red + green * green + blue * blue)) + LEAST_WEIGHT
 
 
 def slopes(field: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:
@@ -108,33 +146,38 @@ def slopes(field: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]
     return found[0], found[1]
 
 
-def upsampled(
+@compiled
+def _upsample(
+    field: FloatArray,
+    known: BoolArray,
+    colors: FloatArray,
     coarse: FloatArray,
     coarse_colors: FloatArray,
-    colors: FloatArray,
-    rows: IntArray,
-    columns: IntArray,
     step: int,
-) -> FloatArray:
-    """(N,) the coarse field at full-size pixels, bilinear with the weights of like colours raised.
+) -> None:
+    """Write the coarse field into a field's unknown pixels, bilinear with the weights of like colours raised.
 
     Args:
+        field: (H, W) float32.
+        known: (H, W) pixels to leave.
+        colors: (H, W, 3).
         coarse: (h, w) every ``step``-th pixel from ``step // 2`` on.
-        coarse_colors: (3, h, w).
-        colors: (3, N) of the pixels.
-        rows: (N,) full-size.
-        columns: (N,) full-size.
-        step: full-size pixels a coarse pixel.
+        coarse_colors: (h, w, 3).
+        step: pixels a coarse pixel.
     """
-    v, u = (np.maximum((at - step // 2) / step, 0.0).astype(np.float32) for at in (rows, columns))
-    top, left = v.astype(int), u.astype(int)
-    v, u = v - top, u - left
-    flat, flat_colors = coarse.ravel(), coarse_colors.reshape(3, -1)
-    total, weights = np.zeros((2, len(rows)), np.float32)
-    for y, share_down in ((top, 1.0 - v), (np.minimum(top + 1, coarse.shape[0] - 1), v)):
-        for x, share_right in ((left, 1.0 - u), (np.minimum(left + 1, coarse.shape[1] - 1), u)):
-            there = y * coarse.shape[1] + x
-            weight = share_down * share_right * color_weights(flat_colors.take(there, axis=1), colors)
-            total += weight * flat.take(there)
-            weights += weight
-    return total / weights
+    for row in range(known.shape[0]):
+        for column in range(known.shape[1]):
+            if known[row, column]:
+                continue
+            v, u = max((row - step // 2) / step, 0.0), max((column - step // 2) / step, 0.0)
+            top, left = int(v), int(u)
+            total = weights = 0.0
+            for down in range(2):
+                for right in range(2):
+                    y, x = min(top + down, coarse.shape[0] - 1), min(left + right, coarse.shape[1] - 1)
+                    share_down = v - top if down else 1.0 - (v - top)
+                    share_right = u - left if right else 1.0 - (u - left)
+                    weight = share_down * share_right * _likeness(coarse_colors[y, x], colors[row, column])
+                    total += weight * coarse[y, x]
+                    weights += weight
+            field[row, column] = total / weights

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.types import FloatArray
+from pipeline.kdtree import compiled
+from pipeline.types import FloatArray, IntArray
 
 MAX_SAMPLES = 40_000
 MAX_ITERATIONS = 30
@@ -30,10 +31,11 @@ def fit_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> tuple[fl
     a, b = weighted_line(x, y, np.ones_like(x))
     if np.mean(np.abs(y - a * x - b) > INLIER_BAND * y) > SEARCHED_OUTLIER_SHARE:
         a, b = best_random_line(x, y, rng)
+    least_width = 1e-9 * float(np.median(y))
     for _ in range(MAX_ITERATIONS):
         residual = y - a * x - b
         spread = np.median(np.abs(residual - np.median(residual)))
-        width = max(TUKEY_WIDTH * spread, 1e-9 * float(np.median(y)))
+        width = max(TUKEY_WIDTH * spread, least_width)
         weights = np.clip(1.0 - (residual / width) ** 2, 0.0, None) ** 2
         before = a, b
         a, b = weighted_line(x, y, weights)
@@ -67,6 +69,15 @@ def best_random_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> 
     intercepts = y[first] - slopes * x[first]
     stride = -(-len(x) // 5000)
     xs, ys = x[::stride], y[::stride]
-    close = np.abs(slopes[:, None] * xs + intercepts[:, None] - ys) < INLIER_BAND * ys
-    best = int(np.argmax(np.where(slopes > 0.0, close.sum(axis=1), -1)))
+    best = int(np.argmax(np.where(slopes > 0.0, _points_near(slopes, intercepts, xs, ys), -1)))
     return float(slopes[best]), float(intercepts[best])
+
+
+@compiled
+def _points_near(slopes: FloatArray, intercepts: FloatArray, x: FloatArray, y: FloatArray) -> IntArray:
+    """(L,) how many of (N,) points are within ``INLIER_BAND`` of each of (L,) lines."""
+    counts = np.zeros(len(slopes), np.int64)
+    for line in range(len(slopes)):
+        for i in range(len(x)):
+            counts[line] += abs(slopes[line] * x[i] + intercepts[line] - y[i]) < INLIER_BAND * y[i]
+    return counts

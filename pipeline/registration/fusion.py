@@ -62,7 +62,9 @@ def _inferred_sigma_m(sensor: PointCloud, inferred: PointCloud) -> FloatArray | 
     """(N,) robust relative depth error at the shared pixels, times depth; None without shared pixels."""
     if sensor.pixels is None or inferred.pixels is None or not len(sensor) or not len(inferred):
         return None
-    sensor_m = np.full(np.maximum(sensor.pixels.max(axis=0), inferred.pixels.max(axis=0)) + 1, np.nan)
+    both = sensor.pixels, inferred.pixels
+    size_px = [max(int(pixels[:, axis].max()) for pixels in both) + 1 for axis in (0, 1)]
+    sensor_m = np.full(size_px, np.nan)
     sensor_m[tuple(sensor.pixels.T)] = sensor.points_m[:, 2]
     ratio = inferred.points_m[:, 2] / sensor_m[tuple(inferred.pixels.T)]
     ratio = ratio[~np.isnan(ratio)]

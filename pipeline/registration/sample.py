@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from packetmesh.errors import InputError
+from pipeline.kdtree import compiled
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 _KEY_PERIODS = (1e5, 2e5)
@@ -72,13 +73,26 @@ def random_keys(points_m: FloatArray, seed: int) -> FloatArray:
     known = _keys.get((id(points_m), seed))
     if known is not None:
         return known
-    arms = points_m - points_m.mean(axis=0)
-    squared = np.einsum("ni,ni->n", arms, arms)
+    squared = _squared_arms(np.ascontiguousarray(points_m, np.float64))
     periods = np.random.default_rng(seed).uniform(*_KEY_PERIODS)
     phases = periods / max(float(squared.mean()), np.finfo(float).tiny) * squared
     keys = _keys[id(points_m), seed] = phases - np.floor(phases)
     weakref.finalize(points_m, _keys.pop, (id(points_m), seed), None)
     return keys
+
+
+@compiled
+def _squared_arms(points: FloatArray) -> FloatArray:
+    """(N,) squared distances of (N, 3) points from their mean."""
+    mean, squared = np.zeros(3), np.empty(len(points))
+    for i in range(len(points)):
+        for axis in range(3):
+            mean[axis] += points[i, axis]
+    mean /= len(points)
+    for i in range(len(points)):
+        arms = points[i, 0] - mean[0], points[i, 1] - mean[1], points[i, 2] - mean[2]
+        squared[i] = arms[0] * arms[0] + arms[1] * arms[1] + arms[2] * arms[2]
+    return squared
 
 
 _keys: dict[tuple[int, int], FloatArray] = {}

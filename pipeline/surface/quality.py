@@ -136,7 +136,7 @@ def kept_share(seen: Sequence[DepthMap], sensed: Sequence[DepthMap], within: flo
     """
     kept = total = 0
     for mesh, sensor in zip(seen, sensed, strict=True):
-        measured_m = sensor.z_m[sensor.valid]
-        total += len(measured_m)
-        kept += int(np.sum(np.abs(mesh.z_m[sensor.valid] - measured_m) <= within * measured_m))
+        total += int(np.count_nonzero(sensor.valid))
+        near = np.abs(mesh.z_m - sensor.z_m) <= within * sensor.z_m  # not where one of both is unknown
+        kept += int(np.count_nonzero(near))
     return kept / total if total else float("nan")

@@ -56,7 +56,8 @@ def voxel_for_count(points_m: FloatArray, count: int, least_m: float = 0.0) -> f
     Raises:
         InputError: no point, or all in one place.
     """
-    extent_m = float(np.ptp(points_m, axis=0).max()) if len(points_m) else 0.0
+    lower_m, upper_m = _bounds(np.ascontiguousarray(points_m, np.float64))
+    extent_m = float((upper_m - lower_m).max())
     if not extent_m > 0.0:
         raise InputError(
             f"A cloud of {len(points_m)} points in one place has no spacing; check the depth image"
