@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.geometry import pixel_rays
+from pipeline.kdtree import compiled
 from pipeline.open3d_runtime import o3d
 from pipeline.types import (
     BoolArray,
@@ -67,10 +68,22 @@ def first_hits(
 
 def camera_hits(scene: o3d.t.geometry.RaycastingScene, camera: Camera) -> dict[str, o3d.core.Tensor]:
     """Open3D's (H, W) answers to the rays of all pixels, whose camera-frame directions have z = 1."""
-    directions = pixel_rays(camera.intrinsics) @ camera.T_world_camera[:3, :3].T
-    rays = np.empty((*directions.shape[:2], 6), np.float32)
-    rays[..., :3], rays[..., 3:] = camera.T_world_camera[:3, 3], directions
+    rays = _in_world(pixel_rays(camera.intrinsics), camera.T_world_camera)
     return scene.cast_rays(tensor(rays, np.float32))
+
+
+@compiled
+def _in_world(directions: FloatArray, T_world_camera: FloatArray) -> FloatArray:
+    """(H, W, 6) float32 rays from (H, W, 3) camera-frame directions: origin and direction in the world."""
+    rays = np.empty((*directions.shape[:2], 6), np.float32)
+    for v in range(directions.shape[0]):
+        for u in range(directions.shape[1]):
+            for axis in range(3):
+                along = 0.0
+                for k in range(3):
+                    along += T_world_camera[axis, k] * directions[v, u, k]
+                rays[v, u, axis], rays[v, u, 3 + axis] = T_world_camera[axis, 3], along
+    return rays
 
 
 def tensor(array: np.ndarray, dtype: type[np.generic]) -> o3d.core.Tensor:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from pipeline.ordering import stable_order
 from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, DepthNoise, FloatArray
 
 FARTHEST_SD = 3.0
@@ -113,6 +114,7 @@ def typical_step(inverse: FloatArray, both: tuple[Steps, Steps]) -> FloatArray:
     size = np.concatenate([np.abs(step[where]) for (step, _), where in zip(both, differ, strict=True)])
     if not len(at):
         return np.zeros_like(inverse)
-    parts = np.array_split(np.argsort(at, kind="stable"), min(BINS, len(at)))
+    order = stable_order(at.view(np.int32))  # positive numbers are ordered as their bits are
+    parts = np.array_split(order, min(BINS, len(at)))
     middle, typical = ([np.median(of[part]) for part in parts] for of in (at, size))
     return np.interp(inverse, middle, typical)

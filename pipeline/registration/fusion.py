@@ -62,11 +62,10 @@ def _inferred_sigma_m(sensor: PointCloud, inferred: PointCloud) -> FloatArray | 
     """(N,) robust relative depth error at the shared pixels, times depth; None without shared pixels."""
     if sensor.pixels is None or inferred.pixels is None or not len(sensor) or not len(inferred):
         return None
-    both = sensor.pixels, inferred.pixels
-    size_px = [max(int(pixels[:, axis].max()) for pixels in both) + 1 for axis in (0, 1)]
-    sensor_m = np.full(size_px, np.nan)
-    sensor_m[tuple(sensor.pixels.T)] = sensor.points_m[:, 2]
-    ratio = inferred.points_m[:, 2] / sensor_m[tuple(inferred.pixels.T)]
+    (u, v), (inferred_u, inferred_v) = sensor.pixels.T, inferred.pixels.T
+    sensor_m = np.full((max(v.max(), inferred_v.max()) + 1, max(u.max(), inferred_u.max()) + 1), np.nan)
+    sensor_m[v, u] = sensor.points_m[:, 2]
+    ratio = inferred.points_m[:, 2] / sensor_m[inferred_v, inferred_u]
     ratio = ratio[~np.isnan(ratio)]
     if not len(ratio):
         return None

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from pipeline.surface.ordering import stable_order
+from pipeline.ordering import stable_order
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 LONGEST_HOLE_M = 1.0
@@ -25,7 +25,9 @@ def edges_and_faces(triangles: IntArray) -> tuple[IntArray, IntArray]:
     directed = directed_edges(triangles)
     order, begins = _by_edge(directed)
     first = np.flatnonzero(begins)
-    return np.sort(directed[order[first]], axis=1), np.diff(first, append=len(order))
+    start, end = directed[order[first]].T
+    edges = np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1)
+    return edges, np.diff(first, append=len(order))
 
 
 def boundary_loops(triangles: IntArray) -> list[IntArray]:

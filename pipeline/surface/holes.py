@@ -16,7 +16,7 @@ from pipeline.surface.boundary import (
     loop_edges,
     loop_measures,
 )
-from pipeline.surface.ordering import stable_order
+from pipeline.ordering import stable_order
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 
@@ -43,7 +43,9 @@ class Hole:
         return not (self.rim or self.island)
 
 
-def find_holes(vertices_m: FloatArray, triangles: IntArray) -> tuple[Hole, ...]:
+def find_holes(
+    vertices_m: FloatArray, triangles: IntArray, parts: IntArray | None = None
+) -> tuple[Hole, ...]:
     """All boundary loops of a mesh: holes, the largest first, then rims and islands, the longest first.
 
     Those that are open add up to ``open_area_m2``.
@@ -51,12 +53,14 @@ def find_holes(vertices_m: FloatArray, triangles: IntArray) -> tuple[Hole, ...]:
     Args:
         vertices_m: (V, 3).
         triangles: (F, 3).
+        parts: (V,) label of the connected part of each vertex; found if left out.
     """
     loops = boundary_loops(triangles)
     if not loops:
         return ()
     lengths_m, areas_m2 = loop_measures(vertices_m, loops)
-    parts = connected_parts(edges_and_faces(triangles)[0], len(vertices_m))
+    if parts is None:
+        parts = connected_parts(edges_and_faces(triangles)[0], len(vertices_m))
     rims = _rims(lengths_m, parts[[loop[0] for loop in loops]])
     edges, first = loop_edges(loops)
     islands = _run_around(vertices_m, triangles, edges, first) & ~rims
@@ -76,9 +80,9 @@ def find_holes(vertices_m: FloatArray, triangles: IntArray) -> tuple[Hole, ...]:
     )
 
 
-def open_area_m2(vertices_m: FloatArray, triangles: IntArray) -> float:
-    """Area of all holes of a mesh, without rims and islands."""
-    return sum((hole.area_m2 for hole in find_holes(vertices_m, triangles) if hole.open), 0.0)
+def open_area_m2(vertices_m: FloatArray, triangles: IntArray, parts: IntArray | None = None) -> float:
+    """Area of all holes of a mesh, without rims and islands; the arguments are those of ``find_holes``."""
+    return sum((hole.area_m2 for hole in find_holes(vertices_m, triangles, parts) if hole.open), 0.0)
 
 
 def _rims(lengths_m: FloatArray, part: IntArray) -> BoolArray:

@@ -62,6 +62,7 @@ def measure_quality(
     views = list(seen_by(vertices_m, triangles, cameras, source))
     seen = [view.depth for view in views]
     edges, faces = edges_and_faces(triangles)
+    parts = connected_parts(edges, len(vertices_m))
     gaps = gaps_of(seen, cameras) if cameras else None
     rim = edges[faces == 1]
     rim_vertices, rim_corners = np.unique(rim, return_inverse=True)
@@ -70,9 +71,9 @@ def measure_quality(
         no_hit_ray_share=missed_share(seen),
         boundary_loops=len(np.unique(rim_parts)),
         boundary_length_m=float(np.linalg.norm(vertices_m[rim[:, 0]] - vertices_m[rim[:, 1]], axis=1).sum()),
-        hole_area_m2=open_area_m2(vertices_m, triangles),
+        hole_area_m2=open_area_m2(vertices_m, triangles, parts),
         non_manifold_edges=int((faces > 2).sum()),
-        components=len(np.unique(connected_parts(edges, len(vertices_m)))),
+        components=len(np.unique(parts)),
         area_m2=float(triangle_areas_m2(vertices_m, triangles).sum()),
         unused_points=n_input_points - len(vertices_m),
         within_2pct_share=kept_share(seen, sensed, 0.02) if sensed else float("nan"),

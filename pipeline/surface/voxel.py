@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.surface.ordering import stable_order
+from pipeline.ordering import stable_order
 from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray, PointCloud
 
 _COUNT_TOLERANCE = 0.02
@@ -128,12 +128,23 @@ def _keys(points_m, voxel_m, first, sizes):  # type: ignore[no-untyped-def]
 
 def _cubes(keys: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     """(V,) first row of each cube by ascending key, (N,) each row's cube, and (V,) how many rows each has."""
-    order = stable_order(keys)
-    begins = np.append(True, np.diff(keys[order]) != 0)[: len(keys)]
-    starts = np.flatnonzero(begins)
-    cell = np.empty(len(keys), dtype=np.int64)
-    cell[order] = np.cumsum(begins) - 1
-    return order[starts], cell, np.diff(starts, append=len(keys))
+    first, cell, count, cubes = _in_order(keys, stable_order(keys))
+    return first[:cubes], cell, count[:cubes]
+
+
+@numba.njit(cache=True, nogil=True)
+def _in_order(keys, order):  # type: ignore[no-untyped-def]
+    """The same, with room for as many cubes as there are keys, and how many there are."""
+    first, cell, count = np.empty_like(order), np.empty_like(order), np.zeros_like(order)
+    cubes = 0
+    for place in range(len(order)):
+        row = order[place]
+        if place == 0 or keys[row] != keys[order[place - 1]]:
+            first[cubes] = row
+            cubes += 1
+        cell[row] = cubes - 1
+        count[cubes - 1] += 1
+    return first, cell, count, cubes
 
 
 @numba.njit(cache=True, nogil=True)
