@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.ordering import stable_order
 from pipeline.surface.boundary import (
     LONGEST_HOLE_M,
     boundary_loops,
@@ -16,7 +17,6 @@ from pipeline.surface.boundary import (
     loop_edges,
     loop_measures,
 )
-from pipeline.ordering import stable_order
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 
