@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -73,16 +74,17 @@ def merge_fused(
             noise deserves no more.
         smoothing_passes: how often every point is moved onto the plane of its neighbours.
     """
+    beside = threads("merging", 2)
     joint = [node.fused for node in nodes]
     if mode == "fill":
-        joint = without_guesses_in_view(frames, nodes, T_world_camera)
+        without_guesses = partial(without_guesses_in_view, frames, nodes, T_world_camera)
+        joint = list(beside.map(without_guesses, range(len(nodes))))
     parts_m = [part.points_m for part in joint]
-    points_m = np.concatenate(list(map(geometry.apply, T_world_camera, parts_m)))
+    points_m = np.concatenate(list(beside.map(geometry.apply, T_world_camera, parts_m)))
     voxel_m = voxel_for_count(points_m, max_points, NOISE_VOXELS * noise_m(nodes))
     if mode != "fill":
         fused = merge(joint, T_world_camera, voxel_m, smoothing_passes)
         return FusedCloud(fused, voxel_m, *spacing(fused.points_m), None)
-    beside = threads("merging", 1)
     own = beside.submit(thinned, [node.sensor for node in nodes], T_world_camera, voxel_m)
     whole = thinned(joint, T_world_camera, voxel_m)
     sensors = own.result()
@@ -132,25 +134,23 @@ def thinned(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], 
 
 
 def without_guesses_in_view(
-    frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], T_world_camera: Sequence[FloatArray]
-) -> list[PointCloud]:
-    """Each node's fused cloud, in its own frame, without inferred points that another sensor can judge, and
+    frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], T_world_camera: Sequence[FloatArray], index: int
+) -> PointCloud:
+    """One node's fused cloud, in its own frame, without inferred points that another sensor can judge, and
     without pixels.
 
     What one node had to infer, another may have measured: an inferred point stands only where it is
     hidden from every other node's sensor.
     """
-    clouds = []
-    for index, node in enumerate(nodes):
-        keep = np.ones(len(node.fused), dtype=bool)
-        inferred = np.flatnonzero(node.fused.source == PointSource.INFERRED)
-        guesses = PointCloud(node.fused.points_m[inferred])
-        for other, frame in enumerate(frames):
-            if other != index:
-                T_other_node = geometry.inverse(T_world_camera[other]) @ T_world_camera[index]
-                keep[inferred] &= hidden_from(guesses, T_other_node, frame.intrinsics, frame.depth)
-        clouds.append(replace(node.fused, pixels=None).select(keep))
-    return clouds
+    cloud = nodes[index].fused
+    keep = np.ones(len(cloud), dtype=bool)
+    inferred = np.flatnonzero(cloud.source == PointSource.INFERRED)
+    guesses = PointCloud(cloud.points_m.take(inferred, axis=0))
+    for other, frame in enumerate(frames):
+        if other != index:
+            T_other_node = geometry.inverse(T_world_camera[other]) @ T_world_camera[index]
+            keep[inferred] &= hidden_from(guesses, T_other_node, frame.intrinsics, frame.depth)
+    return replace(cloud, pixels=None).select(keep)
 
 
 def _placed(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray]) -> list[PointCloud]:
