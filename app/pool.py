@@ -205,10 +205,12 @@ class ComputePool:
                     slot.next_may_start.set()
 
     def _free(self) -> list[Ticket]:
-        """The waiting jobs that may run beside those that do; the lock is held."""
+        """The waiting jobs that may run now; who waits for what runs already counts as its owner, too."""
         running = [slot.ticket for slot in self._slots if slot.ticket is not None]
-        owners, keys = {id(one.owner) for one in running}, {one.key for one in running} - {None}
-        return [one for one in self._waiting if id(one.owner) not in owners and one.key not in keys]
+        keys = {one.key for one in running} - {None}
+        served = [one for one in self._waiting if one.key in keys]
+        owners = {id(one.owner) for one in (*running, *served)}
+        return [one for one in self._waiting if id(one.owner) not in owners and one not in served]
 
     def _attend(self, slot: _Slot, before: _Slot | None) -> None:
         """Keep one process alive and hand on what it says, until the pool closes; after the one before."""

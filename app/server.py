@@ -12,6 +12,7 @@ from pathlib import Path
 
 import viser
 
+from app.ahead import compute_ahead
 from app.any_thread import queue_from_any_thread
 from app.drawing.colors import BRAND
 from app.entrance import Entrance, Token, is_loopback
@@ -138,6 +139,7 @@ def build_server(
     queue_from_any_thread(server)
     _dress(server)
     store, uploads, shared = Store(str(folder.path)), Uploads(folder.path), SharedViews()
+    compute_ahead(pool, store, shared, spec)
 
     def begin(target: Target, number: int, lecture: Lecture | None = None) -> Session:
         app.sessions[number] = Session(target, pool, store, uploads, shared, spec, PANELS, lecture)

@@ -159,10 +159,10 @@ class Session:
     ) -> None:
         """Run a job of the store, the spec and these arguments, in place of the one before.
 
-        It waits for the chain's own. On this thread, ``on_partial`` gets what it has so far, and
-        ``on_end`` its result or None.
+        It waits for the chain's own, that which follows what happens now too. On this thread, ``on_partial``
+        gets what it has so far, and ``on_end`` its result or None.
         """
-        self._run_beside(self._side, job, arguments, on_end, on_partial)
+        self.post(self._run_beside, self._side, job, arguments, on_end, on_partial)
 
     def quick_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
         """Run a job of a fraction of a second, even beside one of the chain; of many, the latest."""
@@ -199,6 +199,8 @@ class Session:
             on_end=lambda outcome: post(ended, outcome),
             key=(job, self.spec, arguments),
         )
+        if not lane.urgent:
+            self._show_status()
 
     def cancel_side_job(self) -> None:
         """End the job beside the chain now."""

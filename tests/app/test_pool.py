@@ -164,6 +164,20 @@ def test_what_several_ask_for_is_computed_once(pool, tmp_path):
     assert all(len(inbox.progress) >= 1 for inbox in inboxes[1:])
 
 
+def test_who_waits_for_what_another_has_running_begins_nothing_beside_it(pool, tmp_path):
+    first, shared, own = Inbox(), Inbox(), Inbox()
+    pool.submit("first", jobs.note, str(tmp_path), "first", key="both want it", **first.callbacks())
+    wait_for(tmp_path / "first")
+    pool.submit("waits", jobs.count, 1, key="both want it", **shared.callbacks())
+    pool.submit("waits", jobs.count, 2, **own.callbacks())
+    other = Inbox()
+    pool.submit("other", jobs.count, 3, **other.callbacks())
+    assert other.end() == Outcome("result", 3)  # a process was free
+    assert not own.progress
+    (tmp_path / "go").touch()
+    assert [inbox.end().value for inbox in (first, shared, own)] == ["first", "first", 2]
+
+
 def test_who_waits_for_a_job_that_is_stopped_has_it_computed(pool, tmp_path):
     first, second = Inbox(), Inbox()
     ticket = pool.submit("leaves", jobs.note, str(tmp_path), "left", key="shared", **first.callbacks())

@@ -26,9 +26,11 @@ class Pool:
 
     begun: list[Any] = field(default_factory=list)
     """What is to be told the end of each."""
+    keys: list[Any] = field(default_factory=list)
 
     def submit(self, owner, function, *arguments, on_progress, on_end, key, urgent):
         self.begun.append(on_end)
+        self.keys.append(key)
         return on_end
 
     def stop(self, ticket, patience_s=None):
@@ -65,6 +67,22 @@ def test_the_end_of_what_was_stopped_is_not_that_of_the_same_asked_for_again(ses
     assert len(pool.begun) == 2
     assert session.results.failure("scene", START) is None
     assert session._tracks[0].running == "scene"
+
+
+class Curious(ScenePanel):
+    """Asks for a job beside the chain as soon as its step is there."""
+
+    def on_view(self, step, view):
+        self.session.side_job("curious", on_end=print)
+
+
+def test_a_job_beside_the_chain_waits_for_the_step_that_follows(server, store, pool, tmp_path):
+    session = Session(server, pool, store, Uploads(tmp_path), SharedViews(), START, [Curious])
+    with contextlib.closing(session):
+        settle(session)
+        pool.begun[0](Outcome("result", "a view"))
+        settle(session)
+        assert pool.keys == [START.key("scene"), START.key("depth"), ("curious", START, ())]
 
 
 @pytest.mark.parametrize("asked", [[], [OTHER, START]], ids=["running", "waiting"])

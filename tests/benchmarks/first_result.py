@@ -19,8 +19,9 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import urlsplit
 
-from playwright.sync_api import Error, Page, sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
 from app.load.connection import Connection, wait_for
 from app.stepper import MARKS
@@ -104,13 +105,15 @@ def served(scene: str) -> Iterator[tuple[str, float]]:
 
 
 def _open(page: Page, url: str) -> None:
-    """Load the page as soon as somebody answers."""
+    """Load the page as soon as somebody answers, as ``make run`` does: every page that says that nobody does
+    would take a browser's time.
+    """
+    address = urlsplit(url)
     while True:
-        try:
-            page.goto(url, wait_until="commit")
-            return
-        except Error:
-            time.sleep(0.05)
+        with contextlib.suppress(OSError), socket.create_connection((address.hostname, address.port)):
+            break
+        time.sleep(0.05)
+    page.goto(url, wait_until="commit")
 
 
 def _connected(url: str) -> Connection:

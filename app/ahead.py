@@ -1,0 +1,41 @@
+"""What the first browser will want, computed while it loads the page."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import partial
+
+from app import jobs
+from app.pool import ComputePool, Outcome
+from app.state import CHAIN, SharedViews, Spec, Step
+from app.store import Store
+
+
+def compute_ahead(pool: ComputePool, store: Store, shared: SharedViews, spec: Spec) -> None:
+    """Begin the chain and return; every view is there for the sessions to come, or is theirs to wait for.
+
+    What fails is left to them: they try again, and say why.
+    """
+    owner, steps = object(), iter(CHAIN)
+
+    def begin_next() -> None:
+        step = next(steps, None)
+        if step is not None:
+            with suppress(RuntimeError):  # the pool is closed
+                pool.submit(
+                    owner,
+                    jobs.run_step,
+                    step,
+                    store,
+                    spec,
+                    on_progress=lambda _: None,
+                    on_end=partial(ended, step),
+                    key=spec.key(step),
+                )
+
+    def ended(step: Step, outcome: Outcome) -> None:
+        if outcome.kind == "result":
+            shared.put(spec.key(step), outcome.value)
+            begin_next()
+
+    begin_next()

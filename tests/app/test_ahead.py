@@ -1,0 +1,49 @@
+"""What the first browser wants is there, or on its way, when it comes."""
+
+from dataclasses import dataclass, field, replace
+
+from app.ahead import compute_ahead
+from app.pool import Outcome
+from app.state import CHAIN, SharedViews
+from pipeline.sources import Demo
+from tests.app.fakes import START, end
+
+
+@dataclass
+class Pool:
+    """Runs every job at once."""
+
+    steps: list = field(default_factory=list)
+
+    def submit(self, owner, function, step, store, spec, *, on_progress, on_end, key):
+        assert key == spec.key(step)
+        self.steps.append(step)
+        try:
+            outcome = Outcome("result", end(function(step, store, spec)))
+        except Exception as error:
+            outcome = Outcome("error", str(error))
+        on_end(outcome)
+
+
+def test_every_view_of_the_chain_is_there(store):
+    pool, shared = Pool(), SharedViews()
+    compute_ahead(pool, store, shared, START)
+    assert pool.steps == list(CHAIN)
+    views = [shared.get(START.key(step)) for step in CHAIN]
+    assert [type(view).__name__ for view in views] == ["SceneView", "DepthView", "FuseView", "SurfaceView"]
+
+
+def test_what_fails_is_left_to_those_who_come(store):
+    pool, shared = Pool(), SharedViews()
+    wrong = replace(START, source=Demo("no-such-scene"))
+    compute_ahead(pool, store, shared, wrong)
+    assert pool.steps == ["scene"]
+    assert shared.get(wrong.key("scene")) is None
+
+
+def test_a_pool_that_is_closed_is_no_error(store):
+    class Closed:
+        def submit(self, *_, **__):
+            raise RuntimeError("the pool is closed")
+
+    compute_ahead(Closed(), store, SharedViews(), START)
