@@ -33,7 +33,7 @@ def flying_score(planes: LocalPlanes) -> FloatArray:
         (H, W) float32; 0 where nothing says that a pixel flies. Those above ``FARTHEST_SD`` do.
     """
     score = np.zeros(planes.inverse.shape, np.float32)
-    rows, columns = np.nonzero(beside_a_step(planes))
+    rows, columns = map(np.ascontiguousarray, np.nonzero(beside_a_step(planes)))
     parts = planes.inverse, planes.right, planes.down, planes.sd
     score[rows, columns] = judged(_distances_sd(*parts, rows, columns, planes.reach_px))
     return score

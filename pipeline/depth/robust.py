@@ -68,7 +68,7 @@ def best_random_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> 
     slopes = np.where(run != 0.0, (y[second] - y[first]) / np.where(run != 0.0, run, 1.0), -1.0)
     intercepts = y[first] - slopes * x[first]
     stride = -(-len(x) // 5000)
-    xs, ys = x[::stride], y[::stride]
+    xs, ys = (np.ascontiguousarray(of[::stride]) for of in (x, y))
     best = int(np.argmax(np.where(slopes > 0.0, _points_near(slopes, intercepts, xs, ys), -1)))
     return float(slopes[best]), float(intercepts[best])
 
