@@ -8,7 +8,7 @@ ARGS   ?=
 # Where no bytecode is kept, every process compiles all that it imports: two seconds each.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test check bench reproduce results results-record lock scenes clean
+.PHONY: run test check audit bench reproduce results results-record lock scenes clean
 
 run: $(VENV)/.core  ## the app in the browser, with a scene reconstructed
 	$(BIN)/packetmesh serve --scene $(SCENE) --open $(ARGS)
@@ -21,6 +21,10 @@ check: $(VENV)/.dev  ## style, types, import rules
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+audit: $(VENV)/.uv  ## the pinned packages beside the known vulnerabilities; fails if one cannot be looked up
+	$(BIN)/uv run -q --no-project --isolated --with-requirements requirements-audit.lock \
+	  pip-audit --strict --disable-pip --require-hashes -r requirements.lock
 
 bench: $(VENV)/.dev  ## speed and memory, beside peers
 	$(BIN)/packetmesh bench --out runs/bench $(ARGS)
@@ -40,6 +44,7 @@ scenes: $(VENV)/.core  ## render the demo scenes again
 lock: $(VENV)/.uv  ## pin everything anew
 	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 pyproject.toml -o requirements.lock
 	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 pyproject.toml --group dev -o requirements-dev.lock
+	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 --group audit -o requirements-audit.lock
 	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 pyproject.toml --extra train -o requirements-train.lock
 
 clean:
