@@ -11,12 +11,12 @@ from app.state import CHAIN, SharedViews, Spec, Step
 from app.store import Store
 
 
-def compute_ahead(pool: ComputePool, store: Store, shared: SharedViews, spec: Spec) -> None:
+def compute_ahead(pool: ComputePool, store: Store, shared: SharedViews, spec: Spec, owner: object) -> None:
     """Begin the chain and return; every view is there for the sessions to come, or is theirs to wait for.
 
     What fails is left to them: they try again, and say why.
     """
-    owner, steps = object(), iter(CHAIN)
+    steps = iter(CHAIN)
 
     def begin_next() -> None:
         step = next(steps, None)

@@ -84,6 +84,11 @@ class AppServer:
         """By which the teacher of a lecture comes."""
         return self.url + _behind(self.entrance.teacher)
 
+    @property
+    def owners(self) -> list[object]:
+        """Whose jobs run in the pool: the sessions', and its own before the first of them."""
+        return [self, *(owner for session in list(self.sessions.values()) for owner in session.owners)]
+
     def _at(self, anywhere: Callable[[], str]) -> str:
         host, port = self.viser_server.get_host(), self.viser_server.get_port()
         return f"http://{anywhere() if host == ANYWHERE else host}:{port}"
@@ -139,7 +144,7 @@ def build_server(
     queue_from_any_thread(server)
     _dress(server)
     store, uploads, shared = Store(str(folder.path)), Uploads(folder.path), SharedViews()
-    compute_ahead(pool, store, shared, spec)
+    compute_ahead(pool, store, shared, spec, app)
 
     def begin(target: Target, number: int, lecture: Lecture | None = None) -> Session:
         app.sessions[number] = Session(target, pool, store, uploads, shared, spec, PANELS, lecture)

@@ -91,7 +91,7 @@ def _serve(pipe: Connection, scene: str) -> None:
     try:
         pipe.send(app.url)
         while pipe.recv() == "look":
-            there = {id(owner) for session in list(app.sessions.values()) for owner in session.owners}
+            there = {id(owner) for owner in app.owners}
             gone = [owner for owner in app.pool.running() if id(owner) not in there]
             sizes = list(_sizes(app.folder.path))
             numbers = {owner: numbers[owner] if owner in numbers else next(unused) for owner in gone}

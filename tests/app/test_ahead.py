@@ -27,7 +27,7 @@ class Pool:
 
 def test_every_view_of_the_chain_is_there(store):
     pool, shared = Pool(), SharedViews()
-    compute_ahead(pool, store, shared, START)
+    compute_ahead(pool, store, shared, START, "the server")
     assert pool.steps == list(CHAIN)
     views = [shared.get(START.key(step)) for step in CHAIN]
     assert [type(view).__name__ for view in views] == ["SceneView", "DepthView", "FuseView", "SurfaceView"]
@@ -36,7 +36,7 @@ def test_every_view_of_the_chain_is_there(store):
 def test_what_fails_is_left_to_those_who_come(store):
     pool, shared = Pool(), SharedViews()
     wrong = replace(START, source=Demo("no-such-scene"))
-    compute_ahead(pool, store, shared, wrong)
+    compute_ahead(pool, store, shared, wrong, "the server")
     assert pool.steps == ["scene"]
     assert shared.get(wrong.key("scene")) is None
 
@@ -46,4 +46,4 @@ def test_a_pool_that_is_closed_is_no_error(store):
         def submit(self, *_, **__):
             raise RuntimeError("the pool is closed")
 
-    compute_ahead(Closed(), store, SharedViews(), START)
+    compute_ahead(Closed(), store, SharedViews(), START, "the server")
