@@ -19,7 +19,7 @@ from packetmesh.errors import PacketMeshError
 OBJECTS = 60
 LONGEST_FIRST: tuple[SchemeName, ...] = ("baseline", "pdc", "greedy")
 """So that the cores end together."""
-SATURATED: Counts = {"ieee802154": (1, 2, 5), "ieee80211b": (1, 5, 20, 50)}
+SATURATED: Counts = {"ieee802154": (1, 2, 5, 20, 50), "ieee80211b": (1, 5, 20, 50)}
 SATURATED_S: dict[MacKind, float] = {"ieee802154": 60.0, "ieee80211b": 10.0}
 """Simulated time. That of IEEE 802.15.4, where so little happens, is long beside what a run takes to set up,
 which ns-3's clock leaves out."""
