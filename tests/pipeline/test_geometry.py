@@ -1,6 +1,9 @@
 """Rigid motions and the pinhole camera."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -35,6 +38,17 @@ def test_every_pixel_of_a_distorted_camera_projects_back_to_itself():
     u, v = np.meshgrid(np.arange(640), np.arange(480))
     uv = geometry.project(DISTORTED, rays.reshape(-1, 3) * 2.5)
     np.testing.assert_allclose(uv, np.stack([u, v], axis=-1).reshape(-1, 2), atol=1e-9)
+
+
+def test_the_rays_of_a_camera_are_its_own_whoever_asked_before_and_nobody_changes_them():
+    straight = replace(DISTORTED, distortion=np.zeros(5))
+    first, other = geometry.pixel_rays(DISTORTED), geometry.pixel_rays(straight)
+    corner = geometry.undistorted_rays(DISTORTED, [[639.0, 479.0]])
+    np.testing.assert_array_equal(first[-1, -1], corner[0])
+    assert not np.allclose(first, other, atol=1e-3)
+    np.testing.assert_array_equal(geometry.pixel_rays(replace(DISTORTED)), first)
+    with pytest.raises(ValueError, match="read-only"):
+        first[0, 0] = 0.0
 
 
 def test_a_camera_that_looks_at_a_point_sees_it_in_its_centre_and_upright():
