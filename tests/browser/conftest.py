@@ -39,6 +39,7 @@ def chromium_path() -> str | None:
     return next((shutil.which(name) for name in candidates if shutil.which(name)), None)
 
 
+@pytest.hookimpl(tryfirst=True)  # pytest-xdist looks at the groups, and where a path is named it came first
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark every test here, and keep them on one worker: they share a browser and a server."""
     for item in items:
