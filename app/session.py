@@ -159,8 +159,8 @@ class Session:
     ) -> None:
         """Run a job of the store, the spec and these arguments, in place of the one before.
 
-        It waits for the chain's own, that which follows what happens now too. On this thread, ``on_partial``
-        gets what it has so far, and ``on_end`` its result or None.
+        It waits for the chain's own, also for the step that the session asks for after what it does now. On
+        this thread, ``on_partial`` gets what it has so far, and ``on_end`` its result or None.
         """
         self.post(self._run_beside, self._side, job, arguments, on_end, on_partial)
 

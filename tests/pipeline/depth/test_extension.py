@@ -1,0 +1,54 @@
+"""A field continued into holes: known answers."""
+
+import numpy as np
+import pytest
+
+from pipeline.depth.extension import SLOPE_SHARE, extrapolated
+
+GREY = np.full((240, 320, 3), 90, np.uint8)
+HOLE = np.s_[90:150, 120:200]
+
+
+def known_but(hole, shape=(240, 320)):
+    known = np.ones(shape, bool)
+    known[hole] = False
+    return known
+
+
+def test_a_constant_stays_what_it_is():
+    known = known_but(HOLE)
+    field = np.where(known, np.float32(0.25), np.float32(0.0))
+    np.testing.assert_allclose(extrapolated(field, known, GREY), 0.25, atol=1e-6)
+
+
+def test_a_hole_takes_the_value_of_the_side_of_its_own_colour():
+    rgb = GREY.copy()
+    rgb[:, 160:] = 200
+    side = np.where(np.arange(320) < 160, np.float32(0.1), np.float32(-0.3))
+    field = np.broadcast_to(side, (240, 320)).copy()
+    known = known_but(HOLE)
+    filled = extrapolated(np.where(known, field, np.float32(0.0)), known, rgb)
+    away = np.abs(np.arange(320) - 159.5) > 6  # the colours are blurred before they are compared
+    np.testing.assert_allclose(filled[:, away], field[:, away], atol=1e-3)
+
+
+def test_a_slope_goes_on_past_the_rim_and_fades():
+    slope = 0.004
+    field = np.broadcast_to(slope * np.arange(320, dtype=np.float32), (240, 320)).copy()
+    known = known_but(np.s_[:, 200:])
+    filled = extrapolated(np.where(known, field, np.float32(0.0)), known, GREY)
+    steps = np.diff(filled[120, 199:])
+    assert 0.5 * SLOPE_SHARE * slope < steps[:8].mean() <= slope
+    assert steps[-30:].mean() < 0.5 * steps[:8].mean()
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (5, 700), (37, 53), (480, 640), (300, 1280)])
+@pytest.mark.parametrize("share", [0.02, 0.9])
+def test_what_is_known_stays_and_the_rest_is_finite_whatever_the_size(shape, share):
+    rng = np.random.default_rng(0)
+    known = rng.random(shape) < share
+    known[0, 0] = True
+    field = np.where(known, rng.normal(size=shape), 0.0).astype(np.float32)
+    filled = extrapolated(field, known, rng.integers(0, 256, (*shape, 3), np.uint8))
+    np.testing.assert_array_equal(filled[known], field[known])
+    assert np.isfinite(filled).all()
