@@ -40,6 +40,8 @@ BROKEN_ZIP = (
 
 _UNFINISHED = re.compile(r"\..*-[0-9a-f]{8}(\..*)?")
 """The names of what ``atomic_path`` gives."""
+_LEAVES = re.compile(r"^[/\\]|^[A-Za-z]:|(^|[/\\])\.\.([/\\]|$)|\0")
+"""What in a name leads out of a folder, on any system."""
 
 
 @contextmanager
@@ -64,6 +66,21 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     finally:
         with suppress(OSError):  # its folder does not exist, so neither does it
             sibling.unlink(missing_ok=True)
+
+
+def path_below(folder: Path, *names: str) -> Path:
+    """Join names that a browser, an archive or a file gave under a folder.
+
+    Raises:
+        InputError: a name is empty or absolute, or has ``..``, a drive or a null character.
+
+    >>> path_below(Path("runs"), "node_00", "color.png").as_posix()
+    'runs/node_00/color.png'
+    """
+    path = folder.joinpath(*names)
+    if not names or path == folder or any(not name or _LEAVES.search(name) for name in names):
+        raise InputError(f"{'/'.join(names)[:80]!r} does not name a file below its folder; rename it")
+    return path
 
 
 def delete_unfinished(folder: Path) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from packetmesh.errors import InputError
+from packetmesh.files import path_below
 from pipeline.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
@@ -72,9 +73,10 @@ def named_inside(folder: Path, name: str, file: str) -> Path:
     Raises:
         InputError: it lies outside the recording's folder.
     """
-    if ".." in Path(name).parts or Path(name).is_absolute():
-        raise InputError(f"{file} in {folder} names {name}, which is outside; check the file")
-    return folder / name
+    try:
+        return path_below(folder, name)
+    except InputError:
+        raise InputError(f"{file} in {folder} names {name}, which is outside; check the file") from None
 
 
 def posed(candidates: list[Candidate], what: str) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:

@@ -12,11 +12,18 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from app.cli import main
-from app.entrance import Entrance, Token, is_loopback
-from app.headers import strict_headers
 from app.load.connection import Connection, wait_for
-from app.origin import only_own_page
-from app.upload_gate import MOST_A_MINUTE, MOST_BYTES, MOST_TOTAL_BYTES, REFUSED, UploadGate, limit_uploads
+from app.web.entrance import Entrance, Token, is_loopback
+from app.web.gate import Gate
+from app.web.headers import strict_headers
+from app.web.origin import only_own_page
+from app.web.upload_gate import (
+    MOST_A_MINUTE,
+    MOST_BYTES,
+    MOST_TOTAL_BYTES,
+    REFUSED,
+    UploadGate,
+)
 from packetmesh.errors import InputError
 
 ENTRANCE = Entrance(Token("token"), Token("teacher"))
@@ -167,11 +174,12 @@ def test_a_file_is_too_large_too_many_or_more_than_it_said():
 def test_what_is_too_much_is_not_kept():
     told, got = [], []
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    gate = Gate(server)
+    gate.on_too_much = lambda _, sentence: told.append(sentence)
     try:
 
         @server.on_client_connect
         def _(client):
-            limit_uploads(client._websock_connection, told.append)
             client.gui.add_upload_button("File").on_upload(
                 lambda event: got.append(event.target.value.content)
             )

@@ -21,13 +21,13 @@ import pool_jobs
 
 import app.server
 from app.load.connection import Connection, wait_for
-from app.own_folder import LOCK, PREFIX, delete_abandoned, own_folder
 from app.pool import DIED
 from app.screens.calibrate.uploads import keep_photographs
-from app.server import FULL, build_server
+from app.server import build_server
 from app.session import Session
 from app.stepper import MARKS
-from app.uploads import keep_upload
+from app.web.own_folder import LOCK, PREFIX, delete_abandoned, own_folder
+from app.web.uploads import keep_upload
 from packetmesh.errors import InputError
 from tests.paths import ROOT
 
@@ -85,6 +85,8 @@ def test_a_worker_killed_at_any_stage_is_one_sentence_and_the_stage_can_be_asked
 
 def test_a_worker_killed_beside_the_chain_costs_only_that_answer(running, page):
     wait_for(lambda: up_to_date(page), LONG_S)
+    page.go("Export")
+    wait_for(lambda: page.current == "Export")
     page.set("Numbers", "Run folder")
     kill_worker_of(running, "export.job:export_job")
     wait_for(lambda: f"That did not work: {DIED}" in page.notices, LONG_S)
@@ -230,13 +232,3 @@ def test_only_what_nobody_uses_is_deleted(tmp_path, monkeypatch):
     assert {path.name for path in tmp_path.iterdir()} == {used.path.name, f"{PREFIX}of-somebody"}
     used.delete()
     assert not used.path.exists()
-
-
-def test_a_browser_too_many_is_told_so_and_gets_no_session(running, page, monkeypatch):
-    wait_for(lambda: len(running.sessions) == 1)
-    monkeypatch.setattr(app.server, "MOST_SESSIONS", 1)
-    with contextlib.closing(Connection(running.url)) as one:
-        wait_for(lambda: f"You cannot come in: {FULL}" in one.notices, LONG_S)
-        assert len(running.sessions) == 1
-    page.go("Depth")
-    wait_for(lambda: page.current == "Depth")

@@ -7,7 +7,7 @@ import pytest
 import viser
 import websockets
 
-from app.origin import is_own, only_own_page
+from app.web.origin import is_own, only_own_page
 
 
 @pytest.fixture(scope="module")

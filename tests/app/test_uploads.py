@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from app import uploads as module
-from app.uploads import KEPT_S, OWN, Uploads, keep_upload, name_in, plain
+from app.web import uploads as module
+from app.web.uploads import KEPT_S, OWN, Uploads, keep_upload, name_in, plain
 from packetmesh.errors import InputError
 from pipeline.sources import Calibrated, Demo, ImagePair, RigFolder
 from pipeline.spec import Spec

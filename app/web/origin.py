@@ -21,6 +21,9 @@ from websockets.asyncio import server as websockets_server
 
 Answer: TypeAlias = Callable[[Any, Any], Any]
 """To a connection and its request: a response, or None to go on to the websocket."""
+ONCE = ("Host", "Origin", "Upgrade", "Cookie", "Accept-Encoding")
+"""Headers that a request may have once."""
+NOT_WELL_FORMED = "This is not a request that PacketMesh understands.\n"
 REFUSED = "PacketMesh answers only its own page: open the address that it printed when it started.\n"
 
 
@@ -30,11 +33,14 @@ def is_own(headers: Mapping[str, str]) -> bool:
     Args:
         headers: of the request, by name in any case.
     """
-    host = headers.get("Host")
+    host = headers.get("Host", "")
     origin = headers.get("Origin")
-    if host is None or not _names_this_machine(urlsplit(f"//{host}").hostname or ""):
+    try:
+        name = urlsplit(f"//{host}").hostname or ""
+        page = host if origin is None else urlsplit(origin).netloc
+    except ValueError:  # a bracket of an address that is not closed
         return False
-    return origin is None or urlsplit(origin).netloc.lower() == host.lower()
+    return _names_this_machine(name) and page.lower() == host.lower()
 
 
 def _names_this_machine(name: str) -> bool:
@@ -44,6 +50,23 @@ def _names_this_machine(name: str) -> bool:
         return True
     own = {"localhost", socket.gethostname().lower(), socket.getfqdn().lower()}
     return name.lower() in own | {f"{socket.gethostname().lower()}.local"}
+
+
+def well_formed() -> AbstractContextManager[None]:
+    """Servers that start meanwhile answer 400 to requests that cannot be read, where viser fails with 500."""
+    return answering(_understood)
+
+
+def _understood(answer: Answer) -> Answer:
+    def answered(connection: Any, request: Any) -> Any:
+        try:
+            if any(len(request.headers.get_all(name)) > 1 for name in ONCE):
+                raise ValueError("twice")
+            return answer(connection, request)
+        except (ValueError, LookupError):
+            return connection.respond(http.HTTPStatus.BAD_REQUEST, NOT_WELL_FORMED)
+
+    return answered
 
 
 def only_own_page() -> AbstractContextManager[None]:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path
+from packetmesh.files import atomic_path, path_below
 from pipeline.sources import Source
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def keep_upload(file: viser.UploadedFile, folder: Path, limit_bytes: int, instea
     last = re.split(r"[/\\]", file.name)[-1]
     name = re.sub(r"[^\w.() -]+", "-", last)[-80:].strip(". ") or "file"
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / (Path(name).stem + Path(name).suffix.lower())
+    path = path_below(folder, Path(name).stem + Path(name).suffix.lower())
     with atomic_path(path) as temporary:
         temporary.write_bytes(file.content)
     return path

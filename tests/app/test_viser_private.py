@@ -6,8 +6,8 @@ import pytest
 import viser
 from websockets.sync.client import connect
 
-from app.any_thread import AnyThreadEvent
 from app.server import build_server
+from app.web.viser_private import AnyThreadEvent
 
 
 class _Changing(deque):

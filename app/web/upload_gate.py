@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
-from typing import Any
-
-from viser import _messages as messages
 
 MOST_BYTES = 256 << 20
 """Of one file; screens may take less."""
@@ -47,26 +43,3 @@ class UploadGate:
         left = self._left.get(transfer, -1) - size_bytes
         self._left[transfer] = left
         return left >= 0
-
-
-def limit_uploads(connection: Any, tell: Callable[[str], object]) -> None:
-    """Have what a connection uploads counted; what is too much is not heard.
-
-    Args:
-        connection: viser's, to a browser or to all.
-        tell: shows a sentence to that browser.
-    """
-    gate, hear = UploadGate(), connection._handle_incoming_message
-
-    async def heard(number: Any, message: Any) -> None:
-        if isinstance(message, messages.FileTransferStartUpload):
-            if not gate.begins(message.size_bytes, message.part_count, message.transfer_uuid):
-                tell(REFUSED)
-                return
-        elif isinstance(message, messages.FileTransferPart) and not gate.goes_on(
-            message.transfer_uuid, len(message.content)
-        ):
-            return
-        await hear(number, message)
-
-    setattr(connection, "_handle_incoming_message", heard)  # noqa: B010

@@ -15,9 +15,10 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any, Literal
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
-from app.landing import WELCOME
-from app.origin import Answer, answering
+from app.web.origin import Answer, answering
 
+WELCOME = "/?welcome"
+"""Where the teacher's link leads."""
 NOT_THAT = "This is not a link of this server: open the one that was printed when it started.\n"
 NO_LINK = "PacketMesh lets in who has its link: open the whole address that it printed when it started.\n"
 

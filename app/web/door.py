@@ -1,0 +1,70 @@
+"""The door: how fast browsers may connect, and that nobody comes before all is ready behind it."""
+
+from __future__ import annotations
+
+import http
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import Any
+
+from app.web.origin import Answer, answering
+
+MOST_AT_ONCE, MOST_A_SECOND = 48.0, 4.0
+"""Connections of one address: so many at once, and so many a second from then on. A class behind one router
+comes in one burst."""
+MOST_ADDRESSES = 10_000
+NOT_NOW = "PacketMesh takes no more connections at this moment; the page tries again by itself.\n"
+
+
+@dataclass(slots=True)
+class _Allowance:
+    """What an address may still open."""
+
+    left: float
+    counted_s: float
+
+
+class Door:
+    """Lets connections in at a bounded rate for each address; shut until it is opened."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._allowances: dict[str, _Allowance] = {}
+        self.is_open = False
+
+    def guarded(self) -> AbstractContextManager[None]:
+        """Servers that start meanwhile answer 503 to those who come too early or too often."""
+        return answering(self._answering)
+
+    def lets_in(self, address: str) -> bool:
+        """Return whether one more connection of an address may come; it counts if it may."""
+        now_s = self._clock()
+        if len(self._allowances) > MOST_ADDRESSES:
+            self._forget(now_s)
+        one = self._allowances.setdefault(address, _Allowance(MOST_AT_ONCE, now_s))
+        one.left = min(one.left + MOST_A_SECOND * (now_s - one.counted_s), MOST_AT_ONCE)
+        one.counted_s = now_s
+        if not self.is_open or one.left < 1.0:
+            return False
+        one.left -= 1.0
+        return True
+
+    def _forget(self, now_s: float) -> None:
+        """Forget the addresses that may open as many as at the start."""
+        whole_s = MOST_AT_ONCE / MOST_A_SECOND
+        self._allowances = {
+            address: one for address, one in self._allowances.items() if now_s - one.counted_s < whole_s
+        }
+
+    def _answering(self, answer: Answer) -> Answer:
+        def answered(connection: Any, request: Any) -> Any:
+            response = answer(connection, request)
+            if response is not None or self.lets_in(str((connection.remote_address or ("",))[0])):
+                return response
+            refusal = connection.respond(http.HTTPStatus.SERVICE_UNAVAILABLE, NOT_NOW)
+            refusal.headers["Retry-After"] = "1"
+            return refusal
+
+        return answered

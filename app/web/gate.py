@@ -1,0 +1,354 @@
+"""The gate for what browsers send: nothing passes that a hand could not have done on the page.
+
+``RULES`` has a rule for each kind of message that passes at all, and ``VALUES`` one for each kind of control:
+which values a hand can give it. What does not pass is dropped and counted. A connection that keeps sending
+what no page sends is closed.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections import Counter
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+from unicodedata import category
+
+import viser
+from viser import _messages as messages
+
+from app.web import viser_private as private
+from app.web.upload_gate import REFUSED, UploadGate
+
+MOST_TEXT = 4096
+"""Characters that a text field takes."""
+MOST_NAME = 1024
+"""Characters of names, such as a file's."""
+FARTHEST = 1e7
+"""Of places in the scene, metres."""
+MOST_PIXELS = 100_000
+MOST_FORGED = 60
+"""Messages that no page sends, before the connection is closed."""
+MOST_AT_ONCE, MOST_A_SECOND = 1000.0, 200.0
+"""Messages other than parts of files: so many in a burst, and so many a second from then on."""
+FLOOD, FORGED_CLOSE = "more than a hand can do", 1008
+
+logger = logging.getLogger(__name__)
+
+
+class Verdict(Enum):
+    """What becomes of a message."""
+
+    PASSES = "passes"
+    LATE = "late"
+    """A page may have sent it, but what it names has changed meanwhile, or is half typed: dropped."""
+    FORGED = "forged"
+    """No page sends it: dropped, and the connection is closed if there are many."""
+    REFUSED = "refused"
+    """A control that all share, and that this browser may not touch."""
+
+
+@dataclass(slots=True)
+class _Guest:
+    """A connection, and what it has sent."""
+
+    uploads: UploadGate = field(default_factory=UploadGate)
+    shows_page: bool = False
+    """Whether it has done more than turn the view, which its page does at once."""
+    forged: int = 0
+    allowance: float = MOST_AT_ONCE
+    counted_s: float = field(default_factory=time.monotonic)
+
+
+class Gate:
+    """Judges the messages of all browsers of a server, on the thread of its connections."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        """Judge from now on; a server judges before its first browser comes if it is made at once."""
+        self._server = server
+        self._guests: dict[int, _Guest] = {}
+        self.dropped: Counter[str] = Counter()
+        """What did not pass, by verdict and kind of message."""
+        self.may_steer: Callable[[int], bool] = lambda _: True
+        """Whether a browser, by its number, may touch what all share."""
+        self.on_refused: Callable[[int], None] = lambda _: None
+        """Called with a browser that has touched what it may not."""
+        self.on_too_much: Callable[[int, str], None] = lambda *_: None
+        """Called with the browser and a sentence, if it uploads more than is taken."""
+        private.listen(server, self._hear)
+        server.on_client_disconnect(lambda client: self._guests.pop(client.client_id, None))
+
+    def shows_page(self, number: int) -> bool:
+        """Return whether a browser has sent what only a page that is shown sends."""
+        return number in self._guests and self._guests[number].shows_page
+
+    async def _hear(self, number: int, message: Any, go_on: Callable[[], Awaitable[None]]) -> None:
+        guest = self._guests.setdefault(number, _Guest())
+        if not isinstance(message, messages.FileTransferPart) and not _within_rate(guest):
+            self.dropped[FLOOD] += 1
+            return
+        rule = RULES.get(type(message), _nothing)
+        verdict = rule(self, number, message)
+        if verdict is Verdict.PASSES:
+            guest.shows_page |= not isinstance(message, messages.ViewerCameraMessage)
+            await go_on()
+            return
+        self.dropped[f"{verdict.value} {type(message).__name__}"] += 1
+        if verdict is Verdict.FORGED:
+            guest.forged += 1
+            if guest.forged == MOST_FORGED:
+                logger.warning("closed a connection that sent %d messages that no page sends", MOST_FORGED)
+                private.close(self._server, number, FORGED_CLOSE, "not a page of this server")
+
+    def _touch(self, number: int, found: tuple[Any, bool] | None) -> Verdict:
+        """Whether a browser may touch what it has named."""
+        if found is None:
+            return Verdict.FORGED
+        return Verdict.PASSES if not found[1] or self.may_steer(number) else Verdict.REFUSED
+
+    # One for every kind of message.
+
+    def update(self, number: int, message: messages.GuiUpdateMessage) -> Verdict:
+        """A control has another value, or a button is pressed."""
+        found = private.find_control(self._server, number, message.uuid) if _is_name(message.uuid) else None
+        updates = message.updates
+        if found is None or not isinstance(updates, dict) or list(updates) != ["value"]:
+            return Verdict.FORGED
+        handle, value = found[0], updates["value"]
+        judge = next((judge for kind, judge in VALUES.items() if isinstance(handle, kind)), None)
+        verdict = Verdict.FORGED if judge is None else judge(handle, value)
+        if verdict is Verdict.FORGED:
+            return verdict
+        if (touched := self._touch(number, found)) is not Verdict.PASSES:
+            private.tell_value(self._server, number, handle)
+            self.on_refused(number)
+            return touched
+        if not private.is_live(handle):
+            private.tell_value(self._server, number, handle)
+            return Verdict.LATE
+        return verdict
+
+    def command(self, number: int, message: messages.CommandTriggerMessage) -> Verdict:
+        """A command of the palette, or its keys."""
+        found = private.find_command(self._server, number, message.uuid) if _is_name(message.uuid) else None
+        if found is not None and (found[0]._impl.removed or found[0].disabled):
+            return Verdict.LATE
+        return self._touch(number, found)
+
+    def begin_upload(self, number: int, message: messages.FileTransferStartUpload) -> Verdict:
+        """A file is about to come."""
+        names = (message.source_component_uuid, message.transfer_uuid, message.filename, message.mime_type)
+        sizes = (message.part_count, message.size_bytes)
+        if not all(map(_is_name, names)) or not all(type(size) is int for size in sizes):
+            return Verdict.FORGED
+        found = private.find_control(self._server, number, message.source_component_uuid)
+        if found is None or not isinstance(found[0], viser.GuiUploadButtonHandle):
+            return Verdict.FORGED
+        if not private.is_live(found[0]):
+            return Verdict.LATE
+        if (touched := self._touch(number, found)) is not Verdict.PASSES:
+            self.on_refused(number)
+            return touched
+        uploads = self._guests[number].uploads
+        if not uploads.begins(message.size_bytes, message.part_count, message.transfer_uuid):
+            self.on_too_much(number, REFUSED)
+            return Verdict.LATE
+        return Verdict.PASSES
+
+    def part(self, number: int, message: messages.FileTransferPart) -> Verdict:
+        """A part of a file that may come."""
+        transfer, content = message.transfer_uuid, message.content
+        if not _is_name(transfer) or type(message.part_index) is not int or not isinstance(content, bytes):
+            return Verdict.FORGED
+        known = self._guests[number].uploads.goes_on(transfer, len(content))
+        return Verdict.PASSES if known else Verdict.LATE
+
+    def acknowledgement(self, number: int, message: messages.FileTransferPartAck) -> Verdict:
+        """A browser has got a part of a file."""
+        sizes = (message.transferred_bytes, message.total_bytes)
+        whole = _is_name(message.transfer_uuid) and all(type(size) is int for size in sizes)
+        return Verdict.PASSES if whole else Verdict.FORGED
+
+    def camera(self, number: int, message: messages.ViewerCameraMessage) -> Verdict:
+        """The view was turned, or the window has another size."""
+        places = (message.position, message.look_at, message.up_direction)
+        lens = (message.fov, message.near, message.far)
+        sizes = (message.image_height, message.image_width)
+        whole = (
+            all(_are_numbers(place, 3) for place in places)
+            and _is_turn(message.wxyz)
+            and _are_numbers(lens, 3)
+            and 0.0 < message.fov < math.pi
+            and 0.0 < message.near < message.far
+            and all(type(size) is int and 0 <= size <= MOST_PIXELS for size in sizes)
+        )
+        if not whole:
+            return Verdict.FORGED
+        return Verdict.PASSES if all(sizes) else Verdict.LATE  # a window that has no picture now
+
+    def pointer(self, number: int, message: messages.ScenePointerMessage) -> Verdict:
+        """A click into the scene."""
+        ray = (message.ray_origin, message.ray_direction)
+        whole = (
+            message.event_type == "click"
+            and all(_are_numbers(one, 3) for one in ray)
+            and message.modifier is None
+            and isinstance(message.screen_pos, tuple | list)
+            and 1 <= len(message.screen_pos) <= 2
+            and all(_are_numbers(one, 2) for one in message.screen_pos)
+        )
+        return self._touch(number, (None, True)) if whole else Verdict.FORGED
+
+    def node(self, number: int, message: messages.SceneNodeClickMessage) -> Verdict:
+        """A click on something in the scene."""
+        ray = (message.ray_origin, message.ray_direction)
+        whole = (
+            _is_name(message.name)
+            and isinstance(message.owner, str)
+            and message.instance_index is None
+            and message.modifier is None
+            and all(_are_numbers(one, 3) for one in ray)
+            and _are_numbers(message.screen_pos, 2)
+        )
+        if not whole:
+            return Verdict.FORGED
+        found = private.find_node(self._server, number, message.name, message.owner)
+        if found is None or not found[0].visible:
+            return Verdict.LATE  # it comes and goes with what is drawn
+        return self._touch(number, found)
+
+    def gizmo(self, number: int, message: Any) -> Verdict:
+        """Arrows in the scene are taken, dragged or let go."""
+        moves = isinstance(message, messages.TransformControlsUpdateMessage)
+        if not _is_name(message.name) or not isinstance(message.owner, str):
+            return Verdict.FORGED
+        if moves and not (_are_numbers(message.position, 3) and _is_turn(message.wxyz)):
+            return Verdict.FORGED
+        found = private.find_node(self._server, number, message.name, message.owner)
+        if found is None or not isinstance(found[0], viser.TransformControlsHandle):
+            return Verdict.LATE  # they come and go with what is drawn
+        return self._touch(number, found) if found[0].visible else Verdict.LATE
+
+    def render(self, number: int, message: messages.GetRenderResponseMessage) -> Verdict:
+        """The picture of the view that the server has asked for."""
+        if not _is_name(message.render_uuid) or not isinstance(message.payload, bytes):
+            return Verdict.FORGED
+        asked = private.is_asked_for_render(self._server, number)
+        return Verdict.PASSES if asked else Verdict.LATE
+
+
+def _nothing(gate: Gate, number: int, message: Any) -> Verdict:
+    return Verdict.FORGED
+
+
+RULES: Mapping[type, Callable[[Gate, int, Any], Verdict]] = {
+    messages.GuiUpdateMessage: Gate.update,
+    messages.CommandTriggerMessage: Gate.command,
+    messages.FileTransferStartUpload: Gate.begin_upload,
+    messages.FileTransferPart: Gate.part,
+    messages.FileTransferPartAck: Gate.acknowledgement,
+    messages.ViewerCameraMessage: Gate.camera,
+    messages.ScenePointerMessage: Gate.pointer,
+    messages.SceneNodeClickMessage: Gate.node,
+    messages.TransformControlsDragStartMessage: Gate.gizmo,
+    messages.TransformControlsUpdateMessage: Gate.gizmo,
+    messages.TransformControlsDragEndMessage: Gate.gizmo,
+    messages.GetRenderResponseMessage: Gate.render,
+}
+"""What passes at all. The app has no forms, no held buttons, no nodes to drag, and no links to share."""
+
+
+def _ticked(handle: Any, value: object) -> Verdict:
+    return Verdict.PASSES if isinstance(value, bool) else Verdict.FORGED
+
+
+def _pressed(handle: Any, value: object) -> Verdict:
+    return Verdict.PASSES if value is True else Verdict.FORGED
+
+
+def _written(handle: Any, value: object) -> Verdict:
+    """A line of text without control characters."""
+    if not isinstance(value, str) or any(category(letter) in ("Cc", "Cs") for letter in value[:MOST_TEXT]):
+        return Verdict.FORGED
+    return Verdict.PASSES if len(value) <= MOST_TEXT else Verdict.LATE
+
+
+def _chosen(handle: Any, value: object) -> Verdict:
+    """One of the options; a list may have had others when it was opened."""
+    if not isinstance(value, str) or len(value) > MOST_TEXT:
+        return Verdict.FORGED
+    if value in handle.options:
+        return Verdict.PASSES
+    return Verdict.LATE
+
+
+def _counted(handle: Any, value: object) -> Verdict:
+    """A number with no more decimals than the control shows, within its bounds."""
+    return _number(handle, value, handle.value, handle.min, handle.max)
+
+
+def _placed(handle: Any, value: object) -> Verdict:
+    """Numbers of a vector, each as above."""
+    count = len(handle.value)
+    if not isinstance(value, tuple | list) or len(value) != count:
+        return Verdict.FORGED
+    least, most = (handle.min or (None,) * count), (handle.max or (None,) * count)
+    each = [_number(handle, *one) for one in zip(value, handle.value, least, most, strict=True)]
+    return next((verdict for verdict in each if verdict is not Verdict.PASSES), Verdict.PASSES)
+
+
+def _number(handle: Any, value: Any, now: float, least: float | None, most: float | None) -> Verdict:
+    if not _is_number(value) or (isinstance(now, int) and value != int(value)):
+        return Verdict.FORGED
+    digits = handle.precision
+    low = -math.inf if least is None else min(least, round(least, digits))
+    high = math.inf if most is None else max(most, round(most, digits))
+    if not low <= value <= high:
+        return Verdict.LATE  # one that is half typed
+    shown = abs(value - round(value, digits)) <= 1e-9 * abs(value) or value in (least, most)
+    return Verdict.PASSES if shown else Verdict.FORGED
+
+
+VALUES: Mapping[type, Callable[[Any, object], Verdict]] = {
+    viser.GuiCheckboxHandle: _ticked,
+    viser.GuiButtonHandle: _pressed,
+    viser.GuiTextHandle: _written,
+    viser.GuiDropdownHandle: _chosen,
+    viser.GuiButtonGroupHandle: _chosen,
+    viser.GuiNumberHandle: _counted,
+    viser.GuiSliderHandle: _counted,
+    viser.GuiVector2Handle: _placed,
+    viser.GuiVector3Handle: _placed,
+}
+"""Which values a hand can give a control; other kinds have none that a browser may set."""
+
+
+def _within_rate(guest: _Guest) -> bool:
+    """Take one from what a connection may still send, which grows with time."""
+    now_s = time.monotonic()
+    more = MOST_A_SECOND * (now_s - guest.counted_s)
+    guest.allowance, guest.counted_s = min(guest.allowance + more, MOST_AT_ONCE), now_s
+    if guest.allowance < 1.0:
+        return False
+    guest.allowance -= 1.0
+    return True
+
+
+def _is_name(text: object) -> bool:
+    return isinstance(text, str) and len(text) <= MOST_NAME
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= FARTHEST
+
+
+def _are_numbers(values: object, count: int) -> bool:
+    return isinstance(values, tuple | list) and len(values) == count and all(map(_is_number, values))
+
+
+def _is_turn(wxyz: Any) -> bool:
+    """Whether it is a unit quaternion, as near as a browser's float32."""
+    return _are_numbers(wxyz, 4) and abs(sum(value * value for value in wxyz) - 1.0) < 1e-2

@@ -1,0 +1,179 @@
+"""What the app needs of viser beyond its interface, each with the reason. Viser is pinned for this.
+
+- ``queue_from_any_thread``: viser 1.1 sets an ``asyncio.Event`` from whatever thread queues a message, before
+  it has the event loop set it again. asyncio's events are not made for that: where the loop begins to wait at
+  the same moment, ``set`` fails with "deque mutated during iteration", once in some thousand visits, and
+  leaves a page half built.
+- ``listen``: viser gives every message of every browser to its handlers, without a place to look at it first.
+- ``find_control``, ``find_command``, ``is_live``: what a message names, and whether a hand could reach it.
+- ``address_of``, ``close``, ``cookies``: of a browser's connection.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any, TypeAlias
+
+import viser
+from viser import _messages as messages
+
+Listener: TypeAlias = Callable[[int, Any, Callable[[], Awaitable[None]]], Awaitable[None]]
+"""Gets the number of a browser, what it sent, and what has viser handle it."""
+
+
+class AnyThreadEvent(asyncio.Event):
+    """An event that other threads set, too; whoever waits is woken by the loop's own call that follows."""
+
+    def set(self) -> None:
+        """Set it; on the event loop, also wake those who wait, even if it is set already."""
+        self._value = True
+        if _on_loop():
+            for waiter in self._waiters:
+                if not waiter.done():
+                    waiter.set_result(True)
+
+
+def queue_from_any_thread(server: viser.ViserServer) -> None:
+    """Have messages to all browsers, and to each that will come, queued safely from all threads."""
+
+    def queue_to(connection: Any) -> None:
+        connection.get_message_buffer().message_event.__class__ = AnyThreadEvent
+
+    queue_to(server._websock_server)
+    server._websock_server.on_client_connect(queue_to)
+
+
+def _on_loop() -> bool:
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return False
+    return True
+
+
+def listen(server: viser.ViserServer, listener: Listener) -> None:
+    """Have all that browsers send go through a listener, once, on the thread of the connections.
+
+    Viser hands a message to what all browsers share and to what the one has of its own; here the listener
+    decides for both.
+    """
+    shared = server._websock_server._handle_incoming_message
+    own: dict[int, Callable[[int, Any], Awaitable[None]]] = {}
+
+    async def heard(number: Any, message: Any) -> None:
+        async def go_on() -> None:
+            await shared(number, message)
+            if number in own:
+                await own[number](number, message)
+
+        await listener(number, message, go_on)
+
+    async def heard_already(number: Any, message: Any) -> None:
+        """Heard together with what all share."""
+
+    def connected(connection: Any) -> None:
+        own[connection.client_id] = connection._handle_incoming_message
+        setattr(connection, "_handle_incoming_message", heard_already)  # noqa: B010
+
+    setattr(server._websock_server, "_handle_incoming_message", heard)  # noqa: B010
+    server._websock_server.on_client_connect(connected)
+    server._websock_server.on_client_disconnect(lambda connection: own.pop(connection.client_id, None))
+
+
+def find_control(server: viser.ViserServer, number: int, uuid: str) -> tuple[Any, bool] | None:
+    """Return the control of that name that a browser has, and whether all share it; None if it has none."""
+    for gui, shared in _guis(server, number):
+        handle = gui._gui_input_handle_from_uuid.get(uuid)
+        if handle is not None:
+            return handle, shared
+    return None
+
+
+def find_command(server: viser.ViserServer, number: int, uuid: str) -> tuple[Any, bool] | None:
+    """Return the command of that name that a browser has, and whether all share it; None if it has none."""
+    for gui, shared in _guis(server, number):
+        handle = gui._command_handle_from_uuid.get(uuid)
+        if handle is not None:
+            return handle, shared
+    return None
+
+
+def find_node(server: viser.ViserServer, number: int, name: str, owner: str) -> tuple[Any, bool] | None:
+    """Return the node of a browser's scene by its name, and whether all share it; None if it has none.
+
+    Args:
+        server: of the browser.
+        number: of the browser.
+        name: of the node.
+        owner: as the browser repeats it: empty for what all share.
+    """
+    client = server._connected_clients.get(number)
+    scene = server.scene if owner == "" else None if client is None else client.scene
+    if scene is None or scene._owner_id != owner:
+        return None
+    handle = scene._handle_from_node_name.get(name)
+    return None if handle is None else (handle, owner == "")
+
+
+def is_live(handle: Any) -> bool:
+    """Return whether a control is there, enabled, and visible with all that it lies in."""
+    if handle._impl.removed or not handle.visible or handle.disabled:
+        return False
+    gui, container = handle._impl.gui_api, handle._impl.parent_container_id
+    while container != "root":
+        try:
+            within = gui._resolve_container_handle(container)
+        except KeyError:  # a dialog that was closed, or a folder that was removed
+            return False
+        if hasattr(within, "_parent"):  # a tab: what holds the tabs counts
+            within = within._parent
+        if not getattr(within, "visible", True):
+            return False
+        if not isinstance(within, viser.GuiFolderHandle | viser.GuiTabGroupHandle):
+            return True  # a dialog or a panel of its own lies in nothing
+        container = within._impl.parent_container_id
+    return True
+
+
+def is_asked_for_render(server: viser.ViserServer, number: int) -> bool:
+    """Return whether the server waits for a picture of a browser."""
+    client = server._connected_clients.get(number)
+    handlers = {} if client is None else client._websock_connection._incoming_handlers
+    return bool(handlers.get(messages.GetRenderResponseMessage))
+
+
+def tell_value(server: viser.ViserServer, number: int, handle: Any) -> None:
+    """Give a browser the value that a control has here."""
+    client = server._connected_clients.get(number)
+    if client is not None and not handle._impl.is_button:
+        back = messages.GuiUpdateMessage(handle._impl.uuid, {"value": handle._impl.value})
+        client._websock_connection.queue_message(back)
+
+
+def cookies(server: viser.ViserServer, number: int) -> str:
+    """Return the cookies with which a browser came; empty if it is gone."""
+    connection = server._websock_server._live_connections.get(number)
+    request = None if connection is None else connection.request
+    return "" if request is None else ", ".join(request.headers.get_all("Cookie"))
+
+
+def address_of(server: viser.ViserServer, number: int) -> str:
+    """Return the network address of a browser; empty if it is gone."""
+    connection = server._websock_server._live_connections.get(number)
+    return "" if connection is None else str((connection.remote_address or ("",))[0])
+
+
+def close(server: viser.ViserServer, number: int, code: int, reason: str) -> None:
+    """End a browser's connection, from any thread."""
+    connection = server._websock_server._live_connections.get(number)
+    loop = server._websock_server._background_event_loop
+    if connection is not None and loop is not None and not loop.is_closed():
+        asyncio.run_coroutine_threadsafe(connection.close(code, reason), loop)
+
+
+def _guis(server: viser.ViserServer, number: int) -> list[tuple[Any, bool]]:
+    """The panel of a browser's own, and the one that all share."""
+    client = server._connected_clients.get(number)
+    own = [] if client is None else [(client.gui, False)]
+    return [*own, (server.gui, True)]
