@@ -8,14 +8,15 @@ import traceback
 from collections.abc import Generator, Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from html import escape
 from pathlib import Path
 from typing import Any, Literal
+from urllib.parse import quote
 
 import cv2
 
 from app.reports.html import picture, pictures, table, write_page
 from app.reports.reconstruction import write_reconstruction_report
+from app.web.markup import Markup
 from packetmesh.batch import run_batch
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.files import atomic_path, finite, writable_folder, write_json
@@ -253,7 +254,7 @@ def write_rigs_table(outcomes: tuple[RigOutcome, ...], out: Path) -> None:
     lines = [",".join(rows[0]), *(",".join(_cell(value) for value in row.values()) for row in rows)]
     with atomic_path(out / "rigs.csv") as temporary:
         Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    write_page(out / "rigs.html", "PacketMesh: many rigs", "".join(_page(outcomes, out)))
+    write_page(out / "rigs.html", "PacketMesh: many rigs", Markup("").join(_page(outcomes, out)))
 
 
 def _cell(value: str | float) -> str:
@@ -261,24 +262,26 @@ def _cell(value: str | float) -> str:
     return '"' + value.replace('"', '""') + '"' if isinstance(value, str) else str(value)
 
 
-def _page(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[str]:
+def _page(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[Markup]:
     failed = sum(outcome.state == "failed" for outcome in outcomes)
-    yield f"<h1>{len(outcomes)} rigs</h1>"
-    yield f'<p class="lead">{len(outcomes) - failed} reconstructed, {failed} failed.</p>'
+    yield Markup("<h1>{} rigs</h1>").format(len(outcomes))
+    yield Markup('<p class="lead">{} reconstructed, {} failed.</p>').format(len(outcomes) - failed, failed)
     yield table((*HEADINGS[:-1], "state"), [(*rigs_row(outcome)[:-1], outcome.state) for outcome in outcomes])
-    said = [f"<li><b>{escape(o.name)}</b>: {escape(o.sentence)}</li>" for o in outcomes if o.sentence]
+    said = [Markup("<li><b>{}</b>: {}</li>").format(o.name, o.sentence) for o in outcomes if o.sentence]
     if said:
-        yield f"<h2>What there is to say</h2><ul>{''.join(said)}</ul>"
-    yield "<h2>Their surfaces, each as its first camera sees it</h2>"
-    yield '<p class="note">Magenta: the camera\'s ray meets no surface. A click opens the report.</p>'
+        yield Markup("<h2>What there is to say</h2><ul>{}</ul>").format(Markup("").join(said))
+    yield Markup("<h2>Their surfaces, each as its first camera sees it</h2>")
+    yield Markup('<p class="note">Magenta: the camera\'s ray meets no surface. A click opens the report.</p>')
     yield pictures(_figures(outcomes, out), 3)
 
 
-def _figures(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[str]:
+def _figures(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[Markup]:
     for outcome in outcomes:
         image = cv2.imread(str(out / outcome.name / PICTURE)) if outcome.state != "failed" else None
         if image is not None:
-            yield f'<a href="{outcome.name}/{REPORT}">{picture(image[..., ::-1], outcome.name)}</a>'
+            yield Markup('<a href="{}/{}">{}</a>').format(
+                quote(outcome.name), REPORT, picture(image[..., ::-1], outcome.name)
+            )
 
 
 HEADINGS = (

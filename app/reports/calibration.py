@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from html import escape
+import json
 from pathlib import Path
 
+import plotly
 import plotly.graph_objects as go
 
 from app.drawing import calibration_plots as plots
 from app.drawing.depth_bias_plots import depth_bias_figures
+from app.reports.document import json_block, shipped
 from app.reports.html import pictures, table, write_page
+from app.web.markup import Markup
 from pipeline.calibration.assess import Trust
 from pipeline.calibration.diagnosis import radial_curve, radial_residuals
 from pipeline.calibration.from_images import CameraReport
 
 HEIGHT_PX = 380
+_PLOTLY = Path(plotly.__file__).parent / "package_data" / "plotly.min.js"
+_SCRIPT = Path(__file__).parent / "calibration.js"
 
 
 def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> None:
@@ -25,25 +30,27 @@ def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> 
     """
     found = report.calibration
     mark, judged = ("reproduced", "pass") if trust.verdict.passed else ("not-reproduced", "fail")
-    body = (
-        f'<h1>Calibration of a camera: <span class="{mark}">{judged}</span></h1>'
-        f'<p class="lead">{escape(trust.verdict.sentence)}</p>'
-        f'<p class="note">{escape(_made_of(report))}</p>'
-    )
+    body = Markup(
+        '<h1>Calibration of a camera: <span class="{}">{}</span></h1>'
+        '<p class="lead">{}</p><p class="note">{}</p>'
+    ).format(mark, judged, trust.verdict.sentence, _made_of(report))
     errors = found.standard_errors
     rows = [
         (name, f"{found.parameters[name]:.6g}", f"{errors[name]:.2g}", f"{low:.6g} to {high:.6g}")
         for name, (low, high) in found.intervals.items()
     ]
-    body += "<h2>The lens</h2>" + table(("parameter", "value", "standard error", "95 % interval"), rows)
+    body += Markup("<h2>The lens</h2>")
+    body += table(("parameter", "value", "standard error", "95 % interval"), rows)
     if trust.outliers:
-        proposed = "".join(f"<li>{escape(one.reason)}</li>" for one in trust.outliers)
-        body += f"<h2>Images that one may leave out</h2><ul>{proposed}</ul>"
-    body += "<h2>Pictures</h2>" + _figures(_all(report, trust))
+        proposed = Markup("").join(Markup("<li>{}</li>").format(one.reason) for one in trust.outliers)
+        body += Markup("<h2>Images that one may leave out</h2><ul>{}</ul>").format(proposed)
+    figures = _all(report, trust)
+    body += Markup("<h2>Pictures</h2>") + _places(len(figures))
     missing = [(name, one.reason) for name, one in report.detections.items() if not one.found]
     if missing:
-        body += "<h2>Images without the board</h2>" + table(("image", "why"), missing)
-    write_page(path, "PacketMesh: calibration", body)
+        body += Markup("<h2>Images without the board</h2>") + table(("image", "why"), missing)
+    body += json_block("figures", [json.loads(figure.to_json()) for figure in figures])
+    write_page(path, "PacketMesh: calibration", body, (shipped(_PLOTLY), shipped(_SCRIPT)))
 
 
 def _made_of(report: CameraReport) -> str:
@@ -78,15 +85,7 @@ def _all(report: CameraReport, trust: Trust) -> list[go.Figure]:
     ]
 
 
-def _figures(figures: list[go.Figure]) -> str:
-    """Side by side; the first brings plotly along, so that the page needs no network."""
-    parts = [
-        figure.to_html(
-            full_html=False,
-            include_plotlyjs="inline" if row == 0 else False,
-            default_height=f"{HEIGHT_PX}px",
-            config={"displayModeBar": False},
-        )
-        for row, figure in enumerate(figures)
-    ]
-    return pictures((f'<div style="min-width: 0">{part}</div>' for part in parts), 2)
+def _places(count: int) -> Markup:
+    """Where ``calibration.js`` draws the figures, side by side."""
+    place = Markup('<div class="plotly-graph-div" id="figure-{}" style="min-width: 0; height: {}px"></div>')
+    return pictures((place.format(row, HEIGHT_PX) for row in range(count)), 2)

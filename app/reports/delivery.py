@@ -11,6 +11,7 @@ from app.reports.delivery_animation import delivery_animation
 from app.reports.hand_out import FramesOnAir, HandOut, HandOutMoment, HandOutNode, thumbnail, viewpoint
 from app.reports.offline_page import offline_page
 from app.reports.packed_mesh import Box, pack_within
+from app.web.markup import Markup
 from pipeline.types import Surface
 
 __all__ = [
@@ -35,7 +36,7 @@ _PARTS = (
 )
 
 
-def delivery_page(hand_out: HandOut) -> str:
+def delivery_page(hand_out: HandOut) -> Markup:
     """A self-contained HTML document of at most ``MOST_BYTES``.
 
     Meshes that would make it larger are thinned, the last one least; pictures and frames are as given.
@@ -125,6 +126,6 @@ def _frames(hand_out: HandOut) -> tuple[bytes, float, float]:
     return zlib.compress(counts.astype("<u4").tobytes() + b"".join(planes), 9), tick_s, until_s
 
 
-def _page(hand_out: HandOut, record: dict[str, Any], blocks: dict[str, bytes]) -> str:
+def _page(hand_out: HandOut, record: dict[str, Any], blocks: dict[str, bytes]) -> Markup:
     words = {"title": hand_out.title, "sentence": hand_out.sentence}
     return offline_page(f"{hand_out.title} · PacketMesh", "hand_out.html", words, _PARTS, record, blocks)

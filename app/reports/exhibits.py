@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 
 from app.reports.html import picture, pictures, table
+from app.web.markup import Markup
 from lab.claims.exhibits import Chart, Curve, Exhibit, HeatMap, Picture, Table
 
 COLORS = (
@@ -27,9 +27,17 @@ WIDTH, HEIGHT = 560, 330
 LEFT, TOP, RIGHT, BOTTOM = 52, 12, 150, 44
 CELL_PX = 54
 PICTURES_IN_A_ROW = 3
+_TEXT = Markup('<text x="{:.1f}" y="{:.1f}" text-anchor="{}">{}</text>')
+_CURVE = Markup(
+    '<polygon points="{band}" fill="{color}" opacity=".13"/>'
+    '<polyline points="{line}" fill="none" stroke="{color}" stroke-width="1.8"{dashes}/>'
+    '<line x1="{left}" x2="{right}" y1="{y}" y2="{y}" stroke="{color}" stroke-width="2.4"{dashes}/>'
+)
+_TICK = Markup('<line x1="{}" x2="{}" y1="{:.1f}" y2="{:.1f}" stroke="#8884"/>')
+_CELL = Markup('<rect x="{}" y="{}" width="{size}" height="{size}" fill="hsl(204 70% {:.0f}%)"/>')
 
 
-def exhibit_html(exhibit: Exhibit) -> str:
+def exhibit_html(exhibit: Exhibit) -> Markup:
     """One table or picture with its title and its note."""
     if isinstance(exhibit, Table):
         kind, body = "wide", table(exhibit.header, exhibit.rows)
@@ -39,11 +47,11 @@ def exhibit_html(exhibit: Exhibit) -> str:
         kind, body = "wide", _images(exhibit)
     else:
         kind, body = "picture", heat_map_svg(exhibit)
-    note = f'<p class="note">{escape(exhibit.note)}</p>' if exhibit.note else ""
-    return f'<div class="{kind}"><h3>{escape(exhibit.title)}</h3>{body}{note}</div>'
+    note = Markup('<p class="note">{}</p>').format(exhibit.note) if exhibit.note else ""
+    return Markup('<div class="{}"><h3>{}</h3>{}{}</div>').format(kind, exhibit.title, body, note)
 
 
-def _images(exhibit: Picture) -> str:
+def _images(exhibit: Picture) -> Markup:
     """As PNG, which loses nothing, so that rays without a surface keep their one colour."""
     figures = [picture(rgb, caption, "png") for caption, rgb in exhibit.images]
     return pictures(figures, min(PICTURES_IN_A_ROW, len(figures)))
@@ -91,7 +99,7 @@ def chart_axes(chart: Chart) -> tuple[Axis, Axis]:
     return Axis(x_low, x_high, chart.logarithmic), Axis(y_low, y_high, chart.logarithmic)
 
 
-def chart_svg(chart: Chart) -> str:
+def chart_svg(chart: Chart) -> Markup:
     """Lines with bands."""
     x_axis, y_axis = chart_axes(chart)
     width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
@@ -104,69 +112,60 @@ def chart_svg(chart: Chart) -> str:
 
     parts = [_axes(chart, x_axis, y_axis)]
     for row, curve in enumerate(chart.curves):
-        color = COLORS[row % len(COLORS)]
-        band = at(curve.x, curve.high) + at(curve.x, curve.low)[::-1]
         y = TOP + 14 + 17 * row
-        parts.append(
-            f'<polygon points="{" ".join(band)}" fill="{color}" opacity=".13"/>'
-            f'<polyline points="{" ".join(at(curve.x, curve.y))}" fill="none" stroke="{color}" '
-            f'stroke-width="1.8"{_dashes(curve)}/>'
-            f'<line x1="{WIDTH - RIGHT + 10}" x2="{WIDTH - RIGHT + 30}" y1="{y - 4}" y2="{y - 4}" '
-            f'stroke="{color}" stroke-width="2.4"{_dashes(curve)}/>'
-            f'<text x="{WIDTH - RIGHT + 36}" y="{y}">{escape(curve.label)}</text>'
-        )
-    return _svg(WIDTH, HEIGHT, chart.title, "".join(parts))
+        parts += [
+            _CURVE.format(
+                band=" ".join(at(curve.x, curve.high) + at(curve.x, curve.low)[::-1]),
+                line=" ".join(at(curve.x, curve.y)),
+                color=COLORS[row % len(COLORS)],
+                dashes=_dashes(curve),
+                left=WIDTH - RIGHT + 10,
+                right=WIDTH - RIGHT + 30,
+                y=y - 4,
+            ),
+            _TEXT.format(WIDTH - RIGHT + 36, y, "start", curve.label),
+        ]
+    return _svg(WIDTH, HEIGHT, chart.title, parts)
 
 
-def heat_map_svg(heat_map: HeatMap) -> str:
+def heat_map_svg(heat_map: HeatMap) -> Markup:
     """Cells from pale (none) to blue (all), each with its share."""
     columns, rows = len(heat_map.x), len(heat_map.y)
     width, height = LEFT + CELL_PX * columns + 10, TOP + CELL_PX * rows + BOTTOM
     parts = []
     for i, shares in enumerate(heat_map.shares):
         y = TOP + CELL_PX * i
-        parts.append(
-            f'<text x="{LEFT - 8}" y="{y + CELL_PX / 2 + 4}" text-anchor="end">{heat_map.y[i]:g}</text>'
-        )
+        parts.append(_TEXT.format(LEFT - 8, y + CELL_PX / 2 + 4, "end", f"{heat_map.y[i]:g}"))
         for j, share in enumerate(shares):
             x = LEFT + CELL_PX * j
-            parts.append(
-                f'<rect x="{x}" y="{y}" width="{CELL_PX - 2}" height="{CELL_PX - 2}" '
-                f'fill="hsl(204 70% {94 - 38 * share:.0f}%)"/>'
-                f'<text x="{x + CELL_PX / 2}" y="{y + CELL_PX / 2 + 4}" text-anchor="middle" fill="#111">'
-                f"{share:.0%}</text>"
-            )
+            cell = _CELL.format(x, y, 94 - 38 * share, size=CELL_PX - 2)
+            number = _TEXT.format(x + CELL_PX / 2, y + CELL_PX / 2 + 4, "middle", f"{share:.0%}")
+            parts += [cell, Markup('<g fill="#111">{}</g>').format(number)]
     for j, value in enumerate(heat_map.x):
-        center = LEFT + CELL_PX * (j + 0.5)
         below = TOP + CELL_PX * rows + 15
-        parts.append(f'<text x="{center}" y="{below}" text-anchor="middle">{value:g}</text>')
-    middle = LEFT + CELL_PX * columns / 2
-    parts.append(
-        f'<text x="{middle}" y="{height - 10}" text-anchor="middle">{escape(heat_map.x_label)}</text>'
-        f'<text transform="translate(14 {TOP + CELL_PX * rows / 2}) rotate(-90)" text-anchor="middle">'
-        f"{escape(heat_map.y_label)}</text>"
-    )
-    return _svg(width, height, heat_map.title, "".join(parts))
+        parts.append(_TEXT.format(LEFT + CELL_PX * (j + 0.5), below, "middle", f"{value:g}"))
+    at = LEFT + CELL_PX * columns / 2, height - 10, TOP + CELL_PX * rows / 2
+    return _svg(width, height, heat_map.title, [*parts, _labels(heat_map, *at)])
 
 
-def _axes(chart: Chart, x_axis: Axis, y_axis: Axis) -> str:
+def _axes(chart: Chart, x_axis: Axis, y_axis: Axis) -> Markup:
     width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
     parts = []
     for value, text in y_axis.ticks():
         y = TOP + height * (1.0 - y_axis.share(value))
-        parts.append(
-            f'<line x1="{LEFT}" x2="{LEFT + width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#8884"/>'
-            f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{text}</text>'
-        )
+        parts += [_TICK.format(LEFT, LEFT + width, y, y), _TEXT.format(LEFT - 6, y + 4, "end", text)]
     for value, text in x_axis.ticks():
-        x = LEFT + width * x_axis.share(value)
-        parts.append(f'<text x="{x:.1f}" y="{TOP + height + 16}" text-anchor="middle">{text}</text>')
-    parts.append(
-        f'<text x="{LEFT + width / 2}" y="{HEIGHT - 8}" text-anchor="middle">{escape(chart.x_label)}</text>'
-        f'<text transform="translate(14 {TOP + height / 2}) rotate(-90)" text-anchor="middle">'
-        f"{escape(chart.y_label)}</text>"
+        parts.append(_TEXT.format(LEFT + width * x_axis.share(value), TOP + height + 16, "middle", text))
+    return Markup("").join([*parts, _labels(chart, LEFT + width / 2, HEIGHT - 8, TOP + height / 2)])
+
+
+def _labels(exhibit: Chart | HeatMap, x: float, below: float, middle: float) -> Markup:
+    """What the axes mean: below at ``x``, and upwards along the left edge."""
+    return Markup('{}<g transform="translate(14 {}) rotate(-90)">{}</g>').format(
+        _TEXT.format(x, below, "middle", exhibit.x_label),
+        middle,
+        _TEXT.format(0, 0, "middle", exhibit.y_label),
     )
-    return "".join(parts)
 
 
 def ticks(high: float, most: int = 6) -> list[float]:
@@ -176,12 +175,12 @@ def ticks(high: float, most: int = 6) -> list[float]:
     return [round(step * k, 10) for k in range(int(high / step + 1e-9) + 1)]
 
 
-def _dashes(curve: Curve) -> str:
-    return ' stroke-dasharray="6 3"' if curve.label.endswith("plane") else ""
+def _dashes(curve: Curve) -> Markup:
+    return Markup(' stroke-dasharray="6 3"') if curve.label.endswith("plane") else Markup("")
 
 
-def _svg(width: float, height: float, title: str, body: str) -> str:
-    return (
-        f'<svg class="chart" role="img" aria-label="{escape(title)}" viewBox="0 0 {width} {height}" '
-        f'width="{width}" height="{height}" fill="currentColor" font-size="12">{body}</svg>'
-    )
+def _svg(width: float, height: float, title: str, parts: Sequence[Markup]) -> Markup:
+    return Markup(
+        '<svg class="chart" role="img" aria-label="{title}" viewBox="0 0 {width} {height}" '
+        'width="{width}" height="{height}" fill="currentColor" font-size="12">{body}</svg>'
+    ).format(title=title, width=width, height=height, body=Markup("").join(parts))

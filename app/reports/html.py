@@ -1,19 +1,20 @@
-"""The few pieces that every written report is made of: one self-contained HTML file, no scripts."""
+"""The few pieces that every written report is made of: one self-contained HTML file."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Sequence
-from html import escape
 from pathlib import Path
 from typing import Literal
 
 import cv2
 
+from app.reports.document import document
+from app.web.markup import Markup
 from packetmesh.files import atomic_path
 from pipeline.types import ByteArray
 
-STYLE = """
+STYLE = Markup("""
 :root { color-scheme: light dark; --line: #8884; --soft: #8881; --good: #1a7f4b; --bad: #b3261e; }
 body { font: 15px/1.55 system-ui, sans-serif; max-width: 1180px; margin: 2rem auto; padding: 0 1.2rem; }
 h1 { font-size: 1.7rem; margin: 0 0 .3rem; } h2 { font-size: 1.2rem; margin: 2.2rem 0 .6rem; }
@@ -31,46 +32,48 @@ h3 { font-size: 1rem; margin: 1.6rem 0 .4rem; } .wide { overflow-x: auto; }
 .picture { display: inline-block; vertical-align: top; max-width: 560px; margin-right: 1.5rem; }
 svg.chart { max-width: 100%; height: auto; }
 .reproduced { color: var(--good); font-weight: 600; } .not-reproduced { color: var(--bad); font-weight: 600; }
-"""
+""")
 
 
-def page(title: str, body: str) -> str:
+def page(title: str, body: Markup, scripts: Sequence[Markup] = ()) -> Markup:
     """A whole HTML document."""
-    return (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<style>{STYLE}</style></head><body>{body}</body></html>\n"
-    )
+    return document(title, body, STYLE, scripts)
 
 
-def write_page(path: Path, title: str, body: str) -> None:
+def write_page(path: Path, title: str, body: Markup, scripts: Sequence[Markup] = ()) -> None:
     """Write a document to ``path``, whole or not at all."""
     with atomic_path(path) as temporary:
-        Path(temporary).write_text(page(title, body), encoding="utf-8")
+        Path(temporary).write_text(page(title, body, scripts), encoding="utf-8")
 
 
-def picture(rgb: ByteArray, caption: str, kind: Literal["jpeg", "png"] = "jpeg") -> str:
+def picture(rgb: ByteArray, caption: str, kind: Literal["jpeg", "png"] = "jpeg") -> Markup:
     """An (H, W, 3) RGB image with what it shows, as an HTML figure holding the image itself."""
     options = [cv2.IMWRITE_JPEG_QUALITY, 88] if kind == "jpeg" else []
     _, encoded = cv2.imencode(f".{kind}", rgb[..., ::-1], options)
     data = base64.b64encode(encoded.tobytes()).decode()
-    return (
-        f'<figure><img alt="{escape(caption)}" src="data:image/{kind};base64,{data}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    return Markup(
+        '<figure><img alt="{caption}" src="data:image/{kind};base64,{data}">'
+        "<figcaption>{caption}</figcaption></figure>"
+    ).format(caption=caption, kind=kind, data=data)
+
+
+def pictures(figures: Iterable[Markup], columns: int) -> Markup:
+    """Figures side by side, ``columns`` to a row."""
+    return Markup('<div class="pictures" style="grid-template-columns: repeat({}, 1fr)">{}</div>').format(
+        columns, Markup("").join(figures)
     )
 
 
-def pictures(figures: Iterable[str], columns: int) -> str:
-    """Figures side by side, ``columns`` to a row."""
-    style = f"grid-template-columns: repeat({columns}, 1fr)"
-    return f'<div class="pictures" style="{style}">{"".join(figures)}</div>'
-
-
-def table(header: Sequence[str], rows: Iterable[Sequence[str | float | int | None]]) -> str:
+def table(header: Sequence[str], rows: Iterable[Sequence[str | float | int | None]]) -> Markup:
     """A table with a name first in each row; what follows is aligned to the right, a dash for None."""
-    head = "".join(f"<th>{escape(name)}</th>" for name in header)
-    body = "".join(f"<tr>{''.join(f'<td>{escape(_text(value))}</td>' for value in row)}</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    head = Markup("").join(map(Markup("<th>{}</th>").format, header))
+    body = Markup("").join(map(_row, rows))
+    return Markup("<table><thead><tr>{}</tr></thead><tbody>{}</tbody></table>").format(head, body)
+
+
+def _row(values: Sequence[str | float | int | None]) -> Markup:
+    cells = Markup("").join(map(Markup("<td>{}</td>").format, map(_text, values)))
+    return Markup("<tr>{}</tr>").format(cells)
 
 
 def _text(value: str | float | int | None) -> str:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import base64
-import json
 from collections.abc import Mapping, Sequence
-from html import escape
 from pathlib import Path
-from string import Template
 from typing import Any
 
 from app.drawing.colors import DELIVERED, INFERRED, LOSS, SOURCE, TARGET, css
+from app.reports.document import bytes_block, document, json_block, shipped
+from app.web.markup import Markup
 
-_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
-"""The page may load nothing from anywhere."""
 _COLORS = {"delivered": DELIVERED, "lost": LOSS, "source": SOURCE, "target": TARGET, "inferred": INFERRED}
 _STYLE = "offline_page.css"
 
@@ -25,7 +21,7 @@ def offline_page(
     parts: Sequence[str],
     record: Mapping[str, Any],
     blocks: Mapping[str, bytes],
-) -> str:
+) -> Markup:
     """A self-contained HTML document.
 
     Args:
@@ -36,25 +32,17 @@ def offline_page(
         record: what the scripts read as JSON, in the element ``record``.
         blocks: what they read as bytes, each in an element of that name.
     """
-    texts = {part: _text(part) for part in (_STYLE, *parts)}
-    styles = "\n".join(text for part, text in texts.items() if part.endswith(".css"))
-    scripts = "\n".join(text for part, text in texts.items() if part.endswith(".js"))
-    colors = "".join(f"--{name}: {css(color)};" for name, color in _COLORS.items())
-    data = "".join(
-        f'<script type="text/plain" id="{name}">{base64.b64encode(block).decode()}</script>\n'
-        for name, block in blocks.items()
-    )
-    content = Template(_text(body)).substitute({name: escape(word) for name, word in words.items()})
-    text = json.dumps(record, allow_nan=False).replace("<", "\\u003c")
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>:root {{{colors}}}\n{styles}</style></head>"
-        f'<body>{content}\n<script type="application/json" id="record">{text}</script>\n{data}'
-        f'<script>"use strict";\n{scripts}</script></body></html>\n'
-    )
+    texts = {part: _shipped(part) for part in (_STYLE, *parts)}
+    colors = Markup("").join(Markup("--{}: {};").format(name, css(color)) for name, color in _COLORS.items())
+    styles = [Markup(":root {{{}}}").format(colors)]
+    styles += [text for part, text in texts.items() if part.endswith(".css")]
+    scripts = [Markup('"use strict";')]
+    scripts += [text for part, text in texts.items() if part.endswith(".js")]
+    content = [_shipped(body).format(**words), json_block("record", record)]
+    content += [bytes_block(name, block) for name, block in blocks.items()]
+    lines = Markup("\n")
+    return document(title, lines.join(content), lines.join(styles), [lines.join(scripts)])
 
 
-def _text(name: str) -> str:
-    return (Path(__file__).parent / name).read_text(encoding="utf-8")
+def _shipped(name: str) -> Markup:
+    return shipped(Path(__file__).parent / name)

@@ -10,6 +10,7 @@ import numpy as np
 from app.drawing.colors import DISTANCE_STOPS, NEUTRAL, css
 from app.reports.hand_out import Viewpoint
 from app.reports.offline_page import offline_page
+from app.web.markup import Markup
 from pipeline.types import ByteArray, FloatArray
 
 _PARTS = ("race_page.css", "offline_page.js", "hand_out_view.js", "race_page.js")
@@ -60,7 +61,7 @@ class RaceShow:
         return max(len(run.poses) for run in self.runs)
 
 
-def race_page(race: RaceShow) -> str:
+def race_page(race: RaceShow) -> Markup:
     """A self-contained HTML document that plays the race."""
     record = {
         "view": race.view.record(),

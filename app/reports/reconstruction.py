@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from html import escape
 from pathlib import Path
 from typing import Any
 
 from app.drawing.pictures import depth_picture, depth_range_m
 from app.reports.html import picture, pictures, table, write_page
+from app.web.markup import Markup
 from pipeline.rays import Camera
 from pipeline.reconstruct import Reconstruction
 from pipeline.stages import cameras_of, dressed
@@ -39,71 +39,73 @@ QUALITY_ROWS = (
 
 def write_reconstruction_report(result: Reconstruction, metrics: dict[str, Any], path: Path) -> None:
     """Write the self-contained HTML report of a run to ``path``."""
-    write_page(path, f"PacketMesh: {metrics['scene']}", "".join(_sections(result, metrics)))
+    write_page(path, f"PacketMesh: {metrics['scene']}", Markup("").join(_sections(result, metrics)))
 
 
-def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
+def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Markup]:
     before, after = metrics["surface_before"], metrics["surface_after"]
-    yield f"<h1>{escape(metrics['scene'])}</h1>"
-    yield (
-        f'<p class="lead">Preset <code>{escape(metrics["preset"])}</code>. Of all camera rays, '
-        f"<b>{before['no_hit_ray_share']:.1%}</b> find no surface before fusion and "
-        f"<b>{after['no_hit_ray_share']:.1%}</b> after it.{_kept(metrics['measured'])}"
-        f"{_agreeing(metrics['measured'])}</p>"
+    yield Markup("<h1>{}</h1>").format(metrics["scene"])
+    yield Markup(
+        '<p class="lead">Preset <code>{}</code>. Of all camera rays, <b>{:.1%}</b> find no surface before '
+        "fusion and <b>{:.1%}</b> after it.{}{}</p>"
+    ).format(
+        metrics["preset"],
+        before["no_hit_ray_share"],
+        after["no_hit_ray_share"],
+        _kept(metrics["measured"]),
+        _agreeing(metrics["measured"]),
     )
     yield from _must_be_known(metrics)
     yield from _surfaces(result, before, after)
     yield from _truth(metrics)
     yield from _nodes(result, metrics)
     yield from _registrations(metrics)
-    yield "<h2>Time and settings</h2>"
+    yield Markup("<h2>Time and settings</h2>")
     yield table(
         ("stage", "seconds"), ((stage, f"{time_s:.3f}") for stage, time_s in metrics["timings_s"].items())
     )
-    memory_mb = metrics["peak_memory_bytes"] / 1e6
-    yield (
-        f'<p class="note">At most {memory_mb:,.0f} MB of memory. All settings are in '
-        "<code>config.json</code>, all numbers in <code>metrics.json</code>.</p>"
-    )
+    yield Markup(
+        '<p class="note">At most {:,.0f} MB of memory. All settings are in <code>config.json</code>, all '
+        "numbers in <code>metrics.json</code>.</p>"
+    ).format(metrics["peak_memory_bytes"] / 1e6)
 
 
-def _kept(measured: dict[str, float]) -> str:
+def _kept(measured: dict[str, float]) -> Markup:
     """What became of the measurements, in two sentences."""
-    return (
-        f" Of the measured pixels, the outlier filter keeps <b>{measured['kept_share']:.2%}</b>; the surface "
-        f"lies within 2 % of what was measured at <b>{measured['within_2pct_before']:.1%}</b> of them before "
-        f"and at <b>{measured['within_2pct_after']:.1%}</b> after fusion. Afterwards measurements close "
-        f"<b>{measured['measured_ray_share']:.1%}</b> of all rays and guesses "
-        f"<b>{measured['guessed_ray_share']:.1%}</b>."
-    )
+    return Markup(
+        " Of the measured pixels, the outlier filter keeps <b>{kept_share:.2%}</b>; the surface lies within "
+        "2 % of what was measured at <b>{within_2pct_before:.1%}</b> of them before and at "
+        "<b>{within_2pct_after:.1%}</b> after fusion. Afterwards measurements close "
+        "<b>{measured_ray_share:.1%}</b> of all rays and guesses <b>{guessed_ray_share:.1%}</b>."
+    ).format(**measured)
 
 
-def _agreeing(measured: dict[str, float]) -> str:
+def _agreeing(measured: dict[str, float]) -> Markup:
     """How far the cameras of a rig agree, in a sentence; nothing where no two measured the same place."""
     share = measured["agreement_between_nodes"]
     if not math.isfinite(share):
-        return ""
-    return f" Of what two cameras both measured, <b>{share:.1%}</b> is within 2 %."
+        return Markup("")
+    return Markup(" Of what two cameras both measured, <b>{:.1%}</b> is within 2 %.").format(share)
 
 
-def _must_be_known(metrics: dict[str, Any]) -> Iterator[str]:
+def _must_be_known(metrics: dict[str, Any]) -> Iterator[Markup]:
     """What is doubtful about the images, and of nodes that found no place, or one that little speaks for."""
     for note in metrics.get("import", {"notes": ()})["notes"]:
-        yield f'<p class="lead">{escape(note)}.</p>'
+        yield Markup('<p class="lead">{}.</p>').format(note)
     for node in metrics["nodes"]:
         for note in node["notes"]:
-            yield f'<p class="lead"><b>{escape(node["name"])}: {escape(note)}.</b></p>'
+            yield Markup('<p class="lead"><b>{}: {}.</b></p>').format(node["name"], note)
         if node["place"]["sentence"]:
-            yield f'<p class="lead"><b>{escape(node["place"]["sentence"])}.</b></p>'
+            yield Markup('<p class="lead"><b>{}.</b></p>').format(node["place"]["sentence"])
 
 
-def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, Any]) -> Iterator[str]:
-    yield "<h2>The surface before and after fusion</h2>"
+def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, Any]) -> Iterator[Markup]:
+    yield Markup("<h2>The surface before and after fusion</h2>")
     radii = ", ".join(f"{1000 * radius:.1f}" for radius in before["radii_m"])
-    yield (
-        f'<p class="note">Ball radii {radii} mm on both. Magenta: a ray that hits nothing. '
-        f"First in photographs, from beside the first camera; then from each node's camera.</p>"
-    )
+    yield Markup(
+        '<p class="note">Ball radii {} mm on both. Magenta: a ray that hits nothing. '
+        "First in photographs, from beside the first camera; then from each node's camera.</p>"
+    ).format(radii)
     frames, placed = result.placement.placed(result.rig.frames), cameras_of(result.rig, result.placement)
     view = beside(placed[0], result.after)
     yield pictures(
@@ -135,12 +137,12 @@ def _in_photographs(result: Reconstruction, surface: Surface, camera: Camera) ->
     return mesh_picture(surface, camera, texture=dressed(result.rig, result.placement, surface))
 
 
-def _truth(metrics: dict[str, Any]) -> Iterator[str]:
+def _truth(metrics: dict[str, Any]) -> Iterator[Markup]:
     if metrics["truth"] is None:
         return
     before, after = metrics["truth"]["surface_before"], metrics["truth"]["surface_after"]
-    yield "<h2>Against the ground truth</h2>"
-    yield (
+    yield Markup(
+        "<h2>Against the ground truth</h2>"
         '<p class="note">Of what the cameras can see. Coverage: share of the true surface with a mesh point '
         "so near; accuracy: share of the mesh with a true surface so near; F-score: their harmonic mean.</p>"
     )
@@ -164,8 +166,8 @@ def _in_units(key: str, *records: dict[str, float] | None) -> tuple[float | None
     return tuple(None if record is None else record[key] * unit for record in records)
 
 
-def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
-    yield "<h2>What the nodes saw, and what the network inferred</h2>"
+def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Markup]:
+    yield Markup("<h2>What the nodes saw, and what the network inferred</h2>")
     for frame, node in zip(result.rig.frames, result.nodes, strict=True):
         range_m = depth_range_m(frame.depth)
         sensor = depth_picture(frame.depth, range_m, f"sensor depth ({frame.depth.coverage:.0%} known)")
@@ -200,10 +202,10 @@ def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[str]:
     yield table(head, rows)
 
 
-def _registrations(metrics: dict[str, Any]) -> Iterator[str]:
+def _registrations(metrics: dict[str, Any]) -> Iterator[Markup]:
     if not metrics["registration"]:
         return
-    yield "<h2>How the nodes found each other</h2>"
+    yield Markup("<h2>How the nodes found each other</h2>")
     head = ("node", "onto", "method", "iterations", "stopped because")
     rows = (
         (

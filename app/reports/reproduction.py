@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from html import escape
 from pathlib import Path
 
 from app.reports.exhibits import exhibit_html
 from app.reports.html import table, write_page
+from app.web.markup import Markup
 from lab.claims.claim import VERDICTS, Verdict
 
 MARKS = {
@@ -21,17 +21,17 @@ MARKS = {
 def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
     """Write one self-contained HTML page with every claim, its verdict and the numbers behind it."""
     ours = [verdict for verdict in verdicts if verdict.beyond]
-    body = (
-        "<h1>The thesis, computed again</h1>"
-        f'<p class="lead">{_counted([verdict for verdict in verdicts if not verdict.beyond])}</p>'
+    thesis = [verdict for verdict in verdicts if not verdict.beyond]
+    body = Markup(
+        '<h1>The thesis, computed again</h1><p class="lead">{}</p>'
         '<p class="note">Shares run from 0 to 1, lengths are in metres; intervals are 95 %: by '
         "bootstrap, of the mean over frames or of the median over rooms, and by Student's t over independent "
-        "runs of the network.</p>"
-    )
-    body += "".join(_section(verdict) for verdict in verdicts if not verdict.beyond)
+        "runs of the network.</p>{}"
+    ).format(_counted(thesis), Markup("").join(map(_section, thesis)))
     if ours:
-        body += f'<h1>Ours, beyond the thesis</h1><p class="lead">{_counted(ours)}</p>'
-        body += "".join(map(_section, ours))
+        body += Markup('<h1>Ours, beyond the thesis</h1><p class="lead">{}</p>{}').format(
+            _counted(ours), Markup("").join(map(_section, ours))
+        )
     write_page(path, "PacketMesh: the thesis, computed again", body)
 
 
@@ -42,17 +42,23 @@ def _counted(verdicts: Sequence[Verdict]) -> str:
     return f"Claims: {', '.join(parts)}."
 
 
-def _section(verdict: Verdict) -> str:
+def _section(verdict: Verdict) -> Markup:
     mark = MARKS.get(verdict.verdict, "")
     judged = "It holds if" if verdict.beyond else f"The thesis: {verdict.thesis}. What tests it"
     rows = []
     for name, value in verdict.ours.items():
         low, high = verdict.ci95.get(name, (None, None))
         rows.append((name.replace("_", " "), value, "" if low is None else f"{low:.4g} to {high:.4g}"))
-    return (
-        f'<h2>{escape(verdict.id)} <span class="{mark}">{escape(verdict.verdict)}</span></h2>'
-        f"<p>{escape(verdict.claim)}. {escape(judged)}: {escape(verdict.tolerance)}.</p>"
-        f"<p><b>Ours:</b> {escape(verdict.why)}.</p>"
-        + (table(("measured", "value", "95 % interval"), rows) if rows else "")
-        + "".join(map(exhibit_html, verdict.exhibits))
+    return Markup(
+        '<h2>{} <span class="{}">{}</span></h2><p>{}. {}: {}.</p><p><b>Ours:</b> {}.</p>{}{}'
+    ).format(
+        verdict.id,
+        mark,
+        verdict.verdict,
+        verdict.claim,
+        judged,
+        verdict.tolerance,
+        verdict.why,
+        table(("measured", "value", "95 % interval"), rows) if rows else "",
+        Markup("").join(map(exhibit_html, verdict.exhibits)),
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from app.drawing.legend import Legend
 from app.reports.hand_out import Viewpoint
 from app.reports.offline_page import offline_page
+from app.web.markup import Markup
 
 _PARTS = ("surface_page.css", "offline_page.js", "hand_out_view.js", "surface_page.js")
 
@@ -35,7 +36,7 @@ class SurfacePage:
     legend: Legend
 
 
-def surface_page(page: SurfacePage) -> str:
+def surface_page(page: SurfacePage) -> Markup:
     """A self-contained HTML document."""
     sides = (page.left, page.right)
     record = {

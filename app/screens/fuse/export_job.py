@@ -55,7 +55,7 @@ def race_show(view: RaceView, title: str) -> RaceShow:
     what = f"Distance {OFF_FROM[view.reference]}"
     return RaceShow(
         title=title,
-        sentence=verdict(view.reference, view.lanes).replace("**", ""),
+        sentence=verdict(view.reference, view.lanes).replace("**", "").unescape(),
         source_m=view.source.points_m,
         target_m=target_m,
         view=viewpoint_of([T], seen_m[inside], cameras_in_sight=False),
