@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from app.page import running
+from app.page import page_call
 from app.ui import Ui
+from app.web.markup import Markup
 
 TIMEOUT_S = 4.0
 """Without an answer for so long, perhaps as there is no browser, it is taken as given. A page that draws
@@ -26,16 +27,16 @@ class DrawAcknowledgement:
     def __init__(self, ui: Ui, on_answer: Callable[[], None]) -> None:
         """Add the hidden parts; ``on_answer`` is called on the session's thread, once for each question."""
         self._on_answer = on_answer
-        self._scripts_sent = 0
+        self._calls = 0
         self.waiting = False
-        self._html = ui.gui.add_html("")
+        self._html = ui.gui.add_html(Markup(""))
         command = ui.gui.add_command("Say that all is drawn", hotkey="insert", modifier="cmd/ctrl+alt+shift")
         command.on_trigger(lambda _: ui.post(self._answered))
         self._timeout = ui.debounce(TIMEOUT_S, self._answered)
 
     def hold(self) -> None:
         """Have only new meshes drawn, until ``ask`` ends that, a hand turns the view, or 6 s have passed."""
-        self._run_script("packetmesh.hold()")
+        self._call("hold")
 
     def ask(self, vertices: Sequence[int] = (), hold: bool = False) -> None:
         """Ask now; of two questions, only the last is answered.
@@ -46,12 +47,12 @@ class DrawAcknowledgement:
             hold: whether to hold the view from now on.
         """
         self.waiting = True
-        self._run_script(f"packetmesh.ask({list(vertices)}, {str(hold).lower()})")
+        self._call("ask", list(vertices), hold)
         self._timeout.restart()
 
-    def _run_script(self, script: str) -> None:
-        self._scripts_sent += 1
-        self._html.content = running(script, mark=self._scripts_sent)
+    def _call(self, function: str, *arguments: object) -> None:
+        self._calls += 1
+        self._html.content = page_call(function, *arguments, mark=self._calls)
 
     def _answered(self) -> None:
         if self.waiting:

@@ -1,6 +1,6 @@
 // The address of the page: what stands in it is what the app shows, and the other way round. It is in the
 // query, beside what viser puts there, for viser cannot connect from an address with a # in it.
-window.packetmeshAddress ??= (() => {
+window.packetmeshAddress = (() => {
   let name = null; // of the session's hidden field
   let keys = []; // its own in the query
   let said = 0;
@@ -42,3 +42,5 @@ window.packetmeshAddress ??= (() => {
     },
   };
 })();
+packetmesh.calls.beginAddress = (_, session, own) => packetmeshAddress.begin(session, own);
+packetmesh.calls.showAddress = (_, text, place) => packetmeshAddress.show(text, place);

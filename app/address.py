@@ -7,7 +7,6 @@ server started. The page's side is ``address.js``.
 
 from __future__ import annotations
 
-import json
 import uuid
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,10 +14,11 @@ from pathlib import Path
 from urllib.parse import parse_qsl, urlencode
 
 from app.dock_row import add_hidden
-from app.page import running
+from app.page import page_call
 from app.state import Spec
 from app.ui import STOP, Ui
-from app.uploads import GONE, PREFIX, Uploads, name_in
+from app.web.markup import Markup
+from app.web.uploads import GONE, PREFIX, Uploads, name_in
 from packetmesh.errors import InputError
 from packetmesh.settings import differences, key_of, with_settings
 from pipeline.config import PRESETS, PipelineConfig
@@ -29,7 +29,6 @@ WAIT_S = 0.3
 """After a change, before the address follows."""
 FILES = {"depth.model"}
 """Settings that name a file, which an address may not."""
-_SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,10 +139,9 @@ class Address:
         self._count = 0
         name = uuid.uuid4().hex
         own = ["scene", "preset", "set", "screen", *keys]
-        begin = f"; window.packetmeshAddress.begin({json.dumps(name)}, {json.dumps(own)})"
-        with add_hidden(ui, name, _SCRIPT + begin):
+        with add_hidden(ui, name, page_call("beginAddress", name, own)):
             self._field = ui.when_changed(ui.gui.add_text("Address", ""), self._hear)
-            self._saying = ui.gui.add_html("")
+            self._saying = ui.gui.add_html(Markup(""))
         self._timer = ui.debounce(WAIT_S, self._say)
 
     def show(self, place: Place) -> None:
@@ -181,5 +179,4 @@ class Address:
         new = not wrong and place.is_beside(before)
         self._text = text
         self._count += 1
-        script = f"window.packetmeshAddress?.show({json.dumps(text)}, {json.dumps(new)})"
-        self._saying.content = running(script, self._count)
+        self._saying.content = page_call("showAddress", text, new, mark=self._count)

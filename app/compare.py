@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,6 +12,7 @@ from app.lesson_file import NUMBER
 from app.records import Picture
 from app.tables import bar_html
 from app.ui import Ui
+from app.web.markup import Markup
 from packetmesh.errors import InputError
 from pipeline.types import ByteArray
 
@@ -61,7 +61,7 @@ class CompareArea:
             visible=visible,
         )
         self._image = ui.gui.add_image(EMPTY, format="jpeg", jpeg_quality=QUALITY, visible=visible)
-        self._captions = ui.gui.add_html("", visible=visible)
+        self._captions = ui.gui.add_html(Markup(""), visible=visible)
         for handle in (self._left, self._right, self._split):
             ui.when_changed(handle, self._draw)
         self._start = (left, right, 50.0)
@@ -166,20 +166,23 @@ def split(left: ByteArray, right: ByteArray, share: float) -> ByteArray:
     return rgb
 
 
-def captions_html(left: Picture, right: Picture) -> str:
+def captions_html(left: Picture, right: Picture) -> Markup:
     """Two columns under the picture: the caption and the colour bar of either side."""
-    return _columns((("<b>Left:</b> ", left), ("<b>Right:</b> ", right)))
+    return _columns(((Markup("<b>Left:</b> "), left), (Markup("<b>Right:</b> "), right)))
 
 
-def caption_html(picture: Picture) -> str:
+def caption_html(picture: Picture) -> Markup:
     """The caption and the colour bar under a picture that is shown alone."""
     return _columns((("", picture),))
 
 
-def _columns(sides: Sequence[tuple[str, Picture]]) -> str:
-    columns = "".join(
-        f'<div style="flex: 1; min-width: 0">{side}{html.escape(picture.caption)}.'
-        f"{'' if picture.bar is None else bar_html(picture.bar)}</div>"
+def _columns(sides: Sequence[tuple[str, Picture]]) -> Markup:
+    columns = Markup("").join(
+        Markup('<div style="flex: 1; min-width: 0">{}{}.{}</div>').format(
+            side, picture.caption, "" if picture.bar is None else bar_html(picture.bar)
+        )
         for side, picture in sides
     )
-    return f'<div style="display: flex; gap: 1em; padding: 0 0.8em 0.8em; font-size: 12px">{columns}</div>'
+    return Markup(
+        '<div style="display: flex; gap: 1em; padding: 0 0.8em 0.8em; font-size: 12px">{}</div>'
+    ).format(columns)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from app.ui import Ui
+from app.window.gui import Gui
 from packetmesh.settings_help import field_docs
 from pipeline.config import PipelineConfig
 
@@ -142,7 +143,7 @@ class Controls:
         on_change(lambda config: stored(control, handle.value, config))
 
 
-def _add(gui: viser.GuiApi, control: Control, config: PipelineConfig) -> Any:
+def _add(gui: Gui, control: Control, config: PipelineConfig) -> Any:
     hint, value = hint_of(control), shown(control, config)
     if isinstance(control, Choice):
         options = [control.names.get(option, option) for option in options_of(control.path)]

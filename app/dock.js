@@ -1,7 +1,5 @@
 // The dock: buttons and a timeline in a row of their own below the picture. Its other side is dock.py.
 (() => {
-  if (window.packetmeshDocks?.made) return;
-
   const DRAG_PX = 4; // less is a click
   const REACH_PX = 4; // how far beside an item still means it
   const AGAIN_MS = 150; // before what was not heard is said again
@@ -292,13 +290,8 @@
     }
   }
 
-  const waiting = window.packetmeshDocks ?? [];
-  window.packetmeshDocks = {
-    made: true,
-    push(message) {
-      if (!docks.has(message.dock)) docks.set(message.dock, new Dock(message.dock));
-      docks.get(message.dock).hear(message);
-    },
+  packetmesh.calls.dock = (_, message) => {
+    if (!docks.has(message.dock)) docks.set(message.dock, new Dock(message.dock));
+    docks.get(message.dock).hear(message);
   };
-  waiting.forEach(message => window.packetmeshDocks.push(message));
 })();

@@ -15,7 +15,6 @@ import time
 import uuid
 from collections.abc import Callable, Sequence
 from dataclasses import astuple
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -23,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.dock_row import add_hidden
-from app.page import running
+from app.page import page_call
 from app.ticker import Ticker
 from app.timeline import Lane
 from app.ui import Ui
+from app.web.markup import Markup
 
 PICTURE_S = 0.04
 """Between two pictures while it plays."""
@@ -42,10 +42,6 @@ COUNT_NS = 1_000_000_000
 """One iteration or step on the axis of a timeline that counts them."""
 PAGES = 50
 """As many pages are known apart."""
-
-_SCRIPT = "".join(
-    Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("dock_view.js", "dock.js")
-)
 
 
 class Dock:
@@ -78,9 +74,9 @@ class Dock:
         self._heard: dict[str, int] = {}
         self._tip = ""
         self._chosen: dict[str, Any] = {}
-        with add_hidden(ui, self._name, _SCRIPT):
+        with add_hidden(ui, self._name):
             self._field = ui.when_changed(ui.gui.add_text("Dock", ""), self._hear)
-            self._setup, self._picture, self._state = (ui.gui.add_html("") for _ in range(3))
+            self._setup, self._picture, self._state = (ui.gui.add_html(Markup("")) for _ in range(3))
         self._ticker = Ticker(lambda: ui.post(self._tick), PICTURE_S)
         ui.closers.append(self._ticker.close)
 
@@ -279,8 +275,7 @@ class Dock:
     # What the page is told.
 
     def _tell(self, handle: Any, **what: Any) -> None:
-        message = json.dumps({"dock": self._name, **what}, separators=(",", ":"))
-        handle.content = running(f"(window.packetmeshDocks ??= []).push({message})")
+        handle.content = page_call("dock", {"dock": self._name, **what})
 
     def _send_setup(self) -> None:
         self._tell(

@@ -1,8 +1,5 @@
 // Plots beside each other in the dock, and a table beside them. Its other side is dock_plots.py.
 (() => {
-  if (window.packetmeshPlots?.made) return;
-
-  const AGAIN_MS = 100; // before it is seen whether the library of plots has come
   const rows = new Map();
   const {DockRow, make} = window.packetmeshDockRow;
 
@@ -40,10 +37,8 @@
     }
 
     draw() {
-      clearTimeout(this.again);
       if (!this.visible) return;
-      if (!window.Plotly) this.again = setTimeout(() => this.draw(), AGAIN_MS);
-      else this.figures.forEach(({data, layout}, index) => {
+      this.figures.forEach(({data, layout}, index) => {
         const plot = this.body.querySelectorAll(".plot")[index] ?? make("div", "plot", null);
         if (!plot.isConnected) this.table.before(plot);
         const size = {width: plot.clientWidth, height: plot.clientHeight};
@@ -52,13 +47,8 @@
     }
   }
 
-  const waiting = window.packetmeshPlots ?? [];
-  window.packetmeshPlots = {
-    made: true,
-    push(message) {
-      if (!rows.has(message.dock)) rows.set(message.dock, new PlotRow(message.dock));
-      rows.get(message.dock).hear(message);
-    },
+  packetmesh.calls.plots = (_, message) => {
+    if (!rows.has(message.dock)) rows.set(message.dock, new PlotRow(message.dock));
+    rows.get(message.dock).hear(message);
   };
-  waiting.forEach(message => window.packetmeshPlots.push(message));
 })();

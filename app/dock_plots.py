@@ -9,15 +9,13 @@ import json
 import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import plotly.graph_objects as go
 
 from app.dock_row import add_hidden
-from app.page import running
+from app.page import page_call
 from app.ui import Ui
-
-_SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
+from app.web.markup import Markup
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +38,8 @@ class PlotDock:
         self._name, self._run = uuid.uuid4().hex, 0
         self._sheet: Sheet | None = None
         self._visible = False
-        with add_hidden(ui, self._name, _SCRIPT):
-            self._message = ui.gui.add_html("")
+        with add_hidden(ui, self._name):
+            self._message = ui.gui.add_html(Markup(""))
 
     def begin(self) -> None:
         """What comes is something else, to be seen even if what was there was closed."""
@@ -65,8 +63,7 @@ class PlotDock:
         if sheet is not None:
             said |= {"title": sheet.title, "legend": sheet.legend, "table": sheet.table}
             said["figures"] = _figures(sheet.figures)
-        message = json.dumps(said, separators=(",", ":"))
-        self._message.content = running(f"(window.packetmeshPlots ??= []).push({message})")
+        self._message.content = page_call("plots", said)
 
 
 def _figures(figures: Sequence[go.Figure]) -> list[object]:

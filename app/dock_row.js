@@ -1,5 +1,5 @@
 // A row of its own below the picture, as wide as the page: what the docks at the lower edge have in common.
-window.packetmeshDockRow ??= (() => {
+window.packetmeshDockRow = (() => {
   function make(tag, className, parent, properties = {}) {
     const element = Object.assign(document.createElement(tag), {className, ...properties});
     parent?.append(element);

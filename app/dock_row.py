@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
-from app.page import running
 from app.ui import Ui
-
-_SCRIPT, _STYLE = (
-    Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("dock_row.js", "dock.css")
-)
+from app.web.markup import Markup
 
 
 @contextmanager
-def add_hidden(ui: Ui, name: str, script: str) -> Iterator[None]:
+def add_hidden(ui: Ui, name: str, call: Markup | None = None) -> Iterator[None]:
     """A container for controls that nobody sees.
 
     It is a panel of its own so that it stays when the control panel is closed.
@@ -23,12 +18,12 @@ def add_hidden(ui: Ui, name: str, script: str) -> Iterator[None]:
     Args:
         ui: of the browser.
         name: by which the page's side finds it.
-        script: the page's side.
+        call: what the page is to do first.
     """
     panel = ui.gui.add_panel()
     panel.float(x=0, y=0)
     panel.expand()
     with panel.add_tab("Dock"):
-        mark = f'<span class="packetmesh-dock" data-dock="{name}"></span>'
-        ui.gui.add_html(f"{mark}<style>{_STYLE}</style>{running(_SCRIPT + script)}")
+        mark = Markup('<span class="packetmesh-dock" data-dock="{}"></span>').format(name)
+        ui.gui.add_html(mark + (call or ""))
         yield

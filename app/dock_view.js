@@ -1,5 +1,5 @@
 // What a dock looks like: lanes, words, clock and axis of a window of time. Style sheet: dock.css.
-window.packetmeshDockView ??= (() => {
+window.packetmeshDockView = (() => {
   const {DockRow, make} = window.packetmeshDockRow;
   const AXIS_PX = 20; // below the lanes; a hand on it moves the clock
   const LANES_GAP_PX = 4;

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-import viser
-
 from app.drawing.colors import BRAND, DELIVERED
 from app.page import stale_html
 from app.state import Step, StepStatus
 from app.stepper import Stepper
+from app.web.markup import Markdown, Markup
+from app.window.gui import Gui
 from packetmesh.progress import Progress
 
-STARTING = "**Starting** …"
+STARTING = Markdown("**Starting** …")
 
 
 class Header:
@@ -20,7 +20,7 @@ class Header:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
+        gui: Gui,
         titles: Sequence[str],
         on_pick: Callable[[str], None],
         on_action: Callable[[str], None],
@@ -29,7 +29,7 @@ class Header:
         self._stepper = Stepper(gui, titles, on_pick)
         self._status = gui.add_markdown(STARTING)
         self._bar = gui.add_progress_bar(0.0)
-        self._stale = gui.add_html("")
+        self._stale = gui.add_html(Markup(""))
         actions = gui.add_button_group(
             "All steps",
             ("Cancel", "Retry", "Reset", "Copy as command"),
@@ -41,7 +41,7 @@ class Header:
     def progressed(self, report: Progress) -> None:
         """How far a computation is."""
         self._bar.value = min(100.0, 100.0 * report.fraction)
-        self._status.content = f"**Computing** · {report.stage}"
+        self._status.content = Markdown("**Computing** · {}").format(report.stage)
 
     def dim(self, numbers: bool, picture: bool) -> None:
         """Dim what belongs to other settings than those that are wanted."""
@@ -66,13 +66,15 @@ class Header:
         """
         self._stepper.show(current, statuses)
         if running:
-            self._status.content = f"**Computing** · {running[0]}"
+            self._status.content = Markdown("**Computing** · {}").format(running[0])
         elif failure is not None:
-            self._status.content = f"**Stopped** · {failure} Change a setting or press Retry."
+            self._status.content = Markdown("**Stopped** · {} Change a setting or press Retry.").format(
+                failure
+            )
             self._bar.value = 0.0
         elif not busy:
-            self._status.content = "**Up to date**"
+            self._status.content = Markdown("**Up to date**")
             self._bar.value = 100.0
         elif self._status.content == STARTING:
-            self._status.content = "**Computing** …"
+            self._status.content = Markdown("**Computing** …")
         self._bar.color = BRAND if running or busy else DELIVERED

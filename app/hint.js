@@ -1,8 +1,5 @@
 // What a name means, by a click on it: names in tables and texts, and labels of controls.
 (() => {
-  if (window.packetmeshHint) return;
-  window.packetmeshHint = true;
-
   const GAP_PX = 6;
   const FARTHEST = 40; // parts of the page between a label and its control
   const note = Object.assign(document.createElement("div"), {className: "packetmesh-hint"});

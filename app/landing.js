@@ -1,6 +1,7 @@
 // The landing: a click opens a lesson or a scene, as hands would; Escape leaves to the scene behind it.
 (() => {
   const landing = document.getElementById("packetmesh-landing");
+  if (!landing) return;
 
   const POLL_MS = 50;
   const POLL_TRIES = 1200; // a slow machine takes its time to begin

@@ -1,25 +1,19 @@
-"""What a new browser sees first: the lessons and the scenes, each with a picture, over the scene that loads.
+"""The page that a browser gets: viser's, with the app's scripts and styles, and the landing over it, which
+offers the lessons and the scenes, each with a picture, while the first scene loads.
 
-It is a part of the page itself, so that it is there before viser is. An address with anything behind a ``?``
-goes past it; in a lecture only the one to which the teacher's link leads shows it, without the scenes.
+The landing is a part of the page itself, so that it is there before viser is. An address with anything behind
+a question mark goes past it; in a lecture only the teacher's link shows it, without the scenes.
 """
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable
-from contextlib import AbstractContextManager
-from dataclasses import replace
-from functools import partial
-from html import escape
 from pathlib import Path
-from typing import Any
-
-from websockets.datastructures import Headers
-from websockets.http11 import Request, Response
 
 from app.lesson_file import LESSONS
-from app.origin import answering
+from app.web.entrance import WELCOME
+from app.web.markup import Markup
+from app.web.page import Page
 from pipeline.io.demos import DEMO_SCENES
 
 PICTURES = Path(__file__).resolve().parents[1] / "assets" / "landing"
@@ -33,28 +27,47 @@ LESSON_PLACES = {
     "how-good-is-my-calibration": ("uncalibrated", "calibrate"),
 }
 """The scene that each lesson speaks of and its screen, in the order in which they are offered."""
-_SCRIPT, _STYLE = (Path(__file__).with_suffix(kind).read_text(encoding="utf-8") for kind in (".js", ".css"))
-_END = b"</body>"
-WELCOME = "/?welcome"
-"""Where the teacher's link leads."""
+
+_HERE = Path(__file__).parent
+SCRIPTS = tuple(
+    _HERE / f"{name}.js"
+    for name in (
+        *("page", "hint", "dock_row", "dock_view", "dock", "dock_plots", "address", "lesson", "lecture"),
+        *("screens/fuse/board", "landing"),
+    )
+)
+"""In the order in which they run."""
+STYLES = tuple(
+    _HERE / f"{name}.css"
+    for name in ("page", "hint", "lesson", "dock", "lecture", "screens/fuse/board", "landing")
+)
 
 
-def landing_html(lecture: bool = False) -> str:
-    """The screen: what stands over viser's page, with its style and script."""
-    lessons = "".join(
+def app_page(lecture: bool) -> Page:
+    """Return the page of the app; in a lecture only the teacher is greeted.
+
+    Raises:
+        InputError: the installed viser has another page than those that are known.
+    """
+    return Page(SCRIPTS, STYLES, {WELCOME if lecture else "/": landing_html(lecture)})
+
+
+def landing_html(lecture: bool = False) -> Markup:
+    """The screen: what stands over viser's page; its style and script are among the page's (``page.py``)."""
+    lessons = Markup("").join(
         _card(name, _title(name), f"scene={scene}&screen={screen}", lesson=True)
         for name, (scene, screen) in LESSON_PLACES.items()
     )
-    scenes = "".join(_card(name, scene.title, f"scene={name}") for name, scene in DEMO_SCENES.items())
-    shared = " data-lecture" if lecture else ""
-    others = "" if lecture else f"<div><h2>Or a scene to explore</h2><section>{scenes}</section></div>"
-    return (
-        f'<style>{_STYLE}</style><main id="packetmesh-landing"{shared} role="dialog" aria-label="Welcome">'
+    scenes = Markup("").join(_card(name, scene.title, f"scene={name}") for name, scene in DEMO_SCENES.items())
+    shared = Markup(" data-lecture") if lecture else ""
+    others = Markup("<div><h2>Or a scene to explore</h2><section>{}</section></div>").format(scenes)
+    return Markup(
+        '<main id="packetmesh-landing"{} role="dialog" aria-label="Welcome">'
         "<header><div><h1>PacketMesh</h1><p>From a camera network's packets to a surface mesh.</p></div>"
         '<button type="button" data-explore>Explore <kbd>Esc</kbd></button></header>'
-        f"<article><div><h2>Six lessons, each of one question</h2><section>{lessons}</section></div>{others}"
-        f"</article></main><script>{_SCRIPT}</script>"
-    )
+        "<article><div><h2>Six lessons, each of one question</h2><section>{}</section></div>{}"
+        "</article></main>"
+    ).format(shared, lessons, "" if lecture else others)
 
 
 def _title(lesson: str) -> str:
@@ -63,39 +76,11 @@ def _title(lesson: str) -> str:
     return text.partition("\n")[0].removeprefix("# ").strip()
 
 
-def _card(name: str, title: str, place: str, lesson: bool = False) -> str:
+def _card(name: str, title: str, place: str, lesson: bool = False) -> Markup:
     """A button that leads to a place, by its address; and there to the lesson of that title."""
     picture = base64.b64encode((PICTURES / f"{name}.jpg").read_bytes()).decode()
-    image = f'<img alt="" src="data:image/jpeg;base64,{picture}">'
-    label = escape(title)
-    data = f'data-place="{escape(place)}"' + (f' data-lesson="{label}"' if lesson else "")
-    return f'<button type="button" {data}>{image}<span>{label}</span></button>'
-
-
-def landing_first(lecture: bool = False) -> AbstractContextManager[None]:
-    """Servers that start meanwhile send the landing with their page; in a lecture only to the teacher."""
-    return answering(partial(_with_landing, WELCOME if lecture else "/", landing_html(lecture).encode()))
-
-
-def _with_landing(
-    path: str, landing: bytes, answer: Callable[[Any, Request], Response | None]
-) -> Callable[[Any, Request], Any]:
-    """The server's own answer, with the landing in the page that a browser opens by this path."""
-
-    def landed(connection: Any, request: Request) -> Response | None:
-        is_page = request.path == path and request.headers.get("Upgrade") != "websocket"
-        if not is_page:
-            return answer(connection, request)
-        plain = Headers(
-            (name, value) for name, value in request.headers.raw_items() if name != "Accept-Encoding"
-        )
-        response = answer(connection, replace(request, headers=plain))
-        if response is None or response.status_code != 200:
-            return response
-        before, end, after = bytes(response.body).rpartition(_END)
-        body = before + landing + end + after
-        del response.headers["Content-Length"]
-        response.headers["Content-Length"] = str(len(body))
-        return replace(response, body=body)
-
-    return landed
+    image = Markup('<img alt="" src="data:image/jpeg;base64,{}">').format(picture)
+    data = Markup('data-place="{}"').format(place)
+    if lesson:
+        data += Markup(' data-lesson="{}"').format(title)
+    return Markup('<button type="button" {}>{}<span>{}</span></button>').format(data, image, title)

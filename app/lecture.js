@@ -1,5 +1,5 @@
 // Somebody of a class: what they are told, their votes, and whether the view is the teacher's or their own.
-window.packetmeshLecture ??= (() => {
+window.packetmeshLecture = (() => {
   const REFUSED_MS = 4000;
   let name = null; // of the seat's hidden field
   let said = 0;
@@ -82,3 +82,6 @@ window.packetmeshLecture ??= (() => {
     },
   };
 })();
+packetmesh.calls.beginSeat = (_, seat) => packetmeshLecture.begin(seat);
+packetmesh.calls.showSeat = (_, state) => packetmeshLecture.show(state);
+packetmesh.calls.refuse = () => packetmeshLecture.refuse();

@@ -7,38 +7,37 @@ for votes, until the teacher lets the class steer.
 
 from __future__ import annotations
 
-import json
+import itertools
 import re
 import uuid
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 from urllib.parse import urlsplit
 
 import viser
-from viser import _messages as messages
 
 from app.dock_row import add_hidden
 from app.drawing.cameras import turn
-from app.entrance import Token, is_loopback
-from app.page import running
+from app.page import page_call
 from app.qr import qr_html
 from app.ui import Ui
+from app.web import viser_private as private
+from app.web.entrance import Token, is_loopback
+from app.web.gate import Gate
+from app.web.markup import Markdown, Markup
+from app.window.gui import Gui
 
-HEARD = (messages.FileTransferPartAck, messages.GetRenderResponseMessage, messages.ViewerCameraMessage)
-"""Of what a browser sends, that which changes nothing for others."""
 SAID = re.compile(r"\d+ (?:(follow)|(roam)|vote ([123]))")
 """What the page of somebody in the class says; a number tells two apart that are alike."""
-UNREACHED = (
+UNREACHED = Markup(
     "<b>No other machine reaches this address.</b> Stop the lecture and start it again with "
     "<code>--host 0.0.0.0</code>; then it is one that the class can open."
 )
 """Of an address of this machine alone."""
 Count: TypeAlias = Callable[[int, int], None]
 """Counts the vote of a voter, both by their numbers; choices count from 1."""
-_SCRIPT, _STYLE = (Path(__file__).with_suffix(kind).read_text(encoding="utf-8") for kind in (".js", ".css"))
 
 
 @dataclass(slots=True)
@@ -50,9 +49,9 @@ class _Seat:
     follows: bool = True
     vote: int = 0
     """Of 1 to 3; 0 is none."""
-    say: Callable[[str], None] = lambda _: None
-    """Runs a script in its page."""
-    tell: Callable[[str], None] = lambda _: None
+    say: Callable[..., None] = lambda *_: None
+    """Has its page call a function of that name with these arguments."""
+    tell: Callable[[Markdown], None] = lambda _: None
     """Shows the teacher how many are there, in markdown."""
     leave: Callable[[], None] = lambda: None
     """Has the teacher's address no longer follow."""
@@ -61,16 +60,16 @@ class _Seat:
 class Lecture:
     """Everybody who is there. All but what the browsers send runs on the session's thread."""
 
-    def __init__(self, server: viser.ViserServer, token: Token, class_url: str) -> None:
-        """Nobody steers but who holds the token; the class comes by the address ``class_url``."""
+    def __init__(self, server: viser.ViserServer, gate: Gate, token: Token, class_url: str) -> None:
+        """Nobody steers but who holds the token, which the gate is told; the class comes by ``class_url``."""
         self._server, self._token, self._url = server, token, class_url
         self._seats: dict[int, _Seat] = {}
         self._count_vote: Count | None = None
         """While a question waits for votes."""
         self._all_steer = False
         self._leading = False
-        self._hear = server._websock_server._handle_incoming_message
-        setattr(server._websock_server, "_handle_incoming_message", self._heard)  # noqa: B010
+        gate.may_steer = self._may_steer
+        gate.on_refused = lambda number: self._post(self._refuse, number)
 
     def begin(
         self,
@@ -164,7 +163,7 @@ class Lecture:
         """The teacher's own controls."""
         client = seat.client
         with client.gui.add_folder("Lecture", order=-1.0):
-            told = client.gui.add_markdown("")
+            told = Gui(client.gui).add_markdown(Markdown(""))
             seat.tell = partial(setattr, told, "content")
             steer = client.gui.add_checkbox(
                 "The class may steer",
@@ -179,12 +178,14 @@ class Lecture:
     def _show_address(self, client: viser.ClientHandle) -> None:
         with client.gui.add_modal("Join the class") as modal:
             warning = (
-                f'<div class="warning">{UNREACHED}</div>'
+                Markup('<div class="warning">{}</div>').format(UNREACHED)
                 if is_loopback(urlsplit(self._url).hostname or "")
-                else ""
+                else Markup("")
             )
-            shown = f'<div class="packetmesh-join">{warning}{qr_html(self._url)}<p>{self._url}</p></div>'
-            client.gui.add_html(f"{shown}<style>{_STYLE}</style>")
+            shown = Markup('<div class="packetmesh-join">{}{}<p>{}</p></div>').format(
+                warning, qr_html(self._url), self._url
+            )
+            Gui(client.gui).add_html(shown)
             client.gui.add_button("Close").on_click(lambda _: modal.close())
 
     def _let_steer(self, all_steer: bool) -> None:
@@ -195,24 +196,21 @@ class Lecture:
     def _count(self) -> None:
         following = sum(seat.follows for seat in self._seats.values() if not seat.teaches)
         size = self.class_size
-        told = f"**{size}** in the class, **{following}** of them follow your view."
+        told = Markdown("**{}** in the class, **{}** of them follow your view.").format(size, following)
         for seat in self._present():
-            seat.tell(told if size else "**Nobody is in the class yet.**")
+            seat.tell(told if size else Markdown("**Nobody is in the class yet.**"))
 
     def _add_chip(self, seat: _Seat) -> None:
         """What is told somebody in the class."""
         client, name = seat.client, uuid.uuid4().hex
         ui = self._own_ui(client)
-        begin = f"; window.packetmeshLecture.begin({json.dumps(name)})"
-        with add_hidden(ui, name, _SCRIPT + begin):
+        with add_hidden(ui, name, page_call("beginSeat", name)):
             field = client.gui.add_text("Seat", "")
-            html = client.gui.add_html(f"<style>{_STYLE}</style>")
-        said = 0
+            html = ui.gui.add_html(Markup(""))
+        marks = itertools.count()
 
-        def say(script: str) -> None:
-            nonlocal said
-            said += 1
-            html.content = f"<style>{_STYLE}</style>{running(script, said)}"
+        def say(function: str, *arguments: object) -> None:
+            html.content = page_call(function, *arguments, mark=next(marks))
 
         def hear() -> None:
             heard = SAID.fullmatch(field.value)
@@ -234,7 +232,7 @@ class Lecture:
 
     def _own_ui(self, client: viser.ClientHandle) -> Ui:
         """For what one browser has beside what all share."""
-        return Ui(client.gui, client.scene, self._post, client.atomic, client.flush)
+        return Ui(Gui(client.gui), client.scene, self._post, client.atomic, client.flush)
 
     def _show(self, seat: _Seat) -> None:
         state = {
@@ -243,37 +241,26 @@ class Lecture:
             "asks": self._count_vote is not None,
             "vote": seat.vote,
         }
-        seat.say(f"window.packetmeshLecture?.show({json.dumps(state)})")
+        seat.say("showSeat", state)
 
     def _vote(self, seat: _Seat, vote: int) -> None:
         if self._count_vote is not None:
             seat.vote = vote
             self._count_vote(seat.client.client_id, vote)
 
-    # Who is heard, on the thread of the connections.
+    # Who may touch what all share, on the thread of the connections.
 
-    async def _heard(self, number: Any, message: Any) -> None:
-        """Pass on what a browser sends to what all share, unless it must not touch it."""
-        if self._all_steer or isinstance(message, HEARD) or self._teaches(number):
-            await self._hear(number, message)
-        elif isinstance(message, messages.GuiUpdateMessage):
-            self._post(self._refuse, number, message.uuid)
+    def _may_steer(self, number: int) -> bool:
+        return self._all_steer or self._teaches(number)
 
     def _teaches(self, number: int) -> bool:
-        connection = self._server._websock_server._live_connections.get(number)
-        request = None if connection is None else connection.request
-        return request is not None and self._token.is_in(request.headers.get("Cookie", ""))
+        return self._token.is_in(private.cookies(self._server, number))
 
-    def _refuse(self, number: int, control: str) -> None:
-        """Give a control back the value that it has for all."""
+    def _refuse(self, number: int) -> None:
+        """Tell somebody in the class that what they have touched is not theirs."""
         seat = self._seats.get(number)
-        handle = self._server.gui._gui_input_handle_from_uuid.get(control)
-        if seat is None or handle is None:
-            return
-        if not handle._impl.is_button:
-            back = messages.GuiUpdateMessage(control, {"value": handle._impl.value})
-            seat.client._websock_connection.queue_message(back)
-        seat.say("window.packetmeshLecture?.refuse()")
+        if seat is not None:
+            seat.say("refuse")
 
 
 def _turn_as(leader: viser.ClientHandle, client: viser.ClientHandle) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Collection
 from dataclasses import replace
@@ -10,11 +9,12 @@ from functools import partial
 from typing import Generic
 
 from app.lesson_file import CHOICES, CLAUSE, FIELD, SCENE, Lesson, Look, Numbers, Question, settled
-from app.page import running
+from app.page import page_call
 from app.ui import Ui
+from app.web.markup import Markdown, Markup, shipped_markdown
 from packetmesh.errors import InputError
 
-OFF, BEGIN = "not now", "Choose a stop, or press **Next**."
+OFF, BEGIN = "not now", Markdown("Choose a stop, or press **Next**.")
 SKIP, SKIPPED = "Skip", -1
 GUESS = f"Take a guess: 1, 2 or 3. Or press **{SKIP}**."
 FIRST = "**Guess before you go on: 1, 2 or 3.** A wrong guess costs nothing. Or press **Skip**."
@@ -24,13 +24,15 @@ FIRST_OF_ALL = -1.0
 """Order of a lesson's folder in the panel of its screen."""
 BAR = 12
 """Blocks of a bar that holds all votes."""
-KEYS = (
+KEYS = Markup(
     "<span class='keys'><span><b>→</b> or <b>space</b> next, <b>←</b> back, <b>1 2 3</b> guess, "
     "<b>S</b> skip.<span class='docked'> Click the dock, and the keys are the dock's.</span></span>"
     "<span>The keys are the dock's now; <b>Esc</b> gives them back to the lesson.</span></span>"
 )
 """What the page says of the keys: while they are the lesson's, and while they are the dock's."""
 TO_COME = "…"
+REPLACED = re.compile(rf"{FIELD.pattern}|!\[|\](?!\(https?://)")
+"""In the markdown of a file: its fields, and what would make an image, or a link to other than the web."""
 
 
 class LessonFolder(Generic[Look]):
@@ -87,7 +89,7 @@ class LessonFolder(Generic[Look]):
                 {"Back": lambda: self._go(-1), "Next": lambda: self._go(1), "End": self._end},
                 "To the stop before or after, or out of the lesson.",
             )
-            self._mark = ui.gui.add_html("")
+            self._mark = ui.gui.add_html(Markup(""))
         self._marked = 0
         ui.resets.append(self.reset)
 
@@ -159,15 +161,14 @@ class LessonFolder(Generic[Look]):
         index = self._index()
         self._marked += 1
         if index < 0:
-            self._mark.content = ""
+            self._mark.content = Markup("")
             return
         stop = self._lesson.stops[index]
-        opens, sees = json.dumps(stop.opens), json.dumps(stop.sees)
-        unfold = json.dumps([self._title, *stop.opens])
-        script = f"window.packetmesh?.unfold({unfold}); window.packetmeshLesson?.at(this, {opens}, {sees})"
+        unfold = page_call("unfold", [self._title, *stop.opens], mark=self._marked)
+        lesson = page_call("lesson", stop.opens, stop.sees, mark=self._marked)
         large = "data-large" if self._large.value else ""
-        self._mark.content = (
-            f"<div class='packetmesh-lesson' {large}>{KEYS}{running(script, self._marked)}</div>"
+        self._mark.content = Markup("<div class='packetmesh-lesson' {}>{}{}</div>").format(
+            large, KEYS, unfold + lesson
         )
 
     def _take(self, guess: int) -> None:
@@ -207,7 +208,7 @@ class LessonFolder(Generic[Look]):
             self._text.content = text
         self._guess.visible = self._waits()
 
-    def _filled(self, text: str, index: int) -> str:
+    def _filled(self, text: str, index: int) -> Markdown:
         """The text with its numbers: of this stop, or as they were at another in the same scene. What it says
         of stops where nobody was is left out."""
         now = self._numbers()
@@ -219,11 +220,13 @@ class LessonFolder(Generic[Look]):
             stops = {int(stop) - 1 for stop, _ in FIELD.findall(found[1]) if stop}
             return found[1] if stops <= self._known.keys() else ""
 
-        def value(field: re.Match[str]) -> str:
-            known = self._known[int(field[1]) - 1] if field[1] else now
-            return known.get(field[2], TO_COME)
+        def value(found: re.Match[str]) -> str:
+            if found[2] is None:
+                return found[0]  # as text
+            known = self._known[int(found[1]) - 1] if found[1] else now
+            return known.get(found[2], TO_COME)
 
-        return FIELD.sub(value, CLAUSE.sub(clause, text))
+        return shipped_markdown(CLAUSE.sub(clause, text), REPLACED, value)
 
 
 def with_votes(question: Question, votes: Collection[int]) -> Question:

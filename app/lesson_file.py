@@ -2,7 +2,8 @@
 
 A lesson is a ``# title`` and sections. A section is a ``## title``, lines ``set: name = value``, lines
 ``open: folder or tab``, lines ``see: control or number`` and its text. What a section does not set is at its
-default, so that every stop can be shown by itself; what it speaks of is opened, framed and in view. Numbers
+default, so that every stop can be shown by itself; what it speaks of is opened, framed and in view. A text
+has emphasis, lists and links to the web; tags and images in it are shown as they are written. Numbers
 are not typed: ``{name}`` is computed of what the screen shows. ``{{, and was {3:name}}}`` says what it was at
 the third stop, and nothing to those who were not there.
 Behind the text a section asks::

@@ -1,6 +1,54 @@
-// What PacketMesh adds to viser's page, once in a browser.
+// What PacketMesh adds to viser's page, and how the server calls it: an element with the name of one of
+// packetmesh.calls and its arguments, each time it comes into the page (page.py).
 (() => {
-  if (window.packetmesh) return;
+  const calls = Object.create(null);
+
+  function call(element) {
+    const {packetmeshCall: name, arguments: given} = element.dataset;
+    if (name in calls) calls[name](element, ...JSON.parse(given));
+  }
+
+  new MutationObserver(changes => {
+    for (const {addedNodes} of changes)
+      for (const node of addedNodes) {
+        if (node.nodeType !== Node.ELEMENT_NODE || !node.isConnected) continue;
+        if (node.matches("[data-packetmesh-call]")) call(node);
+        node.querySelectorAll("[data-packetmesh-call]").forEach(call);
+      }
+  }).observe(document.documentElement, {childList: true, subtree: true});
+
+  // viser makes itself ready for Gaussian splats, which the app never draws, with code made of text, which the
+  // content policy forbids: it waits for that module and never gets it.
+  const {fetch} = window;
+  window.fetch = (from, ...options) => String(from).startsWith("data:application/wasm")
+    ? new Promise(() => {})
+    : fetch(from, ...options);
+
+  // Buttons in HTML, which is told nothing else of a click.
+  const PRESSED = {
+    // Copy the text before it.
+    packetmeshCopy(button) {
+      navigator.clipboard.writeText(button.previousElementSibling.textContent);
+      button.textContent = "Copied";
+    },
+    // Press the panel's own button of that name.
+    packetmeshPress(button, name) {
+      [...document.querySelectorAll("button")].find(one => one.textContent === name && one !== button)?.click();
+    },
+    // Write into the hidden field behind the HTML; with the time, as the same may be picked again.
+    packetmeshPick(button, name) {
+      const html = button.closest("[data-packetmesh-field]");
+      const input = html.parentElement.nextElementSibling.querySelector("input");
+      const text = JSON.stringify([name, Date.now()]);
+      Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(input, text);
+      input.dispatchEvent(new Event("input", {bubbles: true}));
+    },
+  };
+  document.addEventListener("click", event => {
+    const button = event.target.closest?.("button");
+    for (const [name, press] of Object.entries(PRESSED))
+      if (button && name in button.dataset) press(button, button.dataset[name]);
+  });
 
   // While anything new arrives, viser draws one frame after another, most of them alike. Without a
   // graphics card that takes the time in which the next mesh is made. A view that is held draws only frames
@@ -126,15 +174,19 @@
     sessionStorage.setItem(REMEMBERED, JSON.stringify(folders));
   }, true);
 
-  window.packetmesh = {
-    // A screen is shown: its folders are as they were left.
-    shown() {
-      for (const {head, key, open} of heads())
-        if (folders[key] !== undefined && folders[key] !== open) head.click();
-    },
+  // A screen is shown: its folders are as they were left.
+  calls.shown = () => {
+    for (const {head, key, open} of heads())
+      if (folders[key] !== undefined && folders[key] !== open) head.click();
+  };
 
-    // Open folders and tabs by their titles; those that are not there yet, when they come within a second or two.
-    unfold,
+  // Open folders and tabs by their titles; those that are not there yet, when they come within a second or two.
+  calls.unfold = (_, titles) => unfold(titles);
+  calls.hold = () => window.packetmesh.hold();
+  calls.ask = (_, vertices, hold) => window.packetmesh.ask(vertices, hold);
+
+  window.packetmesh = {
+    calls,
 
     // Draw nothing but new meshes for now.
     hold() {

@@ -1,43 +1,39 @@
-"""What the app adds to viser's page: scripts and style sheets of its own, ``PARTS``."""
+"""What the app adds to viser's page, and how the server has the page do something.
+
+Its scripts and styles are files of the server. The content policy forbids scripts in HTML, so that no text
+from a file can be one: to have the page do something, the server sends HTML with the name of a function and
+its arguments, and ``page.js`` calls it.
+"""
 
 from __future__ import annotations
 
-from html import escape
-from pathlib import Path
-from typing import TYPE_CHECKING
+import json
 
-if TYPE_CHECKING:
-    import viser
-
-PARTS = ("page", "hint", "lesson")
-_SCRIPT, _STYLE = (
-    "".join(Path(__file__).with_name(name + kind).read_text(encoding="utf-8") for name in PARTS)
-    for kind in (".js", ".css")
-)
+from app.web.markup import Markup
 
 
-def add_script(gui: viser.GuiApi) -> None:
-    """Have the page run the scripts, before they are first called, and take the style sheets."""
-    gui.add_html(f"<style>{_STYLE}</style>{running(_SCRIPT)}")
-
-
-def stale_html(numbers: bool, picture: bool) -> str:
+def stale_html(numbers: bool, picture: bool) -> Markup:
     """HTML by which the style sheet dims the numbers of the panel, or the 3-D picture."""
     marks = {"packetmesh-old-numbers": numbers, "packetmesh-old-picture": picture}
-    return "".join(f'<i class="{mark}"></i>' for mark, wanted in marks.items() if wanted)
+    found = (Markup('<i class="{}"></i>').format(mark) for mark, wanted in marks.items() if wanted)
+    return Markup("").join(found)
 
 
-def screen_mark(title: str) -> str:
+def screen_mark(title: str) -> Markup:
     """HTML that begins a screen, by which the page knows that it is shown."""
-    mark = f'<span data-packetmesh-screen="{escape(title)}"></span>'
-    return mark + running("window.packetmesh?.shown()", title)
+    mark = Markup('<span data-packetmesh-screen="{}"></span>').format(title)
+    return mark + page_call("shown", mark=title)
 
 
-def running(script: str, mark: object = "") -> str:
-    """HTML that runs a script when it is shown. It cannot hold one, but what is to be done without its image.
+def page_call(function: str, *arguments: object, mark: object = "") -> Markup:
+    """Return HTML that has the page call one of its functions each time it is shown.
 
     Args:
-        script: what to run.
-        mark: tells two apart that are otherwise alike, as a page runs the same HTML once only.
+        function: its name in ``packetmesh.calls`` (``page.js``).
+        arguments: what JSON can hold; the function gets the element first, then these.
+        mark: tells two calls apart that are otherwise alike, as a page takes the same HTML once only.
     """
-    return f'<img alt="" style="display: none" src="data:," data-mark="{mark}" onerror="{escape(script)}">'
+    told = json.dumps(arguments, separators=(",", ":"))
+    return Markup('<i hidden data-packetmesh-call="{}" data-arguments="{}" data-mark="{}"></i>').format(
+        function, told, mark
+    )

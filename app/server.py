@@ -7,21 +7,18 @@ import io
 import logging
 import socket
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import viser
 
 from app.ahead import compute_ahead
-from app.any_thread import queue_from_any_thread
 from app.drawing.colors import BRAND
-from app.entrance import Entrance, Token, is_loopback
-from app.headers import strict_headers
 from app.jobs import start_pool
-from app.landing import landing_first
+from app.landing import app_page
 from app.lecture import Lecture
-from app.origin import only_own_page
-from app.own_folder import OwnFolder, own_folder
 from app.pool import ComputePool
 from app.screens.calibrate.panel import CalibratePanel
 from app.screens.depth.panel import DepthPanel
@@ -33,8 +30,16 @@ from app.screens.surface.panel import SurfacePanel
 from app.session import Session, Target
 from app.state import SharedViews, Spec
 from app.store import Store
-from app.upload_gate import limit_uploads
-from app.uploads import Uploads
+from app.web import viser_private as private
+from app.web.crowd import MOST_OF_ONE_ADDRESS, MOST_SESSIONS, Crowd, Visitor
+from app.web.door import Door
+from app.web.entrance import Entrance, Token, is_loopback
+from app.web.gate import Gate
+from app.web.headers import strict_headers
+from app.web.origin import only_own_page, well_formed
+from app.web.own_folder import OwnFolder, own_folder
+from app.web.page import Page
+from app.web.uploads import Uploads
 from packetmesh.errors import InputError
 from packetmesh.files import file_trouble
 from packetmesh.memory import give_back_memory, share_arenas
@@ -44,12 +49,13 @@ from pipeline.sources import Demo, RigFolder
 PANEL_WIDTH_PX = 440
 ANYWHERE = "0.0.0.0"
 """As a host: all addresses of this machine."""
-MOST_SESSIONS = 64
-"""At once; in a lecture all browsers share one."""
 FULL = (
-    f"{MOST_SESSIONS} browsers are here already, each with a reconstruction of its own; come again when one "
-    "has left, or share one with `packetmesh serve --lecture`."
+    f"There is room for {MOST_SESSIONS} browsers, {MOST_OF_ONE_ADDRESS} of them from one address, each with "
+    "a reconstruction of its own, and all places are taken. You come in automatically as soon as one is "
+    "free. With `packetmesh serve --lecture` all browsers share one reconstruction."
 )
+TRY_AGAIN = 1013
+"""Code with which a connection is closed, after which a page tries again by itself."""
 PANELS = (ScenePanel, CalibratePanel, DepthPanel, FusePanel, SurfacePanel, NetworkPanel, ExportPanel)
 """The steps of the app, in their order."""
 
@@ -63,6 +69,7 @@ class AppServer:
     folder: OwnFolder
     sessions: dict[int, Session] = field(default_factory=dict)
     entrance: Entrance = field(default_factory=Entrance)
+    crowd: Crowd = field(default_factory=Crowd)
 
     @property
     def url(self) -> str:
@@ -95,6 +102,7 @@ class AppServer:
 
     def stop(self) -> None:
         """End all sessions and processes."""
+        self.crowd.close()
         for session in list(self.sessions.values()):
             session.close()
         with contextlib.redirect_stdout(io.StringIO()):
@@ -124,24 +132,27 @@ def build_server(
         pool: one that was started before; None starts one. It ends with the server.
 
     Raises:
-        InputError: the port is taken or the address is not this machine's.
+        InputError: the port is taken, the address is not this machine's, or the installed viser is not known.
         OSError: there is no place for the server's folder.
     """
     _check_address(host, port)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a port scan is no reason for a stack trace
     share_arenas()
+    page = app_page(lecture)
     spec = start_spec(scene, config or PipelineConfig())
     folder = own_folder()
     pool = start_pool() if pool is None else pool
     teacher = Token("teacher") if lecture else None
     visitor = Token("token") if with_token and not is_loopback(host) else None
     entrance = Entrance(visitor, teacher)
-    server = _listening(host, port, entrance, lecture)
+    door = Door()
+    server = _listening(host, port, door, entrance, page)
+    gate = Gate(server)
     app = AppServer(server, pool, folder, entrance=entrance)
     if port and server.get_port() != port:
         app.stop()
         raise InputError(_taken(port))
-    queue_from_any_thread(server)
+    private.queue_from_any_thread(server)
     _dress(server)
     store, uploads, shared = Store(str(folder.path)), Uploads(folder.path), SharedViews()
     compute_ahead(pool, store, shared, spec, app)
@@ -151,51 +162,81 @@ def build_server(
         return app.sessions[number]
 
     if teacher is not None:
-        limit_uploads(server._websock_server, lambda _: None)
-        together = Lecture(server, teacher, app.class_link)
+        together = Lecture(server, gate, teacher, app.class_link)
         session = begin(server, -1, together)
         together.begin(session.post, lambda: session.frame_view(anew=True), session.places.add)
     else:
-        _let_in(app, begin)
+        _let_in(app, gate, begin)
+    door.is_open = True
     return app
 
 
-def _listening(host: str, port: int, entrance: Entrance, lecture: bool) -> viser.ViserServer:
-    """A server whose answers pass the rules on headers, origin, entrance and landing, in this order."""
+def _listening(host: str, port: int, door: Door, entrance: Entrance, page: Page) -> viser.ViserServer:
+    """A server whose answers pass these rules, each before those after it."""
     with contextlib.ExitStack() as outermost_first:
-        for answers in (strict_headers(), only_own_page(), entrance.guarded(), landing_first(lecture)):
+        for answers in (
+            well_formed(),
+            strict_headers(page.script_hashes),
+            only_own_page(),
+            entrance.guarded(),
+            door.guarded(),
+            page.served(),
+        ):
             outermost_first.enter_context(answers)
         outermost_first.enter_context(contextlib.redirect_stdout(io.StringIO()))
         return viser.ViserServer(host=host, port=port, label="PacketMesh", verbose=False)
 
 
-def _let_in(app: AppServer, begin: Callable[[Target, int], Session]) -> None:
-    """Give every browser a session of its own, as long as it is there."""
+def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session]) -> None:
+    """Give every browser a session of its own, as long as it is there and there is room."""
     server = app.viser_server
+    notes = dict[int, Any]()
+    """What those who wait were told."""
 
     def leave(client: viser.ClientHandle) -> None:
+        app.crowd.leave(client.client_id)
+        notes.pop(client.client_id, None)
         session = app.sessions.pop(client.client_id, None)
         if session is not None:
             session.close()
             give_back_memory()
 
-    def come(client: viser.ClientHandle) -> None:
-        def tell(sentence: str) -> None:
-            session = app.sessions.get(client.client_id)
-            if session is not None:
-                session.post(session.notify, "That did not work", sentence)
-
-        limit_uploads(client._websock_connection, tell)
-        if len(app.sessions) >= MOST_SESSIONS:
-            client.add_notification("You cannot come in", FULL, color="red", auto_close_seconds=None)
-            return
+    def start(client: viser.ClientHandle) -> Future[None] | None:
+        note = notes.pop(client.client_id, None)
+        if note is not None:
+            note.remove()
         try:
-            begin(client, client.client_id)
+            built = begin(client, client.client_id).built
         except OSError as error:
             client.add_notification("You cannot come in", file_trouble(error), color="red")
+            return None
         if client.client_id not in server.get_clients():  # it left before its session was there
             leave(client)
+        return built
 
+    def wait(client: viser.ClientHandle) -> None:
+        title = "You wait for a place"
+        notes[client.client_id] = client.add_notification(title, FULL, auto_close_seconds=None)
+
+    async def come(client: viser.ClientHandle) -> None:  # on the connections' own thread: it is quick
+        number = client.client_id
+        app.crowd.come(
+            Visitor(
+                number,
+                private.address_of(server, number),
+                begin=lambda: start(client),
+                wait=lambda: wait(client),
+                turn_away=lambda: private.close(server, number, TRY_AGAIN, "no room, or no page is shown"),
+                shows_page=lambda: gate.shows_page(number),
+            )
+        )
+
+    def tell_too_much(number: int, sentence: str) -> None:
+        session = app.sessions.get(number)
+        if session is not None:
+            session.post(session.notify, "That did not work", sentence)
+
+    gate.on_too_much = tell_too_much
     server.on_client_connect(come)
     server.on_client_disconnect(leave)
 

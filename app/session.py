@@ -17,14 +17,15 @@ from app.framing import Framing
 from app.header import Header
 from app.lane import LatestWins, Submission, Track
 from app.lecture import Lecture
-from app.page import add_script, screen_mark
+from app.page import screen_mark
 from app.places import Places
 from app.pool import ComputePool, Outcome
 from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
 from app.store import Store
 from app.ui import Offers, Panel, Ui
-from app.uploads import Uploads, plain
 from app.views import Views
+from app.web.uploads import Uploads, plain
+from app.window.gui import Gui
 from packetmesh.errors import PacketMeshError
 from packetmesh.files import file_trouble
 from packetmesh.progress import Progress
@@ -56,8 +57,8 @@ class Session:
         lecture: Lecture | None = None,
     ) -> None:
         self.target = target
-        self.gui, self.scene = target.gui, target.scene
-        self.ui = Ui(target.gui, target.scene, self.post, target.atomic, target.flush, lecture=lecture)
+        self.gui, self.scene = Gui(target.gui), target.scene
+        self.ui = Ui(self.gui, target.scene, self.post, target.atomic, target.flush, lecture=lecture)
         self.store, self.uploads = store, uploads
         self._shared = shared
         self.spec = self._start = spec
@@ -76,7 +77,8 @@ class Session:
         self.views = Views(target) if isinstance(target, viser.ClientHandle) else None
         self._framing = Framing(self)
         self.places = Places(self)
-        self._thread.submit(self._guarded, self._build_in_turn)
+        self.built = self._thread.submit(self._guarded, self._build_in_turn)
+        """Done when its panels are there."""
         if isinstance(target, viser.ClientHandle):
             target.camera.on_update(lambda _: self._framing.follow_window())
 
@@ -288,7 +290,6 @@ class Session:
 
     def _build(self) -> None:
         titles = [panel.title for panel in self.panels]
-        add_script(self.gui)
         self._header = Header(
             self.gui,
             titles,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-import viser
-
 from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, css
 from app.state import StepStatus
+from app.web.markup import Markup
+from app.window.gui import Gui
 
 MARKS: dict[StepStatus, str] = {"fresh": "✓", "stale": "↻", "running": "…", "failed": "✗", "missing": ""}
 COLORS: dict[StepStatus, str] = {
@@ -17,40 +17,35 @@ COLORS: dict[StepStatus, str] = {
     "failed": css(LOSS),
     "missing": "#868e96",
 }
+_BUTTON = Markup("div:has(> .packetmesh-steps) + div button:nth-of-type({}) {{ border-color: {}; {} }}")
+_MARK = Markup(
+    "div:has(> .packetmesh-steps) + div button:nth-of-type({}) .mantine-Button-label::after "
+    "{{ content: '\\00a0{}' }}"
+)
+"""The marks are the style's, so that the buttons stay the same while a hand is on one."""
 
 
 class Stepper:
     """Buttons, one for each step; the current one is filled."""
 
-    def __init__(self, gui: viser.GuiApi, titles: Sequence[str], on_pick: Callable[[str], None]) -> None:
+    def __init__(self, gui: Gui, titles: Sequence[str], on_pick: Callable[[str], None]) -> None:
         self._titles = tuple(titles)
-        self._labels = self._titles
-        self._style = gui.add_html("")
-        self._buttons = gui.add_button_group("Steps", self._labels)
-        self._buttons.on_click(lambda event: on_pick(self._title_of(event.target.value)))
-
-    def _title_of(self, label: str) -> str:
-        """The step of a label, whatever its mark: it may have changed since the click."""
-        return next(title for title in self._titles if label.split(" ")[0] == title)
+        self._style = gui.add_html(Markup(""))
+        self._buttons = gui.add_button_group("Steps", self._titles)
+        self._buttons.on_click(lambda event: on_pick(event.target.value))
 
     def show(self, current: str, statuses: Mapping[str, StepStatus]) -> None:
         """Mark the current step and the state of all."""
-        labels = tuple(
-            f"{title} {MARKS[statuses[title]]}".rstrip() if title in statuses else title
-            for title in self._titles
-        )
-        if labels != self._labels:
-            self._labels = labels
-            self._buttons.options = labels
         self._style.content = _style(self._titles.index(current), [statuses.get(t) for t in self._titles])
 
 
-def _style(current: int, statuses: Sequence[StepStatus | None]) -> str:
+def _style(current: int, statuses: Sequence[StepStatus | None]) -> Markup:
     """CSS for the buttons that follow this element: their colours; ``page.css`` has their place."""
-    row = "div:has(> .packetmesh-steps) + div"
-    rules = [f"canvas[data-engine] {{ background: {css(BACKGROUND)} }}"]
-    for index, status in enumerate(statuses):
+    rules = [Markup("canvas[data-engine] {{ background: {} }}").format(css(BACKGROUND))]
+    for number, status in enumerate(statuses, 1):
         color = COLORS[status] if status is not None else css(BRAND)
-        look = f"background: {color}; color: white;" if index == current else f"color: {color};"
-        rules.append(f"{row} button:nth-of-type({index + 1}) {{ border-color: {color}; {look} }}")
-    return f'<style class="packetmesh-steps">{" ".join(rules)}</style>'
+        look = f"background: {color}; color: white;" if number == current + 1 else f"color: {color};"
+        rules.append(_BUTTON.format(number, color, look))
+        if status is not None and MARKS[status]:
+            rules.append(_MARK.format(number, MARKS[status]))
+    return Markup('<style class="packetmesh-steps">{}</style>').format(Markup(" ").join(rules))

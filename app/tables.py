@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import html
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
 from app.drawing.colors import css
 from app.records import ColorBar, MeshView
+from app.web.markup import Markup
 
 _CELL = "padding: 2px 8px 2px 0; vertical-align: top;"
+_VALUE = Markup('<td style="{} text-align: right; font-variant-numeric: tabular-nums">{}</td>')
 
 WAITING, UNKNOWN = "…", "–"
 """For a value that is to come, and for one that is not."""
@@ -37,60 +38,61 @@ TRUTH_ROWS = (
 PER_UNIT = {"%": 100.0, "mm": 1000.0}
 
 
-def term(name: str, hint: str) -> str:
+def term(name: str, hint: str) -> Markup:
     """HTML of a word that is explained by a click on it, as ``hint.js`` does."""
-    told = html.escape(hint, quote=True)
-    return f'<button type="button" class="packetmesh-term" data-hint="{told}">{html.escape(name)}</button>'
+    return Markup('<button type="button" class="packetmesh-term" data-hint="{}">{}</button>').format(
+        hint, name
+    )
 
 
 def table(
     rows: Sequence[Row], columns: Sequence[Head] = (), colors: Sequence[tuple[int, int, int]] = ()
-) -> str:
+) -> Markup:
     """HTML of rows of numbers; ``columns`` head the values when there are several, in ``colors`` if given."""
     lines = []
     if columns:
-        names = [html.escape(one) if isinstance(one, str) else term(*one) for one in columns]
+        names = [one if isinstance(one, str) else term(*one) for one in columns]
         inks = [f" color: {css(color)};" for color in colors] or [""] * len(names)
-        heads = "".join(
-            f'<th style="{_CELL} text-align: right;{ink}">{name}</th>'
+        heads = _joined(
+            Markup('<th style="{} text-align: right;{}">{}</th>').format(_CELL, ink, name)
             for name, ink in zip(names, inks, strict=True)
         )
-        lines.append(f"<tr><th></th>{heads}</tr>")
+        lines.append(Markup("<tr><th></th>{}</tr>").format(heads))
     for name, hint, *values in rows:
+        cells = _joined(_VALUE.format(_CELL, value) for value in values)
         text = term(name, hint)
-        cells = "".join(
-            f'<td style="{_CELL} text-align: right; font-variant-numeric: tabular-nums">{html.escape(v)}</td>'
-            for v in values
-        )
-        lines.append(f'<tr><td style="{_CELL}">{text}</td>{cells}</tr>')
-    return (
+        lines.append(Markup('<tr><td style="{}">{}</td>{}</tr>').format(_CELL, text, cells))
+    return Markup(
         '<div class="packetmesh-numbers" '
         'style="padding: 0 0.8em 0.8em 0.8em; font-size: 13px; overflow-x: auto">'
-        f'<table style="border-collapse: collapse; width: 100%">{"".join(lines)}</table></div>'
-    )
+        '<table style="border-collapse: collapse; width: 100%">{}</table></div>'
+    ).format(_joined(lines))
 
 
-def bar_html(bar: ColorBar) -> str:
+def bar_html(bar: ColorBar) -> Markup:
     """The colours from left to right over their labels."""
     gradient = ", ".join(css(stop) for stop in bar.stops)
-    ends = "".join(f"<span>{html.escape(label)}</span>" for label in bar.labels)
-    return (
-        f'<div style="height: 0.7em; background: linear-gradient(to right, {gradient}); border-radius: 2px; '
-        f'margin-top: 0.3em"></div><div style="display: flex; justify-content: space-between">{ends}</div>'
-    )
+    ends = _joined(Markup("<span>{}</span>").format(label) for label in bar.labels)
+    return Markup(
+        '<div style="height: 0.7em; background: linear-gradient(to right, {}); border-radius: 2px; '
+        'margin-top: 0.3em"></div><div style="display: flex; justify-content: space-between">{}</div>'
+    ).format(gradient, ends)
 
 
-def command_html(command: str) -> str:
-    """A command line to select or copy with one click."""
+def command_html(command: str) -> Markup:
+    """A command line to select or copy with one click, which ``page.js`` does."""
     look = (
         "margin: 0; padding: 0.8em; white-space: pre-wrap; overflow-wrap: anywhere; font-size: 12px; "
         "user-select: all; border: 1px solid #bbb; border-radius: 4px"
     )
-    copy = "navigator.clipboard.writeText(this.previousElementSibling.textContent);this.textContent='Copied'"
-    return (
-        f'<div style="padding: 0 0.8em 0.8em 0.8em"><pre style="{look}">{html.escape(command)}</pre>'
-        f'<button style="margin-top: 0.5em; padding: 0.2em 1em" onclick="{copy}">Copy</button></div>'
-    )
+    return Markup(
+        '<div style="padding: 0 0.8em 0.8em 0.8em"><pre style="{}">{}</pre>'
+        '<button style="margin-top: 0.5em; padding: 0.2em 1em" data-packetmesh-copy>Copy</button></div>'
+    ).format(look, command)
+
+
+def _joined(parts: Iterable[str]) -> Markup:
+    return Markup("").join(parts)
 
 
 def number(value: float | None, digits: int = 1, unit: str = "", scale: float = 1.0) -> str:

@@ -13,7 +13,9 @@ import numpy as np
 from app.debounce import Debounce
 from app.state import Spec, Step
 from app.tables import command_html
-from app.uploads import plain
+from app.web.markup import Markdown
+from app.web.uploads import plain
+from app.window.gui import Gui
 from packetmesh.errors import InputError
 from pipeline.types import FloatArray
 
@@ -32,7 +34,7 @@ Input = TypeVar("Input", bound="viser.GuiInputHandle[Any]")
 class Ui:
     """A browser's control panel and scene; what a person does there is answered on the session's thread."""
 
-    gui: viser.GuiApi
+    gui: Gui
     scene: viser.SceneApi
     post: Callable[..., None]
     """Runs a function on the session's thread."""
@@ -68,7 +70,7 @@ class Ui:
     def show_command(self, command: str) -> None:
         """Show a command in a window of its own."""
         with self.gui.add_modal("The same from the command line") as modal:
-            self.gui.add_markdown("This computes and writes what the app shows now:")
+            self.gui.add_markdown(Markdown("This computes and writes what the app shows now:"))
             self.gui.add_html(command_html(plain(command)))
             self.gui.add_button("Close").on_click(lambda _: modal.close())
 
@@ -223,6 +225,9 @@ class Offer:
     """Whether the job takes the 3-D view as the browser draws it, (H, W, 4), as its last argument."""
 
 
+NO_NOTE = Markdown("")
+
+
 @dataclass(frozen=True, slots=True)
 class Offers:
     """Files of one kind, and how a command makes the same."""
@@ -231,7 +236,7 @@ class Offers:
     hint: str
     files: tuple[Offer, ...]
     command: str = ""
-    note: str = ""
+    note: Markdown = NO_NOTE
     """On the command, or why there is none."""
 
 

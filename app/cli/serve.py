@@ -45,8 +45,8 @@ def serve(
         signal.signal(number, lambda number, _: stops.append(number))
     pool = start_pool()  # it imports what it needs while this process does
     try:
-        from app.entrance import is_loopback
         from app.server import build_server
+        from app.web.entrance import is_loopback
 
         app = build_server(scene, config, host, port, lecture, not no_token, pool=pool)
     except BaseException:

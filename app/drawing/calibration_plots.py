@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 
 from app.drawing.colors import DELIVERED, DISTANCE_STOPS, LOSS, NEUTRAL, SOURCE, TARGET, css
 from app.drawing.plots import BAND95, faint, image_figure, titled_figure
+from app.web.markup import escape
 from pipeline.calibration.diagnosis import Coverage, RadialCurve, RadialResiduals
 from pipeline.calibration.estimate import Calibration, FittedView
 from pipeline.calibration.next_view import NextView
@@ -29,12 +30,12 @@ def views_figure(
 ) -> go.Figure:
     """Bars of every view's error, in the fit and, beside it, when it is held out; outliers are red."""
     figure = titled_figure("Error of each view", "", "RMS, px")
-    names = [view.name for view in fitted]
-    colors = [css(LOSS) if name in outliers else css(TARGET) for name in names]
+    names = [escape(view.name) for view in fitted]
+    colors = [css(LOSS) if view.name in outliers else css(TARGET) for view in fitted]
     figure.add_bar(x=names, y=[view.rms_px for view in fitted], name="in the fit", marker_color=colors)
     if unseen:
         figure.add_bar(
-            x=[view.name for view in unseen],
+            x=[escape(view.name) for view in unseen],
             y=[view.rms_px for view in unseen],
             name="held out",
             marker_color=css(SOURCE),

@@ -22,6 +22,7 @@ ASKED = "packetmesh.ask("
 DRAWN = "Say that all is drawn"
 """The label of the command that answers it."""
 _CURRENT = re.compile(r"nth-of-type\((\d+)\) {[^}]*color: white;")
+_MARK = re.compile(r"nth-of-type\((\d+)\) .mantine-Button-label::after {[^}]*00a0(.)'")
 
 
 def wait_for(happened: Callable[[], bool], patience_s: float = PATIENCE_S) -> None:
@@ -55,7 +56,8 @@ class Connection:
         self.notices: list[str] = []
         """Titles and sentences of the notifications."""
         self.steps: tuple[str, ...] = ()
-        """The steps' labels, with their marks."""
+        """The steps' labels."""
+        self._marks: dict[str, str] = {}
         self.current = ""
         """The step that is shown."""
         self.heard_s: dict[str, float] = {}
@@ -99,12 +101,11 @@ class Connection:
 
     def go(self, step: str) -> None:
         """Click a step."""
-        label = next(label for label in self.steps if label.split(" ")[0] == step)
-        self.set("Steps", label)
+        self.set("Steps", step)
 
     def mark(self, step: str) -> str:
         """How the stepper marks a step; empty without a mark."""
-        return next(label for label in self.steps if label.startswith(step)).partition(" ")[2]
+        return self._marks.get(step, "")
 
     def _read(self) -> None:
         try:
@@ -140,8 +141,6 @@ class Connection:
             self._take_html(told["content"])
         if "options" in told and uuid in self.uuids.get("Steps", ()):
             self.steps = tuple(told["options"])
-            if self.mark("Surface") == MARKS["fresh"]:
-                self.heard_s["surface"] = time.monotonic()
         value = message.get("value", told.get("value"))
         if value is not None:
             self.values[uuid] = value
@@ -153,5 +152,8 @@ class Connection:
                 self.say(messages.CommandTriggerMessage(uuid))
         current = _CURRENT.search(content)
         if current is not None and self.steps:
-            self.current = self.steps[int(current[1]) - 1].split(" ")[0]
+            self.current = self.steps[int(current[1]) - 1]
             self.heard_s[self.current] = time.monotonic()
+            self._marks = {self.steps[int(number) - 1]: mark for number, mark in _MARK.findall(content)}
+            if self.mark("Surface") == MARKS["fresh"]:
+                self.heard_s["surface"] = time.monotonic()

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import html
 import inspect
+import json
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,6 +15,7 @@ import viser
 from app import jobs
 from app.state import CHAIN, Results, Spec
 from app.ui import Ui
+from app.window.gui import Gui as PanelGui
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import drain as end
 from pipeline.sources import Demo
@@ -171,7 +175,7 @@ def at_once(function, *arguments):
 
 def ui_of(scene=None, post=at_once, kind=Ui):
     """A bundle with a new control panel; the scene is a server's."""
-    return kind(Gui(), Scene(scene), post, contextlib.nullcontext, lambda: None)
+    return kind(PanelGui(Gui()), Scene(scene), post, contextlib.nullcontext, lambda: None)
 
 
 class Impatient(Ui):
@@ -179,6 +183,12 @@ class Impatient(Ui):
 
     def debounce(self, wait_s, action):
         return SimpleNamespace(restart=action, cancel=lambda: None, pending=False)
+
+
+def page_calls(content):
+    """What HTML has the page call, by name and with its arguments."""
+    found = re.findall(r'data-packetmesh-call="([^"]+)" data-arguments="([^"]*)"', content)
+    return [(name, json.loads(html.unescape(arguments))) for name, arguments in found]
 
 
 START = Spec(Demo("box-on-table"))

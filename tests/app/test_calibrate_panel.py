@@ -35,7 +35,7 @@ from tests.app.boards import (
     save_believing_rig,
     save_boards,
 )
-from tests.app.fakes import Bench, Impatient, ui_of
+from tests.app.fakes import Bench, Impatient, page_calls, ui_of
 
 pytestmark = pytest.mark.xdist_group("calibrate panel")
 BENT = "The board may be bent"
@@ -125,7 +125,7 @@ def test_both_cameras_are_found_within_their_intervals(screen):
 
 def test_every_photograph_has_a_bar_and_a_click_shows_it(screen):
     (bars,) = [one for one in screen.gui.handles if "packetmesh-views" in str(getattr(one, "content", ""))]
-    assert bars.content.count("data-view=") == MOMENTS + 1
+    assert bars.content.count("data-packetmesh-pick=") == MOMENTS + 1
     assert "View 99: no board found" in bars.content
     field = screen.gui.find("View that was clicked")
     for name in ("3", BLANK):
@@ -350,8 +350,9 @@ def test_the_trials_are_in_the_dock_while_the_screen_is_shown(screen):
 
     def docked():
         told = (str(getattr(one, "content", "")) for one in gui.handles)
-        (message,) = [one for one in told if "packetmeshPlots ??= []).push" in one]
-        return "&quot;visible&quot;:true" in message
+        calls = [call for one in told for call in page_calls(one)]
+        (visible,) = [message["visible"] for name, (message, *_) in calls if name == "plots"]
+        return visible
 
     assert not docked()
     gui.set("Noise (px)", 0.2)

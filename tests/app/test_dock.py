@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from app.dock import COUNT_NS, Dock, speed_text, time_text
 from app.levels import levels_of
 from app.timeline import Curve, CurvesLane, FramesLane
-from tests.app.fakes import ui_of
+from tests.app.fakes import page_calls, ui_of
 
 STOPS_NS = np.array([1_000, 2_000_000_000, 5_000_000_000])
 START_NS, END_NS = 1_000, 10_000_000_000
@@ -45,9 +46,11 @@ class Hand:
         self.ui.gui.set("Dock", text)
 
     def told(self, word):
-        """The last that was told with this word in it."""
+        """The last that was told of this kind, as it is written."""
         contents = [one.content for one in self.ui.gui.handles if one.kind == "add_html"]
-        return next(content for content in contents if f"&quot;kind&quot;:&quot;{word}&quot;" in content)
+        calls = [call for content in contents for call in page_calls(content)]
+        message = next(message for name, (message,) in calls if name == "dock" and message["kind"] == word)
+        return html.escape(json.dumps(message, separators=(",", ":")))
 
     def later(self, seconds):
         """Let time pass, and the ticker tick."""

@@ -1,13 +1,9 @@
 """What a page is told of the plots in the dock."""
 
-import html
-import json
-import re
-
 import plotly.graph_objects as go
 
 from app.dock_plots import PlotDock, Sheet
-from tests.app.fakes import ui_of
+from tests.app.fakes import page_calls, ui_of
 
 SHEET = Sheet("Trials", "<i></i>dots", (go.Figure(),), "<table></table>")
 
@@ -15,8 +11,9 @@ SHEET = Sheet("Trials", "<i></i>dots", (go.Figure(),), "<table></table>")
 def told(ui):
     """The last that a page was told."""
     contents = [str(getattr(one, "content", "")) for one in ui.gui.handles]
-    (message,) = [one for one in contents if "packetmeshPlots ??= []).push" in one]
-    return json.loads(html.unescape(re.search(r"push\((.*)\)", message)[1]))
+    ((name, (message,)),) = [call for content in contents for call in page_calls(content)]
+    assert name == "plots"
+    return message
 
 
 def test_nothing_is_seen_before_there_is_something_and_somebody_looks():

@@ -115,7 +115,7 @@ def test_the_map_names_every_cell_and_marks_what_arrives():
     errors_m[1, :2] = 0.001
     view = CaptureView(("ICP point", "CEICP-A plane"), errors_m)
     html = capture_html(view, 1)
-    assert re.findall('data-cell="([^"]+)"', html) == [
+    assert re.findall('data-packetmesh-press="([^"]+)"', html) == [
         cell_name(turn_deg, shift_m) for turn_deg in CAPTURE_TURNS_DEG for shift_m in CAPTURE_SHIFTS_M
     ]
     assert html.count("✓ 0.1") == 10

@@ -6,12 +6,14 @@ import gzip
 import html
 import http.client
 import re
+from pathlib import Path
 
 import pytest
 import viser
 
+import app.landing
 from app.address import Place, place_of
-from app.landing import LESSON_PLACES, PICTURES, landing_first, landing_html
+from app.landing import LESSON_PLACES, PICTURES, SCRIPTS, STYLES, app_page, landing_html
 from app.lesson_file import LESSONS
 from app.server import PANELS
 from app.state import Spec
@@ -21,7 +23,7 @@ from pipeline.sources import Demo
 
 @pytest.fixture(scope="module")
 def port():
-    with landing_first():
+    with app_page(lecture=False).served():
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     yield server.get_port()
     server.stop()
@@ -43,6 +45,19 @@ def test_it_is_in_the_page_of_the_bare_address_only(port):
     assert page.rstrip().endswith("</html>")
     assert "packetmesh-landing" not in get(port, "/?scene")[1]
     assert get(port, "/nothing")[0] == 404
+
+
+def test_the_page_has_its_title_and_the_apps_own_files_from_the_first_byte(port):
+    page = get(port, "/?scene")[1]
+    assert page.count("<title>PacketMesh</title>") == page.count("<title>") == 1
+    plotly, script = re.findall('<script defer src="([^"]+)">', page)
+    (style,) = re.findall('<link rel="stylesheet" href="([^"]+)">', page)
+    assert "Plotly" in get(port, plotly)[1]
+    assert all(one.read_text("utf-8") in get(port, script)[1] for one in SCRIPTS)
+    assert all(one.read_text("utf-8") in get(port, style)[1] for one in STYLES)
+    here = Path(app.landing.__file__).parent
+    parts = {*here.rglob("*.js"), *here.rglob("*.css")} - {*(here / "reports").iterdir()}
+    assert parts == {*SCRIPTS, *STYLES}
 
 
 def test_it_offers_every_lesson_and_every_scene_with_a_small_picture():

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from app.entrance import Token, is_loopback
 from app.lesson import told, with_votes
 from app.lesson_file import Choice, Question
 from app.load.connection import Connection, wait_for
 from app.qr import modules_of, qr_html
 from app.server import build_server
+from app.web.entrance import Token, is_loopback
 
 pytestmark = pytest.mark.xdist_group("lecture")  # one worker starts the server once
 CLASS = 30
@@ -157,6 +157,8 @@ def test_thirty_browsers_see_the_room_and_each_vote_is_counted_once(lecture, tea
         wait_for(lambda: teacher.reads(f"**{CLASS}** in the class"))
         wait_for(lambda: all("Seat" in one.uuids and "Scene" in one.uuids for one in students))
         wait_for(lambda: all(one.positions for one in students))
+        teacher.go("Calibrate")  # the first of the screens that have a lesson
+        wait_for(lambda: teacher.current == "Calibrate")
         teacher.set("Go", "Next")
         wait_for(lambda: all(one.reads("The class votes") for one in students))
         for number, one in enumerate(students):

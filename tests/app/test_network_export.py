@@ -23,6 +23,7 @@ from app.screens.network.export_job import (
 from app.screens.network.job import network_job
 from app.screens.network.labels import NETWORKS
 from app.state import Sent, Spec
+from app.web.markup import Markdown
 from network_sim.presets import PRESETS
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
@@ -96,5 +97,8 @@ def test_what_is_offered_is_of_the_clocks_moment_and_says_what_commands_make(vie
     assert mesh.arguments == (len(view.moments) - 1, "moment.glb")
     assert f"{moment.t_ns / 1e9:.3g} s" in mesh.label
     assert len(delivery_offers(view, -1, "").files) == 2  # before anything has arrived
-    assert network_offers(("a", "b"), "simulate x\nsimulate y").command.count("--out") == 2
+    runs = network_offers(("a", "b"), "simulate x\nsimulate y")
+    assert runs.command.count("--out") == 2
+    assert "`trace.csv`" in Markdown("{}").format(runs.note)
+    assert "`delivery.gif`" in Markdown("{}").format(offers.note)
     assert "no trace" in network_offers((), "").note

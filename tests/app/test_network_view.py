@@ -120,8 +120,14 @@ def test_numbers_have_units_and_definitions(view):
     assert "Attempts lost to a busy channel" in others
     assert value_text("packet_delay_mean", None) == "–"
     assert value_text("packet_delay_mean", Metric(0.00137, "s", "")) == "1.37 ms"
-    assert "0.0 s of the network's time" in runs_summary([view])
+    assert "0.0 s of the network's time" in runs_summary([view]).unescape()
     assert all(metric.unit and metric.definition for metric in view.metrics.values())
+
+
+def test_a_summary_of_two_runs_names_each_in_bold_as_it_is_written(view):
+    said = runs_summary([replace(view, label="PDC"), replace(view, label="<b>a*b")])
+    assert said.startswith("**PDC**: 0.0 s of the network")
+    assert " **&lt;b&gt;a&#42;b**: 0.0 s of the network" in said
 
 
 @pytest.mark.parametrize("preset", NETWORKS)

@@ -1,6 +1,5 @@
 """Quick looks: one at a time, always the newest, none faster than the browser answers."""
 
-import html
 import time
 from types import SimpleNamespace
 
@@ -10,7 +9,7 @@ from app.debounce import Debounce
 from app.screens.surface import quick
 from app.screens.surface.quick import FEWEST_POINTS, LOOKS, SLOW_S, Detail, QuickLook
 from app.screens.surface.view import QUICK_POINTS, PaintedView, PaintRequest
-from tests.app.fakes import ui_of
+from tests.app.fakes import page_calls, ui_of
 
 
 class Browser:
@@ -25,9 +24,10 @@ class Browser:
         self.jobs.append((request, on_end))
 
     @property
-    def script(self):
-        """What the browser was asked to run last."""
-        return html.unescape(self.ui.gui.handles[0].content)
+    def call(self):
+        """What the page was asked to call last, and with what."""
+        (call,) = page_calls(self.ui.gui.handles[0].content)
+        return call
 
     def answer(self):
         self.ui.gui.press("Say that all is drawn")
@@ -170,11 +170,11 @@ def test_what_is_asked_for_follows_the_browsers_answers(scene, monkeypatch):
 def test_the_view_is_held_from_the_first_move_until_the_radius_rests(scene):
     browser, look, _ = scene
     look.want(request(0.01))
-    assert "packetmesh.hold()" in browser.script
+    assert browser.call == ("hold", [])
     look.sent([4, 5])
-    assert "packetmesh.ask([4, 5], true)" in browser.script
+    assert browser.call == ("ask", [[4, 5], True])
     look.want(request(0.02))
-    assert "packetmesh.ask([4, 5], true)" in browser.script
+    assert browser.call == ("ask", [[4, 5], True])
     browser.ui.close()
     look.sent()
-    assert "packetmesh.ask([], false)" in browser.script
+    assert browser.call == ("ask", [[], False])

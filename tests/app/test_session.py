@@ -13,7 +13,7 @@ from app.pool import Outcome
 from app.screens.scene.panel import ScenePanel
 from app.session import CANCELLED, Session
 from app.state import SharedViews
-from app.uploads import Uploads
+from app.web.uploads import Uploads
 from tests.app.fakes import START
 
 LONG_S = 30.0

@@ -30,9 +30,9 @@ from tests.browser.conftest import ARGUMENTS, chromium_path
 PATIENCE_MS = 300_000
 MOMENTS = {
     "panels": "button:has-text('Surface')",
-    "scene": "button:has-text('Scene ✓')",
+    "scene": "role=button[name='Scene ✓']",
     "surface": "text=No-hit rays",
-    "all numbers": "button:has-text('Surface ✓')",
+    "all numbers": "role=button[name='Surface ✓']",
     "up to date": "text=Up to date",
 }
 """What is looked for, by what it shows."""

@@ -13,7 +13,7 @@ from tests.browser.conftest import dismiss_notifications
 from tests.browser.hands import PATIENCE_MS, canvas, changed_from, go, pick, press, slider, unfold
 
 """For the cameras and their depth on a busy machine."""
-BARS = ".packetmesh-views [data-view]"
+BARS = ".packetmesh-views [data-packetmesh-pick]"
 DOCK = ".packetmesh-dock-row"
 
 

@@ -13,9 +13,11 @@ from playwright.sync_api import expect
 
 from app.dock import Dock
 from app.drawing.colors import LOSS, TARGET
+from app.landing import app_page
 from app.levels import levels_of
 from app.timeline import Curve, CurvesLane, FramesLane
 from app.ui import Ui
+from app.window.gui import Gui
 from tests.browser.hands import PATIENCE_MS
 
 END_NS = 10_000_000_000
@@ -26,7 +28,7 @@ class Stage:
 
     def __init__(self, client):
         self.thread = ThreadPoolExecutor(1)
-        ui = Ui(client.gui, client.scene, self.post, client.atomic, client.flush)
+        ui = Ui(Gui(client.gui), client.scene, self.post, client.atomic, client.flush)
         self.ui, self.moves, self.picks = ui, [], []
         self.folder = client.gui.add_folder(None)
         with self.folder:
@@ -59,7 +61,8 @@ class Stage:
 @pytest.fixture(scope="module")
 def docks(chromium):
     """A server whose visitors see nothing but a dock."""
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    with app_page(lecture=True).served():
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     stages = []
     server.on_client_connect(lambda client: stages.append(Stage(client)))
     yield server, stages
@@ -300,9 +303,9 @@ def test_it_follows_the_width_of_the_window(page, stage):
     page.set_viewport_size({"width": 1200, "height": 600})
     until(page, lambda: field(page)[2] == before + 200)
     wide = "[...document.querySelectorAll('.packetmesh-dock-field img')].map(image => image.naturalWidth)"
-    page.wait_for_function(f"{wide}.every(width => width === {round(before + 200)})")
+    page.wait_for_function(f"() => {wide}.every(width => width === {round(before + 200)})")
     page.set_viewport_size({"width": 1000, "height": 600})
-    page.wait_for_function(f"{wide}.every(width => width === {round(before)})")
+    page.wait_for_function(f"() => {wide}.every(width => width === {round(before)})")
 
 
 def test_it_stays_when_the_control_panel_is_closed_and_goes_when_it_is_hidden(page, stage):

@@ -217,12 +217,12 @@ def test_the_capture_map_is_computed_and_a_cell_starts_a_race(fuse):
     unfold(fuse, "Capture range")
     fuse.get_by_role("button", name="Compute the map").click()
     fuse.get_by_text(re.compile("Of 25 starts")).wait_for()
-    cells = fuse.locator("button[data-cell]")
+    cells = fuse.locator("button[data-packetmesh-press]")
     assert cells.count() == 25
     marks = [cells.nth(index).inner_text()[0] for index in range(25)]
     assert set(marks) <= {"✓", "✗"}
     assert "✓" in marks
-    fuse.locator("button[data-cell='20° 30 cm']").click()
+    fuse.locator("button[data-packetmesh-press='20° 30 cm']").click()
     assert await_change(fuse, "Start error", before)[0] > 25
     assert fuse.get_by_label("Start", exact=True).first.input_value() == "by hand"
     assert cells.count() == 25
@@ -237,7 +237,7 @@ def test_the_map_can_be_stopped(fuse):
     fuse.get_by_text("Computing; the bar").wait_for()
     fuse.get_by_role("button", name="Stop the map").click()
     fuse.get_by_text("Stopped.").wait_for()
-    assert fuse.locator("button[data-cell]").count() == 0
+    assert fuse.locator("button[data-packetmesh-press]").count() == 0
 
 
 def test_inferred_on_sensor_is_another_race(fuse):

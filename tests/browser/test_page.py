@@ -108,7 +108,7 @@ def test_a_view_that_is_held_is_drawn_when_its_size_changes(page):
     page.evaluate("packetmesh.hold()")
     begin_to_count(page)
     page.set_viewport_size({"width": 860, "height": 600})
-    page.wait_for_function("watched.drawn > 0")
+    page.wait_for_function("() => watched.drawn > 0")
     assert page.evaluate("look()") > 0
 
 
@@ -116,22 +116,22 @@ def test_a_view_that_is_held_is_drawn_when_a_surface_is_gone(page):
     page.evaluate("packetmesh.hold()")
     begin_to_count(page)
     page.evaluate("packetmesh.ask([], true)")
-    page.wait_for_function("watched.answers === 1 && watched.drawn > 0")
+    page.wait_for_function("() => watched.answers === 1 && watched.drawn > 0")
 
 
 def test_a_question_is_answered_even_if_its_mesh_never_comes(page):
     begin_to_count(page)
     page.evaluate("packetmesh.ask([123456789], true)")
     assert page.evaluate("watched.answers") == 0
-    page.wait_for_function("watched.answers === 1")
+    page.wait_for_function("() => watched.answers === 1")
     page.evaluate("packetmesh.ask([], false)")
-    page.wait_for_function("watched.answers === 2")
+    page.wait_for_function("() => watched.answers === 2")
 
 
 def test_of_two_questions_only_the_last_is_answered(page):
     begin_to_count(page)
     page.evaluate("packetmesh.ask([123456789], true); packetmesh.ask([], false)")
-    page.wait_for_function("watched.answers === 1")
+    page.wait_for_function("() => watched.answers === 1")
     page.wait_for_timeout(1500)
     assert page.evaluate("watched.answers") == 1
 
@@ -141,4 +141,4 @@ def test_a_mesh_that_is_awaited_still_keeps_the_view_until_it_comes(page):
     page.evaluate("packetmesh.ask([123456789], true); packetmesh.ask([], false)")
     page.wait_for_timeout(500)
     assert page.evaluate("[watched.answers, watched.drawn]") == [0, 0]
-    page.wait_for_function("watched.answers === 1")
+    page.wait_for_function("() => watched.answers === 1")

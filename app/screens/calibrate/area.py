@@ -10,6 +10,7 @@ from app.compare import captions_html, no_pictures, place_of, place_text, split
 from app.records import Picture
 from app.screens.calibrate.labels import PAIRS, STRAIGHTENED
 from app.ui import Ui
+from app.web.markup import Markup
 
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 QUALITY = 92
@@ -33,7 +34,7 @@ class PictureArea:
             "Split (%)", 0.0, 100.0, 1.0, 50.0, hint="Where the line is, in % of the picture's width."
         )
         self._image = ui.gui.add_image(EMPTY, format="jpeg", jpeg_quality=QUALITY)
-        self._captions = ui.gui.add_html("")
+        self._captions = ui.gui.add_html(Markup(""))
         ui.when_changed(self._pair, on_pair)
         ui.when_changed(self._split, self._draw)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -12,17 +11,11 @@ from app.screens.calibrate.terms import HELD_OUT, RMS
 from app.screens.calibrate.view import CameraView
 from app.tables import term
 from app.ui import Ui
+from app.web.markup import Markup
 
 MARK = "packetmesh-views"
 HEIGHT_PX, LEAST_PX = 84, 3
 """Of the row, and of a bar."""
-PICK = (
-    f"const input = this.closest('.{MARK}').parentElement.nextElementSibling.querySelector('input');"
-    "Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set.call("
-    "input, JSON.stringify([this.dataset.view, Date.now()]));"
-    "input.dispatchEvent(new Event('input', {bubbles: true}))"
-)
-"""What a page does when a bar is clicked: it writes into the hidden field behind the bars."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,14 +70,14 @@ def picked_name(text: str) -> str:
     return name if isinstance(name, str) else ""
 
 
-def bars_html(bars: tuple[Bar, ...], chosen: str) -> str:
+def bars_html(bars: tuple[Bar, ...], chosen: str) -> Markup:
     """HTML of the row, its axis and what it means."""
     errors = [one for bar in bars for one in (bar.rms_px, bar.unseen_rms_px) if one is not None]
     most = max(errors, default=1.0)
-    columns = "".join(_column(bar, most, bar.name == chosen) for bar in bars)
-    hide = f"<style>div:has(> .{MARK}) + div {{ display: none }}</style>"
+    columns = Markup("").join(_column(bar, most, bar.name == chosen) for bar in bars)
+    hide = Markup("<style>div:has(> .{}) + div {{ display: none }}</style>").format(MARK)
     if not bars:
-        return f'<div class="{MARK}">{hide}</div>'
+        return Markup('<div class="{}" data-packetmesh-field>{}</div>').format(MARK, hide)
     kept = [bar.rms_px for bar in bars if bar.rms_px is not None and not bar.dropped]
     meaning = (
         f"Error of each of {len(bars)} views, px ({term('RMS', RMS)}): bar by the lens that has seen it, "
@@ -92,22 +85,22 @@ def bars_html(bars: tuple[Bar, ...], chosen: str) -> str:
     meaning += f"line by one that has not ({term('held out', HELD_OUT)}). Click one."
     if len(kept) < len(bars):
         meaning += " ✕ no board found, pale: dropped."
-    return (
-        f'<div class="{MARK}" style="padding: 0 0.8em 0.5em; font-size: 12px">{hide}'
-        f'<div style="display: flex; gap: 0.4em"><div style="text-align: right; display: flex; '
-        f'flex-direction: column; justify-content: space-between; font-variant-numeric: tabular-nums">'
-        f"<span>{most:.2g}</span><span>0</span></div>"
-        f'<div role="group" aria-label="Views" style="display: flex; flex: 1; gap: 2px; '
-        f"height: {HEIGHT_PX}px; "
-        f'border-left: 1px solid #bbb; border-bottom: 1px solid #bbb">{columns}</div></div>'
-        f'<div style="margin-top: 0.3em; color: #667">{meaning}</div></div>'
-    )
+    return Markup(
+        '<div class="{}" data-packetmesh-field style="padding: 0 0.8em 0.5em; font-size: 12px">{}'
+        '<div style="display: flex; gap: 0.4em"><div style="text-align: right; display: flex; '
+        'flex-direction: column; justify-content: space-between; font-variant-numeric: tabular-nums">'
+        "<span>{:.2g}</span><span>0</span></div>"
+        '<div role="group" aria-label="Views" style="display: flex; flex: 1; gap: 2px; '
+        "height: {}px; "
+        'border-left: 1px solid #bbb; border-bottom: 1px solid #bbb">{}</div></div>'
+        '<div style="margin-top: 0.3em; color: #667">{}</div></div>'
+    ).format(MARK, hide, most, HEIGHT_PX, columns, meaning)
 
 
-def _column(bar: Bar, most: float, chosen: bool) -> str:
-    name = html.escape(bar.name, quote=True)
+def _column(bar: Bar, most: float, chosen: bool) -> Markup:
+    name = bar.name
     if bar.rms_px is None:
-        told, inside = f"View {name}: no board found", f'<b style="color: {css(LOSS)}">✕</b>'
+        told, inside = f"View {name}: no board found", Markup('<b style="color: {}">✕</b>').format(css(LOSS))
     else:
         told = f"View {name}: {bar.rms_px:.3f} px"
         if bar.unseen_rms_px is not None and not bar.dropped:
@@ -116,23 +109,22 @@ def _column(bar: Bar, most: float, chosen: bool) -> str:
         color = css(SOURCE) if chosen else css(LOSS) if bar.suspect else css(BRAND)
         tall = max(LEAST_PX, round(HEIGHT_PX * bar.rms_px / most))
         faint = "opacity: 0.3;" if bar.dropped else ""
-        inside = (
-            f'<i style="display: block; width: 100%; height: {tall}px; background: {color}; {faint}"></i>'
-        )
+        inside = Markup(
+            '<i style="display: block; width: 100%; height: {}px; background: {}; {}"></i>'
+        ).format(tall, color, faint)
         if bar.unseen_rms_px is not None:
             at = round(HEIGHT_PX * bar.unseen_rms_px / most)
-            inside += (
-                f'<i style="position: absolute; left: 0; right: 0; bottom: {at - 1}px; height: 2px; '
-                f'background: {css(NEUTRAL)}"></i>'
-            )
+            inside += Markup(
+                '<i style="position: absolute; left: 0; right: 0; bottom: {}px; height: 2px; '
+                'background: {}"></i>'
+            ).format(at - 1, css(NEUTRAL))
     around = f"outline: 2px solid {css(SOURCE)};" if chosen else ""
     look = (
         "position: relative; flex: 1; min-width: 4px; height: 100%; padding: 0; border: 0; cursor: pointer; "
         f"background: transparent; display: flex; align-items: flex-end; justify-content: center; {around}"
     )
     pressed = "true" if chosen else "false"
-    return (
-        f'<button type="button" data-view="{name}" title="{told}" aria-label="{told}" '
-        f'aria-pressed="{pressed}" '
-        f'style="{look}" onclick="{html.escape(PICK, quote=True)}">{inside}</button>'
-    )
+    return Markup(
+        '<button type="button" data-packetmesh-pick="{}" title="{}" aria-label="{}" aria-pressed="{}" '
+        'style="{}">{}</button>'
+    ).format(name, told, told, pressed, look, inside)

@@ -8,10 +8,13 @@ from app.drawing.depth_bias_plots import bias_figure
 from app.screens.calibrate.view import BiasView
 from app.tables import number, table
 from app.ui import Ui
+from app.web.markup import Markdown, Markup
 
-TEXT = """No registration repairs a sensor that measures everything too near. The board's plane says how deep
+TEXT = Markdown(
+    """No registration repairs a sensor that measures everything too near. The board's plane says how deep
 each of its pixels truly is, so the photographs that calibrate the lens calibrate the depth as well. Under
 **Compare** is the picture of it."""
+)
 
 
 class DepthFolder:
@@ -22,25 +25,25 @@ class DepthFolder:
         gui = ui.gui
         with gui.add_folder("What the depth sensor is off by", expand_by_default=False):
             gui.add_markdown(TEXT)
-            self._table = gui.add_html("")
+            self._table = gui.add_html(Markup(""))
             self._plot = gui.add_plotly(
                 go.Figure(), aspect=0.85, config={"displayModeBar": False}, visible=False
             )
-            self._note = gui.add_markdown("")
+            self._note = gui.add_markdown(Markdown(""))
 
     def load(self, told: BiasView | str | None) -> None:
         """Show another camera's; None is still to come, a sentence says why there is none."""
         found = told if isinstance(told, BiasView) else None
         self._plot.visible = found is not None
-        self._table.content = "" if found is None else bias_table(found)
+        self._table.content = Markup("") if found is None else bias_table(found)
         if found is not None:
             self._plot.figure = bias_figure(found.curve)
-            self._note.content = found.note and f"{found.note}."
+            self._note.content = Markdown("{}.").format(found.note) if found.note else Markdown("")
         else:
-            self._note.content = "Comparing depth with the board …" if told is None else str(told)
+            self._note.content = Markdown.escape("Comparing depth with the board …" if told is None else told)
 
 
-def bias_table(view: BiasView) -> str:
+def bias_table(view: BiasView) -> Markup:
     """HTML: the terms that held-out views justify, and what they do."""
     meaning = {
         "Offset": "Added to every depth; with its 95 % interval.",

@@ -5,11 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-TEXT = """**What you see.** Photographs of a board of known size tell how each camera bends what it sees, and
+from app.web.markup import Markdown
+
+TEXT = Markdown(
+    """**What you see.** Photographs of a board of known size tell how each camera bends what it sees, and
 where the board stood: click a bar or a board. What counts is not how well the lens explains these views, but
 how sure it is of **others**. Go on with **Depth**."""
-NOTHING = """This scene comes **without photographs of a board**: its cameras are taken at their word. Open a
+)
+NOTHING = Markdown(
+    """This scene comes **without photographs of a board**: its cameras are taken at their word. Open a
 scene whose cameras need calibration, or use your own photographs below."""
+)
 
 PictureName = Literal[
     "photo", "straightened", "uncertainty", "halves", "coverage", "next", "off-before", "off-after"

@@ -11,6 +11,7 @@ from app.compare import caption_html
 from app.screens.calibrate.maps import warp_picture
 from app.screens.calibrate.view import CameraView
 from app.ui import Ui
+from app.web.markup import Markdown, Markup
 from pipeline.config import Lens
 
 ABOUT_LENS = (
@@ -21,8 +22,10 @@ ABOUT_BENT = (
     "Estimates where every point of the board truly is, with the camera, and uses that if views that had no "
     "part in it are predicted better. Off: the board is as flat as it was printed."
 )
-NOT_BENT = """Only with the photographs of **one camera**: several are placed by a board that is taken as
+NOT_BENT = Markdown(
+    """Only with the photographs of **one camera**: several are placed by a board that is taken as
 flat. Use those of one of them alone to see whether the board is bent."""
+)
 EMPTY = np.full((48, 64, 3), 235, np.uint8)
 
 
@@ -35,9 +38,9 @@ class LensFolder:
         with gui.add_folder("Advanced", expand_by_default=False):
             self._lens = gui.add_dropdown("Lens", list(get_args(Lens)), hint=ABOUT_LENS)
             self._bent = gui.add_checkbox("The board may be bent", False, hint=ABOUT_BENT)
-            self._why_not = gui.add_markdown("")
+            self._why_not = gui.add_markdown(Markdown(""))
             self._image = gui.add_image(EMPTY, format="jpeg", visible=False)
-            self._caption = gui.add_html("", visible=False)
+            self._caption = gui.add_html(Markup(""), visible=False)
         for handle in (self._lens, self._bent):
             ui.when_changed(handle, on_change)
 
@@ -54,7 +57,7 @@ class LensFolder:
     def one_camera(self, alone: bool) -> None:
         """Whether there is only one, so that the board may be bent."""
         self._bent.disabled = not alone
-        self._why_not.content = "" if alone else NOT_BENT
+        self._why_not.content = Markdown("") if alone else NOT_BENT
         if not alone:
             self._bent.value = False
 

@@ -10,13 +10,16 @@ from app.dock_plots import PlotDock
 from app.screens.calibrate.noise_view import CLOSE, NoiseRequest, NoiseView
 from app.screens.calibrate.scatter import noise_sheet
 from app.ui import Ui
+from app.web.markup import Markdown
 
-TEXT = """What if every circle were seen a little beside its place? The calibration above is taken as the
+TEXT = Markdown(
+    """What if every circle were seen a little beside its place? The calibration above is taken as the
 **truth**, its views are seen again with this noise on every point, and the camera is estimated anew, 200
 times; the scatter is shown below, across the window. Table 4.1 of the thesis has one value for each noise."""
+)
 THIS, OTHER = "this lens", "one of another kind"
-READY = "Drag the slider to begin."
-STOPPED = "Stopped. Drag the slider to begin anew."
+READY = Markdown("Drag the slider to begin.")
+STOPPED = Markdown("Stopped. Drag the slider to begin anew.")
 REST_S = 0.25
 """How long the slider has to rest before the experiment begins."""
 
@@ -112,7 +115,7 @@ class NoiseFolder:
 
     def _rested(self) -> None:
         self._wanted, self._view = (float(self._sigma.value), self._through.value == OTHER), None
-        self._status.content = "The first trials are coming …"
+        self._status.content = Markdown("The first trials are coming …")
         self._dock.begin()
         self._on_replay(*self._wanted)
 
@@ -122,19 +125,20 @@ def asked(request: NoiseRequest) -> tuple[float, bool]:
     return request.sigma_px, request.other_lens
 
 
-def noise_line(view: NoiseView) -> str:
+def noise_line(view: NoiseView) -> Markdown:
     """The experiment in some sentences."""
-    done = (
-        f"{view.trials} of {view.request.trials} trials"
-        if view.trials < view.request.trials
-        else "All trials"
-    )
-    told = (
-        f"**{done}.** fx, fy, cx and cy are all within {100.0 * CLOSE:g} % of the truth in "
-        f"**{100.0 * view.close_share:.0f} %** of them. RMS {view.rms_px:.3f} px; noise alone leaves "
-        f"{np.sqrt(2.0) * view.request.sigma_px:.3f} px at most."
+    whole = view.trials >= view.request.trials
+    told = Markdown(
+        "**{}.** fx, fy, cx and cy are all within {:g} % of the truth in **{:.0f} %** of them. "
+        "RMS {:.3f} px; noise alone leaves {:.3f} px at most."
+    ).format(
+        "All trials" if whole else f"{view.trials} of {view.request.trials} trials",
+        100.0 * CLOSE,
+        100.0 * view.close_share,
+        view.rms_px,
+        np.sqrt(2.0) * view.request.sigma_px,
     )
     if not view.halved:
         return told
     beyond = f"{view.beyond_noise} of {view.halved}"
-    return f"{told} Two halves of the views differ beyond noise in **{beyond}** trials."
+    return Markdown("{} Two halves of the views differ beyond noise in **{}** trials.").format(told, beyond)

@@ -9,6 +9,7 @@ import numpy as np
 from app.screens.calibrate.terms import BENT, HELD_OUT, INTERVAL, RMS, STANDARD_ERROR, TRUTH, VIEWS
 from app.screens.calibrate.view import CameraView
 from app.tables import number, table
+from app.web.markup import Markup
 from pipeline.calibration.estimate import Calibration, rms_px
 
 UNITS = {"fx": "px", "fy": "px", "cx": "px", "cy": "px"}
@@ -31,7 +32,7 @@ def unseen_rms_px(camera: CameraView) -> float | None:
     return rms_px(np.concatenate(apart)) if apart else None
 
 
-def summary_table(cameras: Sequence[CameraView], names: Sequence[str] = ()) -> str:
+def summary_table(cameras: Sequence[CameraView], names: Sequence[str] = ()) -> Markup:
     """HTML: errors and the focal length, a column for each: now, and before views were dropped."""
     found = [camera.calibration for camera in cameras]
 
@@ -72,11 +73,11 @@ def within(found: Calibration | None, name: str) -> str:
     return f"{value:.{digits}f} ± {0.5 * (high - low):.{digits}f}{' px' if name in UNITS else ''}"
 
 
-def parameter_table(camera: CameraView) -> str:
+def parameter_table(camera: CameraView) -> Markup:
     """HTML: every parameter, its standard error, its 95 % interval, and the truth where it is known."""
     found = camera.calibration
     if found is None:
-        return ""
+        return Markup("")
     rows = []
     for name, error in found.standard_errors.items():
         digits, unit = (3, ", px") if name in UNITS else (5, "")

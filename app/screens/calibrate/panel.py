@@ -30,6 +30,7 @@ from app.screens.calibrate.use import WRITING, UseRow
 from app.screens.calibrate.view import CalibrationView, CameraView, RigView, TrustView
 from app.state import BoardViews, Spec, Step
 from app.ui import STOP, Awaited, Panel
+from app.web.markup import Markdown, Markup
 from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_SCENES, board_views_of
 from pipeline.sources import Calibrated, Demo
@@ -60,14 +61,14 @@ class CalibratePanel(Panel):
         gui.add_markdown(TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, CalibrateLook(), NUMBERS)
         self._lesson = LessonFolder(ui, lesson, self._take_look, self._lesson_numbers)
-        self._status = gui.add_markdown("")
+        self._status = gui.add_markdown(Markdown(""))
         self._open = ui.buttons(
             "Open",
             {DEMO_SCENES[name].title: partial(self._open_scene, name) for name in with_boards()},
             "A scene with views of a board.",
             visible=False,
         )
-        self._verdict = gui.add_html("")
+        self._verdict = gui.add_html(Markup(""))
         self._use = UseRow(ui, self._use_it, self._as_before)
         self._cameras = gui.add_dropdown("Camera", ["node_00"], hint="Whose views are shown.", visible=False)
         self._camera = Awaited(ui, self._cameras, self._picked_camera)
@@ -80,7 +81,7 @@ class CalibratePanel(Panel):
             "In space", list(AROUND), hint="What stays in its place in the 3-D scene."
         )
         ui.when_changed(self._around, self._draw)
-        self._numbers = gui.add_html("")
+        self._numbers = gui.add_html(Markup(""))
         self._build_folders()
         self._drawing = BoardsDrawing(self.scene, lambda name: ui.post(self._pick, name))
         self._show_camera()
@@ -166,7 +167,7 @@ class CalibratePanel(Panel):
         if step == "calibrate":
             self._view = None
             self._show_camera()
-            self._status.content = sentence
+            self._status.content = Markdown.escape(sentence)
 
     def _take(self, view: CalibrationView, all_there: bool) -> None:
         self._view = view
@@ -193,14 +194,15 @@ class CalibratePanel(Panel):
             self._use.show(camera is not None and camera.calibration is not None)
             nothing = camera is None and self.session.spec.views is None
             self._open.visible = nothing
-            self._status.content = NOTHING if nothing else "" if camera is None else camera.reason
+            reason = "" if camera is None else camera.reason
+            self._status.content = NOTHING if nothing else Markdown.escape(reason)
             self._show_numbers(camera)
             self._show_view()
         self._draw()
 
     def _show_numbers(self, camera: CameraView | None) -> None:
         if camera is None or self._view is None:
-            self._verdict.content = self._numbers.content = ""
+            self._verdict.content = self._numbers.content = Markup("")
             self._judge.load(None)
             self._parameters.load(None)
             self._lens.load(None)

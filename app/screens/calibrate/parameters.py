@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import html
-
 import numpy as np
 
 from app.drawing.colors import ramp
@@ -13,6 +11,7 @@ from app.screens.calibrate.terms import CORRELATION
 from app.screens.calibrate.view import CameraView
 from app.tables import term
 from app.ui import Ui
+from app.web.markup import Markup
 from pipeline.calibration.correlation import DISTANCE, Correlations, Pair
 
 WEAK = 0.8
@@ -29,48 +28,55 @@ class ParameterFolder:
     def __init__(self, ui: Ui) -> None:
         """Add the folder."""
         with ui.gui.add_folder("Every parameter, and how sure it is", expand_by_default=False):
-            self._table = ui.gui.add_html("")
-            self._together = ui.gui.add_html("")
+            self._table = ui.gui.add_html(Markup(""))
+            self._together = ui.gui.add_html(Markup(""))
 
     def load(self, camera: CameraView | None) -> None:
         """Show another camera; None shows none."""
-        self._table.content = "" if camera is None else parameter_table(camera)
+        self._table.content = Markup("") if camera is None else parameter_table(camera)
         if camera is None:
             self.relate(None)
 
     def relate(self, together: Correlations | None) -> None:
         """Show how its parameters go together, once that is known."""
-        self._together.content = "" if together is None else correlation_html(together)
+        self._together.content = Markup("") if together is None else correlation_html(together)
 
 
-def correlation_html(together: Correlations) -> str:
+def correlation_html(together: Correlations) -> Markup:
     """The strongest pair in a sentence over the lower half of the square, colours and numbers."""
     names = [short(name) for name in together.names]
     heads = [term(name, AWAY) if name == SHORT else name for name in names]
     rows = [
-        f'<tr><th style="text-align: right; padding-right: 6px">{heads[row]}</th>'
-        + "".join(_cell(names[column], name, float(together.matrix[row, column])) for column in range(row))
-        + "</tr>"
+        Markup('<tr><th style="text-align: right; padding-right: 6px">{}</th>').format(heads[row])
+        + Markup("").join(
+            _cell(names[column], name, float(together.matrix[row, column])) for column in range(row)
+        )
+        + Markup("</tr>")
         for row, name in enumerate(names)
         if row
     ]
-    below = "".join(f"<th>{head}</th>" for head in heads[:-1])
-    return (
-        f'<div style="padding: 0 0.8em 0.8em; font-size: 13px"><b>{term("Correlation", CORRELATION)}</b>: '
-        f"{html.escape(strongest_sentence(together.strongest))}"
+    below = Markup("").join(Markup("<th>{}</th>").format(head) for head in heads[:-1])
+    return Markup(
+        '<div style="padding: 0 0.8em 0.8em; font-size: 13px"><b>{}</b>: '
+        "{}"
         '<table style="width: 100%; margin-top: 0.5em; border-collapse: separate; border-spacing: 2px; '
-        f'table-layout: fixed; font-size: 12px; font-variant-numeric: tabular-nums">{"".join(rows)}'
-        f"<tr><th></th>{below}</tr></table></div>"
+        'table-layout: fixed; font-size: 12px; font-variant-numeric: tabular-nums">{}'
+        "<tr><th></th>{}</tr></table></div>"
+    ).format(
+        term("Correlation", CORRELATION),
+        strongest_sentence(together.strongest),
+        Markup("").join(rows),
+        below,
     )
 
 
-def _cell(one: str, other: str, value: float) -> str:
+def _cell(one: str, other: str, value: float) -> Markup:
     red, green, blue = ramp(np.array([value + 1.0]), 2.0, (NEARER, EQUAL, FARTHER))[0].tolist()
     ink = "white" if value < DARK else "black"
-    return (
-        f'<td title="{one} and {other}: {signed(value)}" style="background: rgb({red}, {green}, {blue}); '
-        f'color: {ink}; text-align: center; padding: 3px 0">{signed(value)}</td>'
-    )
+    return Markup(
+        '<td title="{} and {}: {}" style="background: rgb({}, {}, {}); '
+        'color: {}; text-align: center; padding: 3px 0">{}</td>'
+    ).format(one, other, signed(value), red, green, blue, ink, signed(value))
 
 
 def signed(value: float) -> str:

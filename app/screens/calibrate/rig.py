@@ -7,9 +7,12 @@ import numpy as np
 from app.screens.calibrate.view import RigView
 from app.tables import number, table
 from app.ui import Ui
+from app.web.markup import Markdown, Markup
 
-TEXT = """Moments at which several cameras see the board tell where these stand to each other. Choose
+TEXT = Markdown(
+    """Moments at which several cameras see the board tell where these stand to each other. Choose
 **cameras of the rig** under *In space*: grey is where the scene had them, blue where the board puts them."""
+)
 MEANING = (
     "Distance from the first camera with its standard error, then the error of the rotation, and the moments "
     "at which both see the board."
@@ -24,17 +27,17 @@ class RigFolder:
         self._folder = ui.gui.add_folder("Where the cameras stand", expand_by_default=False, visible=False)
         with self._folder:
             ui.gui.add_markdown(TEXT)
-            self._table = ui.gui.add_html("")
-            self._text = ui.gui.add_markdown("")
+            self._table = ui.gui.add_html(Markup(""))
+            self._text = ui.gui.add_markdown(Markdown(""))
 
     def load(self, rig: RigView | str | None) -> None:
         """Show another rig; a sentence says why there is none, None hides it."""
         self._folder.visible = rig is not None
-        self._table.content = rig_table(rig) if isinstance(rig, RigView) else ""
-        self._text.content = rig_line(rig) if isinstance(rig, RigView) else rig or ""
+        self._table.content = rig_table(rig) if isinstance(rig, RigView) else Markup("")
+        self._text.content = rig_line(rig) if isinstance(rig, RigView) else Markdown.escape(rig or "")
 
 
-def rig_table(rig: RigView) -> str:
+def rig_table(rig: RigView) -> Markup:
     """HTML: a line for each camera but the first."""
     rows = []
     for one in rig.cameras[1:]:
@@ -52,13 +55,13 @@ def rig_table(rig: RigView) -> str:
     return table(rows, (f"from {rig.cameras[0].name}", "± position", "± rotation", "moments"))
 
 
-def rig_line(rig: RigView) -> str:
+def rig_line(rig: RigView) -> Markdown:
     """How well all of it fits, and moments that had no part in it."""
     told = f"RMS over all cameras {rig.rms_px:.3f} px"
     if rig.held_out_rms_px is None:
-        return f"{told}; there are too few shared moments to hold some out."
+        return Markdown("{}; there are too few shared moments to hold some out.").format(told)
     moved = [one.held_out_position_m for one in rig.cameras[1:] if one.held_out_position_m is not None]
-    return (
-        f"{told}, {rig.held_out_rms_px:.3f} px in moments that were held out; without a quarter of the "
-        f"moments no camera moves by more than {1000.0 * max(moved, default=0.0):.2f} mm."
-    )
+    return Markdown(
+        "{}, {:.3f} px in moments that were held out; without a quarter of the "
+        "moments no camera moves by more than {:.2f} mm."
+    ).format(told, rig.held_out_rms_px, 1000.0 * max(moved, default=0.0))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import html
-
 import numpy as np
 import plotly.graph_objects as go
 
@@ -13,6 +11,7 @@ from app.screens.calibrate.noise_view import CLOSE, INSIDE_95, NoiseView
 from app.screens.calibrate.numbers import MEANING, UNITS
 from app.screens.calibrate.thesis import Cell, nearest_cell
 from app.tables import number, term
+from app.web.markup import Markup
 from pipeline.types import FloatArray
 
 PAIRS = (("fx", "fy"), ("cx", "cy"), ("k1", "k2"))
@@ -44,30 +43,32 @@ def noise_sheet(view: NoiseView) -> Sheet:
     )
 
 
-def legend_html(cell: Cell | None) -> str:
+def legend_html(cell: Cell | None) -> Markup:
     """What the signs mean."""
     signs = [
-        (f'<i style="background: {css(BRAND)}"></i>', "trial"),
-        (f'<i style="background: {css(LOSS)}"></i>', "trial outside"),
-        (f'<i class="line" style="border-color: {css(DELIVERED)}"></i>', "95 % predicted"),
-        ("<b>+ </b>", "truth"),
+        (Markup('<i style="background: {}"></i>').format(css(BRAND)), "trial"),
+        (Markup('<i style="background: {}"></i>').format(css(LOSS)), "trial outside"),
+        (Markup('<i class="line" style="border-color: {}"></i>').format(css(DELIVERED)), "95 % predicted"),
+        (Markup("<b>+ </b>"), "truth"),
         (
-            f'<i class="line" style="border-top-style: dashed; border-color: {css(NEUTRAL)}"></i>',
+            Markup('<i class="line" style="border-top-style: dashed; border-color: {}"></i>').format(
+                css(NEUTRAL)
+            ),
             f"thesis: within {100.0 * CLOSE:g} %",
         ),
     ]
     if cell is not None:
-        sign = f'<b style="color: {css(INFERRED)}">◆ </b>'
+        sign = Markup('<b style="color: {}">◆ </b>').format(css(INFERRED))
         signs.append((sign, f"thesis: printed at {cell.sigma_px:g} px (Table 4.1)"))
-    return "".join(f"<span>{sign}{html.escape(text)}</span>" for sign, text in signs)
+    return Markup("").join(Markup("<span>{}{}</span>").format(sign, text) for sign, text in signs)
 
 
-def errors_html(view: NoiseView, cell: Cell | None) -> str:
+def errors_html(view: NoiseView, cell: Cell | None) -> Markup:
     """A table: how far the trials are off, how far they think they are, and the thesis's."""
     pad = "padding: 3px 0 3px 14px; text-align: right; font-variant-numeric: tabular-nums"
     heads = [term("error", ERROR), term("predicted", PREDICTED)]
     heads += [] if cell is None else [term("thesis", THESIS)]
-    lines = ["".join(f'<th style="{pad}">{head}</th>' for head in ("", *heads))]
+    lines = [Markup("").join(Markup('<th style="{}">{}</th>').format(pad, head) for head in ("", *heads))]
     for name in view.names:
         digits, unit = (2, "px") if name in UNITS else (4, "")
         told = [number(view.rmse(name), digits, unit), number(view.predicted(name), digits, unit)]
@@ -77,9 +78,13 @@ def errors_html(view: NoiseView, cell: Cell | None) -> str:
             if cell is None
             else ["–" if off is None else f"{off:+.{digits}f} {unit}".strip().replace("-", "−")]
         )
-        cells = "".join(f'<td style="{pad}">{one}</td>' for one in told)
-        lines.append(f'<td style="{pad}">{term(name, MEANING.get(name, name))}</td>{cells}')
-    return f'<table style="border-collapse: collapse">{"".join(f"<tr>{line}</tr>" for line in lines)}</table>'
+        cells = Markup("").join(Markup('<td style="{}">{}</td>').format(pad, one) for one in told)
+        lines.append(
+            Markup('<td style="{}">{}</td>{}').format(pad, term(name, MEANING.get(name, name)), cells)
+        )
+    return Markup('<table style="border-collapse: collapse">{}</table>').format(
+        Markup("").join(Markup("<tr>{}</tr>").format(line) for line in lines)
+    )
 
 
 def scatter_figure(view: NoiseView, x: str, y: str, cell: Cell | None) -> go.Figure:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable, Sequence
 
 import plotly.graph_objects as go
@@ -13,6 +12,7 @@ from app.screens.calibrate.terms import HALVES
 from app.screens.calibrate.view import TrustRequest, TrustView
 from app.tables import number, table, term
 from app.ui import Ui
+from app.web.markup import Markdown, Markup
 
 REST_S = 0.3
 OWN_M = 2.0
@@ -30,7 +30,9 @@ class TrustFolder:
         self._resting = ui.debounce(REST_S, on_ask)
         gui = ui.gui
         with gui.add_folder("Good enough for what?", expand_by_default=False):
-            gui.add_markdown("Say how far away things will be, and how well they are to be placed there.")
+            gui.add_markdown(
+                Markdown("Say how far away things will be, and how well they are to be placed there.")
+            )
             self._range = gui.add_slider(
                 "Range (m)", 0.3, 6.0, 0.1, OWN_M, hint="Distance of what will be measured, from the camera."
             )
@@ -42,7 +44,7 @@ class TrustFolder:
                 5.0,
                 hint="Within which a point at that range must be placed, across the line of sight.",
             )
-            self._table = gui.add_html("")
+            self._table = gui.add_html(Markup(""))
         with gui.add_folder("How the lens bends", expand_by_default=False):
             self._curve = gui.add_dropdown(
                 "Curve", list(CURVES.values()), hint="Over the radius in the image."
@@ -70,7 +72,7 @@ class TrustFolder:
     def load(self, view: TrustView | None) -> None:
         """Show the answer; None where there is none."""
         self._view = view
-        self._table.content = "" if view is None else trust_table(view)
+        self._table.content = Markup("") if view is None else trust_table(view)
         self._draw()
 
     def _draw(self) -> None:
@@ -84,22 +86,22 @@ class TrustFolder:
             )
 
 
-def verdict_html(view: TrustView | None) -> str:
+def verdict_html(view: TrustView | None) -> Markup:
     """The verdict as a sign and its sentences."""
     if view is None:
-        return ""
+        return Markup("")
     sign, color = ("✓ PASS", DELIVERED) if view.passed else ("✗ FAIL", LOSS)
-    first, *rest = (html.escape(line) for line in view.lines)
+    first, *rest = view.lines
     rest = [line.replace("Two halves", term("Two halves", HALVES)) for line in rest]
-    more = "".join(f"<div style='margin-top: 0.4em'>{line}</div>" for line in rest)
-    return (
-        f"<div style='margin: 0 0.8em 0.6em; padding: 0.5em 0.8em; font-size: 13px; border-radius: 4px; "
-        f"border-left: 4px solid {css(color)}; background: rgba(120, 130, 140, 0.1)'>"
-        f"<b style='color: {css(color)}'>{sign}</b> {first}{more}</div>"
-    )
+    more = Markup("").join(Markup("<div style='margin-top: 0.4em'>{}</div>").format(line) for line in rest)
+    return Markup(
+        "<div style='margin: 0 0.8em 0.6em; padding: 0.5em 0.8em; font-size: 13px; border-radius: 4px; "
+        "border-left: 4px solid {}; background: rgba(120, 130, 140, 0.1)'>"
+        "<b style='color: {}'>{}</b> {}{}</div>"
+    ).format(css(color), css(color), sign, first, more)
 
 
-def trust_table(view: TrustView) -> str:
+def trust_table(view: TrustView) -> Markup:
     """HTML: what noise leaves, and what two halves of the views say of each other."""
     return table(
         [

@@ -13,22 +13,25 @@ import viser
 from app.screens.calibrate.request import shots_of, views_in
 from app.state import BoardViews
 from app.ui import Ui
-from app.zips import opened_zip
+from app.web.markup import Markdown
+from app.web.zips import opened_zip
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path, unpacked
+from packetmesh.files import atomic_path, path_below, unpacked
 from pipeline.calibration.shots import BOARD_FILE
 from pipeline.config import Pattern
 
-TEXT = """Photograph a flat board of circles or squares from eight or more directions, tilted by 20 to 40°,
+TEXT = Markdown(
+    """Photograph a flat board of circles or squares from eight or more directions, tilted by 20 to 40°,
 also into the corners of the image. `packetmesh target` prints one. Add the photographs one by one, or all in
 a ZIP, with a folder for each camera (node_00, node_01 …) if there are several; depth images beside them
 (depth_05.png of color_05.png) tell what the depth sensor is off by."""
+)
 ENDINGS = (".png", ".jpg", ".jpeg")
 UPLOAD_LIMIT_BYTES = 64 << 20
 UNPACKED_LIMIT_BYTES = 256 << 20
 MOST_FILES = 240
 INSTEAD = "use packetmesh calibrate for larger files"
-NONE = "No photograph yet."
+NONE = Markdown("No photograph yet.")
 
 
 class UploadFolder:
@@ -95,9 +98,9 @@ class UploadFolder:
             self._write(views)
         count = sum(len(node.shots) for node in shots_of(views))
         noun = "photograph" if count == 1 else "photographs"
-        self._have.content = (
-            f"**{count} {noun}**, the last {kept[-1]}. Add more, or press *Find the cameras*."
-        )
+        self._have.content = Markdown(
+            "**{} {}**, the last {}. Add more, or press *Find the cameras*."
+        ).format(count, noun, kept[-1])
 
     def _write(self, views: BoardViews) -> None:
         """Show what a ZIP says of the board."""
@@ -143,7 +146,7 @@ def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[
     if there + len(photographs) > MOST_FILES:
         raise InputError(f"The app takes up to {MOST_FILES} images; {INSTEAD}.")
     for place, content in photographs.items():
-        with atomic_path(folder / place) as temporary:
+        with atomic_path(path_below(folder, place)) as temporary:
             temporary.write_bytes(content)
     return list(photographs)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from app.tables import UNKNOWN, number, table, truth_rows
 from app.ui import Ui
+from app.web.markup import Markdown, Markup
 
 USE, BEFORE = "Use this calibration", "As before"
 WRITING = "Writing the calibration …"
@@ -25,8 +26,8 @@ class UseRow:
             "with what the rig came with.",
             visible=False,
         )
-        self._text = ui.gui.add_markdown("")
-        self._table = ui.gui.add_html("")
+        self._text = ui.gui.add_markdown(Markdown(""))
+        self._table = ui.gui.add_html(Markup(""))
         self._surfaces: dict[bool, Any] = {}
 
     def show(self, visible: bool) -> None:
@@ -35,13 +36,13 @@ class UseRow:
 
     def say(self, sentence: str) -> None:
         """Tell what is going on."""
-        self._text.content = sentence
+        self._text.content = Markdown.escape(sentence)
 
     def used(self, folder: str | None) -> None:
         """The chain computes with a calibration's folder, or as before."""
-        self._text.content = (
-            "" if folder is None else f"**In use** ({Path(folder).name}): every later step computes with it."
-        )
+        name = "" if folder is None else Path(folder).name
+        in_use = Markdown("**In use** ({}): every later step computes with it.").format(name)
+        self._text.content = in_use if name else Markdown("")
         if folder is not None:
             self._surfaces.pop(True, None)
         self._draw()
@@ -59,12 +60,12 @@ class UseRow:
     def _draw(self) -> None:
         columns = {"as before": self._surfaces.get(False), "calibrated": self._surfaces.get(True)}
         if columns["calibrated"] is None:
-            self._table.content = ""
+            self._table.content = Markup("")
             return
         self._table.content = surface_table(columns)
 
 
-def surface_table(columns: dict[str, Any]) -> str:
+def surface_table(columns: dict[str, Any]) -> Markup:
     """HTML: the surface's numbers, a column for each mesh; a dash for one that is not there."""
     meshes = list(columns.values())
     rows = [

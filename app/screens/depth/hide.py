@@ -14,15 +14,18 @@ from app.screens.depth.labels import FILLS
 from app.screens.depth.view import Disc, HiddenView, HideRequest, SeenSample
 from app.tables import number, table
 from app.ui import Ui
+from app.web.markup import Markdown, Markup
 from pipeline.types import FloatArray
 
-TEXT = """Where the sensor is blind, nobody can tell how good a guess is. So **hide a part of what it did
+TEXT = Markdown(
+    """Where the sensor is blind, nobody can tell how good a guess is. So **hide a part of what it did
 measure**, have it filled without that knowledge, and compare. **Tick the brush and click points in the
 picture**, or place discs with the sliders."""
+)
 BUTTON = "Hide and fill"
-WAITING = "Filling …"
-SILENT = "No answer came. Press the button again."
-BESIDE = "No measured point there. Click a point of the node that is chosen above."
+WAITING = Markdown("Filling …")
+SILENT = Markdown("No answer came. Press the button again.")
+BESIDE = Markdown("No measured point there. Click a point of the node that is chosen above.")
 
 
 class HideFolder:
@@ -42,9 +45,9 @@ class HideFolder:
             gui.add_button(BUTTON, icon=viser.Icon.ERASER, hint="It takes some seconds.").on_click(
                 lambda _: ui.post(self._ask)
             )
-            self._status = gui.add_markdown("")
+            self._status = gui.add_markdown(Markdown(""))
             self._area = CompareArea(ui, FILLS, "hidden", "ours", visible=False)
-            self._table = gui.add_html("")
+            self._table = gui.add_html(Markup(""))
 
     def _add_brush(self, ui: Ui) -> None:
         gui = ui.gui
@@ -97,7 +100,7 @@ class HideFolder:
     def forget(self) -> None:
         """What was filled with other settings is not what these would fill."""
         self._status.content = painted_line(self.discs)
-        self._table.content = ""
+        self._table.content = Markup("")
         self._area.load(None)
 
     def load(self, view: HiddenView | None) -> None:
@@ -106,7 +109,9 @@ class HideFolder:
         if view is None:
             self._status.content = SILENT
             return
-        self._status.content = f"**{view.hidden_px:,} measured pixels of {view.node} hidden.**"
+        self._status.content = Markdown("**{:,} measured pixels of {} hidden.**").format(
+            view.hidden_px, view.node
+        )
         self._area.load(
             {
                 name: replace(picture, caption=f"{FILLS[name].capitalize()}: {picture.caption}")
@@ -137,15 +142,15 @@ class HideFolder:
         self._on_hide(HideRequest(0, self.discs))
 
 
-def painted_line(discs: tuple[Disc, ...]) -> str:
+def painted_line(discs: tuple[Disc, ...]) -> Markdown:
     """How much is painted; empty for nothing."""
     if not discs:
-        return ""
+        return Markdown("")
     count = "1 disc" if len(discs) == 1 else f"{len(discs)} discs"
-    return f"{count} painted in magenta. Paint more, or press **{BUTTON}**."
+    return Markdown("{} painted in magenta. Paint more, or press **{}**.").format(count, BUTTON)
 
 
-def fills_table(view: HiddenView) -> str:
+def fills_table(view: HiddenView) -> Markup:
     """HTML: a line for each way to fill: AbsRel, share within 5 %, share filled, time."""
     hint = (
         "AbsRel: mean of |filled - measured| / measured over the hidden pixels that were filled. Within 5 %: "

@@ -11,20 +11,23 @@ from app.screens.depth.labels import AS_IT_SAYS, NETWORK_KINDS, NETWORK_PRESETS,
 from app.screens.depth.view import ModelChoice, ModelView
 from app.tables import number, table
 from app.ui import Ui
-from app.uploads import OWN, keep_upload
+from app.web.markup import Markdown, Markup
+from app.web.uploads import OWN, keep_upload
 from pipeline.config import DepthConfig, ModelKind
 
 SHIPPED = "the network that ships"
 LIMIT_BYTES = 128 << 20
-TEXT = """Any ONNX network that makes depth of one picture will do. What it expects and what it answers
+TEXT = Markdown(
+    """Any ONNX network that makes depth of one picture will do. What it expects and what it answers
 (metric, relative or inverse depth, size, colours) is read from the file, or taken from a preset."""
-ADVICE: dict[ModelKind, str] = {
-    "metric": "It gives metres: the alignments *none* and *one scale* are worth a look.",
-    "relative": "",
-    "inverse": "It gives 1/depth: the smooth correction starts from a line of 1/depth then.",
+)
+ADVICE: dict[ModelKind, Markdown] = {
+    "metric": Markdown("It gives metres: the alignments *none* and *one scale* are worth a look."),
+    "relative": Markdown(""),
+    "inverse": Markdown("It gives 1/depth: the smooth correction starts from a line of 1/depth then."),
 }
-TRYING = "Trying the network …"
-KEPT = "The network before is kept. Say what this one expects, or choose another."
+TRYING = Markdown("Trying the network …")
+KEPT = Markdown("The network before is kept. Say what this one expects, or choose another.")
 
 
 class ModelFolder:
@@ -57,8 +60,8 @@ class ModelFolder:
             )
             button.on_upload(lambda event: ui.post(self._keep, event.target.value))
             self._add_input(ui)
-            self._status = gui.add_markdown("")
-            self._table = gui.add_html("")
+            self._status = gui.add_markdown(Markdown(""))
+            self._table = gui.add_html(Markup(""))
 
     def _add_input(self, ui: Ui) -> None:
         """Add the settings of the input of a network that is not ours."""
@@ -108,7 +111,7 @@ class ModelFolder:
         self._chosen()
 
     def _chosen(self) -> None:
-        self._status.content, self._table.content = TRYING, ""
+        self._status.content, self._table.content = TRYING, Markup("")
         model = self._models[self._model.value]
         self._advanced.visible = model is not None
         width_px, height_px = (round(side) or None for side in self._size.value)
@@ -138,7 +141,7 @@ class ModelFolder:
         return name
 
 
-def model_table(view: ModelView) -> str:
+def model_table(view: ModelView) -> Markup:
     """HTML: what was found when the network was tried, and what its file says."""
     rows = [
         ("Answers", "What its numbers mean.", f"{view.kind} depth"),

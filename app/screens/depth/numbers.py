@@ -5,6 +5,7 @@ from __future__ import annotations
 from app.records import DepthNode
 from app.screens.depth.labels import ALIGNMENTS
 from app.tables import number, table
+from app.web.markup import Markup
 
 LINES = {
     "none": "z′ = z",
@@ -24,7 +25,7 @@ def fitted_line(node: DepthNode) -> str:
     return line.format(**node.coefficients)
 
 
-def depth_table(node: DepthNode) -> str:
+def depth_table(node: DepthNode) -> Markup:
     """HTML: the network, the alignment, and the points."""
     duration = "remembered" if node.inference_s is None else number(node.inference_s, 0, "ms", 1000)
     kept, rejected = node.sensor.total, node.outliers.total
@@ -69,7 +70,7 @@ def depth_table(node: DepthNode) -> str:
     )
 
 
-def residual_table(node: DepthNode) -> str:
+def residual_table(node: DepthNode) -> Markup:
     """HTML: what was fitted, and what it leaves."""
     return table(
         [
@@ -98,7 +99,7 @@ def residual_table(node: DepthNode) -> str:
     )
 
 
-def confidence_table(node: DepthNode) -> str:
+def confidence_table(node: DepthNode) -> Markup:
     """HTML: what of the inferred depth is let in where the sensor is blind."""
     judged = node.judged
     return table(

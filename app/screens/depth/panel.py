@@ -25,12 +25,15 @@ from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, wit
 from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
 from app.state import Spec, Step
 from app.ui import STOP, Awaited, Panel, Picked
+from app.web.markup import Markdown, Markup, shipped_markdown
 
-TEXT = """**What you see.** Blue: points the sensor measured. Violet: points that are inferred: from the
+TEXT = Markdown(
+    """**What you see.** Blue: points the sensor measured. Violet: points that are inferred: from the
 colour image, made metric where the sensor knows a depth too; in its holes from colours and measured depth
 together. Red: points the outlier filter rejects. Fusion takes violet points only where the sensor measured
 nothing. Go on with **Fuse**."""
-CONFIDENCE_TEXT = (
+)
+CONFIDENCE_TEXT = Markdown(
     "Inferred depth that flies, lies too far from anything measured or is hardly believed is left out."
 )
 
@@ -61,7 +64,7 @@ class DepthPanel(Panel):
             "Colours", list(COLORINGS), hint="What the colours of the points in the 3-D scene mean."
         )
         self.ui.when_changed(self._coloring, self._draw)
-        self._numbers = gui.add_html("")
+        self._numbers = gui.add_html(Markup(""))
         colors: dict[str, str] = {coloring: label for label, coloring in COLORINGS.items()}
         self.in_address |= {STOP: self._lesson, "color": Picked(self._coloring, colors, self._draw)}
         self.in_address |= {"node": self._node, "pictures": self._area}
@@ -70,15 +73,15 @@ class DepthPanel(Panel):
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session
         with gui.add_folder("Residuals of the alignment", expand_by_default=False):
-            self._residuals = gui.add_html("")
+            self._residuals = gui.add_html(Markup(""))
             self._histogram = gui.add_plotly(
                 residual_figure(None), aspect=0.62, config={"displayModeBar": False}
             )
         with gui.add_folder("How far to believe it", expand_by_default=False):
             gui.add_markdown(CONFIDENCE_TEXT)
-            gui.add_markdown(WORTH.read_text("utf-8"))
+            gui.add_markdown(shipped_markdown(WORTH.read_text("utf-8")))
             self._controls.append(self._fields(CONFIDENCE_CONTROLS))
-            self._confidence_table = gui.add_html("")
+            self._confidence_table = gui.add_html(Markup(""))
         self._hide = HideFolder(self.ui, self._ask_to_hide)
         self._model = ModelFolder(self.ui, session.folder, self._choose_model)
         with gui.add_folder("Advanced", expand_by_default=False):

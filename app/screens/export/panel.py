@@ -11,13 +11,16 @@ from app.records import Shown
 from app.state import Spec, Step
 from app.tables import command_html
 from app.ui import Offer, Offers, Panel
-from app.uploads import plain
+from app.web.markup import Markdown, Markup
+from app.web.uploads import plain
 from packetmesh.errors import InputError
 from pipeline.types import ByteArray
 
-TEXT = """**Take it along.** Files hold metres, Z up. Pages need no server: they open in any browser, offline.
+TEXT = Markdown(
+    """**Take it along.** Files hold metres, Z up. Pages need no server: they open in any browser, offline.
 The run folder is what `packetmesh reconstruct` writes: configuration, metrics, clouds, surfaces and the
 report."""
+)
 SURFACES: dict[Shown, str] = {
     "after": "the surface after fusion",
     "before": "the surface before fusion",
@@ -46,18 +49,18 @@ class ExportPanel(Panel):
         gui = self.gui
         self._offers: dict[str, Offers] = {}
         gui.add_markdown(TEXT)
-        self._surface = gui.add_markdown("")
+        self._surface = gui.add_markdown(Markdown(""))
         self._groups = {kind: gui.add_button_group(kind, ("…",), visible=False) for kind in KINDS}
         for kind, group in self._groups.items():
             group.on_click(lambda event, kind=kind: self._clicked(kind, event.target.value, event.client))
-        gui.add_markdown("**The same from the command line**")
-        self._commands = {kind: (gui.add_markdown(""), gui.add_html("")) for kind in KINDS}
+        gui.add_markdown(Markdown("**The same from the command line**"))
+        self._commands = {kind: (gui.add_markdown(Markdown("")), gui.add_html(Markup(""))) for kind in KINDS}
         self.on_spec(self.session.spec)
 
     def on_spec(self, spec: Spec) -> None:
         """Show which surface is exported, and what else there is."""
-        self._surface.content = (
-            f"Surface and page hold **{SURFACES[spec.shown]}**, as the Surface screen shows."
+        self._surface.content = Markdown("Surface and page hold **{}**, as the Surface screen shows.").format(
+            SURFACES[spec.shown]
         )
         self._arrange()
 
@@ -85,7 +88,7 @@ class ExportPanel(Panel):
                 "The surface that the Surface screen shows, with colours.",
                 surfaces,
                 plain(spec.command()),
-                f"`{FILES[spec.shown]}` in its folder is {SURFACES[spec.shown]}.",
+                Markdown("`{}` in its folder is {}.").format(FILES[spec.shown], SURFACES[spec.shown]),
             ),
             Offers("Clouds", "Points of all nodes in the world frame, as the ball meets them; PLY.", clouds),
             Offers("Numbers", "Everything measured and set, as JSON; or a ZIP of the whole run.", numbers),
@@ -99,7 +102,7 @@ class ExportPanel(Panel):
                 offers = self._offers.get(kind)
                 group.visible = offers is not None
                 text, command = self._commands[kind]
-                text.content, command.content = "", ""
+                text.content, command.content = Markdown(""), Markup("")
                 if offers is None:
                     continue
                 group.hint = offers.hint
@@ -107,7 +110,7 @@ class ExportPanel(Panel):
                 if group.options != labels:
                     group.options = labels
                 if offers.note:
-                    text.content = f"{kind}: {offers.note}"
+                    text.content = Markdown("{}: {}").format(kind, offers.note)
                 if offers.command:
                     command.content = command_html(plain(offers.command))
 

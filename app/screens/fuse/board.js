@@ -1,7 +1,5 @@
 // The board over a race: names, large numbers and the scale of colours. Its other side is board.py.
 (() => {
-  if (window.packetmeshBoards?.made) return;
-
   const RULER_CM = 10;
   const DOT_CM = 0.35;
   const boards = new Map();
@@ -115,15 +113,10 @@
     }
   }
 
-  const waiting = window.packetmeshBoards ?? [];
-  window.packetmeshBoards = {
-    made: true,
-    push(message) {
-      if (!boards.has(message.dock)) boards.set(message.dock, new Board(message.dock));
-      const board = boards.get(message.dock);
-      board[message.kind](message);
-      board.place();
-    },
+  packetmesh.calls.board = (_, message) => {
+    if (!boards.has(message.dock)) boards.set(message.dock, new Board(message.dock));
+    const board = boards.get(message.dock);
+    board[message.kind](message);
+    board.place();
   };
-  waiting.forEach(message => window.packetmeshBoards.push(message));
 })();

@@ -7,24 +7,21 @@ of HTML, each of which says all of its part.
 from __future__ import annotations
 
 import base64
-import json
 import uuid
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from app.dock_row import add_hidden
 from app.drawing.colors import DISTANCE_STOPS, MOST_DISTANCE_M, css
-from app.page import running
+from app.page import page_call
 from app.screens.fuse.draw import FOOT
 from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import METHODS, METRICS, color_of
 from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, LensView, RaceLane, RaceStep, RaceView, Reference
 from app.tables import UNKNOWN, number
 from app.ui import Ui
+from app.web.markup import Markup
 from pipeline.types import ByteArray
-
-_SCRIPT, _STYLE = (Path(__file__).with_suffix(kind).read_text(encoding="utf-8") for kind in (".js", ".css"))
 
 
 class Board:
@@ -35,9 +32,8 @@ class Board:
         self._name = uuid.uuid4().hex
         self._view: RaceView | None = None
         self._visible = False
-        with add_hidden(ui, self._name, _SCRIPT):
-            ui.gui.add_html(f"<style>{_STYLE}</style>")
-            self._setup, self._state = ui.gui.add_html(""), ui.gui.add_html("")
+        with add_hidden(ui, self._name):
+            self._setup, self._state = ui.gui.add_html(Markup("")), ui.gui.add_html(Markup(""))
 
     def load(self, view: RaceView | None) -> None:
         """Stand over another race, at its start; None is no race."""
@@ -72,8 +68,7 @@ class Board:
         )
 
     def _tell(self, handle: Any, **what: Any) -> None:
-        message = json.dumps({"dock": self._name, **what}, separators=(",", ":"))
-        handle.content = running(f"(window.packetmeshBoards ??= []).push({message})")
+        handle.content = page_call("board", {"dock": self._name, **what})
 
 
 def _head(mark: str, lane: RaceLane) -> dict[str, str]:

@@ -9,17 +9,15 @@ from app.screens.fuse.labels import MARKS
 from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, SUCCESS_M, CaptureView
 from app.tables import number
 from app.ui import Ui
+from app.web.markup import Markdown, Markup
 
 REACHED, MISSED = "#bfe6d6", "#f3cdc8"
-_PRESS = (
-    "[...document.querySelectorAll('button')].find(b => b.textContent === this.dataset.cell && b !== this)"
-    "?.click()"
-)
-"""Presses the panel's own button of the same name, as HTML cannot talk to the server by itself."""
 COMPUTE, STOP = "Compute the map", "Stop the map"
-TEXT = """Which starts does a method come home from? 25 of them, on 2000 points of each cloud, with the
+TEXT = Markdown(
+    """Which starts does a method come home from? 25 of them, on 2000 points of each cloud, with the
 methods, clouds and damage chosen above."""
-COMPUTING = "Computing; the bar at the top shows how far."
+)
+COMPUTING = Markdown("Computing; the bar at the top shows how far.")
 
 
 class CaptureFolder:
@@ -38,10 +36,10 @@ class CaptureFolder:
         with gui.add_folder("Capture range", expand_by_default=False):
             gui.add_markdown(TEXT)
             ui.buttons("Map", {COMPUTE: on_compute, STOP: on_stop}, "It takes seconds; Stop ends it.")
-            self._status = gui.add_markdown("")
+            self._status = gui.add_markdown(Markdown(""))
             self._lane = gui.add_dropdown("Map of", [f"{MARKS[0]} first"], hint="Method whose map is shown.")
             ui.when_changed(self._lane, self._show)
-            self._map = gui.add_html("")
+            self._map = gui.add_html(Markup(""))
             with gui.add_folder("The cells as buttons", expand_by_default=False):
                 for turn_deg in CAPTURE_TURNS_DEG:
                     cells = {
@@ -55,7 +53,7 @@ class CaptureFolder:
         """The map of another race is not the map of this one."""
         self._view = None
         self._lane.visible = self._map.visible = False
-        self._status.content = ""
+        self._status.content = Markdown("")
 
     def wait(self) -> None:
         """Say that it is being computed."""
@@ -66,7 +64,7 @@ class CaptureFolder:
         """Show a map; None was stopped."""
         self.forget()
         if view is None:
-            self._status.content = "Stopped."
+            self._status.content = Markdown("Stopped.")
             return
         self._view = view
         names = tuple(f"{mark} {label}" for mark, label in zip(MARKS, view.labels, strict=False))
@@ -84,40 +82,41 @@ def cell_name(turn_deg: float, shift_m: float) -> str:
     return f"{turn_deg:.0f}° {100 * shift_m:.0f} cm"
 
 
-def capture_html(view: CaptureView, lane: int) -> str:
+def capture_html(view: CaptureView, lane: int) -> Markup:
     """Rows of rotations, columns of translations; each cell holds how far off it ends."""
-    heads = "".join(f"<th>{100 * shift_m:.0f} cm</th>" for shift_m in CAPTURE_SHIFTS_M)
-    lines = [f"<tr><th></th>{heads}</tr>"]
+    heads = Markup("").join(
+        Markup("<th>{:.0f} cm</th>").format(100 * shift_m) for shift_m in CAPTURE_SHIFTS_M
+    )
+    lines = [Markup("<tr><th></th>{}</tr>").format(heads)]
     for row, turn_deg in enumerate(CAPTURE_TURNS_DEG):
-        cells = "".join(
+        cells = Markup("").join(
             _cell(cell_name(turn_deg, shift_m), float(view.errors_m[lane, row, column]))
             for column, shift_m in enumerate(CAPTURE_SHIFTS_M)
         )
-        lines.append(f"<tr><th>{turn_deg:.0f}°</th>{cells}</tr>")
-    return (
+        lines.append(Markup("<tr><th>{:.0f}°</th>{}</tr>").format(turn_deg, cells))
+    return Markup(
         "<div style='padding: 0 0.8em 0.5em; font-size: 12px'>"
-        f"{capture_sentence(view)} Cells of <b>{view.labels[lane]}</b>: end error in cm; press one to race "
+        "{} Cells of <b>{}</b>: end error in cm; press one to race "
         "from there."
-        f"<table style='width: 100%; border-spacing: 2px; table-layout: fixed'>{''.join(lines)}</table></div>"
-    )
+        "<table style='width: 100%; border-spacing: 2px; table-layout: fixed'>{}</table></div>"
+    ).format(capture_sentence(view), view.labels[lane], Markup("").join(lines))
 
 
 def capture_sentence(view: CaptureView) -> str:
     """How many starts every method arrives from."""
     counts = (view.errors_m < SUCCESS_M).sum(axis=(1, 2))
     starts = view.errors_m[0].size
-    reached = ", ".join(f"{label} {count}" for label, count in zip(view.labels, counts, strict=True))
+    reached = Markup(", ").join(f"{label} {count}" for label, count in zip(view.labels, counts, strict=True))
     return f"Of {starts} starts, so many end within {100 * SUCCESS_M:.0f} cm: {reached}."
 
 
-def _cell(name: str, error_m: float) -> str:
+def _cell(name: str, error_m: float) -> Markup:
     arrived = error_m < SUCCESS_M
     look = (
         f"width: 100%; padding: 3px 0; border: 1px solid #999; border-radius: 3px; cursor: pointer; "
         f"color: #222; font-size: 12px; background: {REACHED if arrived else MISSED}"
     )
     text = f"{'✓' if arrived else '✗'} {number(error_m, 1 if error_m < 0.1 else 0, scale=100.0)}"
-    return (
-        f'<td><button data-cell="{name}" title="{name}: ends {number(error_m, 1, "cm", 100.0)} off" '
-        f'style="{look}" onclick="{_PRESS}">{text}</button></td>'
-    )
+    return Markup(
+        '<td><button data-packetmesh-press="{}" title="{}: ends {} off" style="{}">{}</button></td>'
+    ).format(name, name, number(error_m, 1, "cm", 100.0), look, text)

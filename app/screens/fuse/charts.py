@@ -12,6 +12,7 @@ from app.screens.fuse.labels import MARKS, MOST_LANES
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.view import RaceView
 from app.ui import Ui
+from app.web.markup import Markdown, Markup
 
 FIRST = f"{MARKS[0]} first"
 
@@ -32,8 +33,8 @@ class RaceCharts:
             self._rmse = Curves(gui, "RMSE, cm", MOST_LANES, 0.1)
         with tabs.add_tab("Entropy"):
             self._entropy = Curves(gui, "entropy, nat", MOST_LANES, 1.0)
-            self._without = gui.add_markdown("None of these methods has an entropy.", visible=False)
-        self._legend = gui.add_html("")
+            self._without = gui.add_markdown(Markdown("None of these methods has an entropy."), visible=False)
+        self._legend = gui.add_html(Markup(""))
 
     def load(self, view: RaceView, clock: RaceClock) -> None:
         """Show another race, or the same by another clock."""
@@ -75,10 +76,12 @@ class RaceCharts:
             self._pairs.show(self._view.lanes[index], self._rows[index], self._view.edges_m)
 
 
-def legend(view: RaceView) -> str:
+def legend(view: RaceView) -> Markup:
     """The lanes with the colours of their curves."""
-    names = " &emsp; ".join(
-        f"<b style='color:{css(color_of(lane.rival))}; white-space: nowrap'>{mark} {lane.label}</b>"
+    names = Markup(" &emsp; ").join(
+        Markup("<b style='color:{}; white-space: nowrap'>{} {}</b>").format(
+            css(color_of(lane.rival)), mark, lane.label
+        )
         for mark, lane in zip(MARKS, view.lanes, strict=False)
     )
-    return f"<div style='padding: 0 0.8em 0.5em; font-size: 13px'>{names}</div>"
+    return Markup("<div style='padding: 0 0.8em 0.5em; font-size: 13px'>{}</div>").format(names)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from app.screens.fuse.view import Race
 from app.ui import Offer, Offers
+from app.web.markup import Markdown
 
 HINT = """The race as it is set up on the Fuse screen, with the error of every method: a page that plays it,
 offline, and a moving picture for slides."""
-NOTE = "No command plays a race; `packetmesh register` moves one cloud onto another by any of these methods."
+NOTE = Markdown(
+    "No command plays a race; `packetmesh register` moves one cloud onto another by any of these methods."
+)
 
 
 def race_offers(race: Race) -> Offers:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import viser
 from viser import uplot
 
 from app.drawing.colors import DELIVERED, INFERRED, NEUTRAL, css
 from app.drawing.curves import add_chart, scales
 from app.screens.fuse.view import PairHistogram, RaceLane
+from app.web.markup import Markup
+from app.window.gui import Gui
 from pipeline.types import FloatArray
 
 BARS, KERNEL, WEIGHT = css(NEUTRAL), css(DELIVERED), css(INFERRED)
@@ -17,14 +18,14 @@ BARS, KERNEL, WEIGHT = css(NEUTRAL), css(DELIVERED), css(INFERRED)
 class HistogramChart:
     """Grey bars of counts, the kernel f in green and the weight w in violet, all over their own peaks."""
 
-    def __init__(self, gui: viser.GuiApi) -> None:
+    def __init__(self, gui: Gui) -> None:
         series = (
             uplot.Series(label="pairs", stroke=BARS, fill=f"{BARS}66", width=1),
             uplot.Series(label="f", stroke=KERNEL, width=2, dash=(7, 3)),
             uplot.Series(label="w", stroke=WEIGHT, width=2),
         )
         self._plot = add_chart(gui, series, ("pair distance, cm", "over its peak"), 190)
-        self._caption = gui.add_html("")
+        self._caption = gui.add_html(Markup(""))
 
     def show(self, lane: RaceLane, row: int, edges_m: FloatArray) -> None:
         """Draw the pairs of a lane's step."""
@@ -58,12 +59,16 @@ def weights(shown: PairHistogram) -> FloatArray:
     return np.interp(bins, known, shown.weights[known], right=0.0)
 
 
-def _caption(lane: RaceLane, shown: PairHistogram) -> str:
-    parts = [f"<b style='color:{BARS}'>▮ pairs</b> ({int(shown.counts.sum()):,})"]
+def _caption(lane: RaceLane, shown: PairHistogram) -> Markup:
+    parts = [Markup("<b style='color:{}'>▮ pairs</b> ({:,})").format(BARS, int(shown.counts.sum()))]
     if lane.kernel:
-        parts.append(f"<b style='color:{KERNEL}'>┅ kernel f</b>, σ = {100 * shown.sigma_m:.1f} cm")
-        parts.append(f"<b style='color:{WEIGHT}'>━ weight w = −p log p</b>")
+        parts.append(
+            Markup("<b style='color:{}'>┅ kernel f</b>, σ = {:.1f} cm").format(KERNEL, 100 * shown.sigma_m)
+        )
+        parts.append(Markup("<b style='color:{}'>━ weight w = −p log p</b>").format(WEIGHT))
     else:
-        parts.append(f"<b style='color:{WEIGHT}'>━ weight w</b> (no kernel f)")
-    text = " · ".join(parts)
-    return f"<div style='padding: 0 0.8em 0.5em; font-size: 12px'>{text}. Last bar: all farther pairs.</div>"
+        parts.append(Markup("<b style='color:{}'>━ weight w</b> (no kernel f)").format(WEIGHT))
+    text = Markup(" · ").join(parts)
+    return Markup(
+        "<div style='padding: 0 0.8em 0.5em; font-size: 12px'>{}. Last bar: all farther pairs.</div>"
+    ).format(text)

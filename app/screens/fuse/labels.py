@@ -6,6 +6,7 @@ from typing import get_args
 
 from app.controls import Choice
 from app.screens.fuse.view import RaceMode, Reference, Rival
+from app.web.markup import Markdown
 from pipeline.config import Direction, Method, Metric
 
 MODES: dict[str, RaceMode] = {"node on node": "nodes", "inferred on sensor": "inferred"}
@@ -53,13 +54,17 @@ MOST_LANES = 4
 MOST_SEED = 20
 MARKS = "①②③④"
 """Of the lanes."""
-TEXT = """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
+TEXT = Markdown(
+    """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
 are how far off every point is. **Play** below (space), then compare what made the
 difference."""
-SINGLE = """This scene has a single node: no other node to find its place beside. What races here is its
+)
+SINGLE = Markdown(
+    """This scene has a single node: no other node to find its place beside. What races here is its
 inferred cloud, onto what its sensor measured."""
+)
 MS = "ms"
-RUNNING = "Who comes nearer? At the end of the race its numbers are here."
+RUNNING = Markdown("Who comes nearer? At the end of the race its numbers are here.")
 RACES = {f"race: {name}": mode for name, mode in MODES.items()}
 RACE_NAMES = {mode: name for name, mode in RACES.items()}
 RESULT, BEFORE = "result", "before registration"

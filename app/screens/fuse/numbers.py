@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from html import escape
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, FuseView, RaceLane, Reference, RegistrationRow
 from app.tables import Row, number, table
+from app.web.markup import Markdown, Markup
 
 STOPS = {"max_iterations": "limit"}
 _OFF: dict[Reference, tuple[str, str]] = {
@@ -20,10 +20,10 @@ _OFF: dict[Reference, tuple[str, str]] = {
 }
 
 
-def verdict(reference: Reference, lanes: tuple[RaceLane, ...]) -> str:
+def verdict(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markdown:
     """A sentence on which method ends nearest to where it belongs, whichever that is."""
     if reference == "cloud":
-        return (
+        return Markdown(
             "The truth of this scene is not known. RMSE alone does not tell which is better: each method "
             "pairs and weighs other points."
         )
@@ -31,12 +31,18 @@ def verdict(reference: Reference, lanes: tuple[RaceLane, ...]) -> str:
     (best_m, best), worst_m = ranking[0], ranking[-1][0]
     missed = f" Nobody arrives within {100 * SUCCESS_M:.0f} cm." if best_m >= SUCCESS_M else ""
     if len(ranking) == 1:
-        return f"**{best}** ends {_cm(best_m)} {OFF_FROM[reference]}.{missed}"
+        return Markdown("**{}** ends {} {}.{}").format(best, _cm(best_m), OFF_FROM[reference], missed)
     if _alike(best_m, worst_m):
         everyone = "both end" if len(ranking) == 2 else "all end"
-        return f"Here {everyone} equally far, {_cm(best_m)}, {OFF_FROM[reference]}.{missed}"
-    places = ", ".join(f"**{label}** {_cm(error_m)}" for error_m, label in ranking[1:])
-    return f"**{best}** ends {_cm(best_m)} {OFF_FROM[reference]}, {places}.{_loss(ranking)}{missed}"
+        return Markdown("Here {} equally far, {}, {}.{}").format(
+            everyone, _cm(best_m), OFF_FROM[reference], missed
+        )
+    places = Markdown(", ").join(
+        Markdown("**{}** {}").format(label, _cm(error_m)) for error_m, label in ranking[1:]
+    )
+    return Markdown("**{}** ends {} {}, {}.{}{}").format(
+        best, _cm(best_m), OFF_FROM[reference], places, _loss(ranking), missed
+    )
 
 
 def _cm(error_m: float) -> str:
@@ -54,7 +60,7 @@ def _loss(ranking: list[tuple[float, str]]) -> str:
     return " So CEICP loses here." if ours_m and "CEICP" not in best and not _alike(best_m, ours_m[0]) else ""
 
 
-def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> str:
+def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
     """A column for each lane; every row's name explains itself."""
 
     def row(name: str, hint: str, value: Callable[[RaceLane], str]) -> Row:
@@ -110,15 +116,15 @@ def _stopped(reason: str) -> str:
     return "lost" if reason.startswith("No point") else STOPS.get(head, head)
 
 
-def places_table(view: FuseView) -> str:
+def places_table(view: FuseView) -> Markup:
     """The chain's own registrations."""
     if not view.rows:
-        return ""
+        return Markup("")
     rows = [_place_row(row) for row in view.rows]
-    said = [f"<b>The chain's own result.</b>{_agreeing(view)}", *map(escape, view.sentences)]
-    return f"<div style='padding: 0 0.8em; font-size: 13px'>{'<br>'.join(said)}</div>" + table(
-        rows, ("iterations", "error before", "after")
-    )
+    said = [Markup("<b>The chain's own result.</b>{}").format(_agreeing(view)), *view.sentences]
+    return Markup("<div style='padding: 0 0.8em; font-size: 13px'>{}</div>").format(
+        Markup("<br>").join(said)
+    ) + table(rows, ("iterations", "error before", "after"))
 
 
 def _agreeing(view: FuseView) -> str:

@@ -43,6 +43,7 @@ from app.screens.fuse.setup import RaceSetup
 from app.screens.fuse.view import CaptureView, FuseView, Race, RaceView, Start
 from app.state import Spec, Step
 from app.ui import STOP, Offers, Panel, Picked, Said
+from app.web.markup import Markdown, Markup
 
 _Wanted: TypeAlias = tuple[tuple[Hashable, ...], Race]
 """A race of the clouds with this key."""
@@ -87,11 +88,11 @@ class FusePanel(Panel):
         self._setup.add_preset()
         self._player = RacePlayer(self.ui, self._moved, self._clocked)
         self._board = Board(self.ui)
-        self._verdict = gui.add_markdown("")
-        self._table = gui.add_html("")
+        self._verdict = gui.add_markdown(Markdown(""))
+        self._table = gui.add_html(Markup(""))
         self._charts = RaceCharts(self.ui)
         self._build_folders()
-        self._rows = gui.add_html("")
+        self._rows = gui.add_html(Markup(""))
         shown = Picked(self._shown, SHOWN, self._picked_shown)
         self.in_address |= {STOP: self._lesson, "race": Said(self._race_text, self._take_race_text)}
         self.in_address |= {"show": shown, "t": Said(self._moment, self._take_moment)}
@@ -267,7 +268,8 @@ class FusePanel(Panel):
         with self.ui.atomic():
             clear(self.scene, "/fuse/race")
             self._board.load(None)
-            self._verdict.content = self._table.content = self._rows.content = ""
+            self._verdict.content = Markdown("")
+            self._table.content = self._rows.content = Markup("")
             self._capture.forget()
 
     def _finished(self, wanted: _Wanted, view: RaceView | None) -> None:
@@ -288,7 +290,7 @@ class FusePanel(Panel):
             self._seen = ()
             self._place_gizmo()
             self._board.load(view)
-            self._verdict.content, self._table.content = RUNNING, ""
+            self._verdict.content, self._table.content = RUNNING, Markup("")
             self._player.load(view.lanes, view.reference)
             self._player.seek_at(self._seek_at)
             self._seek_at = 0.0

@@ -9,6 +9,7 @@ from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.labels import CAUSES
 from app.screens.network.view import What
 from app.tables import Head, Row, number, table
+from app.web.markup import Markdown, Markup
 from network_sim.config import NetworkConfig
 from network_sim.types import Cause
 from packetmesh.settings import differences
@@ -27,7 +28,7 @@ MOST_CHANGES = 4
 """That are told one by one."""
 
 
-def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> str:
+def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Markup:
     """HTML of what matters: at the clock ``now_ns``, in the end, and where nothing is lost."""
     end = view.moment_at(view.times_ns[-1])
     done = end is not None and end.t_ns == view.times_ns[-1]
@@ -111,10 +112,10 @@ def _by_cause(view: DeliveryView, now: MomentView | None, last: MomentView | Non
     ]
 
 
-def more_rows(view: DeliveryView, now: MomentView | None) -> str:
+def more_rows(view: DeliveryView, now: MomentView | None) -> Markup:
     """HTML of what the sink has of each camera."""
     if now is None:
-        return ""
+        return Markup("")
     rows = [
         (
             node.name,
@@ -130,12 +131,14 @@ def more_rows(view: DeliveryView, now: MomentView | None) -> str:
     return table([*rows, sent, energy], ("depth", "colour", "coarse"))
 
 
-def summary(view: DeliveryView) -> str:
+def summary(view: DeliveryView) -> Markdown:
     """What is there so far."""
     computed, planned = len(view.moments), len(view.times_ns)
-    sentence = (
-        f"{len([n for n in view.nodes if n.row >= 0])} cameras sent {view.total_bytes * BYTES_MB:.2f} MB in "
-        f"{view.run.packets:,} packets; simulated in {view.run.elapsed_s:.1f} s."
+    sentence = Markdown("{} cameras sent {:.2f} MB in {:,} packets; simulated in {:.1f} s.").format(
+        len([node for node in view.nodes if node.row >= 0]),
+        view.total_bytes * BYTES_MB,
+        view.run.packets,
+        view.run.elapsed_s,
     )
     if not view.run.series or not len(view.run.pieces):
         sentence += " Nothing happened in that time."
@@ -146,11 +149,11 @@ def summary(view: DeliveryView) -> str:
     return sentence
 
 
-def difference(before: DeliveryView, after: DeliveryView, what: str) -> str:
+def difference(before: DeliveryView, after: DeliveryView, what: str) -> Markdown:
     """In a sentence what another setting changed, in the network and in the mesh; empty while unknown."""
     one, two = (view.moment_at(view.times_ns[-1]) for view in (before, after))
     if one is None or two is None or two.t_ns != after.times_ns[-1]:
-        return ""
+        return Markdown("")
     network = [
         f"the last byte came after {time_text(two.t_ns)} instead of {time_text(one.t_ns)}",
         f"{_percent(two.delivered_bytes / after.total_bytes)} of the bytes arrived instead of "
@@ -163,7 +166,7 @@ def difference(before: DeliveryView, after: DeliveryView, what: str) -> str:
     ]
     if one.f_score is not None and two.f_score is not None:
         mesh.append(f"the F-score is {_percent(two.f_score)} instead of {_percent(one.f_score)}")
-    return f"**{what}**: {', '.join(network)}; in the mesh, {' and '.join(mesh)}."
+    return Markdown("**{}**: {}; in the mesh, {}.").format(what, ", ".join(network), " and ".join(mesh))
 
 
 def changes(before: DeliveryView, after: DeliveryView) -> str:

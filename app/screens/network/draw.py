@@ -13,6 +13,7 @@ from app.drawing.clouds import clear
 from app.drawing.colors import BACKGROUND, BRAND, COVERAGE_STOPS, DELIVERED, LOSS, NEUTRAL, css, linear, ramp
 from app.screens.network.labels import ANSWER, PACKET_COLORS
 from app.screens.network.view import NetworkView, Pieces, What
+from app.web.markup import Markup
 from network_sim.coverage import RoadCoverage
 from network_sim.mobility import cells_m
 from network_sim.radio import reach_m
@@ -273,20 +274,20 @@ class Roads:
             self._lines.colors = np.repeat(linear(colors)[:, None], 2, axis=1)
 
 
-def road_legend(views: Sequence[NetworkView]) -> str:
+def road_legend(views: Sequence[NetworkView]) -> Markup:
     """HTML: what the colours of the roads mean; empty without roads."""
     schemes = [view.config.scheme for view in views if view.roads is not None]
     if not schemes:
-        return ""
-    stops = ", ".join(css((int(r), int(g), int(b))) for r, g, b in COVERAGE_STOPS)
+        return Markup("")
+    stops = Markup(", ").join(css((int(r), int(g), int(b))) for r, g, b in COVERAGE_STOPS)
     roads = "Roads, each way" if all(scheme.directed_cells for scheme in schemes) else "Roads"
-    spans = " and ".join(dict.fromkeys(f"{scheme.validity_s:g}" for scheme in schemes))
-    return (
-        f"<div style='padding: 0 0.8em 0.8em; font-size: 12px'>{roads}: of the spans of {spans} s in which a "
+    spans = Markup(" and ").join(dict.fromkeys(f"{scheme.validity_s:g}" for scheme in schemes))
+    return Markup(
+        "<div style='padding: 0 0.8em 0.8em; font-size: 12px'>{}: of the spans of {} s in which a "
         "camera saw them so far, an image has arrived of 0 % <span style='display: inline-block; width: 7em; "
-        f"height: 0.8em; background: linear-gradient(to right, {stops})'></span> 100 %; grey: not seen yet"
+        "height: 0.8em; background: linear-gradient(to right, {})'></span> 100 %; grey: not seen yet"
         "</div>"
-    )
+    ).format(roads, spans, stops)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.screens.network.delivery_view import DeliveryView
 from app.ui import Offer, Offers
+from app.web.markup import Markdown
 
 JOB = "network.export_job"
 
@@ -24,7 +25,9 @@ def delivery_offers(view: DeliveryView, now_ns: int, command: str) -> Offers:
         ]
     hint = f"""A page that plays the delivery, offline, and a moving picture of it; mesh and measured points
 of what has arrived by the moment that the Network screen's clock shows ({at})."""
-    note = "`delivery.html` and `delivery.gif` in its folder are page and GIF; its mesh is that of the end."
+    note = Markdown(
+        "`delivery.html` and `delivery.gif` in its folder are page and GIF; its mesh is that of the end."
+    )
     return Offers("Delivery", hint, tuple(files), command, note)
 
 
@@ -36,7 +39,9 @@ def network_offers(labels: tuple[str, ...], commands: str) -> Offers:
     )
     hint = "The whole timeline of the Network screen; every event of the network as NDJSON and CSV."
     if not commands:
-        return Offers("Network", hint, files, note="The command of the delivery writes no trace.")
+        return Offers("Network", hint, files, note=Markdown("The command of the delivery writes no trace."))
     lines = [f"{line} --out runs/network-{row + 1}" for row, line in enumerate(commands.splitlines())]
-    note = "`trace.ndjson` and `trace.csv` in its folder are the trace; no command draws the timeline."
+    note = Markdown(
+        "`trace.ndjson` and `trace.csv` in its folder are the trace; no command draws the timeline."
+    )
     return Offers("Network", hint, files, "\n".join(lines), note)

@@ -11,6 +11,7 @@ from app.screens.network.labels import PICK
 from app.screens.network.packets import Frames
 from app.screens.network.packets_told import told
 from app.ui import Ui
+from app.web.markup import Markdown
 
 if TYPE_CHECKING:
     from app.session import Session
@@ -67,9 +68,9 @@ class Inspector:
 
             self._session.quick_job("network.delivery_job:packet_job", source, first, count, on_end=came)
 
-    def _light(self, story: str, packet: PacketView | None) -> None:
+    def _light(self, story: Markdown, packet: PacketView | None) -> None:
         if packet is None or self._drawing is None:
             return
-        self._text.content = f"{story}\n\n{told(packet)}"
+        self._text.content = Markdown("{}\n\n{}").format(story, told(packet))
         with self._ui.atomic():
             self._drawing.light(packet)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from app.drawing.colors import INFERRED, SOURCE, TARGET
+from app.web.markup import Markdown
 from network_sim.config import EnergyConfig, NetworkConfig
 from network_sim.presets import PRESETS, WAVELAN
 from network_sim.types import Cause, PacketKind
@@ -153,11 +154,17 @@ def _possible(config: NetworkConfig, settings: tuple[str, ...]) -> bool:
     return True
 
 
-TEXT = """The cameras of the room send their pictures and depth by radio, packet by packet; some are lost.
+TEXT = Markdown(
+    """The cameras of the room send their pictures and depth by radio, packet by packet; some are lost.
 **Play** below, and watch the mesh grow from what has arrived."""
-STREET_TEXT = """Vehicles with cameras drive on a grid of streets and offer images to access points (green).
+)
+STREET_TEXT = Markdown(
+    """Vehicles with cameras drive on a grid of streets and offer images to access points (green).
 **Play** below: every moving point is a frame on the air, a red one was lost there."""
-ORIGIN = """The schemes are our reconstruction: of the paper they come from (Bruno & Nurchis, arXiv 1311.6013)
+)
+ORIGIN = Markdown(
+    """The schemes are our reconstruction: of the paper they come from (Bruno & Nurchis, arXiv 1311.6013)
 only the abstract and the first lines could be read."""
-RUNNING = "Sending; the bar at the top shows how far. *Cancel* ends it."
-PICK = "Click a frame on the timeline to see what it carried and how it fared."
+)
+RUNNING = Markdown("Sending; the bar at the top shows how far. *Cancel* ends it.")
+PICK = Markdown("Click a frame on the timeline to see what it carried and how it fared.")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from app.screens.network.view import NetworkView
 from app.tables import Row, table
+from app.web.markup import Markdown, Markup
 from network_sim.metrics import Metric
 
 FIRST = (
@@ -43,7 +44,7 @@ SHARES = ("ratio", "share", "coverage", "redundancy")
 """Words in the names of numbers that are shown in per cent."""
 
 
-def metric_tables(views: Sequence[NetworkView]) -> tuple[str, str]:
+def metric_tables(views: Sequence[NetworkView]) -> tuple[Markup, Markup]:
     """HTML of the most telling numbers, and of all others that are not zero in every run."""
     by_name: dict[str, list[Metric | None]] = {}
     for index, view in enumerate(views):
@@ -60,20 +61,21 @@ def metric_tables(views: Sequence[NetworkView]) -> tuple[str, str]:
     return one, other
 
 
-def verdict(views: Sequence[NetworkView]) -> str:
+def verdict(views: Sequence[NetworkView]) -> Markdown:
     """What the second of two runs brings and keeps, in a sentence; empty where there is nothing to weigh."""
+    nothing = Markdown("")
     if len(views) != 2:
-        return ""
+        return nothing
     one, two = ({name: metric.value for name, metric in view.metrics.items()} for view in views)
     images, coverage = "images_per_minute", "coverage"
     if not all(run.get(name) for run in (one, two) for name in (images, coverage)):
-        return ""
+        return nothing
     first, second = (view.label.partition(":")[0] for view in views)
-    return (
-        f"**{second} brings {two[images] / one[images]:.0%} of the images that {first} brings, and keeps "
-        f"{two[coverage] / one[coverage]:.0%} of what is seen**: {two[coverage]:.1%} of what the cameras saw "
-        f"instead of {one[coverage]:.1%}."
-    )
+    brings = Markdown(
+        "**{} brings {:.0%} of the images that {} brings, and keeps {:.0%} of what is seen**"
+    ).format(second, two[images] / one[images], first, two[coverage] / one[coverage])
+    seen = f": {two[coverage]:.1%} of what the cameras saw instead of {one[coverage]:.1%}."
+    return brings + seen
 
 
 def _row(name: str, metrics: Sequence[Metric | None]) -> Row:
@@ -101,14 +103,14 @@ def value_text(name: str, metric: Metric | None) -> str:
     return digits if unit == "1" else f"{digits} {unit}"
 
 
-def runs_summary(views: Sequence[NetworkView]) -> str:
+def runs_summary(views: Sequence[NetworkView]) -> Markdown:
     """What was simulated, and whether the timeline holds all of it."""
-    sentences = []
+    sentences: list[str] = []
     for view in views:
-        name = f"**{view.label}**: " if len(views) > 1 else ""
+        name = Markdown("**{}**: ").format(view.label) if len(views) > 1 else Markdown("")
         shown_s = (view.end_ns - view.start_ns) / 1e9
         sentences.append(
-            f"{name}{shown_s:,.1f} s of the network's time, {view.packets:,} packets in all, simulated in "
+            name + f"{shown_s:,.1f} s of the network's time, {view.packets:,} packets in all, simulated in "
             f"{view.elapsed_s:.1f} s."
         )
         if view.kept_until_ns < view.end_ns:
@@ -118,4 +120,4 @@ def runs_summary(views: Sequence[NetworkView]) -> str:
             )
         if not len(view.pieces):
             sentences.append("Nothing happened in that time: no event was kept.")
-    return " ".join(sentences)
+    return Markdown(" ").join(sentences)

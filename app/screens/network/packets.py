@@ -7,6 +7,7 @@ import numpy as np
 from app.dock import time_text
 from app.screens.network.labels import CAUSES, PACKET_NAMES
 from app.screens.network.view import NetworkView, Pieces, What
+from app.web.markup import Markdown
 from network_sim.types import Cause, PacketKind
 
 ANSWER_WITHIN_NS = 2_000_000
@@ -33,22 +34,28 @@ class Frames:
         """Whether it carries a piece of a camera's images."""
         return self.pieces.carries[item] == PacketKind.IMAGE
 
-    def story(self, item: int) -> str:
+    def story(self, item: int) -> Markdown:
         """Markdown about one frame, for the inspector."""
         one, names = self.pieces, self._view.names
         tries = np.flatnonzero((one.packet == one.packet[item]) & (one.node == one.node[item]))
         took_ns = int(one.end_ns[item] - one.start_ns[item])
         size = int(one.size_bytes[item])
         headers = f", {self._view.header_bytes} of them headers" if self.carries_image(item) else ""
-        lines = [
-            f"**{names[one.node[item]]} → {names[one.peer[item]]}** at "
-            f"{time_text(int(one.start_ns[item]))}: {self._content(item)}",
-            f"{size:,} bytes{headers}; {time_text(took_ns)} on the air",
-            f"Attempt {1 + int(np.searchsorted(tries, item))} of {len(tries)}; "
-            f"waited {self._waited(item, int(tries[0]))} in the node",
-            f"**{self._fate(item)[0].upper()}{self._fate(item)[1:]}**",
-        ]
-        return "\n\n".join(lines)
+        fate = self._fate(item)
+        return Markdown("\n\n").join(
+            [
+                Markdown("**{} → {}** at {}: {}").format(
+                    names[one.node[item]],
+                    names[one.peer[item]],
+                    time_text(int(one.start_ns[item])),
+                    self._content(item),
+                ),
+                f"{size:,} bytes{headers}; {time_text(took_ns)} on the air",
+                f"Attempt {1 + int(np.searchsorted(tries, item))} of {len(tries)}; "
+                f"waited {self._waited(item, int(tries[0]))} in the node",
+                Markdown("**{}**").format(f"{fate[0].upper()}{fate[1:]}"),
+            ]
+        )
 
     def bytes_of(self, item: int) -> tuple[int, int]:
         """First byte and number of bytes of its image that it carries."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from app.drawing.colors import css
 from app.screens.network.delivery_view import PacketView
+from app.web.markup import Markup
 
 
 def told(packet: PacketView) -> str:
@@ -23,10 +24,12 @@ def told(packet: PacketView) -> str:
     return f"It tells the {' and the '.join(parts)} (yellow in the picture and the cloud)."
 
 
-def legend_html(colors: Sequence[tuple[str, tuple[int, int, int]]]) -> str:
+def legend_html(colors: Sequence[tuple[str, tuple[int, int, int]]]) -> Markup:
     """HTML: what the colours of the drawing mean."""
-    words = " &ensp; ".join(
-        f"<span style='white-space: nowrap'><b style='color: {css(color)}'>●</b> {name}</span>"
+    words = Markup(" &ensp; ").join(
+        Markup("<span style='white-space: nowrap'><b style='color: {}'>●</b> {}</span>").format(
+            css(color), name
+        )
         for name, color in colors
     )
-    return f"<div style='padding: 0 0.8em 0.8em; font-size: 12px'>{words}</div>"
+    return Markup("<div style='padding: 0 0.8em 0.8em; font-size: 12px'>{}</div>").format(words)

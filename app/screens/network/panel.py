@@ -40,6 +40,7 @@ from app.screens.network.view import NetworkView
 from app.state import Spec, Step
 from app.timeline import Lane
 from app.ui import STOP, Offers, Panel, Said
+from app.web.markup import Markdown, Markup
 from packetmesh.errors import InputError
 
 LESSONS = {STOP: CROSSING, f"{STOP}-lost": LOST_PACKET}
@@ -82,22 +83,22 @@ class NetworkPanel(Panel):
         self._asked_ns: int | None = None
         """The moment that an address asks for, until its run is there."""
         self._text = gui.add_markdown(TEXT)
-        self._difference = gui.add_markdown("")
+        self._difference = gui.add_markdown(Markdown(""))
         self._lessons = {}
         for key, path in LESSONS.items():
             lesson = read_lesson(path, SETTINGS, NetworkLook(), NUMBERS)
             take = partial(self._take_look, key)
             self._lessons[key] = LessonFolder(ui, lesson, take, self._lesson_numbers)
         self._setup = NetworkSetup(ui, self._resting.restart)
-        self._about = gui.add_markdown("")
-        self._status = gui.add_markdown("Nothing is sent yet.")
-        self._table = gui.add_html("")
+        self._about = gui.add_markdown(Markdown(""))
+        self._status = gui.add_markdown(Markdown("Nothing is sent yet."))
+        self._table = gui.add_html(Markup(""))
         with gui.add_folder("What if"):
             self._setup.add_what_if(f"{self.drawn_below}/what-if")
         self._inspector = Inspector(ui, self.session)
-        self._legend = gui.add_html("")
+        self._legend = gui.add_html(Markup(""))
         with gui.add_folder("All other numbers", expand_by_default=False):
-            self._others = gui.add_html("")
+            self._others = gui.add_html(Markup(""))
         with gui.add_folder("Advanced", expand_by_default=False):
             self._setup.add_advanced()
         self._dock = Dock(ui, self._moved, self._inspector.pick)
@@ -128,7 +129,7 @@ class NetworkPanel(Panel):
         """What streams in from now on belongs to something else; in another room nothing has happened yet."""
         if spec.source != self._source:
             self._source = spec.source
-            self._before, self._other_room, self._difference.content = None, True, ""
+            self._before, self._other_room, self._difference.content = None, True, Markdown("")
             if self._setup.what_if.leave_room() and self._visited:
                 self.ui.post(self._run)
         if not self.session.results.fresh("network", spec):
@@ -166,7 +167,9 @@ class NetworkPanel(Panel):
         if step == self.step:
             with self.ui.atomic():
                 self._forget()
-                self._status.content = f"**Not sent**: {sentence} Change a setting or press *Retry*."
+                self._status.content = Markdown("**Not sent**: {} Change a setting or press *Retry*.").format(
+                    sentence
+                )
 
     def look(self) -> bool:
         """Turn the view to the cameras and the room, or the streets, once for each shape of the window."""
@@ -208,7 +211,8 @@ class NetworkPanel(Panel):
         setup, session = self._setup, self.session
         preset = NETWORKS[setup.preset]
         self._text.content = STREET_TEXT if preset.street else TEXT
-        self._about.content = preset.sentence + (f" {ORIGIN}" if preset.street else "")
+        about = Markdown("{} {}").format(preset.sentence, ORIGIN)
+        self._about.content = about if preset.street else Markdown("")
         if preset.street:
             runs = setup.runs()
             self._labels = tuple(runs)
@@ -360,7 +364,7 @@ class NetworkPanel(Panel):
         self._inspector.load(())
         self._dock.show(False)
         for html in (self._table, self._others, self._difference, self._legend):
-            html.content = ""
+            html.content = Markup("")
         clear(self.scene, f"{self.drawn_below}/runs")
 
     # The clock.

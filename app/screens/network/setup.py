@@ -16,6 +16,7 @@ from app.screens.network.place import show, shown, text_of, values_of
 from app.screens.network.what_if import WhatIf
 from app.state import Sent, Spec
 from app.ui import Ui
+from app.web.markup import Markdown
 from network_sim.config import NetworkConfig
 from network_sim.presets import PRESETS
 from packetmesh.errors import InputError
@@ -29,8 +30,10 @@ NOTHING = "nothing"
 FIRST = next(iter(NETWORKS))
 MOMENTS = 20
 OF_NODES = ("off", "wall", "moved")
-FREE = """Any setting of `packetmesh simulate --describe`, several separated by spaces, for example
+FREE = Markdown(
+    """Any setting of `packetmesh simulate --describe`, several separated by spaces, for example
 `radio.capture_db=6 nodes.deadline_s=4`. Those for the second run apply to it alone."""
+)
 
 
 class NetworkSetup:

@@ -12,6 +12,7 @@ from app.drawing.colors import NEUTRAL
 from app.drawing.poses import place
 from app.screens.network.delivery_view import DeliveryView
 from app.ui import Ui
+from app.web.markup import Markdown
 from network_sim.radio import IEEE80211B
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
@@ -31,7 +32,7 @@ WALL_AWAY, WALL_HALF = 0.2, 0.25
 MOST_AWAY_M, MOST_HALF_M = 1.0, 1.0
 APART = 0.4
 """Half the length of the wall over the distance to the nearest other node, at most: it stands before one."""
-MOVED_TEXT = (
+MOVED_TEXT = Markdown(
     "Drag the arrows: the radio moves and frames are sent from there; its camera stays. Choose *nobody* to "
     "put all radios back."
 )
@@ -79,7 +80,7 @@ class WhatIf:
         self._mover = gui.add_dropdown(
             "Move radio of", [NOBODY], hint="Arrows appear at this node; its camera stays where it is."
         )
-        self._text = gui.add_markdown("")
+        self._text = gui.add_markdown(Markdown(""))
         self._visible = True
         self._controls = (self._off, self._walled, self._wall_db, self._retries, self._rate)
         for handle in self._controls:
@@ -134,7 +135,7 @@ class WhatIf:
         """Have all radios at their cameras, without arrows; what is drawn goes."""
         self._mover.value = NOBODY
         self._moved_m.clear()
-        self._text.content = ""
+        self._text.content = Markdown("")
         self.clear()
 
     def leave_room(self) -> bool:
@@ -183,7 +184,7 @@ class WhatIf:
 
     def _put_back_or_show(self) -> None:
         """Arrows at another node; with nobody chosen, all radios go back to their cameras."""
-        self._text.content = "" if self._mover.value == NOBODY else MOVED_TEXT
+        self._text.content = Markdown("") if self._mover.value == NOBODY else MOVED_TEXT
         self._draw()
         if self._mover.value == NOBODY and self._moved_m:
             self._moved_m.clear()

@@ -10,8 +10,10 @@ from pathlib import Path
 import viser
 
 from app.ui import Ui
-from app.uploads import OWN, keep_upload
+from app.web.markup import Markdown
+from app.web.uploads import OWN, keep_upload
 from packetmesh.errors import InputError
+from packetmesh.files import path_below
 from pipeline.sources import ImagePair
 from pipeline.types import MAX_NODES
 
@@ -24,11 +26,15 @@ FILES = {
     "intrinsics": ("Intrinsics …", ".json,.yaml,.yml,.txt"),
 }
 RECORDINGS = ".zip,.bag,.mcap,.db3,application/zip"
-PAIR_TEXT = """**A pair**: colour, depth (16 bits, or metres in floating point) and the camera's
+PAIR_TEXT = Markdown(
+    """**A pair**: colour, depth (16 bits, or metres in floating point) and the camera's
 intrinsics (JSON, YAML or a 3 × 3 matrix)."""
-RECORDING_TEXT = """**A recording**: a bag of ROS, or a ZIP of a rig (node_00, node_01 …) or of a folder of
+)
+RECORDING_TEXT = Markdown(
+    """**A recording**: a bag of ROS, or a ZIP of a rig (node_00, node_01 …) or of a folder of
 TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood, Open3D or COLMAP, or of a pair (color.png, depth.png,
 intrinsics.json)."""
+)
 INSTEAD = "use packetmesh import and reconstruct for larger files"
 
 
@@ -70,7 +76,7 @@ class OwnFolder:
             gui.add_markdown(PAIR_TEXT)
             for kind, (label, mime) in FILES.items():
                 self._add_button(label, mime, self._keep_file, kind)
-            self._have = gui.add_markdown("Add all three files, then press the button.")
+            self._have = gui.add_markdown(Markdown("Add all three files, then press the button."))
             gui.add_button("Reconstruct this pair", icon=viser.Icon.PLAYER_PLAY).on_click(
                 lambda _: ui.post(self._use_files)
             )
@@ -79,11 +85,11 @@ class OwnFolder:
                 "Frames", 3, min=1, max=MAX_NODES, step=1, hint="Of a recording; each becomes a node."
             )
             self._add_button("Recording …", RECORDINGS, self._keep_recording)
-            self._notes = gui.add_markdown("")
+            self._notes = gui.add_markdown(Markdown(""))
 
     def tell(self, notes: tuple[str, ...]) -> None:
         """Show what was found in a recording, or that nothing was."""
-        self._notes.content = "\n".join(f"- {note}" for note in notes)
+        self._notes.content = Markdown("\n").join(Markdown("- {}").format(note) for note in notes)
 
     def _add_button(self, label: str, mime: str, action: Callable[..., None], *arguments: str) -> None:
         button = self._ui.gui.add_upload_button(label, icon=viser.Icon.UPLOAD, mime_type=mime)
@@ -93,7 +99,9 @@ class OwnFolder:
         self._files[kind] = keep_upload(file, self._below / kind, PAIR_LIMIT_BYTES, INSTEAD)
         missing = [name for name in FILES if name not in self._files]
         self._have.content = (
-            f"Still needed: {', '.join(missing)}." if missing else "All there: press the button."
+            Markdown("Still needed: {}.").format(", ".join(missing))
+            if missing
+            else Markdown("All there: press the button.")
         )
 
     def _use_files(self) -> None:
@@ -102,9 +110,9 @@ class OwnFolder:
         folder, files = self._new_folder() / OWN, dict[str, str]()
         folder.mkdir()
         for kind, path in self._files.items():
-            place = folder / path.name
+            place = path_below(folder, path.name)
             if place.exists():  # as where images of both kinds are numbered
-                place = folder / kind / path.name
+                place = path_below(folder, kind, path.name)
                 place.parent.mkdir()
             files[kind] = str(shutil.copyfile(path, place))
         self._on_pair(ImagePair(**files, depth_scale=self._depth_scale))

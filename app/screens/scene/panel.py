@@ -16,13 +16,16 @@ from app.screens.scene.recording import ReadRecording
 from app.state import Spec, Step
 from app.tables import number, table
 from app.ui import Panel
+from app.web.markup import Markdown, Markup
 from pipeline.config import PRESETS
 from pipeline.io.demos import DEMO_SCENES
 from pipeline.sources import Demo, ImagePair, RigFolder
 
-TEXT = """**What you see.** Each camera node delivers a colour image and a depth image. The points are
+TEXT = Markdown(
+    """**What you see.** Each camera node delivers a colour image and a depth image. The points are
 the depth pixels put where they belong in space; the gaps are what the sensor could not measure.
 Go on with **Depth**."""
+)
 DEMOS = {name: scene.title for name, scene in DEMO_SCENES.items()}
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 
@@ -60,10 +63,10 @@ class ScenePanel(Panel):
         self._own = OwnFolder(
             self.ui, self.session.folder, self.session.new_folder, self._use_pair, self._read_recording
         )
-        self._notes = gui.add_markdown("")
+        self._notes = gui.add_markdown(Markdown(""))
         self._color = gui.add_image(EMPTY, label="Colour image")
         self._depth = gui.add_image(EMPTY, label="Sensor depth", format="png")
-        self._numbers = gui.add_html("")
+        self._numbers = gui.add_html(Markup(""))
 
     def on_spec(self, spec: Spec) -> None:
         """Show the preset and the scene that are wanted."""
@@ -83,7 +86,9 @@ class ScenePanel(Panel):
             for node in view.nodes:
                 add_cloud(self.scene, f"/scene/{node.name}/cloud", node.sensor, node.T_world_camera)
                 add_camera(self.scene, f"/scene/{node.name}/camera", node, node.T_world_camera)
-            self._notes.content = "\n\n".join(f"**{note}.**" for note in view.notes)
+            self._notes.content = Markdown("\n\n").join(
+                Markdown("**{}.**").format(note) for note in view.notes
+            )
             names = tuple(node.name for node in view.nodes)
             if names != self._node.options:
                 self._node.options = names

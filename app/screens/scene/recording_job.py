@@ -9,8 +9,9 @@ from pathlib import Path
 from app.screens.scene.recording import ReadRecording
 from app.state import Spec
 from app.store import Store
-from app.zips import opened_zip
+from app.web.zips import opened_zip
 from packetmesh.errors import InputError
+from packetmesh.files import path_below
 from packetmesh.progress import Progress
 from pipeline.importing import is_recording, iterate_import
 from pipeline.io.rigs import is_pair, is_rig, load_rig
@@ -39,7 +40,7 @@ def recording_job(
         InputError: a file that cannot be read, that is too large, or that holds no recording or several.
     """
     yield Progress("reading the recording", 0.0)
-    rig = path.parent.with_name(name)
+    rig = path_below(path.parent.parent, name)
     if path.suffix.lower() != ".zip":
         return (yield from _imported(path, rig, frames, depth_scale))
     unpacked = path.with_suffix("")

@@ -8,13 +8,16 @@ from app.screens.surface.sweep_plot import BELOW, sweep_figure, sweep_sentence
 from app.screens.surface.view import SweepView
 from app.tables import number, table
 from app.ui import Ui
+from app.web.markup import Markdown, Markup
 from pipeline.findings import Suggestion
 
-TEXT = """A ball bridges the triangles around a point if it is as wide as the largest of their circumcircles.
+TEXT = Markdown(
+    """A ball bridges the triangles around a point if it is as wide as the largest of their circumcircles.
 How wide that is can be read off the points before any ball rolls."""
+)
 NO_ADVICE = "No point has neighbours on all sides, so no radius can be read off this cloud; try more points."
-WAITING = "The first ball is about to roll."
-STOPPED = "Stopped; the curves end where the sweep did."
+WAITING = Markdown("The first ball is about to roll.")
+STOPPED = Markdown("Stopped; the curves end where the sweep did.")
 UNNAMED = "–"
 """Of the only button before there is a suggestion; it is not shown."""
 
@@ -36,7 +39,7 @@ class AdviceFolder:
         gui = ui.gui
         with gui.add_folder("Which radius?", expand_by_default=False):
             gui.add_markdown(TEXT)
-            self._table = gui.add_html("")
+            self._table = gui.add_html(Markup(""))
             self._take = gui.add_button_group(
                 "Take", (UNNAMED,), hint="Roll one ball of this radius.", visible=False
             )
@@ -46,7 +49,7 @@ class AdviceFolder:
                 {"Sweep the radius": self._sweep, "Stop the sweep": on_stop},
                 "One ball after another, each alone over the cloud after fusion; it takes some seconds.",
             )
-            self._status = gui.add_markdown("")
+            self._status = gui.add_markdown(Markdown(""))
             self._below = gui.add_dropdown(
                 "Lower plot", list(BELOW), hint="What the lower of the two plots shows.", visible=False
             )
@@ -67,11 +70,11 @@ class AdviceFolder:
     def load(self, view: SweepView | None) -> None:
         """Show a sweep, or as much of it as there is; None was stopped."""
         if view is None:
-            self._status.content = "Stopped." if self._view is None else STOPPED
+            self._status.content = Markdown("Stopped.") if self._view is None else STOPPED
             return
         self._view = view
         self._draw()
-        running = f"{len(view.points)} of {view.planned} balls have rolled."
+        running = Markdown("{} of {} balls have rolled.").format(len(view.points), view.planned)
         self._status.content = sweep_sentence(view) if view.done else running
 
     def forget(self) -> None:
@@ -79,7 +82,7 @@ class AdviceFolder:
         self._radii_m, self._view = {}, None
         self._take.visible = False
         self._draw()
-        self._table.content = self._status.content = ""
+        self._table.content, self._status.content = Markup(""), Markdown("")
 
     def _draw(self) -> None:
         if self._view is not None:
@@ -97,10 +100,10 @@ class AdviceFolder:
         self._on_sweep()
 
 
-def suggestions_html(rows: tuple[Suggestion, ...]) -> str:
+def suggestions_html(rows: tuple[Suggestion, ...]) -> Markup:
     """A line for each suggested radius: its name, the radius, and what it closes."""
     if not rows:
-        return f"<div style='padding: 0 0.8em; font-size: 13px'>{NO_ADVICE}</div>"
+        return Markup("<div style='padding: 0 0.8em; font-size: 13px'>{}</div>").format(NO_ADVICE)
     return table(
         [
             (row.name, row.sentence, number(row.radius_m, 1, "mm", 1000.0), number(row.share, 0, "%", 100.0))

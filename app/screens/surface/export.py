@@ -5,10 +5,13 @@ from __future__ import annotations
 from app.screens.surface.labels import BASELINES, COLORINGS
 from app.screens.surface.view import Coloring
 from app.ui import Offer, Offers
+from app.web.markup import Markdown
 
 HINT = """The surface as the Surface screen shows it: one page to turn it, offline, with a line between before
 and after; a moving picture of a flight along the cameras, for slides; the 3-D view as it is now."""
-NOTE = "No command makes these: each is of what you see. The meshes in them are those of the command above."
+NOTE = Markdown(
+    "No command makes these: each is of what you see. The meshes in them are those of the command above."
+)
 
 
 def surface_offers(shown: str, colors: str, rims: bool) -> Offers:

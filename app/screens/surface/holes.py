@@ -10,20 +10,27 @@ from app.screens.surface.draw_holes import HoleDrawing, picked_hole
 from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
 from app.tables import number, table
 from app.ui import Ui
+from app.web.markup import Markdown, Markup
 from pipeline.findings import Explanation, RayParts
 from pipeline.types import FloatArray
 
-TEXT = """**Click a red rim in the picture, or choose one here**, and read why it is there. The list goes
+TEXT = Markdown(
+    """**Click a red rim in the picture, or choose one here**, and read why it is there. The list goes
 along the mesh, so it also has gaps that no camera looks into: a *hole* is a loop of edges shorter than
 1 m with surface all around it; at a *rim* the surface ends, or the loop is longer."""
+)
 NONE = "none"
 LISTED_HOLES, LISTED_RIMS = 30, 10
-ASKING = "Looking for the reason …"
-SILENT = "No answer came, since something else was computed instead. Click the hole again to ask once more."
+ASKING = Markdown("Looking for the reason …")
+SILENT = Markdown(
+    "No answer came, since something else was computed instead. Click the hole again to ask once more."
+)
 FILL_MOST_CM = 100.0
-FILL_OFF = "Filling is off. Drag the slider to close small holes by guessing, and see what that is worth."
-FILLING = "Filling …"
-UNFILLED = "No answer came, since something else was computed instead. Drag the slider again."
+FILL_OFF = Markdown(
+    "Filling is off. Drag the slider to close small holes by guessing, and see what that is worth."
+)
+FILLING = Markdown("Filling …")
+UNFILLED = Markdown("No answer came, since something else was computed instead. Drag the slider again.")
 NOTHING: tuple[HoleView, ...] = ()
 WHICH: tuple[Which, ...] = ("after", "before")
 
@@ -60,9 +67,9 @@ class HolesFolder:
             ui.when_changed(self._list, self._listed)
             steps = {"Previous": lambda: self._step(-1), "Next": lambda: self._step(1)}
             ui.buttons("Go to", steps, "The hole before or after this one.")
-            self._why = gui.add_markdown("")
-            self._shares = gui.add_html("")
-            self._parts = gui.add_markdown("")
+            self._why = gui.add_markdown(Markdown(""))
+            self._shares = gui.add_html(Markup(""))
+            self._parts = gui.add_markdown(Markdown(""))
             self._add_filling(ui)
         self.forget()
 
@@ -97,7 +104,7 @@ class HolesFolder:
 
     def parts(self, parts: RayParts | None) -> None:
         """Tell where the rays of all pixels end; None if it is not known."""
-        self._parts.content = "" if parts is None else parts_sentence(parts)
+        self._parts.content = Markdown("") if parts is None else parts_sentence(parts)
 
     def picked(
         self, ray_origin_m: FloatArray, ray_direction: FloatArray, which: Which, offset_m: FloatArray
@@ -176,7 +183,7 @@ class HolesFolder:
         names = self._names()
         self._list.options = [NONE, *names.values()]
         self._list.value = NONE if index is None else names[index]
-        self._shares.content = ""
+        self._shares.content = Markup("")
         if index is None or self._which is None:
             self._drawing.clear()
             self._why.content = self._invitation()
@@ -198,15 +205,15 @@ class HolesFolder:
         )
         return {index: hole_name(index, self._shown[index]) for index in sorted(listed)}
 
-    def _invitation(self) -> str:
+    def _invitation(self) -> Markdown:
         """What to do while no hole is chosen."""
         if not self._holes:
-            return ""
+            return Markdown("")
         if self._which is None:
-            return "Click a red rim, or show one surface alone to have its holes listed here."
+            return Markdown("Click a red rim, or show one surface alone to have its holes listed here.")
         rims = sum(hole.rim for hole in self._shown)
         counts = f"{_count(len(self._shown) - rims, 'hole')} and {_count(rims, 'rim')}"
-        return f"{counts} {self._which} fusion; none is chosen."
+        return Markdown("{} {} fusion; none is chosen.").format(counts, self._which)
 
     def _dragged(self) -> None:
         longest_cm = float(self._fill.value)
@@ -230,12 +237,14 @@ def hole_name(index: int, hole: HoleView) -> str:
     return f"{index + 1}: {100.0 * hole.length_m:,.0f} cm around, {1e4 * hole.area_m2:,.1f} cm²"
 
 
-def reason_text(found: Explanation) -> str:
+def reason_text(found: Explanation) -> Markdown:
     """Markdown: the reason in a word and in a sentence, and what to do about it."""
-    return f"**{found.reason.capitalize()}.** {found.sentence}\n\n**What to try:** {found.remedy}"
+    return Markdown("**{}.** {}\n\n**What to try:** {}").format(
+        found.reason.capitalize(), found.sentence, found.remedy
+    )
 
 
-def shares_table(found: Explanation) -> str:
+def shares_table(found: Explanation) -> Markup:
     """HTML: who has a depth for the pixels that look into the hole; empty if no camera does."""
     rows = [
         (name, hint, number(share, 0, "%", 100.0))
@@ -257,37 +266,44 @@ def shares_table(found: Explanation) -> str:
             ),
         )
     ]
-    return table(rows, ("share of pixels",)) if np.isfinite(found.sensor_share) else ""
+    return table(rows, ("share of pixels",)) if np.isfinite(found.sensor_share) else Markup("")
 
 
-def parts_sentence(parts: RayParts) -> str:
+def parts_sentence(parts: RayParts) -> Markdown:
     """Markdown: where the rays of all pixels end on the surface after fusion."""
 
     def share(value: float) -> str:
         return number(value, 1, "%", 100.0)
 
     missed = parts.missed_measured + parts.missed_inferred + parts.missed_unknown
-    return (
-        f"**All pixel rays, after fusion:** {share(parts.on_sensor)} end on measured surface and "
-        f"{share(parts.on_inferred)} on inferred surface. {share(missed)} miss it: "
-        f"{share(parts.missed_measured)} though the sensor measured there, "
-        f"{share(parts.missed_inferred)} where only inference has a depth, "
-        f"{share(parts.missed_unknown)} where nobody has one."
+    return Markdown(
+        "**All pixel rays, after fusion:** {} end on measured surface and "
+        "{} on inferred surface. {} miss it: "
+        "{} though the sensor measured there, "
+        "{} where only inference has a depth, "
+        "{} where nobody has one."
+    ).format(
+        share(parts.on_sensor),
+        share(parts.on_inferred),
+        share(missed),
+        share(parts.missed_measured),
+        share(parts.missed_inferred),
+        share(parts.missed_unknown),
     )
 
 
-def filled_sentence(view: FilledView) -> str:
+def filled_sentence(view: FilledView) -> Markdown:
     """Markdown: what was invented, and how to judge it."""
     if not view.holes:
-        return "No hole is that small. Drag the slider further."
+        return Markdown("No hole is that small. Drag the slider further.")
     truth = view.mesh.truth
     worth = (
         "" if truth is None else f", and an F-score at 5 cm of {number(truth['f_score_5cm'], 1, '%', 100.0)}"
     )
     area, missed = number(view.area_m2, 1, "cm²", 1e4), view.mesh.quality.no_hit_ray_share
-    return (
-        f"**{_count(view.holes, 'hole')} filled, {area}.** The magenta surface is invented: nobody measured "
-        f"it. It leaves {number(missed, 1, '%', 100.0)} no-hit rays{worth}. Compare that with the surfaces "
+    return Markdown(
+        "**{} filled, {}.** The magenta surface is invented: nobody measured "
+        "it. It leaves {} no-hit rays{}. Compare that with the surfaces "
         "before and after fusion: what fusion adds is inferred from the colour image, not made up from the "
         "rim."
-    )
+    ).format(_count(view.holes, "hole"), area, number(missed, 1, "%", 100.0), worth)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from app.records import Shown
 from app.screens.surface.view import BaselineName, Coloring
+from app.web.markup import Markdown
 from pipeline.config import RadiusRule
 
-TEXT = """**What you see.** A ball rolls over the points and leaves a triangle wherever it rests on three.
+TEXT = Markdown(
+    """**What you see.** A ball rolls over the points and leaves a triangle wherever it rests on three.
 Too small, and it falls through between the points; too large, and it skips detail. Red lines are the rims
 of holes. Drag the radius, and compare before and after fusion. Go on with **Export**."""
+)
 AFTER, BEFORE, BOTH = "after fusion", "before fusion (sensor only)", "side by side"
 POISSON, ALPHA = "Poisson, a baseline", "alpha shape, a baseline"
 BASELINES: dict[str, BaselineName] = {POISSON: "poisson", ALPHA: "alpha"}

@@ -8,6 +8,7 @@ from app.records import ColorBar
 from app.screens.surface.labels import OWN_COLORS
 from app.screens.surface.view import Coloring
 from app.tables import bar_html
+from app.web.markup import Markup
 from pipeline.texture import SEAM_M
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"
@@ -36,20 +37,23 @@ def legend_of(coloring: Coloring, has_truth: bool) -> Legend:
     return Legend(bar=ColorBar(DISTANCE_STOPS, ("on the truth", half, f"{most} or more")))
 
 
-def legend_html(coloring: Coloring, has_truth: bool, baseline: bool = False) -> str:
+def legend_html(coloring: Coloring, has_truth: bool, baseline: bool = False) -> Markup:
     """What the colours mean, of a baseline why it has others, and those of points that the ball left out."""
     left_out = Legend("Points the ball left out:", (("measured", TARGET), _INFERRED))
     surface = Legend() if coloring in _OWN else legend_of(coloring, has_truth)
     closed = Legend(CLOSED if coloring in ("photo", "violet") else "")
     legends = (Legend(OWN_COLORS),) if baseline else (surface, left_out, closed)
     lines = [_line(legend) for legend in legends if legend != Legend()]
-    return "".join(f'<div style="padding: 0 0.8em; font-size: 13px">{line}</div>' for line in lines)
+    return Markup("").join(
+        Markup('<div style="padding: 0 0.8em; font-size: 13px">{}</div>').format(line) for line in lines
+    )
 
 
-def _line(legend: Legend) -> str:
+def _line(legend: Legend) -> Markup:
     if legend.bar is not None:
         return bar_html(legend.bar)
     boxes = (
-        f'<span style="{_BOX}; background: {css(color)}"></span>{text}' for text, color in legend.swatches
+        Markup('<span style="{}; background: {}"></span>{}').format(_BOX, css(color), text)
+        for text, color in legend.swatches
     )
-    return " &emsp; ".join(filter(None, (legend.text, *boxes)))
+    return Markup(" &emsp; ").join(filter(None, (legend.text, *boxes)))

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable, Iterable
 
 from app.records import MeshView
 from app.screens.surface.labels import BASELINE_HEADS
 from app.screens.surface.view import BaselineView, PaintedView, SurfaceView
 from app.tables import UNKNOWN, WAITING, Row, number, table, truth_rows
+from app.web.markup import Markup
 
 
-def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_truth: bool) -> str:
+def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_truth: bool) -> Markup:
     """HTML: before and after fusion and, beside them, the baselines that have been computed."""
     columns: dict[str, MeshView | None] = {"before": view.before, "after fusion": view.after}
     columns |= {BASELINE_HEADS[baseline.name]: baseline.mesh for baseline in baselines}
@@ -74,56 +74,57 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
     ]
     if has_truth:
         rows[1:1] = truth_rows(list(columns.values()))
-    head = ", ".join(f"{1000 * radius_m:.1f}" for radius_m in view.radii_m)
-    look = "class='packetmesh-numbers' style='padding: 0 0.8em; font-size: 13px'"
-    caption = f"<div {look}>Ball radii: {head} mm</div>"
+    head = Markup(", ").join(f"{1000 * radius_m:.1f}" for radius_m in view.radii_m)
+    caption = Markup(
+        "<div class='packetmesh-numbers' style='padding: 0 0.8em; font-size: 13px'>Ball radii: {} mm</div>"
+    ).format(head)
     return caption + table(rows, tuple(columns)) + _rule(view) + _price(view)
 
 
-WAIT = "<div style='padding: 0 0.8em; font-size: 13px'>Computing the baseline …</div>"
+WAIT = Markup("<div style='padding: 0 0.8em; font-size: 13px'>Computing the baseline …</div>")
 
 
-def note_html(view: BaselineView) -> str:
+def note_html(view: BaselineView) -> Markup:
     """What a baseline is, and what it took."""
-    text = f"{html.escape(view.note)} It took {view.elapsed_s:.1f} s."
-    return f"<div style='padding: 0 0.8em; font-size: 13px'>{text}</div>"
+    text = f"{view.note} It took {view.elapsed_s:.1f} s."
+    return Markup("<div style='padding: 0 0.8em; font-size: 13px'>{}</div>").format(text)
 
 
-def quick_line(view: PaintedView) -> str:
+def quick_line(view: PaintedView) -> Markup:
     """What the quick look shows, while the numbers below are still those before it."""
     mesh, radius_mm = next(iter(view.meshes.values())), 1000 * (view.request.radius_m or 0.0)
     part = "" if view.points == view.all_points else f" of {view.all_points:,}; the rest when you let go"
-    return (
-        f"<div style='padding: 0 0.8em; font-size: 13px'><b>{radius_mm:.1f} mm</b>: "
-        f"{mesh.triangles:,} triangles over {view.points:,} points{part}; rolled in "
-        f"{1000 * view.roll_s:.0f} ms</div>"
-    )
+    return Markup(
+        "<div style='padding: 0 0.8em; font-size: 13px'><b>{:.1f} mm</b>: "
+        "{:,} triangles over {:,} points{}; rolled in "
+        "{:.0f} ms</div>"
+    ).format(radius_mm, mesh.triangles, view.points, part, 1000 * view.roll_s)
 
 
-def _rule(view: SurfaceView) -> str:
+def _rule(view: SurfaceView) -> Markup:
     """What is counted as a hole and, where there are more after fusion, why."""
-    text = (
+    text = Markup(
         "A <b>hole</b> is a patch of a camera's picture, of any size, whose rays miss the surface. The outer "
         "rim of the scene is not one."
     )
     before, after = (mesh and mesh.quality.gaps for mesh in (view.before, view.after))
     if before and after and after.count > before.count and after.area_m2 < before.area_m2:
-        text += (
+        text += Markup(
             " Fusion leaves <b>more but smaller</b> ones: it fills the middle of a large hole, and where "
             "guess and measurement do not quite meet, a seam of tiny ones stays. Their area falls from "
-            f"{before.area_m2:.2f} to {after.area_m2:.2f} m²."
-        )
-    return f"<div style='padding: 0.2em 0.8em; font-size: 13px'>{text}</div>"
+            "{:.2f} to {:.2f} m²."
+        ).format(before.area_m2, after.area_m2)
+    return Markup("<div style='padding: 0.2em 0.8em; font-size: 13px'>{}</div>").format(text)
 
 
-def _price(view: SurfaceView) -> str:
+def _price(view: SurfaceView) -> Markup:
     """Says so if the filled surface is nearer to complete but farther from the truth; empty otherwise."""
     if view.before is None or view.before.truth is None or view.after.truth is None:
-        return ""
+        return Markup("")
     before, after = (mesh.truth["f_score_5cm"] for mesh in (view.before, view.after) if mesh.truth)
     if after >= before:
-        return ""
-    return (
+        return Markup("")
+    return Markup(
         "<div style='padding: 0.4em 0.8em; font-size: 13px'>Fewer holes have a price here: what fills them "
-        f"is guessed, and the F-score falls from {before:.1%} to {after:.1%}.</div>"
-    )
+        "is guessed, and the F-score falls from {:.1%} to {:.1%}.</div>"
+    ).format(before, after)

@@ -36,6 +36,7 @@ from app.screens.surface.view import (
 from app.screens.surface.walks import Walks
 from app.state import Spec, Step
 from app.ui import STOP, Offers, Panel
+from app.web.markup import Markup
 from pipeline.types import FloatArray
 
 NAMES = {rule: name for name, rule in RULES.items()}
@@ -53,7 +54,7 @@ class SurfacePanel(Panel):
         gui, session = self.gui, self.session
         self._view: SurfaceView | None = None
         self._look: SurfaceLook | None = None
-        self._quick_line = ""
+        self._quick_line = Markup("")
         self._by_click = self._quickly_drawn = False
         self._thinning: tuple[int, int] | None = None
         self._key = session.spec.key("surface")
@@ -76,8 +77,8 @@ class SurfacePanel(Panel):
         self.ui.when_changed(self._shown, self._picked_shown)
         for shown in (self._loops, self._unused):
             self.ui.when_changed(shown, self._arrange)
-        self._quick = gui.add_html("")
-        self._table = gui.add_html("")
+        self._quick = gui.add_html(Markup(""))
+        self._table = gui.add_html(Markup(""))
         self._histogram = gui.add_plotly(spacing_figure(None), aspect=0.62, config={"displayModeBar": False})
         self._build_folders()
         self.in_address |= {STOP: self._lesson, "ball": self._walks.folder}
@@ -196,7 +197,7 @@ class SurfacePanel(Panel):
                 self._radius.min, self._radius.max = slider_range_mm(view.spacing, view.radii_m)
                 self._radius.value = round(2000.0 * view.radii_m[-1]) / 2.0
             self._show_numbers()
-            self._quick.content = ""
+            self._quick.content = Markup("")
             self._arrange()
         if view.before is not None:
             suggested_m = [row.radius_m for row in view.suggestions]
@@ -240,13 +241,13 @@ class SurfacePanel(Panel):
                 self._ball.show(view)
                 self._quickly_drawn = True
             self._look_quickly.sent([mesh.vertices for mesh in drawn if mesh.triangles] if quick else ())
-        self._quick_line = quick_line(view) if quick else ""
+        self._quick_line = quick_line(view) if quick else Markup("")
         self.ui.flush()
 
     def _picked_shown(self) -> None:
         """Show another surface; that of a baseline is made first."""
         name = BASELINES.get(self._shown.value)
-        self._quick.content = ""
+        self._quick.content = Markup("")
         if name is None or self._view is None:
             self._load_holes()
         else:
@@ -256,7 +257,7 @@ class SurfacePanel(Panel):
     def _made(self, name: BaselineName, made: bool) -> None:
         """A baseline is there, or could not be made."""
         if not made:
-            self._shown.value, self._quick.content = AFTER, ""
+            self._shown.value, self._quick.content = AFTER, Markup("")
         else:
             self._show_numbers()
             if BASELINES.get(self._shown.value) == name:

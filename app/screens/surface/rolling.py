@@ -16,6 +16,7 @@ from app.screens.surface.view import Which
 from app.screens.surface.walk_view import Happening, WalkRequest, WalkView
 from app.timeline import Curve, CurvesLane
 from app.ui import Ui
+from app.web.markup import Markdown
 from packetmesh.errors import InputError
 from pipeline.types import FloatArray
 
@@ -23,10 +24,12 @@ BELOW = "/surface/rolling"
 CLOSE_UP, WHOLE = "close up, pivot by pivot", "the whole surface, fast"
 WAYS = {CLOSE_UP: "close", WHOLE: "whole"}
 CLOUDS: dict[str, Which] = {AFTER: "after", BEFORE: "before"}
-TEXT = """A ball of true size is put down on three points and turns about one edge after the other until it
+TEXT = Markdown(
+    """A ball of true size is put down on three points and turns about one edge after the other until it
 touches the next point; every rest leaves a triangle. Green: the front, edges it has yet to turn about. Red:
 edges at which it found nothing, the rims of holes. Darker triangles are those of larger balls."""
-WAITING = "Rolling; the bar at the top shows how far."
+)
+WAITING = Markdown("Rolling; the bar at the top shows how far.")
 HAPPENED: dict[Happening, str] = {
     "seed": "put down on three points",
     "join": "joined a new point",
@@ -58,7 +61,7 @@ class RollingFolder:
         with ui.gui.add_folder("Watch the ball roll", expand_by_default=False):
             ui.gui.add_markdown(TEXT)
             self._add_choices(ui)
-            self._status = ui.gui.add_markdown("")
+            self._status = ui.gui.add_markdown(Markdown(""))
         self._dock = Dock(ui, self._moved, lambda lane, item: None)
 
     def _add_choices(self, ui: Ui) -> None:
@@ -122,7 +125,7 @@ class RollingFolder:
         """Play a walk from its start; None did not come."""
         self.forget()
         if view is None:
-            self._status.content = "Stopped."
+            self._status.content = Markdown("Stopped.")
             return
         self._drawn += 1
         with self._ui.atomic():
@@ -148,7 +151,7 @@ class RollingFolder:
             if self._drawing is not None:
                 clear(self._ui.scene, BELOW)
             self._view = self._drawing = None
-            self._status.content = ""
+            self._status.content = Markdown("")
             self._dock.show(False)
 
     def visit(self, here: bool) -> None:
@@ -196,7 +199,7 @@ def front_lane(view: WalkView) -> CurvesLane:
     return CurvesLane("Front", curves, veil=1.0)
 
 
-def status_line(view: WalkView, done: int) -> str:
+def status_line(view: WalkView, done: int) -> Markdown:
     """What has happened after ``done`` steps."""
     front, dead = view.open_edges(done)
     ball = int(view.step_radius[max(done - 1, 0)])
@@ -204,12 +207,12 @@ def status_line(view: WalkView, done: int) -> str:
     if len(view.radii_m) > 1:
         radius += f" ({ball + 1} of {len(view.radii_m)})"
     words = [
-        f"**Step {done:,} of {view.steps:,}**",
+        Markdown("**Step {:,} of {:,}**").format(done, view.steps),
         f"{view.count(done):,} triangles",
         f"front {len(front):,} edges",
         f"{len(dead):,} found nothing",
         radius,
     ]
     if done and view.happenings:
-        words.append(f"**{HAPPENED[view.happenings[done - 1]]}**")
-    return " · ".join(words)
+        words.append(Markdown("**{}**").format(HAPPENED[view.happenings[done - 1]]))
+    return Markdown(" · ").join(words)

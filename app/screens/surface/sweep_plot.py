@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 from app.drawing.colors import DELIVERED, INFERRED, LOSS, NEUTRAL, SOURCE, TARGET, css
 from app.drawing.marks import mark
 from app.screens.surface.view import SweepView
+from app.web.markup import Markdown
 from pipeline.findings import SweepPoint
 
 NO_HIT, ACCURATE, LEFT, RIGHT = css(LOSS), css(TARGET), css(NEUTRAL), css(INFERRED)
@@ -87,11 +88,11 @@ def _fill(figure: go.Figure, view: SweepView, below: str) -> None:
     mark(figure, widest_mm, "r<sub>F</sub>+σ<sub>D</sub>", css(SOURCE), "left", "dot", log=True)
 
 
-def sweep_sentence(view: SweepView) -> str:
+def sweep_sentence(view: SweepView) -> Markdown:
     """The sweep in a sentence: from where on larger balls close hardly anything, and what they cost."""
     rows = [row for row in view.points if row.triangles]
     if not rows:
-        return "No ball of the sweep leaves a triangle."
+        return Markdown("No ball of the sweep leaves a triangle.")
     missed = np.array([row.no_hit_ray_share for row in rows])
     best = int(missed.argmin())
     level = int(np.flatnonzero(missed < missed[best] + LEVEL_SHARE)[0])
@@ -104,7 +105,7 @@ def sweep_sentence(view: SweepView) -> str:
         parts.append(f"the widest, {_mm(last)}, misses {missed[-1]:.1%} again")
     if level < len(rows) - 1 and math.isfinite(start.accuracy_1cm):
         parts.append(f"accuracy within 1 cm {_went(start.accuracy_1cm, last.accuracy_1cm)} up to {_mm(last)}")
-    return "; ".join(parts) + "."
+    return Markdown("; ").join(parts) + Markdown(".")
 
 
 def _mm(row: SweepPoint) -> str:

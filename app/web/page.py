@@ -1,0 +1,174 @@
+"""The page as the server sends it: viser's, with the app's title, scripts and styles from the first byte.
+
+All scripts are files of this server or have their hash in the content policy (``headers.py``): viser's page
+is one script that unpacks another. The names of files hold a hash of their content, so that browsers keep
+them.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import http
+import re
+from base64 import b64encode
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly
+import viser
+import zstandard
+from websockets.datastructures import Headers
+from websockets.http11 import Response
+
+from app.web.markup import Markup, plain_text
+from app.web.origin import Answer, answering
+from packetmesh.errors import InputError
+
+TITLE = "PacketMesh"
+_DIGITS = b"!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
+"""Of the base 88 in which viser's page holds its own script."""
+_PACKED = re.compile(r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">(.*?)</script>', re.DOTALL)
+_AT_ONCE, _IN_TURN = 'if(document.readyState==="loading")', "if(!window.packetmesh)"
+"""When viser's script waits for the page before it runs the one that it unpacks."""
+
+
+@dataclass(frozen=True)
+class File:
+    """What a path of the server gives."""
+
+    path: str
+    kind: str
+    """MIME type."""
+    content: bytes
+    kept: bool = True
+    """Whether its content is always the same, so that a browser need not ask again."""
+
+    @cached_property
+    def packed(self) -> bytes:
+        """Its content as gzip."""
+        return gzip.compress(self.content)
+
+    def response(self, accepted: str) -> Response:
+        """Return the answer to a browser that accepts these encodings."""
+        packed = "gzip" in accepted
+        body = self.packed if packed else self.content
+        headers = Headers()
+        headers["Content-Type"] = self.kind
+        headers["Content-Length"] = str(len(body))
+        headers["Content-Encoding"] = "gzip" if packed else "identity"
+        headers["Vary"] = "Accept-Encoding"
+        headers["Cache-Control"] = "public, max-age=31536000, immutable" if self.kept else "no-cache"
+        return Response(http.HTTPStatus.OK, "OK", headers, body)
+
+
+class Page:
+    """Viser's page with what the app adds, read once."""
+
+    def __init__(
+        self, scripts: Sequence[Path], styles: Sequence[Path], greetings: Mapping[str, Markup]
+    ) -> None:
+        """Read everything.
+
+        Args:
+            scripts: the app's own, in the order in which they run.
+            styles: the app's own.
+            greetings: HTML that stands over the page when it is opened by a path with its query.
+
+        Raises:
+            InputError: the installed viser has another page than those that are known.
+        """
+        self._viser = _viser_page()
+        files = (
+            _file("plotly", "js", [Path(plotly.__file__).parent / "package_data" / "plotly.min.js"]),
+            _file("packetmesh", "js", scripts),
+            _file("packetmesh", "css", styles),
+        )
+        *scripted, style = files
+        head = Markup('<link rel="stylesheet" href="{}">').format(style.path)
+        head += Markup("").join(
+            Markup('<script defer src="{}"></script>').format(one.path) for one in scripted
+        )
+        usual = self._page(head, Markup(""))
+        self._files = {one.path: one for one in files} | {"/": usual, "/index.html": usual}
+        self._greetings = {place: self._page(head, greeting) for place, greeting in greetings.items()}
+
+    def served(self) -> AbstractContextManager[None]:
+        """Servers that start meanwhile send this page and its files."""
+        return answering(self._answering)
+
+    @cached_property
+    def script_hashes(self) -> tuple[str, ...]:
+        """What the content policy says of viser's scripts: of the one in the page, and of what it unpacks."""
+        return tuple(map(_hash, _viser_scripts(self._viser)))
+
+    def _page(self, head: Markup, greeting: Markup) -> File:
+        text = self._viser.replace("<title>Viser</title>", f"<title>{TITLE}</title>", 1)
+        text = text.replace("</head>", plain_text(head) + "</head>", 1)
+        before, end, after = text.rpartition("</body>")
+        text = f"{before}{plain_text(greeting)}{end}{after}"
+        return File("/", "text/html; charset=utf-8", text.encode(), kept=False)
+
+    def _answering(self, answer: Answer) -> Answer:
+        def answered(connection: Any, request: Any) -> Any:
+            path = request.path
+            found = self._greetings.get(path) or self._files.get(path.partition("?")[0])
+            if found is None or "Upgrade" in request.headers:
+                return answer(connection, request)
+            return found.response(request.headers.get("Accept-Encoding", ""))
+
+        return answered
+
+
+def _file(name: str, suffix: str, parts: Sequence[Path]) -> File:
+    content = b"\n".join(part.read_bytes() for part in parts)
+    mark = hashlib.sha256(content).hexdigest()[:12]
+    kinds = {"js": "text/javascript; charset=utf-8", "css": "text/css; charset=utf-8"}
+    return File(f"/{name}-{mark}.{suffix}", kinds[suffix], content)
+
+
+def _viser_page() -> str:
+    """Viser's page, which begins only when the app's scripts have run: they prepare things for it.
+
+    Raises:
+        InputError: it is another page than those that are known.
+    """
+    path = Path(viser.__file__).parent / "client" / "build" / "index.html"
+    page = path.read_text(encoding="utf-8")
+    if page.count(_AT_ONCE) != 1 or page.count("<script") != 1 or _PACKED.search(page) is None:
+        raise InputError(
+            f"The page of viser {viser.__version__} is not known to PacketMesh; try to install viser 1.1.1"
+        )
+    return page.replace(_AT_ONCE, _IN_TURN)
+
+
+def _viser_scripts(page: str) -> Iterator[str]:
+    """The script in viser's page, and the one that it unpacks and runs."""
+    found = _PACKED.search(page)
+    assert found is not None
+    packed, style_bytes, code_bytes, script = found.groups()
+    unpacked = zstandard.ZstdDecompressor().decompress(_from_base88(packed))
+    yield script
+    yield unpacked[int(style_bytes) :][: int(code_bytes)].decode()
+
+
+def _from_base88(text: str) -> bytes:
+    """Five digits are four bytes; of a rest, one digit more than bytes."""
+    places = np.full(128, -1, dtype=np.int64)
+    places[np.frombuffer(_DIGITS, dtype=np.uint8)] = np.arange(88)
+    digits = places[np.frombuffer(text.encode("ascii"), dtype=np.uint8)]
+    rest = len(digits) % 5
+    whole = digits[: len(digits) - rest].reshape(-1, 5) @ 88 ** np.arange(4, -1, -1)
+    value = 0
+    for digit in digits[len(digits) - rest :]:
+        value = 88 * value + int(digit)
+    return whole.astype(">u4").tobytes() + (value.to_bytes(rest - 1, "big") if rest else b"")
+
+
+def _hash(script: str) -> str:
+    return f"'sha256-{b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
