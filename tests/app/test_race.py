@@ -141,6 +141,12 @@ def test_an_inferred_cloud_belongs_where_it_is(rig, nodes):
     assert contest.target is nodes[2].sensor
 
 
+@pytest.mark.parametrize("which", ["source", "target"])
+def test_a_node_that_an_address_names_has_to_be_there(rig, nodes, which):
+    with pytest.raises(InputError, match=f"has {len(nodes)} nodes, and none is number 99"):
+        contest_of(rig, nodes, Race(**{which: 99}))
+
+
 def test_a_node_is_not_moved_onto_itself(rig, nodes):
     with pytest.raises(InputError, match="cannot be moved onto itself"):
         contest_of(rig, nodes, Race(source=1, target=1))

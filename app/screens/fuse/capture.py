@@ -106,7 +106,7 @@ def capture_sentence(view: CaptureView) -> str:
     """How many starts every method arrives from."""
     counts = (view.errors_m < SUCCESS_M).sum(axis=(1, 2))
     starts = view.errors_m[0].size
-    reached = Markup(", ").join(f"{label} {count}" for label, count in zip(view.labels, counts, strict=True))
+    reached = ", ".join(f"{label} {count}" for label, count in zip(view.labels, counts, strict=True))
     return f"Of {starts} starts, so many end within {100 * SUCCESS_M:.0f} cm: {reached}."
 
 

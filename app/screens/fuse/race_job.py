@@ -113,8 +113,13 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
     """The clouds of a race.
 
     Raises:
-        InputError: a node cannot be moved onto itself.
+        InputError: the scene has no such node, or it cannot be moved onto itself.
     """
+    last = max(race.source, race.target)
+    if last >= len(nodes):
+        raise InputError(
+            f"This scene has {len(nodes)} nodes, and none is number {last}; choose another node."
+        )
     moving = nodes[race.source]
     if race.mode == "inferred":
         source, target = moving.inferred, moving.sensor

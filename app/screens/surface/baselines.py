@@ -5,12 +5,12 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Hashable
 
-import viser
-
 from app.screens.surface.numbers import WAIT, note_html
 from app.screens.surface.stage import SurfaceStage
 from app.screens.surface.view import BaselineName, BaselineView
 from app.session import Session
+from app.web.markup import Markup
+from app.window.gui import Piece
 
 
 class Baselines:
@@ -20,7 +20,7 @@ class Baselines:
         self,
         session: Session,
         stage: SurfaceStage,
-        line: viser.GuiHtmlHandle,
+        line: Piece[Markup],
         on_made: Callable[[BaselineName, bool], None],
     ) -> None:
         """Keep none yet.

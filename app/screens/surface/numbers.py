@@ -74,7 +74,7 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
     ]
     if has_truth:
         rows[1:1] = truth_rows(list(columns.values()))
-    head = Markup(", ").join(f"{1000 * radius_m:.1f}" for radius_m in view.radii_m)
+    head = ", ".join(f"{1000 * radius_m:.1f}" for radius_m in view.radii_m)
     caption = Markup(
         "<div class='packetmesh-numbers' style='padding: 0 0.8em; font-size: 13px'>Ball radii: {} mm</div>"
     ).format(head)
