@@ -17,16 +17,18 @@ from app.page import page_call
 from app.ui import Ui
 from app.web.markup import Markup
 
+NO_TABLE = Markup("")
+
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
     """What is shown at a time."""
 
     title: str
-    legend: str
+    legend: Markup
     """HTML: what the signs in all plots mean."""
     figures: tuple[go.Figure, ...]
-    table: str = ""
+    table: Markup = NO_TABLE
     """HTML, right of the plots."""
 
 

@@ -1,13 +1,19 @@
 """The numbers of the Calibrate screen that need no photographs: what goes together, the thesis's table."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from app.screens.calibrate import thesis
+from app.screens.calibrate.bars import Bar, bars_html
 from app.screens.calibrate.noise_view import NoiseRequest, NoiseView
 from app.screens.calibrate.parameters import correlation_html, signed, strongest_sentence
 from app.screens.calibrate.scatter import PAIRS, noise_sheet
+from app.screens.calibrate.terms import HALVES, HELD_OUT, RMS
 from app.screens.calibrate.thesis import nearest_cell
+from app.screens.calibrate.trust import verdict_html
+from app.tables import term
 from lab.claims.calibration.protocol import TRUTH
 from pipeline.calibration.correlation import DISTANCE, Correlations, Pair
 
@@ -79,3 +85,17 @@ def test_the_sheet_has_axes_with_units_signs_and_the_thesis_beside_the_trials():
     assert sheet.table.count("<tr>") == 1 + len(NAMES)
     assert "thesis" in sheet.table
     assert "Table 4.1" not in noise_sheet(trials(3, 0.0)).legend
+
+
+def test_the_row_of_bars_explains_its_words_and_shows_names_as_text():
+    shown = bars_html((Bar("<i>'", 0.2, 0.3), Bar('"><b>', None, None)), "<i>'")
+    assert all(word in shown for word in (term("RMS", RMS), term("held out", HELD_OUT)))
+    for name in ("&lt;i&gt;&#39;", "&#34;&gt;&lt;b&gt;"):
+        assert f'data-packetmesh-pick="{name}" title="View {name}:' in shown
+
+
+def test_the_verdict_explains_its_halves_and_shows_names_as_text():
+    lines = ("Not good enough", "Two halves differ", "Out of line: view <b>")
+    shown = verdict_html(SimpleNamespace(passed=False, lines=lines))
+    assert f"{term('Two halves', HALVES)} differ" in shown
+    assert "view &lt;b&gt;" in shown

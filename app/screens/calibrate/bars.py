@@ -79,10 +79,10 @@ def bars_html(bars: tuple[Bar, ...], chosen: str) -> Markup:
     if not bars:
         return Markup('<div class="{}" data-packetmesh-field>{}</div>').format(MARK, hide)
     kept = [bar.rms_px for bar in bars if bar.rms_px is not None and not bar.dropped]
-    meaning = (
-        f"Error of each of {len(bars)} views, px ({term('RMS', RMS)}): bar by the lens that has seen it, "
-    )
-    meaning += f"line by one that has not ({term('held out', HELD_OUT)}). Click one."
+    meaning = Markup(
+        "Error of each of {} views, px ({}): bar by the lens that has seen it, "
+        "line by one that has not ({}). Click one."
+    ).format(len(bars), term("RMS", RMS), term("held out", HELD_OUT))
     if len(kept) < len(bars):
         meaning += " ✕ no board found, pale: dropped."
     return Markup(

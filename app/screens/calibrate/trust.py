@@ -12,7 +12,7 @@ from app.screens.calibrate.terms import HALVES
 from app.screens.calibrate.view import TrustRequest, TrustView
 from app.tables import number, table, term
 from app.ui import Ui
-from app.web.markup import Markdown, Markup
+from app.web.markup import Markdown, Markup, escape
 
 REST_S = 0.3
 OWN_M = 2.0
@@ -91,7 +91,7 @@ def verdict_html(view: TrustView | None) -> Markup:
     if view is None:
         return Markup("")
     sign, color = ("✓ PASS", DELIVERED) if view.passed else ("✗ FAIL", LOSS)
-    first, *rest = view.lines
+    first, *rest = (escape(line) for line in view.lines)
     rest = [line.replace("Two halves", term("Two halves", HALVES)) for line in rest]
     more = Markup("").join(Markup("<div style='margin-top: 0.4em'>{}</div>").format(line) for line in rest)
     return Markup(
