@@ -4,6 +4,8 @@ window.packetmeshAddress = (() => {
   let name = null; // of the session's hidden field
   let keys = []; // its own in the query
   let said = 0;
+  let unsaid = null; // what the server has yet to hear
+  let again = 0; // the timer of the next try to say it
 
   function split() {
     const own = new URLSearchParams(), others = new URLSearchParams();
@@ -12,10 +14,18 @@ window.packetmeshAddress = (() => {
     return [own.toString(), others.toString()];
   }
 
-  // To the server: what the address asks for. A number tells two that are alike apart.
+  // To the server, as soon as it hears: what the address asks for.
   function say() {
-    if (!window.packetmeshDockRow.write(name, `${said + 1} ${split()[0]}`)) return void setTimeout(say, 100);
+    unsaid = split()[0];
+    deliver();
+  }
+
+  // A number tells two that are alike apart.
+  function deliver() {
+    clearTimeout(again);
+    if (!window.packetmeshDockRow.write(name, `${said + 1} ${unsaid}`)) return void (again = setTimeout(deliver, 100));
     said += 1;
+    unsaid = null;
   }
 
   window.addEventListener("popstate", say); // Back and forward
@@ -34,8 +44,10 @@ window.packetmeshAddress = (() => {
       say();
     },
 
-    // What is shown now; a place of its own among those that Back knows, or a change to the one before.
+    // What is shown now; a place of its own among those that Back knows, or a change to the one before. It is
+    // out of date while the server has yet to hear what was asked for meanwhile.
     show(text, place) {
+      if (unsaid !== null) return;
       const [own, others] = split();
       const query = others ? `${others}&${text}` : text;
       if (own !== text) history[place ? "pushState" : "replaceState"](null, "", `${location.pathname}?${query}`);

@@ -172,9 +172,9 @@ class Address:
         return place_of(text, self._start, self._screens, sources, self._keys)
 
     def _say(self) -> None:
+        """Tell the page what its address should be, also if it asked for just that: it may have heard of
+        another place since."""
         place, text = self._place, self._place.text()
-        if text == self._text:
-            return
         before, wrong = self._read(self._text)
         new = not wrong and place.is_beside(before)
         self._text = text

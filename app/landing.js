@@ -30,7 +30,7 @@
     const screen = new URLSearchParams(place).get("screen");
     const steps = () => [...document.querySelectorAll("div:has(> .packetmesh-steps) + div button")];
     if (shared) once(() => steps().find(one => one.textContent.toLowerCase().startsWith(screen)), step => step.click());
-    else once(() => window.packetmeshAddress, address => address.ask(place));
+    else window.packetmeshAddress.ask(place);
   }
 
   function openLesson(title) {

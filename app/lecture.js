@@ -41,12 +41,12 @@ window.packetmeshLecture = (() => {
     chip.classList.toggle("packetmesh-refused", refused > 0);
     back.hidden = state.follows;
     document.documentElement.classList.toggle("packetmesh-seated", !state.steers);
-    window.packetmeshLesson?.show();
+    window.packetmeshLesson.show();
     place();
   }
 
   function place() {
-    const home = window.packetmeshDockRow?.root();
+    const home = window.packetmeshDockRow.root();
     if (!home) return void setTimeout(place, 200);
     if (!chip.isConnected) home.append(chip);
   }

@@ -34,7 +34,7 @@
 
   // A guess; of somebody in a class it is a vote.
   function press(name) {
-    if (!window.packetmeshLecture?.vote(Number(name))) button(name)?.click();
+    if (!window.packetmeshLecture.vote(Number(name))) button(name)?.click();
   }
 
   function give(toDock) {
@@ -71,7 +71,7 @@
     waiting = false;
     if (!mark?.isConnected) frame([], []);
     const text = mark?.isConnected ? textOf(mark) : null;
-    const home = window.packetmeshDockRow?.root();
+    const home = window.packetmeshDockRow.root();
     if (!text || !home) return card.remove();
     const large = "large" in mark.dataset;
     const html = `<div class="told">${columns([...text.children], large)}</div>${row()}`;
@@ -99,7 +99,7 @@
   function html(parts) {
     const waits = button("1") !== undefined;
     const choice = (one, index) => {
-      const voted = window.packetmeshLecture?.voted === index + 1;
+      const voted = window.packetmeshLecture.voted === index + 1;
       return `<button type="button" class="choice" data-press="${index + 1}" aria-pressed="${voted}">` +
         `<b>${index + 1}</b><span>${one.innerHTML}</span></button>`;
     };
@@ -153,10 +153,10 @@
   }).observe(document.body, {childList: true, subtree: true, characterData: true});
 
   window.packetmeshLesson = {
-    // A stop is shown whose mark holds this image: the keys are its own, also after its list was used. A list
+    // A stop is shown whose mark holds this element: the keys are its own, also after its list was used. A list
     // that somebody has opened again meanwhile stays open.
-    at(image, folders, names) {
-      mark = image.closest(".packetmesh-lesson");
+    at(element, folders, names) {
+      mark = element.closest(".packetmesh-lesson");
       folder = folderOf(mark);
       give(false);
       if (document.activeElement?.matches("input:not([aria-expanded=true])")) document.activeElement.blur();
@@ -167,5 +167,5 @@
 
     show,
   };
-  packetmesh.calls.lesson = (mark, opens, sees) => window.packetmeshLesson.at(mark, opens, sees);
+  packetmesh.calls.lesson = (element, opens, sees) => window.packetmeshLesson.at(element, opens, sees);
 })();

@@ -9,12 +9,14 @@
   }
 
   new MutationObserver(changes => {
+    const come = new Set(); // once each, also if it and what it lies in came one after the other
     for (const {addedNodes} of changes)
       for (const node of addedNodes) {
         if (node.nodeType !== Node.ELEMENT_NODE || !node.isConnected) continue;
-        if (node.matches("[data-packetmesh-call]")) call(node);
-        node.querySelectorAll("[data-packetmesh-call]").forEach(call);
+        if (node.matches("[data-packetmesh-call]")) come.add(node);
+        for (const one of node.querySelectorAll("[data-packetmesh-call]")) come.add(one);
       }
+    for (const element of come) queueMicrotask(() => call(element)); // one that fails stops no other
   }).observe(document.documentElement, {childList: true, subtree: true});
 
   // viser makes itself ready for Gaussian splats, which the app never draws, with code made of text, which the

@@ -3,8 +3,10 @@ anything anywhere else, being framed.
 
 Scripts are files of this server, or the two of viser's page by their hashes: a script that gets into the
 page by a text, an attribute or an address does not run. Viser's page compiles WebAssembly, works in blobs
-and sets styles as it runs; so styles within the page are allowed. With them a text could change how the page
-looks, but not what it does, and nothing could be fetched from or sent to another place.
+and sets styles as it runs; so styles within the page are allowed. A text that got past the escaping could
+change how the page looks, and call what ``page.js`` offers the server by name; no script of its own runs, and
+the page fetches nothing from another place and sends nothing there. What no policy forbids is to leave: by a
+link, or a ``<meta http-equiv=refresh>``, which needs no click.
 """
 
 from __future__ import annotations

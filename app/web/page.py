@@ -84,6 +84,8 @@ class Page:
             InputError: the installed viser has another page than those that are known.
         """
         self._viser = _viser_page()
+        self.script_hashes = tuple(map(_hash, _viser_scripts(self._viser)))
+        """What the content policy says of viser's scripts: of the one in the page, and of what it unpacks."""
         files = (
             _file("plotly", "js", [Path(plotly.__file__).parent / "package_data" / "plotly.min.js"]),
             _file("packetmesh", "js", scripts),
@@ -101,11 +103,6 @@ class Page:
     def served(self) -> AbstractContextManager[None]:
         """Servers that start meanwhile send this page and its files."""
         return answering(self._answering)
-
-    @cached_property
-    def script_hashes(self) -> tuple[str, ...]:
-        """What the content policy says of viser's scripts: of the one in the page, and of what it unpacks."""
-        return tuple(map(_hash, _viser_scripts(self._viser)))
 
     def _page(self, head: Markup, greeting: Markup) -> File:
         text = self._viser.replace("<title>Viser</title>", f"<title>{TITLE}</title>", 1)
@@ -140,19 +137,30 @@ def _viser_page() -> str:
     """
     path = Path(viser.__file__).parent / "client" / "build" / "index.html"
     page = path.read_text(encoding="utf-8")
-    if page.count(_AT_ONCE) != 1 or page.count("<script") != 1 or _PACKED.search(page) is None:
-        raise InputError(
-            f"The page of viser {viser.__version__} is not known to PacketMesh; try to install viser 1.1.1"
-        )
+    once = (_AT_ONCE, "<script", "<title>Viser</title>", "</head>")
+    if any(page.count(part) != 1 for part in once) or _PACKED.search(page) is None:
+        raise _unknown()
     return page.replace(_AT_ONCE, _IN_TURN)
 
 
+def _unknown() -> InputError:
+    version = viser.__version__
+    return InputError(f"The page of viser {version} is not known to PacketMesh; try to install viser 1.1.1")
+
+
 def _viser_scripts(page: str) -> Iterator[str]:
-    """The script in viser's page, and the one that it unpacks and runs."""
+    """The script in viser's page, and the one that it unpacks and runs.
+
+    Raises:
+        InputError: what is in the page is packed in another way than is known.
+    """
     found = _PACKED.search(page)
     assert found is not None
     packed, style_bytes, code_bytes, script = found.groups()
-    unpacked = zstandard.ZstdDecompressor().decompress(_from_base88(packed))
+    try:
+        unpacked = zstandard.ZstdDecompressor().decompress(_from_base88(packed))
+    except (ValueError, OverflowError, zstandard.ZstdError):  # packed in another way
+        raise _unknown() from None
     yield script
     yield unpacked[int(style_bytes) :][: int(code_bytes)].decode()
 

@@ -1,7 +1,10 @@
 """Who comes in where other machines reach the server, and what browsers are told to forbid."""
 
 import contextlib
+import hashlib
 import http.client
+import re
+from base64 import b64encode
 from contextlib import closing
 from urllib.parse import quote
 
@@ -12,6 +15,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from app.cli import main
+from app.landing import app_page
 from app.load.connection import Connection, wait_for
 from app.web.entrance import Entrance, Token, is_loopback
 from app.web.gate import Gate
@@ -120,6 +124,26 @@ def test_every_answer_forbids_other_sites(server, lets_in):
     assert f"ws://127.0.0.1:{server.get_port()}" in policy["connect-src"]
     assert not any("http" in sources or "*" in sources for sources in policy.values())
     assert response.headers["X-Content-Type-Options"] == "nosniff"
+
+
+def test_scripts_are_files_of_the_server_or_known_by_their_hashes():
+    page = app_page(lecture=False)
+    with strict_headers(page.script_hashes), page.served():
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        for path in ("/", "/?scene", "/nothing"):
+            response = get(server, path)
+            policy = dict(
+                part.split(" ", 1) for part in response.headers["Content-Security-Policy"].split("; ")
+            )
+            wanted = {"'self'", "'wasm-unsafe-eval'", *page.script_hashes}
+            assert set(policy["script-src"].split()) == wanted
+            assert policy["object-src"] == policy["frame-src"] == policy["form-action"] == "'none'"
+        inline = re.findall(rb"<script(?! defer src=)[^>]*>(.*?)</script>", get(server).text, re.DOTALL)
+        digests = [b64encode(hashlib.sha256(one).digest()).decode() for one in inline]
+        assert [f"'sha256-{one}'" for one in digests] == [page.script_hashes[0]]
+    finally:
+        server.stop()
 
 
 def test_the_policy_holds_no_header_of_a_stranger(server):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import hashlib
 import html
 import http.client
 import re
@@ -17,6 +18,7 @@ from app.landing import LESSON_PLACES, PICTURES, SCRIPTS, STYLES, app_page, land
 from app.lesson_file import LESSONS
 from app.server import PANELS
 from app.state import Spec
+from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_SCENES
 from pipeline.sources import Demo
 
@@ -29,13 +31,18 @@ def port():
     server.stop()
 
 
-def get(port, path):
+def fetch(port, path, encoding="gzip"):
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
-    connection.request("GET", path, headers={"Accept-Encoding": "gzip"})
+    connection.request("GET", path, headers={"Accept-Encoding": encoding})
     answer = connection.getresponse()
-    body, encoding = answer.read(), answer.getheader("Content-Encoding")
+    body = answer.read()
     connection.close()
-    return answer.status, (gzip.decompress(body) if encoding == "gzip" else body).decode()
+    return answer, gzip.decompress(body) if answer.getheader("Content-Encoding") == "gzip" else body
+
+
+def get(port, path):
+    answer, body = fetch(port, path)
+    return answer.status, body.decode()
 
 
 def test_it_is_in_the_page_of_the_bare_address_only(port):
@@ -58,6 +65,41 @@ def test_the_page_has_its_title_and_the_apps_own_files_from_the_first_byte(port)
     here = Path(app.landing.__file__).parent
     parts = {*here.rglob("*.js"), *here.rglob("*.css")} - {*(here / "reports").iterdir()}
     assert parts == {*SCRIPTS, *STYLES}
+
+
+def test_browsers_keep_the_files_by_their_content_and_ask_for_the_page_again(port):
+    page = get(port, "/")[1]
+    for path in re.findall('(?:src|href)="(/[^"]+)"', page):
+        packed, content = fetch(port, path)
+        assert packed.getheader("Content-Encoding") == "gzip"
+        assert "immutable" in packed.getheader("Cache-Control")
+        assert hashlib.sha256(content).hexdigest()[:12] in path
+        kind = "text/css" if path.endswith(".css") else "text/javascript"
+        assert packed.getheader("Content-Type") == f"{kind}; charset=utf-8"
+        plain, same = fetch(port, path, "identity")
+        assert (plain.getheader("Content-Encoding"), same) == ("identity", content)
+    assert fetch(port, "/")[0].getheader("Cache-Control") == "no-cache"
+
+
+@pytest.mark.parametrize(
+    ("known", "other"),
+    [
+        ("data-p=", "data-q="),
+        ('data-p="', 'data-p="~~~~~'),
+        ('data-p="', 'data-p="\u00e9'),
+        ("<title>Viser</title>", "<title>Other</title>"),
+        ("</head>", "<script>1</script></head>"),
+        ('if(document.readyState==="loading")', "if(true)"),
+    ],
+)
+def test_another_page_of_viser_is_no_page_of_the_app(monkeypatch, tmp_path, known, other):
+    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text("utf-8")
+    path = tmp_path / "client" / "build" / "index.html"
+    path.parent.mkdir(parents=True)
+    path.write_text(page.replace(known, other, 1), "utf-8")
+    monkeypatch.setattr(viser, "__file__", str(tmp_path / "__init__.py"))
+    with pytest.raises(InputError, match=re.escape(f"viser {viser.__version__} is not known")):
+        app_page(lecture=False)
 
 
 def test_it_offers_every_lesson_and_every_scene_with_a_small_picture():

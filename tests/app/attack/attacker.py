@@ -31,6 +31,7 @@ def wrong_for(handle):
         extra = (*extra, False)
     if isinstance(handle, viser.GuiDropdownHandle | viser.GuiButtonGroupHandle):
         extra = ("", handle.options[0] + " ", handle.options[0].upper() + "!", 0, True, list(handle.options))
+        return without((*ANYTHING, *extra), (one for one in ANYTHING if one in handle.options))
     if isinstance(handle, viser.GuiNumberHandle | viser.GuiSliderHandle):
         extra = (True, False, "1", handle.value + 0.5 if isinstance(handle.value, int) else math.nan)
         extra += tuple(one for one in (below(handle.min), above(handle.max)) if one is not None)
