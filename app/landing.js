@@ -55,5 +55,6 @@
     else leave();
   });
   window.addEventListener("keydown", escape, true);
+  landing.inert = false; // nobody clicks in vain before this
   landing.querySelector("[data-explore]").focus();
 })();

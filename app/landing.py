@@ -62,7 +62,7 @@ def landing_html(lecture: bool = False) -> Markup:
     shared = Markup(" data-lecture") if lecture else ""
     others = Markup("<div><h2>Or a scene to explore</h2><section>{}</section></div>").format(scenes)
     return Markup(
-        '<main id="packetmesh-landing"{} role="dialog" aria-label="Welcome">'
+        '<main id="packetmesh-landing"{} inert role="dialog" aria-label="Welcome">'
         "<header><div><h1>PacketMesh</h1><p>From a camera network's packets to a surface mesh.</p></div>"
         '<button type="button" data-explore>Explore <kbd>Esc</kbd></button></header>'
         "<article><div><h2>Six lessons, each of one question</h2><section>{}</section></div>{}"

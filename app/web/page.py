@@ -87,8 +87,8 @@ class Page:
         self.script_hashes = tuple(map(_hash, _viser_scripts(self._viser)))
         """What the content policy says of viser's scripts: of the one in the page, and of what it unpacks."""
         files = (
-            _file("plotly", "js", [Path(plotly.__file__).parent / "package_data" / "plotly.min.js"]),
             _file("packetmesh", "js", scripts),
+            _file("plotly", "js", [Path(plotly.__file__).parent / "package_data" / "plotly.min.js"]),
             _file("packetmesh", "css", styles),
         )
         *scripted, style = files

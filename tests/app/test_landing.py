@@ -57,7 +57,7 @@ def test_it_is_in_the_page_of_the_bare_address_only(port):
 def test_the_page_has_its_title_and_the_apps_own_files_from_the_first_byte(port):
     page = get(port, "/?scene")[1]
     assert page.count("<title>PacketMesh</title>") == page.count("<title>") == 1
-    plotly, script = re.findall('<script defer src="([^"]+)">', page)
+    script, plotly = re.findall('<script defer src="([^"]+)">', page)
     (style,) = re.findall('<link rel="stylesheet" href="([^"]+)">', page)
     assert "Plotly" in get(port, plotly)[1]
     assert all(one.read_text("utf-8") in get(port, script)[1] for one in SCRIPTS)
