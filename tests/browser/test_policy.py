@@ -20,7 +20,8 @@ HOSTILE = """
 <embed src="data:text/html,<script>parent.pwned=1</script>">
 <a class=bait href="javascript:window.pwned=1">a</a>
 <base href="{there}"><img src="{there}/image"><img srcset="{there}/images 1x">
-<iframe src="{there}/frame"></iframe><video src="{there}/video" autoplay></video><object data="{there}/object"></object><embed src="{there}/embed">
+<iframe src="{there}/frame"></iframe><video src="{there}/video" autoplay></video>
+<object data="{there}/object"></object><embed src="{there}/embed">
 <link rel=stylesheet href="{there}/sheet"><link rel=prefetch href="{there}/early">
 <style>@import "{there}/more"; .bait {{ background: url("{there}/picture") }}</style>
 <form action="{there}/form"><button class=bait>b</button></form>
