@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 from pathlib import Path
 
-from app.lesson_file import LESSONS
+from app.lesson.files import LESSONS
 from app.web.entrance import WELCOME
 from app.web.markup import Markup
 from app.web.page import Page
@@ -32,14 +32,17 @@ _HERE = Path(__file__).parent
 SCRIPTS = tuple(
     _HERE / f"{name}.js"
     for name in (
-        *("page", "hint", "dock_row", "dock_view", "dock", "dock_plots", "address", "lesson", "lecture"),
-        *("screens/fuse/board", "landing"),
+        *("window/page", "window/hint", "window/dock_row", "dock/dock_view", "dock/dock", "dock/dock_plots"),
+        *("session/address", "lesson/lesson", "session/lecture", "screens/fuse/board", "landing"),
     )
 )
 """In the order in which they run."""
 STYLES = tuple(
     _HERE / f"{name}.css"
-    for name in ("page", "hint", "lesson", "dock", "lecture", "screens/fuse/board", "landing")
+    for name in (
+        *("window/page", "window/hint", "lesson/lesson", "dock/dock", "session/lecture"),
+        *("screens/fuse/board", "landing"),
+    )
 )
 
 

@@ -14,12 +14,13 @@ from typing import Any
 
 import viser
 
-from app.ahead import compute_ahead
+from app.compute.ahead import compute_ahead
+from app.compute.jobs import start_pool
+from app.compute.pool import ComputePool
+from app.compute.state import SharedViews, Spec
+from app.compute.store import Store
 from app.drawing.colors import BRAND
-from app.jobs import start_pool
 from app.landing import app_page
-from app.lecture import Lecture
-from app.pool import ComputePool
 from app.screens.calibrate.panel import CalibratePanel
 from app.screens.depth.panel import DepthPanel
 from app.screens.export.panel import ExportPanel
@@ -27,9 +28,8 @@ from app.screens.fuse.panel import FusePanel
 from app.screens.network.panel import NetworkPanel
 from app.screens.scene.panel import ScenePanel
 from app.screens.surface.panel import SurfacePanel
-from app.session import Session, Target
-from app.state import SharedViews, Spec
-from app.store import Store
+from app.session.lecture import Lecture
+from app.session.session import Session
 from app.web import viser_private as private
 from app.web.crowd import MOST_OF_ONE_ADDRESS, MOST_SESSIONS, Crowd, Visitor
 from app.web.door import Door
@@ -40,6 +40,7 @@ from app.web.origin import only_own_page, well_formed
 from app.web.own_folder import OwnFolder, own_folder
 from app.web.page import Page
 from app.web.uploads import Uploads
+from app.window.ui import Target
 from packetmesh.errors import InputError
 from packetmesh.files import file_trouble
 from packetmesh.memory import give_back_memory, share_arenas

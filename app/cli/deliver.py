@@ -49,8 +49,8 @@ def deliver(
     network, config = _settings(preset, chain, set)
 
     from app.cli.reconstruct import imported_notes
+    from app.cli.runs import iterate_imported
     from app.reports.hand_out_of import write_hand_out
-    from app.runs import iterate_imported
     from packetmesh.files import writable_folder
     from pipeline.deliver import iterate_delivery
     from pipeline.delivery.folder import delivery_metrics, summary, write_delivery_folder

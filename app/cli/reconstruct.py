@@ -53,7 +53,7 @@ def reconstruct(
     source = images.source()
     config = with_settings(config_named(preset, PRESETS), set)
 
-    from app.runs import iterate_run
+    from app.cli.runs import iterate_run
 
     result, metrics = drain(iterate_run(source, preset, config, out, baseline), say_progress)
     before, after = metrics["surface_before"], metrics["surface_after"]
@@ -94,7 +94,7 @@ def _many(
 
     from dataclasses import asdict
 
-    from app.runs import HEADINGS, RigTask, iterate_rigs, rigs_in, rigs_row
+    from app.cli.runs import HEADINGS, RigTask, iterate_rigs, rigs_in, rigs_row
     from packetmesh.files import writable_folder
 
     found = rigs_in(rigs)

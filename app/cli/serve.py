@@ -37,7 +37,7 @@ def serve(
             votes and looks around.
         no_token: With another --host: let in whoever reaches it, not only who has the link that is printed.
     """
-    from app.jobs import start_pool
+    from app.compute.jobs import start_pool
 
     config = config_named(preset, PRESETS)
     stops = list[int]()

@@ -1,1 +1,3 @@
-"""What each screen puts into the 3-D scene."""
+"""Clouds, meshes, cameras, plots and timelines as they are drawn. Imports of ``app`` only ``compute`` and
+``web``.
+"""

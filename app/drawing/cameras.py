@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.compute.records import SceneNode
 from app.drawing.colors import NEUTRAL
 from app.drawing.poses import place
-from app.records import SceneNode
 from pipeline.geometry import apply
 from pipeline.types import FloatArray
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from app.compute.records import Sample
 from app.drawing.colors import NEUTRAL
 from app.drawing.poses import place
-from app.records import Sample
 from pipeline.types import ByteArray, FloatArray
 
 POINT_SIZE_M = 0.012

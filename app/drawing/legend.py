@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from app.compute.records import ColorBar
 from app.drawing.colors import css
-from app.records import ColorBar
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.compute.records import MeshView
 from app.drawing.colors import LOSS, NEUTRAL
 from app.drawing.glb import lines_glb, mesh_glb, textured_glb
-from app.records import MeshView
 from pipeline.io.images import jpeg_of
 from pipeline.texture import Texture
 from pipeline.types import ByteArray, FloatArray, PointSource, Surface, SurfaceResult

@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from app.compute.records import ColorBar, Picture
 from app.drawing.colors import CONFIDENCE_STOPS, HOLE, ramp
-from app.records import ColorBar, Picture
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 UNKNOWN = (90, 90, 90)

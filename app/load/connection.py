@@ -14,7 +14,7 @@ from viser import _messages as messages
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from app.stepper import MARKS
+from app.window.stepper import MARKS
 
 PATIENCE_S = 30.0
 ASKED = "packetmesh.ask("

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from app.compute.pool import PATIENCE_S
 from app.load.serving import Look, Serving, serving
 from app.load.visitor import Diary, Visitor
-from app.pool import PATIENCE_S
 
 SCENE = "living-room"
 BROWSERS = 30

@@ -11,7 +11,7 @@ import numpy as np
 from websockets.exceptions import WebSocketException
 
 from app.load.connection import Connection, wait_for
-from app.stepper import MARKS
+from app.window.stepper import MARKS
 
 STEPS = ("Scene", "Depth", "Fuse", "Surface", "Export")
 """Those that are clicked: none of them has anything computed by being shown."""

@@ -1,1 +1,3 @@
-"""The HTML and pictures that commands write; no display needed."""
+"""The HTML pages and pictures that commands write, without a display. Imports of ``app`` only ``drawing``,
+``compute`` and ``web``.
+"""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image, ImageDraw
 
+from app.drawing.timeline import Lane
 from app.reports.captioned import EDGE_PX, INK, PAPER, SOFT, font
-from app.timeline import Lane
 
 WIDTH_PX = 1600
 _TITLE_PX, _AXIS_PX, _FOOT_PX, _GAP_PX, _RIGHT_PX = 54, 34, 40, 12, 40

@@ -1,1 +1,3 @@
-"""What every screen is made of. Imports of ``app`` only ``drawing``, ``compute`` and ``web``."""
+"""The parts that every screen is built from: controls, tables, the stepper, the page's script and style.
+Imports of ``app`` only ``drawing``, ``compute`` and ``web``.
+"""

@@ -3,7 +3,7 @@
 import pytest
 import viser
 
-from app.store import Store
+from app.compute.store import Store
 
 
 @pytest.fixture(scope="module")

@@ -12,10 +12,10 @@ from types import SimpleNamespace
 
 import viser
 
-from app import jobs
-from app.state import CHAIN, Results, Spec
-from app.ui import Ui
+from app.compute import jobs
+from app.compute.state import CHAIN, Results, Spec
 from app.window.gui import Gui as PanelGui
+from app.window.ui import Ui
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import drain as end
 from pipeline.sources import Demo

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.address import Place, name_of, place_of
-from app.state import Sent, Spec
+from app.compute.state import Sent, Spec
+from app.session.address import Place, name_of, place_of
 from network_sim.config import NetworkConfig
 from packetmesh.settings import with_settings
 from pipeline.config import PRESETS

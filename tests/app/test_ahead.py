@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field, replace
 
-from app.ahead import compute_ahead
-from app.pool import Outcome
-from app.state import CHAIN, SharedViews
+from app.compute.ahead import compute_ahead
+from app.compute.pool import Outcome
+from app.compute.state import CHAIN, SharedViews
 from pipeline.sources import Demo
 from tests.app.fakes import START, end
 

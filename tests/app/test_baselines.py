@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from app.compute.state import Spec
 from app.screens.surface.baselines_job import baseline_job
-from app.state import Spec
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from packetmesh.settings import with_settings

@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 
 from app.cli import main
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.calibrate import bias
 from app.screens.calibrate.job import calibrate_job
 from app.screens.calibrate.request import calibrate_command, views_in
 from app.screens.calibrate.use_job import use_job
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import drain
 from pipeline.sources import RigFolder
 from tests.app.boards import BLANK, MOMENTS, save_believing_rig, save_boards

@@ -13,7 +13,7 @@ from app.screens.calibrate.scatter import PAIRS, noise_sheet
 from app.screens.calibrate.terms import HALVES, HELD_OUT, RMS
 from app.screens.calibrate.thesis import nearest_cell
 from app.screens.calibrate.trust import verdict_html
-from app.tables import term
+from app.window.tables import term
 from lab.claims.calibration.protocol import TRUTH
 from pipeline.calibration.correlation import DISTANCE, Correlations, Pair
 

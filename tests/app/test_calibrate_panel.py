@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 import viser
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.calibrate.labels import AROUND, COVERAGE, DEPTH, HALVES, NEXT, UNCERTAINTY
 from app.screens.calibrate.lesson import left_out
 from app.screens.calibrate.noise import OTHER, READY
 from app.screens.calibrate.panel import CalibratePanel
 from app.screens.calibrate.use import BEFORE, USE
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError
 from pipeline.io.calibrations import node_files
 from pipeline.io.depth_correction import read_depth_correction

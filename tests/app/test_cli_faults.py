@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.runs import RigTask, reconstruct_one
+from app.cli.runs import RigTask, reconstruct_one
 from pipeline.config import PipelineConfig
 from pipeline.io.clouds import read_cloud, write_cloud
 from pipeline.io.demos import load_demo
@@ -155,7 +155,7 @@ def test_a_damaged_run_of_many_is_computed_again(task, tmp_path, monkeypatch, da
     out = tmp_path / "out"
     shutil.copytree(task.out, out)
     DAMAGE[damage](out)
-    monkeypatch.setattr("app.runs.iterate_run", begun)
+    monkeypatch.setattr("app.cli.runs.iterate_run", begun)
     with pytest.raises(ComputedAgain):
         reconstruct_one(replace(task, out=str(out)))
     assert not (out / "task.json").exists()

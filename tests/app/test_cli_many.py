@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.runs import RigTask, iterate_rigs, rigs_in
+from app.cli.runs import RigTask, iterate_rigs, rigs_in
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import drain
 from pipeline.config import PipelineConfig
@@ -104,7 +104,7 @@ def test_an_error_of_the_program_and_a_rig_that_failed_are_rows_and_the_table_is
     shutil.copytree(rigs / "a-rig", folder / "a-rig")
     save_rig(folder / "b-strangers", Rig("b", tuple(two)))
     out = tmp_path / "out"
-    monkeypatch.setattr("app.runs.run_batch", lambda do, tasks, *_, **__: enumerate(map(do, tasks)))
+    monkeypatch.setattr("app.cli.runs.run_batch", lambda do, tasks, *_, **__: enumerate(map(do, tasks)))
     words = ["reconstruct", "--rigs", folder, "--out", out, *QUICK]
     with monkeypatch.context() as broken:
         broken.setattr("pipeline.stages.acquire", nothing)
@@ -131,7 +131,7 @@ def test_the_table_is_written_of_what_was_done_when_the_rest_cannot_be(rigs, tmp
         yield 0, do(tasks[0])
         raise PacketMeshError("The cluster was lost")
 
-    monkeypatch.setattr("app.runs.run_batch", lost)
+    monkeypatch.setattr("app.cli.runs.run_batch", lost)
     chain = "packetmesh", PipelineConfig(), None
     tasks = [RigTask(n, str(rigs / n), str(tmp_path / n), *chain) for n in ("c-empty", "a-rig")]
     with pytest.raises(PacketMeshError, match="lost"):

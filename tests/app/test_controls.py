@@ -5,8 +5,8 @@ import pytest
 import app.screens.depth.settings as depth
 import app.screens.fuse.panel as fuse
 import app.screens.surface.settings as surface
-from app import controls
-from app.controls import Choice, Number, Toggle
+from app.window import controls
+from app.window.controls import Choice, Number, Toggle
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
 

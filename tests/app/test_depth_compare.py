@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.compare import CompareArea, captions_html, split
+from app.compute.records import ColorBar, Picture, ResidualView
 from app.drawing.colors import CONFIDENCE_STOPS, HOLE
 from app.drawing.pictures import (
     EQUAL,
@@ -15,8 +15,8 @@ from app.drawing.pictures import (
     depth_picture,
     difference_picture,
 )
-from app.records import ColorBar, Picture, ResidualView
 from app.screens.depth.residuals import residual_figure
+from app.window.compare import CompareArea, captions_html, split
 from pipeline.types import DepthMap
 from tests.app.fakes import ui_of
 
@@ -149,7 +149,7 @@ def test_pictures_of_the_same_names_replace_those_before():
 
 def test_a_burst_of_the_same_change_is_drawn_once(monkeypatch):
     drawn = []
-    monkeypatch.setattr("app.compare.split", lambda *a: drawn.append(a) or split(*a))
+    monkeypatch.setattr("app.window.compare.split", lambda *a: drawn.append(a) or split(*a))
     screen = Screen()
     screen.area.load(PICTURES_OF)
     for _ in range(9):

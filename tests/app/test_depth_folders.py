@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.records import Picture
+from app.compute.records import Picture
+from app.compute.state import Spec
 from app.screens.depth.hide import BESIDE, BUTTON, SILENT, WAITING, HideFolder, fills_table, painted_line
 from app.screens.depth.labels import AS_IT_SAYS, FILLS
 from app.screens.depth.model import LIMIT_BYTES, SHIPPED, ModelFolder
 from app.screens.depth.numbers import LINES, fitted_line
 from app.screens.depth.settings import with_model
 from app.screens.depth.view import Disc, FillRow, HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
-from app.state import Spec
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig, PipelineConfig
 from pipeline.depth.alignment import ALIGNMENTS, align_depth

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from app.compute.state import Spec
 from app.drawing.colors import HOLE
 from app.drawing.pictures import UNKNOWN, confidence_colors
 from app.screens.depth.discs import window_around
@@ -14,7 +15,6 @@ from app.screens.depth.job import depth_job, judged_view, residual_view
 from app.screens.depth.labels import AS_IT_SAYS, FILLS, NETWORK_PRESETS, PICTURES
 from app.screens.depth.model_job import model_job
 from app.screens.depth.view import Disc, HideRequest, ModelChoice, SeenSample
-from app.state import Spec
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from pipeline.acquisition import acquire

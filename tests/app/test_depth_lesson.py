@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.lesson_file import read_lesson
+from app.lesson.files import read_lesson
 from app.screens.depth.hide_job import hidden_pixels
 from app.screens.depth.labels import EVERYWHERE
 from app.screens.depth.lesson import NUMBERS, SETTINGS, SHIPPED, DepthLook

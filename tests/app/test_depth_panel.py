@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.lesson_file import read_lesson
+from app.lesson.files import read_lesson
 from app.screens.depth.brush import painted
 from app.screens.depth.hide import BUTTON
 from app.screens.depth.labels import COLORINGS, EVERYWHERE, FILLS, HOLES, PICTURES, UNSEEN

@@ -8,9 +8,9 @@ import json
 import numpy as np
 import pytest
 
-from app.dock import COUNT_NS, Dock, speed_text, time_text
-from app.levels import levels_of
-from app.timeline import Curve, CurvesLane, FramesLane
+from app.dock.dock import COUNT_NS, Dock, speed_text, time_text
+from app.drawing.levels import levels_of
+from app.drawing.timeline import Curve, CurvesLane, FramesLane
 from tests.app.fakes import page_calls, ui_of
 
 STOPS_NS = np.array([1_000, 2_000_000_000, 5_000_000_000])

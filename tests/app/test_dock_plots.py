@@ -2,7 +2,7 @@
 
 import plotly.graph_objects as go
 
-from app.dock_plots import PlotDock, Sheet
+from app.dock.plots import PlotDock, Sheet
 from tests.app.fakes import page_calls, ui_of
 
 SHEET = Sheet("Trials", "<i></i>dots", (go.Figure(),), "<table></table>")

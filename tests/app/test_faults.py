@@ -20,14 +20,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 import pool_jobs
 
 import app.server
+from app.compute.pool import DIED
 from app.load.connection import Connection, wait_for
-from app.pool import DIED
 from app.screens.calibrate.uploads import keep_photographs
 from app.server import build_server
-from app.session import Session
-from app.stepper import MARKS
+from app.session.session import Session
 from app.web.own_folder import LOCK, PREFIX, delete_abandoned, own_folder
 from app.web.uploads import keep_upload
+from app.window.stepper import MARKS
 from packetmesh.errors import InputError
 from tests.paths import ROOT
 

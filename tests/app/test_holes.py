@@ -5,8 +5,8 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from app.compute.state import Spec
 from app.screens.surface.holes_job import explain_job, fill_job, hole_views, parts_of, views_of
-from app.state import Spec
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from pipeline.config import PipelineConfig

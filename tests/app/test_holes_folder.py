@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.records import MeshView
+from app.compute.records import MeshView
 from app.screens.surface.draw_holes import picked_hole, tape
 from app.screens.surface.holes import FILL_OFF, NONE, HolesFolder, filled_sentence, hole_name, parts_sentence
 from app.screens.surface.view import ExplainView, FilledView, HoleView

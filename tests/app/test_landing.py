@@ -13,11 +13,11 @@ import pytest
 import viser
 
 import app.landing
-from app.address import Place, place_of
+from app.compute.state import Spec
 from app.landing import LESSON_PLACES, PICTURES, SCRIPTS, STYLES, app_page, landing_html
-from app.lesson_file import LESSONS
+from app.lesson.files import LESSONS
 from app.server import PANELS
-from app.state import Spec
+from app.session.address import Place, place_of
 from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_SCENES
 from pipeline.sources import Demo

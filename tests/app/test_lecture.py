@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from app.lesson import told, with_votes
-from app.lesson_file import Choice, Question
+from app.lesson.files import Choice, Question
+from app.lesson.player import told, with_votes
 from app.load.connection import Connection, wait_for
-from app.qr import modules_of, qr_html
 from app.server import build_server
+from app.session.qr import modules_of, qr_html
 from app.web.entrance import Token, is_loopback
 
 pytestmark = pytest.mark.xdist_group("lecture")  # one worker starts the server once

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import pytest
 from markdown_it import MarkdownIt
 
-from app import jobs
-from app.lesson import BEGIN, COMPUTING, FIRST, OFF, SKIP, SKIPPED, LessonFolder, told
-from app.lesson_file import CLAUSE, FIELD, LESSONS, SCENE, read_lesson, settled
+from app.compute import jobs
+from app.compute.state import CHAIN, Spec
+from app.lesson.files import CLAUSE, FIELD, LESSONS, SCENE, read_lesson, settled
+from app.lesson.player import BEGIN, COMPUTING, FIRST, OFF, SKIP, SKIPPED, LessonFolder, told
 from app.screens.calibrate import lesson as calibrate
 from app.screens.depth import lesson as depth
 from app.screens.fuse import lesson as fuse
@@ -18,8 +19,7 @@ from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.view import Race, Start
 from app.screens.network import lesson as network
 from app.screens.surface import lesson as surface
-from app.state import CHAIN, Spec
-from app.tables import UNKNOWN
+from app.window.tables import UNKNOWN
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.sources import Demo
@@ -333,7 +333,7 @@ def test_the_folders_that_lessons_unfold_are_on_their_screens(path, screen):
     folders = set(re.findall(r'add_(?:folder|tab)\(\s*"([^"]+)"', sources))
     named = set(re.findall(r"^open: (.+)$", path.read_text(), re.MULTILINE))
     assert named <= folders
-    sources += Path("app/compare.py").read_text()
+    sources += Path("app/window/compare.py").read_text()
     seen = re.findall(r"^see: (.+)$", path.read_text(), re.MULTILINE)
     assert [name for name in seen if f'"{name}"' not in sources] == []
 

@@ -5,10 +5,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from app.compute.turns import Turns
 from app.load.load import Load
 from app.load.serving import Look
 from app.load.visitor import Diary
-from app.turns import Turns
 
 
 def look(strays=(), server=100, files=3):

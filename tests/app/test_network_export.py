@@ -10,6 +10,7 @@ from dataclasses import replace
 import pytest
 from PIL import Image
 
+from app.compute.state import Sent, Spec
 from app.screens.network.delivery_job import delivery_job
 from app.screens.network.export import delivery_offers, network_offers
 from app.screens.network.export_job import (
@@ -22,7 +23,6 @@ from app.screens.network.export_job import (
 )
 from app.screens.network.job import network_job
 from app.screens.network.labels import NETWORKS
-from app.state import Sent, Spec
 from app.web.markup import Markdown
 from network_sim.presets import PRESETS
 from packetmesh.errors import InputError

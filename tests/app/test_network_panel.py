@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 import viser
 
-from app.dock import time_text
+from app.compute.state import Spec
+from app.dock.dock import time_text
 from app.drawing.colors import COVERAGE_STOPS, linear
-from app.lesson_file import read_lesson
+from app.lesson.files import read_lesson
 from app.screens.network.delivery_draw import EMPTY, FULL
 from app.screens.network.delivery_legend import legend
 from app.screens.network.delivery_numbers import moment_table
@@ -25,7 +26,6 @@ from app.screens.network.panel import NetworkPanel
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import What
 from app.screens.network.what_if import WhatIf
-from app.state import Spec
 from network_sim.presets import PRESETS
 from network_sim.types import Cause
 from packetmesh.errors import InputError

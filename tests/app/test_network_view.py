@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pipeline.delivery
+from app.compute.state import Spec
 from app.drawing.curves import polyline
 from app.screens.network.draw import Flights, ground_of
 from app.screens.network.job import network_job
@@ -15,7 +16,6 @@ from app.screens.network.labels import ACCESS, CODINGS, NETWORKS, SCHEMES, ways
 from app.screens.network.numbers import metric_tables, runs_summary, value_text
 from app.screens.network.run_view import run_view
 from app.screens.network.view import What
-from app.state import Spec
 from network_sim.config import NetworkConfig, RunConfig
 from network_sim.metrics import Metric
 from network_sim.presets import PRESETS

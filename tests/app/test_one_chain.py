@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from app.cli import main
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.export.job import export_job
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import drain
 from packetmesh.settings import with_settings

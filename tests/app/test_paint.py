@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.compute.state import Spec
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET
 from app.screens.surface.labels import COLORINGS
 from app.screens.surface.legend import legend_html
 from app.screens.surface.paint_job import paint_job, vertex_colors
 from app.screens.surface.view import QUICK_POINTS, PaintRequest
-from app.state import Spec
 from packetmesh.progress import drain as end
 from pipeline.config import PipelineConfig
 from pipeline.sources import Demo

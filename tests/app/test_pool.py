@@ -14,8 +14,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 import pool_jobs as jobs
 
-from app.lane import LatestWins
-from app.pool import DIED, ComputePool, Outcome
+from app.compute.lane import LatestWins
+from app.compute.pool import DIED, ComputePool, Outcome
 
 TIMEOUT_S = 60.0
 

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from app.debounce import Debounce
 from app.screens.surface import quick
 from app.screens.surface.quick import FEWEST_POINTS, LOOKS, SLOW_S, Detail, QuickLook
 from app.screens.surface.view import QUICK_POINTS, PaintedView, PaintRequest
+from app.window.debounce import Debounce
 from tests.app.fakes import page_calls, ui_of
 
 

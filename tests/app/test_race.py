@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.colors import MOST_DISTANCE_M
 from app.screens.fuse.capture_job import capture_job
 from app.screens.fuse.race_job import contest_of, race_job
 from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, Race, Start
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from pipeline.io.rigs import save_rig

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from app.compute.state import Spec
 from app.drawing.colors import NEUTRAL
 from app.reports.race import race_page
 from app.reports.race_animation import off_text, race_animation
@@ -20,7 +21,6 @@ from app.screens.fuse.export_job import race_show
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.race_job import race_job
 from app.screens.fuse.view import Race, Start
-from app.state import Spec
 from packetmesh.progress import drain
 from pipeline.sources import Demo
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.dock import COUNT_NS
+from app.dock.dock import COUNT_NS
 from app.screens.fuse.clock import RaceClock
 from app.screens.fuse.player import error_lane
 from tests.app.test_fuse_numbers import lane

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from app.pool import Outcome
+from app.compute.pool import Outcome
+from app.compute.state import SharedViews
 from app.screens.scene.panel import ScenePanel
-from app.session import CANCELLED, Session
-from app.state import SharedViews
+from app.session.session import CANCELLED, Session
 from app.web.uploads import Uploads
 from tests.app.fakes import START
 

@@ -7,8 +7,8 @@ import pytest
 import tyro
 
 from app.cli import options
-from app.controls import put
-from app.state import CHAIN, BoardViews, Results, Spec
+from app.compute.state import CHAIN, BoardViews, Results, Spec
+from app.window.controls import put
 from network_sim.config import NetworkConfig
 from packetmesh.settings import config_named, with_settings
 from pipeline.config import PRESETS

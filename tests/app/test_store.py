@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.store import Store
+from app.compute.store import Store
 from packetmesh.progress import Progress, drain
 
 

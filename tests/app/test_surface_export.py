@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from app.compute.records import ColorBar
+from app.compute.state import Spec
 from app.drawing.colors import BACKGROUND, DISTANCE_STOPS, INFERRED, LOSS, TARGET, css
 from app.drawing.legend import Legend
-from app.records import ColorBar
 from app.reports.captioned import captioned
 from app.screens.surface.export import surface_offers
 from app.screens.surface.export_job import flight_job, page_job, view_job
 from app.screens.surface.labels import AFTER, POISSON
 from app.screens.surface.paint_job import colored_glb
-from app.state import Spec
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from packetmesh.settings import with_settings

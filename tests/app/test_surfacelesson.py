@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from app.lesson_file import read_lesson
+from app.lesson.files import read_lesson
 from app.screens.surface.labels import BEFORE, BOTH, POISSON
 from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook
 from packetmesh.errors import InputError

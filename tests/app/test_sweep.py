@@ -7,12 +7,12 @@ from functools import partial
 import numpy as np
 import pytest
 
+from app.compute.state import Spec
 from app.screens.surface.advice import NO_ADVICE, STOPPED, WAITING, AdviceFolder
 from app.screens.surface.spacing_plot import ADVISED, OF_THESIS, USED, spacing_figure
 from app.screens.surface.sweep_job import suggestions_of, sweep_job
 from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
 from app.screens.surface.view import SpacingView, SweepView
-from app.state import Spec
 from packetmesh.progress import Progress, drain
 from pipeline.config import PipelineConfig, SurfaceConfig
 from pipeline.findings import Suggestion, SweepPoint

@@ -2,7 +2,7 @@
 
 import time
 
-from app.ticker import Ticker
+from app.dock.ticker import Ticker
 
 
 def test_a_ticker_keeps_its_own_period_and_rests_when_stopped():

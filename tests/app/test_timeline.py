@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.drawing.colors import LOSS, TARGET
-from app.levels import counts_of, levels_of
-from app.timeline import Curve, CurvesLane, FramesLane, round_up
+from app.drawing.levels import counts_of, levels_of
+from app.drawing.timeline import Curve, CurvesLane, FramesLane, round_up
 
 ROWS = 3
 CAUSES = ("", "collision", "bit errors")

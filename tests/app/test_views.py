@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.drawing.cameras import turn
-from app.views import ECHO_S, Views
+from app.session.views import ECHO_S, Views
 from packetmesh.errors import InputError
 
 START, SCENE, RACE, HAND = ((float(i), 0.0, 1.0, 0.0, 0.0, 0.0) for i in range(1, 5))

@@ -7,14 +7,14 @@ import time
 import numpy as np
 import pytest
 
-from app.dock import COUNT_NS
+from app.compute.state import Spec
+from app.compute.store import Store
+from app.dock.dock import COUNT_NS
 from app.screens.surface.draw_rolling import RollingDrawing, pieces
 from app.screens.surface.labels import AFTER, BEFORE
 from app.screens.surface.rolling import CLOSE_UP, WHOLE, RollingFolder, front_lane, status_line
 from app.screens.surface.walk_job import PATCH_POINTS, PLACES, walk_job, walk_over
 from app.screens.surface.walk_view import WalkRequest
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain as end
 from pipeline.sources import Demo

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.cli.runs import RigOutcome, write_rigs_table
 from app.drawing.glb import mesh_glb
 from app.drawing.legend import Legend
 from app.reports.calibration import write_calibration_report
@@ -17,7 +18,6 @@ from app.reports.race import RaceRun, RaceShow, race_page
 from app.reports.reconstruction import write_reconstruction_report
 from app.reports.reproduction import write_reproduction_report
 from app.reports.surface_page import Side, SurfacePage, surface_page
-from app.runs import RigOutcome, write_rigs_table
 from app.web.markup import plain_text
 from lab.claims.claim import Verdict
 from lab.claims.exhibits import Chart, Curve, HeatMap, Picture, Table

@@ -6,10 +6,10 @@ from urllib.parse import urlencode
 
 import pytest
 
-from app.address import Place, place_of
+from app.compute.state import Spec
 from app.screens.calibrate.uploads import keep_photographs
 from app.screens.scene.recording_job import recording_job
-from app.state import Spec
+from app.session.address import Place, place_of
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import drain
 from pipeline.io.demos import DEMO_SCENES

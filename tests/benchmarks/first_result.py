@@ -24,7 +24,7 @@ from urllib.parse import urlsplit
 from playwright.sync_api import Page, sync_playwright
 
 from app.load.connection import Connection, wait_for
-from app.stepper import MARKS
+from app.window.stepper import MARKS
 from tests.browser.conftest import ARGUMENTS, chromium_path
 
 PATIENCE_MS = 300_000

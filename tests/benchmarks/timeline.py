@@ -19,10 +19,10 @@ import numpy as np
 import viser
 from playwright.sync_api import sync_playwright
 
-from app.dock import Dock
-from app.levels import levels_of
-from app.timeline import Curve, CurvesLane, FramesLane
-from app.ui import Ui
+from app.dock.dock import Dock
+from app.drawing.levels import levels_of
+from app.drawing.timeline import Curve, CurvesLane, FramesLane
+from app.window.ui import Ui
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "browser"))
 

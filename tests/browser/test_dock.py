@@ -11,13 +11,13 @@ import viser
 from PIL import Image
 from playwright.sync_api import expect
 
-from app.dock import Dock
+from app.dock.dock import Dock
 from app.drawing.colors import LOSS, TARGET
+from app.drawing.levels import levels_of
+from app.drawing.timeline import Curve, CurvesLane, FramesLane
 from app.landing import app_page
-from app.levels import levels_of
-from app.timeline import Curve, CurvesLane, FramesLane
-from app.ui import Ui
 from app.window.gui import Gui
+from app.window.ui import Ui
 from tests.browser.hands import PATIENCE_MS
 
 END_NS = 10_000_000_000

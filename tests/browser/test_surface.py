@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from app import acknowledgement
 from app.screens.surface.labels import BOTH, COLORINGS, POISSON
+from app.window import acknowledgement
 from tests.browser.hands import (
     ALIKE,
     DRAG_S,

@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from typing import TYPE_CHECKING
 
-from app.records import Picture
+from app.compute.records import Picture
 from app.screens.calibrate.view import CameraView, DepthErrorView, TrustRequest, TrustView
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.window.panel import PanelSession
 
 
 class Answers:
     """The newest verdict and the newest depth pictures; of two questions, the later waits for the earlier."""
 
     def __init__(
-        self, session: Session, on_trust: Callable[[TrustView | None], None], on_depth: Callable[[], None]
+        self,
+        session: PanelSession,
+        on_trust: Callable[[TrustView | None], None],
+        on_depth: Callable[[], None],
     ) -> None:
         """Ask nothing yet.
 

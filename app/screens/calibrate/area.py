@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from app.compare import captions_html, no_pictures, place_of, place_text, split
-from app.records import Picture
+from app.compute.records import Picture
 from app.screens.calibrate.labels import PAIRS, STRAIGHTENED
-from app.ui import Ui
 from app.web.markup import Markup
+from app.window.compare import captions_html, no_pictures, place_of, place_text, split
+from app.window.ui import Ui
 
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 QUALITY = 92

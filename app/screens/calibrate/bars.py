@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from app.drawing.colors import BRAND, LOSS, NEUTRAL, SOURCE, css
 from app.screens.calibrate.terms import HELD_OUT, RMS
 from app.screens.calibrate.view import CameraView
-from app.tables import term
-from app.ui import Ui
 from app.web.markup import Markup
+from app.window.tables import term
+from app.window.ui import Ui
 
 MARK = "packetmesh-views"
 HEIGHT_PX, LEAST_PX = 84, 3

@@ -6,12 +6,12 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.compute.state import BoardViews
+from app.compute.store import Store
 from app.drawing.depth_bias_plots import bias_curve
 from app.screens.calibrate.cameras import CamerasFound, own_views, stage_name
 from app.screens.calibrate.request import shots_of
 from app.screens.calibrate.view import BiasView
-from app.state import BoardViews
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.calibration.depth_bias import DepthFit
 from pipeline.calibration.rig_from_images import node_with_depth

@@ -9,6 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from app.compute.state import BoardViews
+from app.compute.store import Store
 from app.screens.calibrate.request import FOLDS, board_of, shots_of, true_parameters
 from app.screens.calibrate.view import (
     CalibrationView,
@@ -18,8 +20,6 @@ from app.screens.calibrate.view import (
     RigView,
     WarpView,
 )
-from app.state import BoardViews
-from app.store import Store
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress, part
 from pipeline.calibration.board import Board

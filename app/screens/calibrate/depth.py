@@ -6,9 +6,9 @@ import plotly.graph_objects as go
 
 from app.drawing.depth_bias_plots import bias_figure
 from app.screens.calibrate.view import BiasView
-from app.tables import number, table
-from app.ui import Ui
 from app.web.markup import Markdown, Markup
+from app.window.tables import number, table
+from app.window.ui import Ui
 
 TEXT = Markdown(
     """No registration repairs a sensor that measures everything too near. The board's plane says how deep

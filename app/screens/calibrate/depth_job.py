@@ -7,14 +7,14 @@ from collections.abc import Generator
 import cv2
 import numpy as np
 
-from app.records import Picture
+from app.compute.records import Picture
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.calibrate.bias import bias_of, depth_file
 from app.screens.calibrate.cameras import cameras_of, finished
 from app.screens.calibrate.maps import off_picture
 from app.screens.calibrate.request import board_of
 from app.screens.calibrate.view import DepthErrorView
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import Calibration

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import viser
 
+from app.compute.records import SceneView
 from app.drawing.cameras import Stage, add_camera, turn
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import BRAND, NEUTRAL, SOURCE, TARGET
 from app.drawing.poses import place
-from app.records import SceneView
 from app.screens.calibrate.labels import Around
 from app.screens.calibrate.photograph import decoded, picture_of
 from app.screens.calibrate.view import CalibrationView, CameraView, RigView

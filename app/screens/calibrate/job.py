@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import replace
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.calibrate.bias import bias_of
 from app.screens.calibrate.cameras import cameras_of
 from app.screens.calibrate.view import CalibrationView
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 
 CAMERAS_SHARE = 0.6

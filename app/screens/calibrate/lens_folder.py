@@ -7,11 +7,11 @@ from typing import get_args
 
 import numpy as np
 
-from app.compare import caption_html
 from app.screens.calibrate.maps import warp_picture
 from app.screens.calibrate.view import CameraView
-from app.ui import Ui
 from app.web.markup import Markdown, Markup
+from app.window.compare import caption_html
+from app.window.ui import Ui
 from pipeline.config import Lens
 
 ABOUT_LENS = (

@@ -9,11 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from app.lesson_file import LESSONS, SCENE, Numbers, Setting, choice, quantity, sets
+from app.lesson.files import LESSONS, SCENE, Numbers, Setting, choice, quantity, sets
 from app.screens.calibrate.labels import AROUND, PAIRS, STRAIGHTENED, Around
 from app.screens.calibrate.numbers import unseen_rms_px, views_used, within
 from app.screens.calibrate.view import CameraView
-from app.tables import UNKNOWN, number
+from app.window.tables import UNKNOWN, number
 from pipeline.config import Lens
 
 SHIPPED = LESSONS / "how-good-is-my-calibration.md"

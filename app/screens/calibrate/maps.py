@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from app.compute.records import ColorBar, Picture
 from app.drawing.colors import DELIVERED, DISTANCE_STOPS, LOSS, NEUTRAL, SOURCE, ramp
 from app.drawing.pictures import EQUAL, FARTHER, NEARER, UNKNOWN
-from app.records import ColorBar, Picture
 from app.screens.calibrate.view import WarpView
 from pipeline.calibration.diagnosis import Coverage
 from pipeline.calibration.estimate import Calibration, FittedView

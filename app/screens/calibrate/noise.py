@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.dock_plots import PlotDock
+from app.dock.plots import PlotDock
 from app.screens.calibrate.noise_view import CLOSE, NoiseRequest, NoiseView
 from app.screens.calibrate.scatter import noise_sheet
-from app.ui import Ui
 from app.web.markup import Markdown
+from app.window.ui import Ui
 
 TEXT = Markdown(
     """What if every circle were seen a little beside its place? The calibration above is taken as the

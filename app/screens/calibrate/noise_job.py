@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.calibrate.cameras import cameras_of, finished
 from app.screens.calibrate.noise_view import NoiseRequest, NoiseView
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.calibration.estimate import Calibration, View, calibrate

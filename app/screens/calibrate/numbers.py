@@ -8,8 +8,8 @@ import numpy as np
 
 from app.screens.calibrate.terms import BENT, HELD_OUT, INTERVAL, RMS, STANDARD_ERROR, TRUTH, VIEWS
 from app.screens.calibrate.view import CameraView
-from app.tables import number, table
 from app.web.markup import Markup
+from app.window.tables import number, table
 from pipeline.calibration.estimate import Calibration, rms_px
 
 UNITS = {"fx": "px", "fy": "px", "cx": "px", "cy": "px"}

@@ -7,9 +7,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
 
-from app.lesson import LessonFolder
-from app.lesson_file import Numbers, read_lesson
-from app.records import SceneView
+from app.compute.records import SceneView
+from app.compute.state import BoardViews, Spec, Step
+from app.lesson.files import Numbers, read_lesson
+from app.lesson.player import LessonFolder
 from app.screens.calibrate.answers import Answers
 from app.screens.calibrate.depth import DepthFolder
 from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of, stand_before
@@ -28,9 +29,9 @@ from app.screens.calibrate.trust import TrustFolder, verdict_html
 from app.screens.calibrate.uploads import UploadFolder
 from app.screens.calibrate.use import WRITING, UseRow
 from app.screens.calibrate.view import CalibrationView, CameraView, RigView, TrustView
-from app.state import BoardViews, Spec, Step
-from app.ui import STOP, Awaited, Panel
 from app.web.markup import Markdown, Markup
+from app.window.in_address import STOP, Awaited
+from app.window.panel import Panel
 from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_SCENES, board_views_of
 from pipeline.sources import Calibrated, Demo

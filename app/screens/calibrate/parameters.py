@@ -9,9 +9,9 @@ from app.drawing.pictures import EQUAL, FARTHER, NEARER
 from app.screens.calibrate.numbers import parameter_table
 from app.screens.calibrate.terms import CORRELATION
 from app.screens.calibrate.view import CameraView
-from app.tables import term
-from app.ui import Ui
 from app.web.markup import Markup
+from app.window.tables import term
+from app.window.ui import Ui
 from pipeline.calibration.correlation import DISTANCE, Correlations, Pair
 
 WEAK = 0.8

@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from app.compute.records import Picture
 from app.drawing.colors import DELIVERED, LOSS, SOURCE
-from app.records import Picture
 from app.screens.calibrate.view import CameraView, Photograph
 from pipeline.calibration.estimate import Calibration, FittedView
 from pipeline.types import ByteArray, FloatArray

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from app.records import Picture
+from app.compute.records import Picture
 from app.screens.calibrate.answers import Answers
 from app.screens.calibrate.area import PictureArea
 from app.screens.calibrate.bars import Bars, bars_of
 from app.screens.calibrate.photograph import found_picture, picture_of, straightened_picture
 from app.screens.calibrate.view import CameraView
-from app.ui import Ui, tell_unknown
+from app.window.in_address import tell_unknown
+from app.window.ui import Ui
 
 
 class Photographs:

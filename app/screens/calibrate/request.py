@@ -6,7 +6,7 @@ import json
 import shlex
 from pathlib import Path
 
-from app.state import BoardViews
+from app.compute.state import BoardViews
 from pipeline.calibration.board import Board
 from pipeline.calibration.shots import BOARD_FILE, NodeShots, camera_images, node_shots, read_board
 from pipeline.io.demos import DEMO_SCENES, SCENES, board_views_of

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from app.screens.calibrate.view import RigView
-from app.tables import number, table
-from app.ui import Ui
 from app.web.markup import Markdown, Markup
+from app.window.tables import number, table
+from app.window.ui import Ui
 
 TEXT = Markdown(
     """Moments at which several cameras see the board tell where these stand to each other. Choose

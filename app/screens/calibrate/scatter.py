@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from app.dock_plots import Sheet
+from app.dock.plots import Sheet
 from app.drawing.colors import BRAND, DELIVERED, INFERRED, LOSS, NEUTRAL, css
 from app.screens.calibrate.noise_view import CLOSE, INSIDE_95, NoiseView
 from app.screens.calibrate.numbers import MEANING, UNITS
 from app.screens.calibrate.thesis import Cell, nearest_cell
-from app.tables import number, term
 from app.web.markup import Markup
+from app.window.tables import number, term
 from pipeline.types import FloatArray
 
 PAIRS = (("fx", "fy"), ("cx", "cy"), ("k1", "k2"))

@@ -10,9 +10,9 @@ from app.drawing.calibration_plots import distortion_figure, radial_residuals_fi
 from app.drawing.colors import DELIVERED, LOSS, css
 from app.screens.calibrate.terms import HALVES
 from app.screens.calibrate.view import TrustRequest, TrustView
-from app.tables import number, table, term
-from app.ui import Ui
 from app.web.markup import Markdown, Markup, escape
+from app.window.tables import number, table, term
+from app.window.ui import Ui
 
 REST_S = 0.3
 OWN_M = 2.0

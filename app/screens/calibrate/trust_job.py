@@ -6,11 +6,11 @@ from collections.abc import Generator, Iterator
 
 import numpy as np
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.calibrate.cameras import cameras_of, finished
 from app.screens.calibrate.maps import coverage_picture, map_picture, next_picture
 from app.screens.calibrate.view import CameraView, TrustRequest, TrustView
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.calibration.assess import Trust, assess

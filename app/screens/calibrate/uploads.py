@@ -10,11 +10,11 @@ from typing import get_args
 
 import viser
 
+from app.compute.state import BoardViews
 from app.screens.calibrate.request import shots_of, views_in
-from app.state import BoardViews
-from app.ui import Ui
 from app.web.markup import Markdown
 from app.web.zips import opened_zip
+from app.window.ui import Ui
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, path_below, unpacked
 from pipeline.calibration.shots import BOARD_FILE

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from app.tables import UNKNOWN, number, table, truth_rows
-from app.ui import Ui
 from app.web.markup import Markdown, Markup
+from app.window.tables import UNKNOWN, number, table, truth_rows
+from app.window.ui import Ui
 
 USE, BEFORE = "Use this calibration", "As before"
 WRITING = "Writing the calibration …"

@@ -6,11 +6,11 @@ from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.calibrate.bias import bias_of
 from app.screens.calibrate.cameras import CamerasFound, cameras_of, finished
 from app.screens.calibrate.request import inner
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.calibration.shots import INFRARED

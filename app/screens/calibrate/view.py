@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from app.compute.records import Picture
 from app.drawing.depth_bias_plots import BiasCurve
-from app.records import Picture
 from pipeline.calibration.board import Board
 from pipeline.calibration.correlation import Correlations
 from pipeline.calibration.diagnosis import RadialCurve, RadialResiduals

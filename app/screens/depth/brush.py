@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import viser
 
+from app.compute.records import Sample
 from app.drawing.clouds import POINT_SIZE_M, add_cloud
 from app.drawing.colors import HOLE
-from app.records import Sample
 from app.screens.depth.discs import covered, disc_at
 from app.screens.depth.view import Disc, SeenSample
 from pipeline.types import BoolArray, FloatArray

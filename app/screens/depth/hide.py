@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import viser
 
-from app.compare import CompareArea
 from app.screens.depth.brush import BrushDrawing, clicked_disc
 from app.screens.depth.labels import FILLS
 from app.screens.depth.view import Disc, HiddenView, HideRequest, SeenSample
-from app.tables import number, table
-from app.ui import Ui
 from app.web.markup import Markdown, Markup
+from app.window.compare import CompareArea
+from app.window.tables import number, table
+from app.window.ui import Ui
 from pipeline.types import FloatArray
 
 TEXT = Markdown(

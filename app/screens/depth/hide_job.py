@@ -9,12 +9,12 @@ from functools import partial
 
 import numpy as np
 
+from app.compute.records import Picture
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.pictures import depth_picture, depth_range_m
-from app.records import Picture
 from app.screens.depth.discs import covered, window_around
 from app.screens.depth.view import Disc, FillRow, HiddenView, HideRequest
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.config import DepthConfig

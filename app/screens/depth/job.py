@@ -8,6 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
+from app.compute.records import (
+    SCREEN_POINTS,
+    DepthNode,
+    DepthView,
+    JudgedView,
+    Picture,
+    ResidualView,
+    Sample,
+    sample,
+)
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.pictures import (
     confidence_colors,
     confidence_picture,
@@ -15,10 +27,7 @@ from app.drawing.pictures import (
     depth_range_m,
     difference_picture,
 )
-from app.records import SCREEN_POINTS, DepthNode, DepthView, JudgedView, Picture, ResidualView, Sample, sample
 from app.screens.depth.view import SeenSample
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.config import DepthConfig
 from pipeline.depth.completion import SHIPPED_COMPLETION

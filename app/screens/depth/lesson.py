@@ -6,11 +6,11 @@ import re
 from dataclasses import dataclass, replace
 from typing import get_args
 
-from app.lesson_file import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets, short
-from app.records import DepthNode, SceneView
+from app.compute.records import DepthNode, SceneView
+from app.lesson.files import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets, short
 from app.screens.depth.labels import COLORINGS, DRAWN, HOLES, PICTURES, PointColoring
 from app.screens.depth.view import Disc, HideRequest, PictureName
-from app.tables import number
+from app.window.tables import number
 from pipeline.config import AlignmentMode, DepthConfig
 
 SHIPPED = LESSONS / "can-a-picture-measure.md"

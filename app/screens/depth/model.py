@@ -9,10 +9,10 @@ import viser
 
 from app.screens.depth.labels import AS_IT_SAYS, NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
 from app.screens.depth.view import ModelChoice, ModelView
-from app.tables import number, table
-from app.ui import Ui
 from app.web.markup import Markdown, Markup
 from app.web.uploads import OWN, keep_upload
+from app.window.tables import number, table
+from app.window.ui import Ui
 from pipeline.config import DepthConfig, ModelKind
 
 SHIPPED = "the network that ships"

@@ -7,9 +7,9 @@ from collections.abc import Generator
 
 import numpy as np
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.depth.view import ModelChoice, ModelView
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork

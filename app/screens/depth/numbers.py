@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from app.records import DepthNode
+from app.compute.records import DepthNode
 from app.screens.depth.labels import ALIGNMENTS
-from app.tables import number, table
 from app.web.markup import Markup
+from app.window.tables import number, table
 
 LINES = {
     "none": "z′ = z",

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import assets
-from app.compare import CompareArea
-from app.controls import Controls
+from app.compute.records import DepthNode, DepthView, Sample, SceneView
+from app.compute.state import Spec, Step
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import INFERRED, LOSS, TARGET
-from app.lesson import LessonFolder
-from app.lesson_file import Numbers, read_lesson
-from app.records import DepthNode, DepthView, Sample, SceneView
+from app.lesson.files import Numbers, read_lesson
+from app.lesson.player import LessonFolder
 from app.screens.depth.hide import HideFolder
 from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PICTURES
 from app.screens.depth.lesson import NUMBERS, SETTINGS, SHIPPED, DepthLook, numbers
@@ -23,9 +22,11 @@ from app.screens.depth.numbers import confidence_table, depth_table, residual_ta
 from app.screens.depth.residuals import residual_figure
 from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_model
 from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
-from app.state import Spec, Step
-from app.ui import STOP, Awaited, Panel, Picked
 from app.web.markup import Markdown, Markup, shipped_markdown
+from app.window.compare import CompareArea
+from app.window.controls import Controls
+from app.window.in_address import STOP, Awaited, Picked
+from app.window.panel import Panel
 
 TEXT = Markdown(
     """**What you see.** Blue: points the sensor measured. Violet: points that are inferred: from the

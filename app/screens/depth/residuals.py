@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
+from app.compute.records import ResidualView
 from app.drawing.colors import BRAND, LOSS, css
 from app.drawing.marks import add_bars, bar_figure, mark
-from app.records import ResidualView
 
 
 def residual_figure(view: ResidualView | None) -> go.Figure:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from app.controls import Choice, Number, Toggle
 from app.screens.depth.labels import ALIGNMENTS
 from app.screens.depth.view import ModelChoice
+from app.window.controls import Choice, Number, Toggle
 from pipeline.config import PipelineConfig
 
 FIRST = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
-from app.records import Picture, Sample
+from app.compute.records import Picture, Sample
 from pipeline.config import DepthConfig, ModelKind, NetworkPreset, Normalisation
 from pipeline.types import IntArray
 

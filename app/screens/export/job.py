@@ -9,10 +9,10 @@ from collections.abc import Generator
 from pathlib import Path
 from typing import Any, get_args
 
-from app.records import Shown
+from app.compute.records import Shown
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.reports.reconstruction import write_reconstruction_report
-from app.state import Spec
-from app.store import Store
 from packetmesh.files import write_json
 from packetmesh.progress import Progress
 from pipeline.config import Baseline

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.records import Shown
-from app.state import Spec, Step
-from app.tables import command_html
-from app.ui import Offer, Offers, Panel
+from app.compute.records import Shown
+from app.compute.state import Spec, Step
 from app.web.markup import Markdown, Markup
 from app.web.uploads import plain
+from app.window.panel import Offer, Offers, Panel
+from app.window.tables import command_html
 from packetmesh.errors import InputError
 from pipeline.types import ByteArray
 

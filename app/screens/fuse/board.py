@@ -11,16 +11,16 @@ import uuid
 from collections.abc import Sequence
 from typing import Any
 
-from app.dock_row import add_hidden
 from app.drawing.colors import DISTANCE_STOPS, MOST_DISTANCE_M, css
-from app.page import page_call
 from app.screens.fuse.draw import FOOT
 from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import METHODS, METRICS, color_of
 from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, LensView, RaceLane, RaceStep, RaceView, Reference
-from app.tables import UNKNOWN, number
-from app.ui import Ui
 from app.web.markup import Markup
+from app.window.hidden import add_hidden
+from app.window.page import page_call
+from app.window.tables import UNKNOWN, number
+from app.window.ui import Ui
 from pipeline.types import ByteArray
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 from app.screens.fuse.labels import MARKS
 from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, SUCCESS_M, CaptureView
-from app.tables import number
-from app.ui import Ui
 from app.web.markup import Markdown, Markup
+from app.window.tables import number
+from app.window.ui import Ui
 
 REACHED, MISSED = "#bfe6d6", "#f3cdc8"
 COMPUTE, STOP = "Compute the map", "Stop the map"

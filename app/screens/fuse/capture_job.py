@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.fuse.methods import label_of
 from app.screens.fuse.race_job import Contest, config_of, contest_of, race_key
 from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, CaptureView, Race, Start
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import Progress
 from pipeline.config import RegistrationConfig

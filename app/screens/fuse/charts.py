@@ -11,8 +11,8 @@ from app.screens.fuse.histogram import HistogramChart
 from app.screens.fuse.labels import MARKS, MOST_LANES
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.view import RaceView
-from app.ui import Ui
 from app.web.markup import Markdown, Markup
+from app.window.ui import Ui
 
 FIRST = f"{MARKS[0]} first"
 

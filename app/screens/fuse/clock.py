@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.dock import COUNT_NS
+from app.dock.dock import COUNT_NS
 from app.screens.fuse.view import RaceLane
 from pipeline.types import FloatArray
 

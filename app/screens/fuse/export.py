@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from app.screens.fuse.view import Race
-from app.ui import Offer, Offers
 from app.web.markup import Markdown
+from app.window.panel import Offer, Offers
 
 HINT = """The race as it is set up on the Fuse screen, with the error of every method: a page that plays it,
 offline, and a moving picture for slides."""

@@ -6,6 +6,8 @@ from collections.abc import Generator
 
 import numpy as np
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.colors import MOST_DISTANCE_M
 from app.reports.hand_out import viewpoint_of
 from app.reports.race import RaceRun, RaceShow, race_page
@@ -15,8 +17,6 @@ from app.screens.fuse.methods import color_of
 from app.screens.fuse.numbers import verdict
 from app.screens.fuse.race_job import race_job
 from app.screens.fuse.view import SUCCESS_M, Race, RaceLane, RaceView
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.geometry import apply
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.fuse.view import FuseView, RegistrationRow
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline import geometry
 from pipeline.nodes import NodeClouds

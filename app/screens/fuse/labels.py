@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import get_args
 
-from app.controls import Choice
 from app.screens.fuse.view import RaceMode, Reference, Rival
 from app.web.markup import Markdown
+from app.window.controls import Choice
 from pipeline.config import Direction, Method, Metric
 
 MODES: dict[str, RaceMode] = {"node on node": "nodes", "inferred on sensor": "inferred"}

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from app.lesson_file import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets, short
+from app.lesson.files import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets, short
 from app.screens.fuse.labels import DIRECTIONS, MODES, MOST_LANES, RIVALS, STARTS
 from app.screens.fuse.view import Race, RaceView, Rival, Start
-from app.tables import UNKNOWN, number
+from app.window.tables import UNKNOWN, number
 
 SHIPPED = LESSONS / "icp-against-ceicp.md"
 START = (3.0, 6.0)

@@ -9,8 +9,8 @@ import numpy as np
 from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, FuseView, RaceLane, Reference, RegistrationRow
-from app.tables import Row, number, table
 from app.web.markup import Markdown, Markup
+from app.window.tables import Row, number, table
 
 STOPS = {"max_iterations": "limit"}
 _OFF: dict[Reference, tuple[str, str]] = {

@@ -9,13 +9,13 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from app.controls import Controls
+from app.compute.records import DepthView
+from app.compute.state import Spec, Step
 from app.drawing.cameras import Stage, stage_of
 from app.drawing.clouds import clear
 from app.drawing.poses import place
-from app.lesson import LessonFolder
-from app.lesson_file import Numbers, read_lesson
-from app.records import DepthView
+from app.lesson.files import Numbers, read_lesson
+from app.lesson.player import LessonFolder
 from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
@@ -41,9 +41,10 @@ from app.screens.fuse.player import END, RacePlayer
 from app.screens.fuse.result import NodesDrawing
 from app.screens.fuse.setup import RaceSetup
 from app.screens.fuse.view import CaptureView, FuseView, Race, RaceView, Start
-from app.state import Spec, Step
-from app.ui import STOP, Offers, Panel, Picked, Said
 from app.web.markup import Markdown, Markup
+from app.window.controls import Controls
+from app.window.in_address import STOP, CallbackState, Picked
+from app.window.panel import Offers, Panel
 
 _Wanted: TypeAlias = tuple[tuple[Hashable, ...], Race]
 """A race of the clouds with this key."""
@@ -94,8 +95,8 @@ class FusePanel(Panel):
         self._build_folders()
         self._rows = gui.add_html(Markup(""))
         shown = Picked(self._shown, SHOWN, self._picked_shown)
-        self.in_address |= {STOP: self._lesson, "race": Said(self._race_text, self._take_race_text)}
-        self.in_address |= {"show": shown, "t": Said(self._moment, self._take_moment)}
+        self.in_address |= {STOP: self._lesson, "race": CallbackState(self._race_text, self._take_race_text)}
+        self.in_address |= {"show": shown, "t": CallbackState(self._moment, self._take_moment)}
 
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
-from app.lesson_file import NUMBER, choice
+from app.lesson.files import NUMBER, choice
 from app.screens.fuse.labels import DEGRADATIONS, MOST_LANES, MOST_SEED, MS, RIVALS, SLIGHTLY, STARTS
 from app.screens.fuse.player import END
 from app.screens.fuse.view import Race, Rival, Start

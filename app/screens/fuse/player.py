@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from app.dock import Dock
+from app.dock.dock import Dock
+from app.drawing.timeline import Curve, CurvesLane, round_up
 from app.screens.fuse.clock import CLOCKS, RaceClock
 from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.view import OFF_DIGITS, RaceLane, Reference
-from app.timeline import Curve, CurvesLane, round_up
-from app.ui import Ui
+from app.window.ui import Ui
 
 RUN_S = 12.0
 """How long a race takes on the screen, about."""

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from app.records import sample
+from app.compute.records import sample
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.fuse.distances import Distances, shades_of
 from app.screens.fuse.job import true_pose
 from app.screens.fuse.lens import Lens, lens_of
@@ -24,8 +26,6 @@ from app.screens.fuse.view import (
     Rival,
     Start,
 )
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import Progress
 from pipeline import geometry

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import viser
 
+from app.compute.records import DepthView
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.poses import move
-from app.records import DepthView
 from app.screens.fuse.view import FuseView
 
 

@@ -23,7 +23,7 @@ from app.screens.fuse.labels import (
 )
 from app.screens.fuse.place import FIRST
 from app.screens.fuse.view import Race, RaceMode, Rival, Start
-from app.ui import Ui
+from app.window.ui import Ui
 
 METHOD_HINT = "Method and what it minimises: distance to the paired point, or to the plane at it."
 

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from app.records import Sample
+from app.compute.records import Sample
 from pipeline.config import Direction, Method, Metric
 from pipeline.types import ByteArray, FloatArray, IntArray
 

@@ -10,11 +10,13 @@ from functools import partial
 import cv2
 import numpy as np
 
+from app.compute.records import sample
+from app.compute.state import Sent, Spec
+from app.compute.store import Store
 from app.drawing.cameras import Stage, stage_around
 from app.drawing.colors import NEUTRAL
 from app.drawing.meshes import surface_glb
 from app.drawing.pictures import cividis, depth_range_m
-from app.records import sample
 from app.screens.network.delivery_view import (
     PICTURE_PX,
     CameraNode,
@@ -25,8 +27,6 @@ from app.screens.network.delivery_view import (
     PacketView,
 )
 from app.screens.network.run_view import run_view
-from app.state import Sent, Spec
-from app.store import Store
 from network_sim.arrivals import energy_by_node_j
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import Progress, part

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.dock import time_text
+from app.dock.dock import time_text
 from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.labels import CAUSES
 from app.screens.network.view import What
-from app.tables import Head, Row, number, table
 from app.web.markup import Markdown, Markup
+from app.window.tables import Head, Row, number, table
 from network_sim.config import NetworkConfig
 from network_sim.types import Cause
 from packetmesh.settings import differences

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.compute.state import Sent
 from app.drawing.cameras import Stage
 from app.screens.network.view import NetworkView
-from app.state import Sent
 from pipeline.types import BoolArray, ByteArray, FloatArray
 
 PICTURE_PX = 160

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from app.screens.network.delivery_view import DeliveryView
-from app.ui import Offer, Offers
 from app.web.markup import Markdown
+from app.window.panel import Offer, Offers
 
 JOB = "network.export_job"
 

@@ -12,7 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.colors import NEUTRAL
+from app.drawing.timeline import Lane
 from app.reports.captioned import png
 from app.reports.delivery import delivery_animation, delivery_page
 from app.reports.hand_out import HandOut
@@ -24,9 +27,6 @@ from app.screens.network.job import network_job
 from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_names
 from app.screens.network.packets import Frames
 from app.screens.network.view import NetworkView
-from app.state import Spec
-from app.store import Store
-from app.timeline import Lane
 from network_sim.simulate import iterate_simulation
 from network_sim.trace import NetworkTrace
 from network_sim.trace_files import write_trace

@@ -10,17 +10,17 @@ from app.screens.network.delivery_view import DeliveryView, PacketView
 from app.screens.network.labels import PICK
 from app.screens.network.packets import Frames
 from app.screens.network.packets_told import told
-from app.ui import Ui
 from app.web.markup import Markdown
+from app.window.ui import Ui
 
 if TYPE_CHECKING:
-    from app.session import Session
+    from app.window.panel import PanelSession
 
 
 class Inspector:
     """The folder of one packet."""
 
-    def __init__(self, ui: Ui, session: Session) -> None:
+    def __init__(self, ui: Ui, session: PanelSession) -> None:
         """Add it to the current container."""
         self._ui, self._session = ui, session
         self._frames: Sequence[Frames] = ()

@@ -7,11 +7,11 @@ from collections.abc import Generator
 from functools import partial
 from typing import Any
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.network.delivery_job import delivery_job
 from app.screens.network.run_view import run_view
 from app.screens.network.view import NetworkView
-from app.state import Spec
-from app.store import Store
 from network_sim.config import NetworkConfig
 from network_sim.simulate import iterate_simulation
 from packetmesh.progress import Progress, part

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.drawing.colors import DELIVERED, INFERRED, LOSS, SOURCE
+from app.drawing.timeline import Curve, CurvesLane, FramesLane
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.labels import CAUSES
 from app.screens.network.packets import Frames
 from app.screens.network.view import NetworkView, What
-from app.timeline import Curve, CurvesLane, FramesLane
 from network_sim.types import Cause, to_ns
 from pipeline.types import FloatArray
 

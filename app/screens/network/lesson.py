@@ -8,14 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from app.dock import time_text
-from app.lesson_file import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets
+from app.dock.dock import time_text
+from app.lesson.files import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets
 from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.labels import ACCESS, CAUSES, CODINGS, NETWORKS, SCHEMES
 from app.screens.network.numbers import verdict
 from app.screens.network.packets import Frames
 from app.screens.network.view import FAILURES, NetworkView, What
-from app.tables import UNKNOWN, number
+from app.window.tables import UNKNOWN, number
 from network_sim.types import Cause
 
 CROSSING, LOST_PACKET = LESSONS / "how-images-cross-a-network.md", LESSONS / "what-one-lost-packet-costs.md"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from app.screens.network.view import NetworkView
-from app.tables import Row, table
 from app.web.markup import Markdown, Markup
+from app.window.tables import Row, table
 from network_sim.metrics import Metric
 
 FIRST = (

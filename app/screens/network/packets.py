@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.dock import time_text
+from app.dock.dock import time_text
 from app.screens.network.labels import CAUSES, PACKET_NAMES
 from app.screens.network.view import NetworkView, Pieces, What
 from app.web.markup import Markdown

@@ -8,11 +8,13 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
 
-from app.dock import Dock
+from app.compute.state import Spec, Step
+from app.dock.dock import Dock
 from app.drawing.cameras import turn
 from app.drawing.clouds import clear
-from app.lesson import LessonFolder
-from app.lesson_file import Numbers, read_lesson
+from app.drawing.timeline import Lane
+from app.lesson.files import Numbers, read_lesson
+from app.lesson.player import LessonFolder
 from app.screens.network.delivery_draw import DeliveryDrawing
 from app.screens.network.delivery_legend import legend, most_j
 from app.screens.network.delivery_numbers import changes, difference, moment_table, more_rows, summary
@@ -37,10 +39,9 @@ from app.screens.network.packets import Frames
 from app.screens.network.packets_told import legend_html
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import NetworkView
-from app.state import Spec, Step
-from app.timeline import Lane
-from app.ui import STOP, Offers, Panel, Said
 from app.web.markup import Markdown, Markup
+from app.window.in_address import STOP, CallbackState
+from app.window.panel import Offers, Panel
 from packetmesh.errors import InputError
 
 LESSONS = {STOP: CROSSING, f"{STOP}-lost": LOST_PACKET}
@@ -103,8 +104,8 @@ class NetworkPanel(Panel):
             self._setup.add_advanced()
         self._dock = Dock(ui, self._moved, self._inspector.pick)
         self.in_address |= self._lessons
-        self.in_address["net"] = Said(self._setup.place, self._take_place)
-        self.in_address["t"] = Said(self._moment, self._take_moment)
+        self.in_address["net"] = CallbackState(self._setup.place, self._take_place)
+        self.in_address["t"] = CallbackState(self._moment, self._take_moment)
 
     def on_show(self) -> None:
         """Send at the first visit; turn the view to the cameras."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from app.levels import Levels, levels_of
+from app.drawing.levels import Levels, levels_of
 from app.screens.network.view import Curve, NetworkView, Pieces, Series, What
 from network_sim.config import NetworkConfig
 from network_sim.coverage import road_coverage

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import viser
 
+from app.compute.state import Sent, Spec
 from app.screens.network.labels import CODINGS, NETWORKS, ways
 from app.screens.network.lesson import NetworkLook
 from app.screens.network.place import show, shown, text_of, values_of
 from app.screens.network.what_if import WhatIf
-from app.state import Sent, Spec
-from app.ui import Ui
 from app.web.markup import Markdown
+from app.window.ui import Ui
 from network_sim.config import NetworkConfig
 from network_sim.presets import PRESETS
 from packetmesh.errors import InputError

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.levels import Levels
+from app.drawing.levels import Levels
 from network_sim.config import NetworkConfig
 from network_sim.coverage import RoadCoverage
 from network_sim.metrics import Metric

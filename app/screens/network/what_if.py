@@ -11,8 +11,8 @@ import numpy as np
 from app.drawing.colors import NEUTRAL
 from app.drawing.poses import place
 from app.screens.network.delivery_view import DeliveryView
-from app.ui import Ui
 from app.web.markup import Markdown
+from app.window.ui import Ui
 from network_sim.radio import IEEE80211B
 from pipeline.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray

@@ -6,10 +6,10 @@ from collections.abc import Generator
 
 import numpy as np
 
+from app.compute.records import SCREEN_POINTS, Picture, SceneNode, SceneView, sample
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.pictures import depth_picture, depth_range_m
-from app.records import SCREEN_POINTS, Picture, SceneNode, SceneView, sample
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.acquisition import back_project
 from pipeline.types import RgbdFrame

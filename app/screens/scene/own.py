@@ -9,9 +9,9 @@ from pathlib import Path
 
 import viser
 
-from app.ui import Ui
 from app.web.markup import Markdown
 from app.web.uploads import OWN, keep_upload
+from app.window.ui import Ui
 from packetmesh.errors import InputError
 from packetmesh.files import path_below
 from pipeline.sources import ImagePair

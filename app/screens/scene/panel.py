@@ -8,15 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from app.compute.records import SceneView
+from app.compute.state import Spec, Step
 from app.drawing.cameras import add_camera
 from app.drawing.clouds import add_cloud, clear
-from app.records import SceneView
 from app.screens.scene.own import OwnFolder
 from app.screens.scene.recording import ReadRecording
-from app.state import Spec, Step
-from app.tables import number, table
-from app.ui import Panel
 from app.web.markup import Markdown, Markup
+from app.window.panel import Panel
+from app.window.tables import number, table
 from pipeline.config import PRESETS
 from pipeline.io.demos import DEMO_SCENES
 from pipeline.sources import Demo, ImagePair, RigFolder

@@ -6,9 +6,9 @@ import shutil
 from collections.abc import Generator
 from pathlib import Path
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.scene.recording import ReadRecording
-from app.state import Spec
-from app.store import Store
 from app.web.zips import opened_zip
 from packetmesh.errors import InputError
 from packetmesh.files import path_below

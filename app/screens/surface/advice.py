@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from app.screens.surface.sweep_plot import BELOW, sweep_figure, sweep_sentence
 from app.screens.surface.view import SweepView
-from app.tables import number, table
-from app.ui import Ui
 from app.web.markup import Markdown, Markup
+from app.window.tables import number, table
+from app.window.ui import Ui
 from pipeline.findings import Suggestion
 
 TEXT = Markdown(

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.screens.surface.stage import SurfaceStage
 from app.screens.surface.view import PaintedView, Ray
-from app.session import Session
+from app.window.panel import PanelSession
 from pipeline.types import FloatArray
 
 
@@ -16,7 +16,7 @@ class ChosenBall:
     While the radius is dragged, the pointer is on the slider, so it cannot say where.
     """
 
-    def __init__(self, session: Session, stage: SurfaceStage) -> None:
+    def __init__(self, session: PanelSession, stage: SurfaceStage) -> None:
         self._session, self._stage = session, stage
         self._clicked: tuple[FloatArray, FloatArray] | None = None
 

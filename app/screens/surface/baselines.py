@@ -8,9 +8,9 @@ from collections.abc import Callable, Hashable
 from app.screens.surface.numbers import WAIT, note_html
 from app.screens.surface.stage import SurfaceStage
 from app.screens.surface.view import BaselineName, BaselineView
-from app.session import Session
 from app.web.markup import Markup
 from app.window.gui import Piece
+from app.window.panel import PanelSession
 
 
 class Baselines:
@@ -18,7 +18,7 @@ class Baselines:
 
     def __init__(
         self,
-        session: Session,
+        session: PanelSession,
         stage: SurfaceStage,
         line: Piece[Markup],
         on_made: Callable[[BaselineName, bool], None],

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Generator
 from typing import get_args
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.meshes import mesh_view
 from app.screens.surface.view import BaselineName, BaselineView
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.merging import FusedCloud

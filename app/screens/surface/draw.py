@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from app.compute.records import MeshView
 from app.drawing.colors import INFERRED, TARGET
-from app.records import MeshView
 from app.screens.surface.view import PaintedMesh, UnusedView
 from pipeline.types import FloatArray
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from app.screens.surface.labels import BASELINES, COLORINGS
 from app.screens.surface.view import Coloring
-from app.ui import Offer, Offers
 from app.web.markup import Markdown
+from app.window.panel import Offer, Offers
 
 HINT = """The surface as the Surface screen shows it: one page to turn it, offline, with a line between before
 and after; a moving picture of a flight along the cameras, for slides; the 3-D view as it is now."""

@@ -10,9 +10,11 @@ import numpy as np
 from PIL import Image
 from scipy.spatial.transform import Rotation, Slerp
 
+from app.compute.records import Shown
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.colors import BACKGROUND, LOSS
 from app.drawing.meshes import VIOLET
-from app.records import Shown
 from app.reports.captioned import captioned, gif, on_background, png
 from app.reports.hand_out import viewpoint_of
 from app.reports.surface_page import Side, SurfacePage, surface_page
@@ -20,8 +22,6 @@ from app.screens.surface.labels import NAMES
 from app.screens.surface.legend import legend_of
 from app.screens.surface.paint_job import colored_glb, vertex_colors
 from app.screens.surface.view import Coloring
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.geometry import rigid, scaled

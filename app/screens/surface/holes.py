@@ -8,9 +8,9 @@ import numpy as np
 
 from app.screens.surface.draw_holes import HoleDrawing, picked_hole
 from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
-from app.tables import number, table
-from app.ui import Ui
 from app.web.markup import Markdown, Markup
+from app.window.tables import number, table
+from app.window.ui import Ui
 from pipeline.findings import Explanation, RayParts
 from pipeline.types import FloatArray
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.colors import HOLE, NEUTRAL
 from app.drawing.meshes import mesh_view, surface_glb
 from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
-from app.state import Spec
-from app.store import Store
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.findings import RayParts

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.compute.records import MeshView
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.meshes import mesh_view
-from app.records import MeshView
 from app.screens.surface.holes_job import hole_views, parts_of
 from app.screens.surface.sweep_job import suggestions_of
 from app.screens.surface.unused import POINT_SHARE, unused_view
 from app.screens.surface.view import SpacingView, SurfaceView, UnusedView, Which
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.merging import FusedCloud
 from pipeline.stages import compute, dressed

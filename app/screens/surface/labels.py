@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.records import Shown
+from app.compute.records import Shown
 from app.screens.surface.view import BaselineName, Coloring
 from app.web.markup import Markdown
 from pipeline.config import RadiusRule

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from app.compute.records import ColorBar
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET, css
 from app.drawing.legend import Legend
-from app.records import ColorBar
 from app.screens.surface.labels import OWN_COLORS
 from app.screens.surface.view import Coloring
-from app.tables import bar_html
 from app.web.markup import Markup
+from app.window.tables import bar_html
 from pipeline.texture import SEAM_M
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"

@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, get_args
 
-from app.lesson_file import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, sets, short
-from app.records import MeshView
+from app.compute.records import MeshView
+from app.lesson.files import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, sets, short
 from app.screens.surface.labels import AFTER, COLORINGS, RULES, SHOWN
 from app.screens.surface.view import BaselineName, BaselineView, Coloring, SurfaceView
-from app.tables import UNKNOWN, number
+from app.window.tables import UNKNOWN, number
 from pipeline.config import RadiusRule, SurfaceConfig
 
 SHIPPED = LESSONS / "which-ball-radius.md"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from app.records import MeshView
+from app.compute.records import MeshView
 from app.screens.surface.labels import BASELINE_HEADS
 from app.screens.surface.view import BaselineView, PaintedView, SurfaceView
-from app.tables import UNKNOWN, WAITING, Row, number, table, truth_rows
 from app.web.markup import Markup
+from app.window.tables import UNKNOWN, WAITING, Row, number, table, truth_rows
 
 
 def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_truth: bool) -> Markup:

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, NEUTRAL, TARGET, ramp
 from app.drawing.glb import lines_glb
 from app.drawing.meshes import photographed_glb, rim_segments_m, surface_glb
 from app.screens.surface.unused import POINT_SHARE, resting_ball_m, unused_view
 from app.screens.surface.view import Coloring, PaintedMesh, PaintedView, PaintRequest, Which
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.placement import Placement
 from pipeline.spec import key

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from app.controls import Controls
+from app.compute.records import SceneView
+from app.compute.state import Spec, Step
 from app.drawing.cameras import stage_of, turn
-from app.lesson import LessonFolder
-from app.lesson_file import Numbers, read_lesson
-from app.records import SceneView
+from app.lesson.files import Numbers, read_lesson
+from app.lesson.player import LessonFolder
 from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.ball import ChosenBall
 from app.screens.surface.baselines import Baselines
@@ -34,9 +34,10 @@ from app.screens.surface.view import (
     Which,
 )
 from app.screens.surface.walks import Walks
-from app.state import Spec, Step
-from app.ui import STOP, Offers, Panel
 from app.web.markup import Markup
+from app.window.controls import Controls
+from app.window.in_address import STOP
+from app.window.panel import Offers, Panel
 from pipeline.types import FloatArray
 
 NAMES = {rule: name for name, rule in RULES.items()}

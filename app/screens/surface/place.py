@@ -7,7 +7,7 @@ from collections.abc import Callable
 import viser
 
 from app.screens.surface.labels import COLORINGS, PLACES
-from app.ui import InAddress, Picked
+from app.window.in_address import InAddress, Picked
 
 
 def picked(

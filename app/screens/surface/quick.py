@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from app.acknowledgement import DrawAcknowledgement
 from app.screens.surface.view import QUICK_POINTS, PaintedView, PaintRequest
-from app.session import Session
+from app.window.acknowledgement import DrawAcknowledgement
+from app.window.panel import PanelSession
 
 QUIET_S = 0.4
 """When the radius has not moved for so long, it rests."""
@@ -26,7 +26,7 @@ class QuickLook:
 
     def __init__(
         self,
-        session: Session,
+        session: PanelSession,
         on_view: Callable[[PaintedView], None],
         on_drawn: Callable[[], None],
         on_rest: Callable[[], None],

@@ -7,16 +7,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.dock import COUNT_NS, Dock
+from app.dock.dock import COUNT_NS, Dock
 from app.drawing.clouds import clear
 from app.drawing.colors import DELIVERED, LOSS, NEUTRAL
+from app.drawing.timeline import Curve, CurvesLane
 from app.screens.surface.draw_rolling import RollingDrawing
 from app.screens.surface.labels import AFTER, BEFORE
 from app.screens.surface.view import Which
 from app.screens.surface.walk_view import Happening, WalkRequest, WalkView
-from app.timeline import Curve, CurvesLane
-from app.ui import Ui
 from app.web.markup import Markdown
+from app.window.ui import Ui
 from packetmesh.errors import InputError
 from pipeline.types import FloatArray
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from app.controls import Number
 from app.screens.surface.view import SpacingView
+from app.window.controls import Number
 from pipeline.config import PipelineConfig, RadiusRule
 
 ADVANCED = (

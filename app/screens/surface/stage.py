@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import viser
 
+from app.compute.records import MeshView
 from app.drawing.cameras import Stage
 from app.drawing.colors import SOURCE
-from app.records import MeshView
 from app.screens.surface.draw import SurfaceDrawing
 from app.screens.surface.labels import AFTER, BASELINES, BEFORE, BOTH
 from app.screens.surface.view import PaintedMesh, UnusedView, Which

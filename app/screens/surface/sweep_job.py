@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Generator
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.surface.view import SweepView
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.findings import Suggestion
 from pipeline.spec import key

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from app.records import MeshView
+from app.compute.records import MeshView
 from pipeline.findings import Explanation, RayParts, Suggestion, SweepPoint
 from pipeline.types import FloatArray, IntArray
 

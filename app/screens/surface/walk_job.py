@@ -6,9 +6,9 @@ from collections.abc import Generator
 
 import numpy as np
 
+from app.compute.state import Spec
+from app.compute.store import Store
 from app.screens.surface.walk_view import Happening, WalkRequest, WalkView
-from app.state import Spec
-from app.store import Store
 from packetmesh.progress import Progress
 from pipeline.spec import key
 from pipeline.surface import radii

@@ -7,13 +7,13 @@ from collections.abc import Callable, Hashable
 
 from app.screens.surface.rolling import RollingFolder
 from app.screens.surface.walk_view import WalkRequest, WalkView
-from app.session import Session
+from app.window.panel import PanelSession
 
 
 class Walks:
     """The folder of the rolling ball, with its jobs and its close-up."""
 
-    def __init__(self, session: Session, on_change: Callable[[], None]) -> None:
+    def __init__(self, session: PanelSession, on_change: Callable[[], None]) -> None:
         """Add the folder; ``on_change`` is called when a walk comes or goes."""
         self._session, self._on_change = session, on_change
         self.folder = RollingFolder(session.ui, self._watch)

@@ -15,7 +15,7 @@ from attacker import connected
 
 from app.load.connection import Connection, wait_for
 from app.server import FULL, build_server
-from app.session import Session
+from app.session.session import Session
 from app.web import crowd as crowds
 from app.web.crowd import (
     MOST_OF_ONE_ADDRESS,

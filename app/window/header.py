@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from app.compute.state import Step, StepStatus
 from app.drawing.colors import BRAND, DELIVERED
-from app.page import stale_html
-from app.state import Step, StepStatus
-from app.stepper import Stepper
 from app.web.markup import Markdown, Markup
 from app.window.gui import Gui
+from app.window.page import stale_html
+from app.window.stepper import Stepper
 from packetmesh.progress import Progress
 
 STARTING = Markdown("**Starting** …")

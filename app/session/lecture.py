@@ -13,21 +13,20 @@ import uuid
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeAlias
 from urllib.parse import urlsplit
 
 import viser
 
-from app.dock_row import add_hidden
 from app.drawing.cameras import turn
-from app.page import page_call
-from app.qr import qr_html
-from app.ui import Ui
+from app.session.qr import qr_html
 from app.web import viser_private as private
 from app.web.entrance import Token, is_loopback
 from app.web.gate import Gate
 from app.web.markup import Markdown, Markup
 from app.window.gui import Gui
+from app.window.hidden import add_hidden
+from app.window.page import page_call
+from app.window.ui import Count, Ui
 
 SAID = re.compile(r"\d+ (?:(follow)|(roam)|vote ([123]))")
 """What the page of somebody in the class says; a number tells two apart that are alike."""
@@ -36,8 +35,6 @@ UNREACHED = Markup(
     "<code>--host 0.0.0.0</code>; then it is one that the class can open."
 )
 """Of an address of this machine alone."""
-Count: TypeAlias = Callable[[int, int], None]
-"""Counts the vote of a voter, both by their numbers; choices count from 1."""
 
 
 @dataclass(slots=True)

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import viser
 
-from app.address import Address, Place
-from app.state import Spec
-from app.ui import STOP, InAddress, Ui
+from app.compute.state import Spec
+from app.session.address import Address, Place
+from app.session.views import Views
+from app.window.in_address import STOP, InAddress
+from app.window.panel import PanelSession
+from app.window.ui import Ui
 from packetmesh.errors import InputError
-
-if TYPE_CHECKING:
-    from app.session import Session
 
 CAMERA = "cam"
 REST_S = 0.3
@@ -24,8 +23,9 @@ REST_S = 0.3
 class Places:
     """The addresses of those who steer a session: of its one browser, or of the teachers in a lecture."""
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, session: PanelSession, views: Views | None) -> None:
+        """Keep the addresses of a session; ``views`` are None where many browsers share it."""
+        self._session, self._views = session, views
         self._start = self._now()
         self._addresses: list[Address] = []
         if isinstance(session.target, viser.ClientHandle):
@@ -67,7 +67,7 @@ class Places:
         for panel in session.panels:
             if panel.drawn_below == session.current.drawn_below:
                 parts |= panel.in_address
-        return parts if session.views is None else parts | {CAMERA: session.views}
+        return parts if self._views is None else parts | {CAMERA: self._views}
 
     def _go_to(self, place: Place, wrong: list[str]) -> None:
         """Show what an address asks for; what it cannot be followed in gets one sentence."""

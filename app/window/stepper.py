@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from app.compute.state import StepStatus
 from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, css
-from app.state import StepStatus
 from app.web.markup import Markup
 from app.window.gui import Gui
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from contextlib import suppress
 from functools import partial
 
-from app import jobs
-from app.pool import ComputePool, Outcome
-from app.state import CHAIN, SharedViews, Spec, Step
-from app.store import Store
+from app.compute import jobs
+from app.compute.pool import ComputePool, Outcome
+from app.compute.state import CHAIN, SharedViews, Spec, Step
+from app.compute.store import Store
 
 
 def compute_ahead(pool: ComputePool, store: Store, shared: SharedViews, spec: Spec, owner: object) -> None:

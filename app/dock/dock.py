@@ -21,12 +21,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.dock_row import add_hidden
-from app.page import page_call
-from app.ticker import Ticker
-from app.timeline import Lane
-from app.ui import Ui
+from app.dock.ticker import Ticker
+from app.drawing.timeline import Lane
 from app.web.markup import Markup
+from app.window.hidden import add_hidden
+from app.window.page import page_call
+from app.window.ui import Ui
 
 PICTURE_S = 0.04
 """Between two pictures while it plays."""

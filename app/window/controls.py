@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from app.ui import Ui
 from app.window.gui import Gui
+from app.window.ui import Ui
 from packetmesh.settings_help import field_docs
 from pipeline.config import PipelineConfig
 

@@ -32,7 +32,7 @@ from packetmesh.errors import InputError
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-LESSONS = Path(__file__).resolve().parents[1] / "assets" / "lessons"
+LESSONS = Path(__file__).resolve().parents[2] / "assets" / "lessons"
 NUMBER = r"(\d+(?:\.\d+)?)"
 CHOICES = 3
 """Of every question; they are the keys 1, 2 and 3."""

@@ -8,8 +8,8 @@ from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
-from app.records import Shown
-from app.turns import Turns
+from app.compute.records import Shown
+from app.compute.turns import Turns
 from network_sim.config import NetworkConfig
 from pipeline import spec
 from pipeline.config import Baseline, Lens, Pattern

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from app.ui import Ui
 from app.web.markup import Markup
+from app.window.ui import Ui
 
 
 @contextmanager

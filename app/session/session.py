@@ -8,33 +8,30 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import viser
 
-from app import jobs
-from app.framing import Framing
-from app.header import Header
-from app.lane import LatestWins, Submission, Track
-from app.lecture import Lecture
-from app.page import screen_mark
-from app.places import Places
-from app.pool import ComputePool, Outcome
-from app.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
-from app.store import Store
-from app.ui import Offers, Panel, Ui
-from app.views import Views
+from app.compute import jobs
+from app.compute.lane import LatestWins, Submission, Track
+from app.compute.pool import ComputePool, Outcome
+from app.compute.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
+from app.compute.store import Store
+from app.session.framing import Framing
+from app.session.places import Places
+from app.session.views import Views
 from app.web.uploads import Uploads, plain
 from app.window.gui import Gui
+from app.window.header import Header
+from app.window.page import screen_mark
+from app.window.panel import Offers, Panel
+from app.window.ui import SharedBy, Target, Ui
 from packetmesh.errors import PacketMeshError
 from packetmesh.files import file_trouble
 from packetmesh.progress import Progress
 from pipeline.config import PipelineConfig
 
 logger = logging.getLogger(__name__)
-
-Target: TypeAlias = viser.ClientHandle | viser.ViserServer
-"""Where a session lives: one browser, or the server for a session that all browsers share."""
 
 CANCELLED = "Cancelled."
 
@@ -54,7 +51,7 @@ class Session:
         shared: SharedViews,
         spec: Spec,
         panels: Sequence[type[Panel]],
-        lecture: Lecture | None = None,
+        lecture: SharedBy | None = None,
     ) -> None:
         self.target = target
         self.gui, self.scene = Gui(target.gui), target.scene
@@ -72,11 +69,11 @@ class Session:
         self._side, self._quick = LatestWins(pool, self), LatestWins(pool, object(), urgent=True)
         self._closed = False
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="session")
-        self.panels = [panel(self) for panel in panels]
+        self.panels: Sequence[Panel] = [panel(self) for panel in panels]
         self.current = self.panels[0]
         self.views = Views(target) if isinstance(target, viser.ClientHandle) else None
-        self._framing = Framing(self)
-        self.places = Places(self)
+        self._framing = Framing(self, self.views)
+        self.places = Places(self, self.views)
         self.built = self._thread.submit(self._guarded, self._build_in_turn)
         """Done when its panels are there."""
         if isinstance(target, viser.ClientHandle):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.drawing.colors import LOSS, TARGET
-from app.levels import Levels, counts_of
+from app.drawing.levels import Levels, counts_of
 from pipeline.types import ByteArray, FloatArray
 
 Color = tuple[int, int, int]

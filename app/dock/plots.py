@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import plotly.graph_objects as go
 
-from app.dock_row import add_hidden
-from app.page import page_call
-from app.ui import Ui
 from app.web.markup import Markup
+from app.window.hidden import add_hidden
+from app.window.page import page_call
+from app.window.ui import Ui
 
 NO_TABLE = Markup("")
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import viser
 
 from app.drawing.cameras import look, stage_of
-
-if TYPE_CHECKING:
-    from app.session import Session
+from app.session.views import Views
+from app.window.panel import PanelSession
 
 
 class Framing:
     """Turns the view of a session when another thing is shown, or the same in another shape of the window."""
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, session: PanelSession, views: Views | None) -> None:
+        """Frame for a session; ``views`` are None where many browsers share it."""
+        self._session, self._views = session, views
         self._wide = False
         self._shape = self._seen_shape = 0.0
 
@@ -27,10 +25,10 @@ class Framing:
             anew: whether the scene is another one.
             keep: whether the view stays where a person has turned it.
         """
-        if self._session.views is None:
+        if self._views is None:
             self._turn(anew)
         else:
-            self._session.views.frame(lambda: self._turn(anew), keep)
+            self._views.frame(lambda: self._turn(anew), keep)
 
     def follow_window(self) -> None:
         """Fit the view anew when the picture has another shape, as when the dock comes or goes."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
+from app.compute.records import ColorBar, MeshView
 from app.drawing.colors import css
-from app.records import ColorBar, MeshView
 from app.web.markup import Markup
 
 _CELL = "padding: 2px 8px 2px 0; vertical-align: top;"

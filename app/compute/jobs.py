@@ -12,8 +12,8 @@ import pkgutil
 from collections.abc import Iterator
 from typing import Any
 
-from app.pool import ComputePool
-from app.state import CHAIN
+from app.compute.pool import ComputePool
+from app.compute.state import CHAIN
 
 SCREENS = "app.screens"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from app.page import page_call
-from app.ui import Ui
 from app.web.markup import Markup
+from app.window.page import page_call
+from app.window.ui import Ui
 
 TIMEOUT_S = 4.0
 """Without an answer for so long, perhaps as there is no browser, it is taken as given. A page that draws

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode
 
-from app.dock_row import add_hidden
-from app.page import page_call
-from app.state import Spec
-from app.ui import STOP, Ui
+from app.compute.state import Spec
 from app.web.markup import Markup
 from app.web.uploads import GONE, PREFIX, Uploads, name_in
+from app.window.hidden import add_hidden
+from app.window.in_address import STOP
+from app.window.page import page_call
+from app.window.ui import Ui
 from packetmesh.errors import InputError
 from packetmesh.settings import differences, key_of, with_settings
 from pipeline.config import PRESETS, PipelineConfig

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from app.pool import ComputePool, Outcome, Ticket
-from app.state import Step
+from app.compute.pool import ComputePool, Outcome, Ticket
+from app.compute.state import Step
 
 CANCEL_S = 1.0
 """How long a cancelled job may go on before its process is ended, which costs everybody a new one."""

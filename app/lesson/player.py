@@ -8,10 +8,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Generic
 
-from app.lesson_file import CHOICES, CLAUSE, FIELD, SCENE, Lesson, Look, Numbers, Question, settled
-from app.page import page_call
-from app.ui import Ui
+from app.lesson.files import CHOICES, CLAUSE, FIELD, SCENE, Lesson, Look, Numbers, Question, settled
 from app.web.markup import Markdown, Markup, shipped_markdown
+from app.window.page import page_call
+from app.window.ui import Ui
 from packetmesh.errors import InputError
 
 OFF, BEGIN = "not now", Markdown("Choose a stop, or press **Next**.")

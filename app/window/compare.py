@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from app.lesson_file import NUMBER
-from app.records import Picture
-from app.tables import bar_html
-from app.ui import Ui
+from app.compute.records import Picture
 from app.web.markup import Markup
+from app.window.tables import bar_html
+from app.window.ui import Ui
 from packetmesh.errors import InputError
 from pipeline.types import ByteArray
 
@@ -130,7 +129,7 @@ def place_of(text: str, start: tuple[str, str, float]) -> tuple[str, str, float]
     """
     if not text:
         return start
-    found = re.fullmatch(rf"([a-z-]+),([a-z-]+),{NUMBER}", text)
+    found = re.fullmatch(r"([a-z-]+),([a-z-]+),(\d+(?:\.\d+)?)", text)
     if found is None or float(found[3]) > 100.0:
         raise no_pictures(text, start)
     return found[1], found[2], float(found[3])

@@ -1,0 +1,3 @@
+"""Heavy work in processes next to the server, its results, and what a session has of them. Imports nothing
+else of ``app``.
+"""
