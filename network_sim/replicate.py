@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import stdtrit  # student's t; scipy.stats takes a second to import
 
 from network_sim.config import NetworkConfig
-from network_sim.metrics import Metric, metrics
+from network_sim.metrics.metrics import Metric, metrics
 from network_sim.simulate import simulate
 from packetmesh.batch import run_batch
 from packetmesh.errors import InputError

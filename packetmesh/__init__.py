@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from network_sim.arrivals import Arrivals, arrivals
+    from network_sim.metrics.arrivals import Arrivals, arrivals
     from network_sim.config import (
         EnergyConfig,
         LossConfig,
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
         StreetConfig,
         UplinkConfig,
     )
-    from network_sim.metrics import Metric, image_delays_s
-    from network_sim.metrics import metrics as network_metrics
+    from network_sim.metrics.metrics import Metric, image_delays_s
+    from network_sim.metrics.metrics import metrics as network_metrics
     from network_sim.presets import PRESETS as NETWORK_PRESETS
     from network_sim.simulate import iterate_simulation, simulate
-    from network_sim.trace import Events, NetworkTrace
+    from network_sim.trace.log import Events, NetworkTrace
     from network_sim.types import Cause, EventKind
     from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
     from packetmesh.progress import Progress, drain
@@ -80,14 +80,14 @@ if TYPE_CHECKING:
     )
 
 _NAMES = {
-    "network_sim.arrivals": "Arrivals arrivals",
+    "network_sim.metrics.arrivals": "Arrivals arrivals",
     "network_sim.config": (
         "EnergyConfig LossConfig MacConfig NetworkConfig NodesConfig RadioConfig RunConfig SchemeConfig "
         "StreetConfig UplinkConfig"
     ),
-    "network_sim.metrics": "Metric image_delays_s",
+    "network_sim.metrics.metrics": "Metric image_delays_s",
     "network_sim.simulate": "iterate_simulation simulate",
-    "network_sim.trace": "Events NetworkTrace",
+    "network_sim.trace.log": "Events NetworkTrace",
     "network_sim.types": "Cause EventKind",
     "packetmesh.errors": "InputError PacketMeshError ReconstructionError",
     "packetmesh.progress": "Progress drain",
@@ -121,7 +121,7 @@ _NAMES = {
 }
 _PLACES = {name: (module, name) for module, names in _NAMES.items() for name in names.split()} | {
     "NETWORK_PRESETS": ("network_sim.presets", "PRESETS"),
-    "network_metrics": ("network_sim.metrics", "metrics"),
+    "network_metrics": ("network_sim.metrics.metrics", "metrics"),
 }
 """Module and attribute of every public name."""
 

@@ -8,19 +8,15 @@ from functools import partial
 
 import numpy as np
 
-from pipeline import geometry
-from pipeline.beside import threads
+from pipeline.kernels import geometry
+from pipeline.kernels.threads import threads
 from pipeline.config import FusionMode
 from pipeline.nodes import NodeClouds
 from pipeline.registration import hidden_from
-from pipeline.surface import (
-    estimate_normals,
-    in_cubes_of,
-    smooth,
-    spacing,
-    voxel_average,
-    voxel_for_count,
-)
+from pipeline.surface.normals import estimate_normals
+from pipeline.surface.voxel import in_cubes_of, voxel_average, voxel_for_count
+from pipeline.surface.smooth import smooth
+from pipeline.surface.radii import spacing
 from pipeline.types import FloatArray, IntArray, PointCloud, PointSource, RgbdFrame
 
 NOISE_VOXELS = 2.0

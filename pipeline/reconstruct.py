@@ -8,10 +8,10 @@ import numpy as np
 
 from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.findings import Kept
+from pipeline.surface.findings import Kept
 from pipeline.merging import MergedClouds
 from pipeline.nodes import NodeClouds
-from pipeline.placement import Placement
+from pipeline.placement.outcome import Placement
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import Cache, Steps, run

@@ -18,7 +18,7 @@ import numpy as np
 
 from packetmesh.progress import Progress, drain
 from pipeline.acquisition import Acquired, acquire
-from pipeline.beside import threads
+from pipeline.kernels.threads import threads
 from pipeline.config import (
     AcquisitionConfig,
     DepthConfig,
@@ -36,22 +36,18 @@ from pipeline.nodes import (
     nothing_inferred,
     prepare_node,
 )
-from pipeline.placement import Placement, whole_placement
-from pipeline.placing import place_nodes
+from pipeline.placement.outcome import Placement, whole_placement
+from pipeline.placement.place_nodes import place_nodes
 from pipeline.sources import Source
 from pipeline.spec import CHAIN, NEEDS, SIDE_BY_SIDE, Spec, StageName, key
-from pipeline.surface import (
-    Camera,
-    Yardstick,
-    compare_with_truth,
-    measured,
-    photographed,
-    radii,
-    roll_or_nothing,
-    yardstick_of,
-)
+from pipeline.kernels.rays import Camera
+from pipeline.surface.truth import Yardstick, compare_with_truth, yardstick_of
+from pipeline.surface.quality import measured
+from pipeline.surface.texture import photographed
+from pipeline.surface.radii import radii
+from pipeline.surface.ball_pivoting import roll_or_nothing
 from pipeline.surface.baselines import alpha_surface, poisson_surface
-from pipeline.texture import Texture
+from pipeline.types import Texture
 from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult
 
 Result = TypeVar("Result")

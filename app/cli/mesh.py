@@ -34,7 +34,7 @@ def mesh(
         metres_per_unit: Of the coordinates in the file: 0.001 if they are millimetres.
         json: Print the quality of the mesh as one JSON object.
     """
-    from pipeline.mesh_cloud import MeshOptions, iterate_mesh_file
+    from pipeline.surface.mesh_cloud import MeshOptions, iterate_mesh_file
 
     if radii_m == ():
         wrong_use("--radii-m needs at least one radius, or auto")

@@ -13,7 +13,7 @@ from packetmesh.settings import config_named, with_settings
 from pipeline.config import PRESETS, Baseline
 
 if TYPE_CHECKING:
-    from pipeline.placement import Placement
+    from pipeline.placement.outcome import Placement
 
 
 def reconstruct(
@@ -116,7 +116,7 @@ def _many(
 
 def say_places(placement: Placement) -> None:
     """How far the nodes of a rig agree, and which found no place; exits with 1 if no two did."""
-    from pipeline.placement import APART
+    from pipeline.placement.outcome import APART
 
     if len(placement.verdicts) < 2:
         return

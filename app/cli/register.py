@@ -12,7 +12,7 @@ from app.cli.text import answers_table, print_json, say, wrong_use
 from packetmesh.errors import InputError
 
 if TYPE_CHECKING:
-    from pipeline.register_pair import Answer
+    from pipeline.pairs.register import Answer
 
 
 def register(
@@ -51,10 +51,10 @@ def register(
     from packetmesh.files import writable_folder
     from pipeline.io.clouds import read_cloud
     from pipeline.io.poses import read_pose
-    from pipeline.mesh_cloud import in_metres
-    from pipeline.register_draws import run_draws, with_gate
-    from pipeline.register_folder import answer_metrics, chosen_pose, write_register_folder
-    from pipeline.register_pair import chosen_methods, config_for, prepared_pair, run_methods
+    from pipeline.surface.mesh_cloud import in_metres
+    from pipeline.pairs.draws import run_draws, with_gate
+    from pipeline.pairs.folder import answer_metrics, chosen_pose, write_register_folder
+    from pipeline.pairs.register import chosen_methods, config_for, prepared_pair, run_methods
     from pipeline.registration.methods import METHODS
 
     try:

@@ -25,7 +25,7 @@ from packetmesh.settings import settings
 from pipeline.config import Baseline, PipelineConfig
 from pipeline.importing import ImportReport, is_recording, iterate_import
 from pipeline.io.rigs import is_rig
-from pipeline.placement import APART
+from pipeline.placement.outcome import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.run_folder import METRICS, clear_run_folder, metrics_of, write_baseline, write_run_folder
 from pipeline.sources import Calibrated, FileSource, RigFolder

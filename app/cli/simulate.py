@@ -65,10 +65,10 @@ def _describe(config: NetworkConfig, json: bool) -> None:
 def _run(
     config: NetworkConfig, preset: str, count: int, scheduler: str | None, out: Path | None, json: bool
 ) -> None:
-    from network_sim.metrics import metrics
+    from network_sim.metrics.metrics import metrics
     from network_sim.replicate import estimates_of, iterate_runs, replications
     from network_sim.simulate import iterate_simulation
-    from network_sim.trace_files import write_trace
+    from network_sim.trace.files import write_trace
     from packetmesh.files import writable_folder, write_json
     from packetmesh.settings import settings
 
@@ -89,7 +89,7 @@ def _run(
 
 
 def _say_who_is_alone(config: NetworkConfig) -> None:
-    from network_sim.collection import disconnected
+    from network_sim.fixed.collection import disconnected
 
     alone = disconnected(config) if config.scenario == "collection" else ()
     if alone:

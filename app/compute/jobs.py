@@ -45,4 +45,4 @@ def warm_up() -> Iterator[None]:
             if module.name.endswith("job"):
                 importlib.import_module(module.name)
                 yield
-    yield from importlib.import_module("pipeline.warm").warm_up()
+    yield from importlib.import_module("app.compute.warm").warm_up()

@@ -11,7 +11,7 @@ import numpy as np
 from app.compute.records import SceneNode
 from app.drawing.colors import NEUTRAL
 from app.drawing.poses import place
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from pipeline.types import FloatArray
 
 if TYPE_CHECKING:

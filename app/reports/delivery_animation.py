@@ -14,7 +14,7 @@ from app.drawing.colors import BACKGROUND, DELIVERED, LOSS, TARGET
 from app.reports.captioned import EDGE_PX, INK, PAPER, SOFT, font, gif, on_background
 from app.reports.hand_out import HandOut, HandOutMoment, viewpoint
 from app.reports.projecting import camera_of, project
-from pipeline.rays import Camera
+from pipeline.kernels.rays import Camera
 from pipeline.surface.pictures import mesh_picture
 from pipeline.types import ByteArray
 

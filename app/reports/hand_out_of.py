@@ -8,8 +8,8 @@ import numpy as np
 
 from app.reports.delivery import delivery_animation, delivery_page
 from app.reports.hand_out import FramesOnAir, HandOut, HandOutMoment, HandOutNode, thumbnail
-from network_sim.frames import fates
-from network_sim.trace import NetworkTrace
+from network_sim.trace.frames import fates
+from network_sim.trace.log import NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind, to_s
 from packetmesh.files import atomic_path
 from pipeline.deliver import Delivery

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.open3d_runtime import o3d
+from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import ByteArray, FloatArray, IntArray, Surface
 
 STEPS = 65_535

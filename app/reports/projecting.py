@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.reports.hand_out import ASPECT, FIELD_RAD, Viewpoint
-from pipeline.rays import Camera
+from pipeline.kernels.rays import Camera
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
 

@@ -9,8 +9,8 @@ from app.drawing.colors import BACKGROUND, DELIVERED, DISTANCE_STOPS, LOSS, NEUT
 from app.reports.captioned import EDGE_PX, INK, PAPER, SOFT, font, gif
 from app.reports.projecting import camera_of, splat
 from app.reports.race import RaceRun, RaceShow
-from pipeline.geometry import apply
-from pipeline.rays import Camera
+from pipeline.kernels.geometry import apply
+from pipeline.kernels.rays import Camera
 from pipeline.types import ByteArray
 
 WIDTH_PX, ROOM_PX, LENS_PX = 960, 300, 190

@@ -10,7 +10,7 @@ from typing import Any
 from app.drawing.pictures import depth_picture, depth_range_m
 from app.reports.html import picture, pictures, table, write_page
 from app.web.markup import Markup
-from pipeline.rays import Camera
+from pipeline.kernels.rays import Camera
 from pipeline.reconstruct import Reconstruction
 from pipeline.stages import cameras_of, dressed
 from pipeline.surface.pictures import beside, mesh_picture

@@ -14,11 +14,11 @@ import numpy as np
 
 from lab.benchmarks.problems import write_problems
 from lab.claims.registration.cases import CONDITIONS, make_case, random_subset
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.io.clouds import read_cloud
 from pipeline.io.poses import read_pose
-from pipeline.points import middle_extent_m
-from pipeline.register_pair import Pair
+from pipeline.kernels.points import middle_extent_m
+from pipeline.pairs.register import Pair
 from pipeline.types import FloatArray, PointCloud
 
 ROOMS = range(300, 305)

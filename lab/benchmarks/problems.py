@@ -19,10 +19,10 @@ from lab.trials import iterate_trials
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from pipeline.io.clouds import read_cloud, write_cloud
-from pipeline.register_draws import with_gate
-from pipeline.register_pair import Pair, prepared_pair
+from pipeline.pairs.draws import with_gate
+from pipeline.pairs.register import Pair, prepared_pair
 from pipeline.registration import register
 from pipeline.registration.peers import available_peers, run_peer
 from pipeline.types import FloatArray, PointCloud

@@ -13,7 +13,7 @@ from lab.worlds.render import Renderer
 from packetmesh.memory import peak_memory_bytes
 from pipeline.acquisition import back_project
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.registration import point_error_m, register_timed
 from pipeline.registration.peers import available_peers, run_peer
 from pipeline.registration.sample import draw

@@ -10,7 +10,7 @@ import psutil
 from lab.claims.claim import Claim, Outcome
 from lab.claims.registration.cases import CONDITIONS
 from lab.claims.registration.setup import ROOMS
-from network_sim.images import ppm_bytes
+from network_sim.fixed.images import ppm_bytes
 from network_sim.mac.ieee802154 import LINK_BPS
 from pipeline.depth.preprocessing import CROP_HEIGHT_PX, CROP_WIDTH_PX
 from pipeline.io.demos import DEMO_SCENES, load_demo

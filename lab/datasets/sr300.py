@@ -15,7 +15,7 @@ from lab.datasets.netpbm import read_netpbm
 from lab.datasets.pair import Load, Pair
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes, read_text
-from pipeline.depth_to_color import carried
+from pipeline.io.depth_to_color import carried
 from pipeline.types import CameraIntrinsics, FloatArray
 
 METRES_PER_UNIT = 0.000124986647

@@ -26,7 +26,7 @@ from lab.worlds.pixels import camera_rays
 from lab.worlds.raycast import world_mesh
 from lab.worlds.scene import Scene
 from packetmesh.errors import InputError
-from pipeline.rays import tensor, triangle_scene
+from pipeline.kernels.rays import tensor, triangle_scene
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray, IntArray
 
 Camera = tuple[CameraIntrinsics, FloatArray]

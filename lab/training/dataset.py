@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from packetmesh.files import atomic_path
-from pipeline.geometry import scaled
+from pipeline.kernels.geometry import scaled
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
 if TYPE_CHECKING:

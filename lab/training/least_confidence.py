@@ -17,7 +17,7 @@ from lab.training.dataset import FIRST_SEED, viewed_room
 from lab.worlds.raycast import world_mesh
 from lab.worlds.sensor import sense_depth
 from pipeline.config import PRESETS
-from pipeline.geometry import scaled
+from pipeline.kernels.geometry import scaled
 from pipeline.reconstruct import reconstruct
 from pipeline.types import DepthMap, RgbdFrame, Rig, RigTruth
 

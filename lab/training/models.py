@@ -174,7 +174,7 @@ def _barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:
 
 def _thinned(vertices: FloatArray, triangles: IntArray, budget: int) -> tuple[FloatArray, IntArray]:
     """A mesh of these triangles with about ``budget`` of them, by quadric errors (Garland, Heckbert 1997)."""
-    from pipeline.open3d_runtime import o3d
+    from pipeline.kernels.open3d_runtime import o3d
 
     rounded = np.round(vertices[triangles].reshape(-1, 3), 5)
     places, index = np.unique(rounded, axis=0, return_inverse=True)

@@ -11,7 +11,7 @@ import numpy as np
 from lab.worlds.board_views import BoardCamera
 from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
-from pipeline.geometry import apply, inverse, project, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, project, rigid, rotation_exp
 from pipeline.types import FloatArray
 
 DISTANCES_M = (0.6, 2.5)

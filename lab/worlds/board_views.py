@@ -23,7 +23,7 @@ from lab.worlds.sensor import sense_depth
 from lab.worlds.textures import parquet, plaster
 from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
-from pipeline.geometry import apply, inverse, pixel_rays, project
+from pipeline.kernels.geometry import apply, inverse, pixel_rays, project
 from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, FloatArray
 
 OVER = 4

@@ -10,7 +10,7 @@ from lab.worlds.room_finishes import draw_seed, muted, random_floor, random_wall
 from lab.worlds.scene import Light, Material, Part, Rng, Scene
 from lab.worlds.textures import plaster, random_palette
 from packetmesh.errors import InputError
-from pipeline.geometry import look_at
+from pipeline.kernels.geometry import look_at
 from pipeline.types import CameraIntrinsics, FloatArray
 
 

@@ -18,7 +18,7 @@ from lab.worlds.scene import Scene
 from lab.worlds.sensor import sense_depth
 from lab.worlds.workshop import workshop
 from packetmesh.errors import InputError
-from pipeline.geometry import rotation_exp
+from pipeline.kernels.geometry import rotation_exp
 from pipeline.io.demos import DEMO_SCENES
 from pipeline.types import DepthMap, FloatArray, RgbdFrame, Rig, RigTruth
 

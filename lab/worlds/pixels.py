@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from lab.worlds import shading
-from pipeline.geometry import pixel_rays
+from pipeline.kernels.geometry import pixel_rays
 from pipeline.types import CameraIntrinsics, FloatArray, IntArray
 
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from pipeline import geometry
+from pipeline.kernels import geometry
 from pipeline.types import FloatArray, IntArray
 
 Mesh = tuple[FloatArray, IntArray]

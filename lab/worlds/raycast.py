@@ -10,9 +10,9 @@ import numpy as np
 from lab.worlds import shading
 from lab.worlds.primitives import merged
 from lab.worlds.scene import Part, Scene
-from pipeline.geometry import apply
-from pipeline.open3d_runtime import o3d
-from pipeline.rays import tensor, triangle_scene
+from pipeline.kernels.geometry import apply
+from pipeline.kernels.open3d_runtime import o3d
+from pipeline.kernels.rays import tensor, triangle_scene
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 

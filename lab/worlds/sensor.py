@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from lab.worlds.render import View
-from pipeline.geometry import pixel_rays
+from pipeline.kernels.geometry import pixel_rays
 from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, FloatArray
 
 

@@ -10,7 +10,7 @@ from lab.worlds.furniture.finishes import painted
 from lab.worlds.furniture.placing import ORIGIN, board, place, solid
 from lab.worlds.primitives import Mesh, box, merged, moved
 from lab.worlds.scene import Light, Material, Part, Rng
-from pipeline.geometry import look_at
+from pipeline.kernels.geometry import look_at
 from pipeline.types import CameraIntrinsics, FloatArray
 
 VGA = CameraIntrinsics.pinhole(525.0, 525.0, 319.5, 239.5, 640, 480)

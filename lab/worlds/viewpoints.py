@@ -14,7 +14,7 @@ from lab.worlds.pieces import bounds
 from lab.worlds.render import Renderer
 from lab.worlds.scene import Rng, Scene
 from packetmesh.errors import InputError
-from pipeline.geometry import look_at, rigid, rotation_exp
+from pipeline.kernels.geometry import look_at, rigid, rotation_exp
 from pipeline.types import CameraIntrinsics, FloatArray, IntArray
 
 NEAREST_M = 0.3

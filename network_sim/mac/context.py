@@ -14,7 +14,7 @@ from network_sim.types import Delivery, Packet
 
 if TYPE_CHECKING:
     from network_sim.mac.medium import Medium
-    from network_sim.trace import Recorder
+    from network_sim.trace.log import Recorder
 
 _BLOCK = 4096
 """Random numbers are drawn in blocks: a call for each would dominate the run time."""

@@ -22,8 +22,8 @@ from numpy.random import Generator
 from network_sim.types import Cause
 
 if TYPE_CHECKING:
-    from network_sim.places import Places
-    from network_sim.radio import Modulation, Radio
+    from network_sim.radio.places import Places
+    from network_sim.radio.propagation import Modulation, Radio
 
 MEMORY_NS = 5_000_000
 """How long ended transmissions are kept: longer than a medium access looks back."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.acquisition.planes import FARTHEST_SD, LocalPlanes
-from pipeline.kdtree import compiled
+from pipeline.kernels.kdtree import compiled
 from pipeline.types import DepthMap, FloatArray
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.geometry import pixel_rays
+from pipeline.kernels.geometry import pixel_rays
 from pipeline.types import BoolArray, DepthMap, FloatArray, PointCloud, PointSource, RgbdFrame
 
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from pipeline.acquisition.planes import FARTHEST_SD, LocalPlanes
-from pipeline.kdtree import compiled
+from pipeline.kernels.kdtree import compiled
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 LEAST_SIDES = 3

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from pipeline.ordering import stable_order
+from pipeline.kernels.ordering import stable_order
 from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, DepthNoise, FloatArray
 
 FARTHEST_SD = 3.0

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.calibration.lens import FREE, Optics
-from pipeline.geometry import apply, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, rigid, rotation_exp
 from pipeline.types import FloatArray, IntArray
 
 STEPS = 60

@@ -12,7 +12,7 @@ from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import Calibration, FittedView, pose_of
 from pipeline.calibration.lens import Optics
-from pipeline.geometry import apply, inverse
+from pipeline.kernels.geometry import apply, inverse
 from pipeline.types import BoolArray, DepthMap, FloatArray, IntArray
 
 RIM_PX = 3

@@ -16,7 +16,7 @@ from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.fisheye import estimate_fisheye
 from pipeline.calibration.lens import FLAGS, FREE, NAMES, Optics
 from pipeline.config import Lens
-from pipeline.geometry import rigid
+from pipeline.kernels.geometry import rigid
 from pipeline.types import FloatArray
 
 LEAST_VIEWS = 3

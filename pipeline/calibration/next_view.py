@@ -14,7 +14,7 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import Calibration, coordinate_sd_px, information, informed, inverted
 from pipeline.calibration.lens import Optics
 from pipeline.calibration.trust import Sight, placing, sight
-from pipeline.geometry import apply, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, rigid, rotation_exp
 from pipeline.types import FloatArray
 
 TILTS_DEG = (0.0, 25.0, 45.0)

@@ -14,7 +14,7 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.bundle import Adjusted, Bundle, Sighting, adjust, place_boards
 from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, FittedView, View, rms_px
 from pipeline.calibration.rig_start import look, start
-from pipeline.geometry import inverse, rigid, rotation_angle_rad, rotation_exp
+from pipeline.kernels.geometry import inverse, rigid, rotation_angle_rad, rotation_exp
 from pipeline.types import FloatArray
 
 LEAST_CAMERAS, MOST_CAMERAS = 2, 12

@@ -13,7 +13,7 @@ from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.bundle import Bundle, Sighting
 from pipeline.calibration.estimate import View, place, rms_px
 from pipeline.calibration.lens import Optics
-from pipeline.geometry import apply, inverse, rotation_angle_rad
+from pipeline.kernels.geometry import apply, inverse, rotation_angle_rad
 from pipeline.types import FloatArray
 
 MOST_TRIED = 12

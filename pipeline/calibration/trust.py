@@ -24,7 +24,7 @@ from pipeline.calibration.estimate import (
 )
 from pipeline.calibration.lens import FREE, Optics
 from pipeline.config import Lens
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from pipeline.types import FloatArray
 
 CELLS = 24

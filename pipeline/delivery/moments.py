@@ -12,11 +12,11 @@ from pipeline.delivery.coding import Received
 from pipeline.delivery.memory import Memory
 from pipeline.delivery.sending import Sending, arrived_bytes, frames_at_sink, received_at
 from pipeline.delivery.sink import heard
-from pipeline.placement import whole_placement
+from pipeline.placement.outcome import whole_placement
 from pipeline.sources import LoadedRig
 from pipeline.spec import REBUILD, Spec
 from pipeline.stages import compared, run, with_rays, yardstick_of_rig
-from pipeline.surface import Yardstick
+from pipeline.surface.truth import Yardstick
 from pipeline.types import BoolArray, ByteArray, FloatArray, RgbdFrame, Rig, SurfaceResult
 
 

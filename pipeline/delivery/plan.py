@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from network_sim.config import NetworkConfig
-from network_sim.places import place_nodes
+from network_sim.radio.places import place_nodes
 from packetmesh.errors import InputError
 from pipeline.types import FloatArray, Rig
 

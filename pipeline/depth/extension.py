@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from pipeline.kdtree import compiled
+from pipeline.kernels.kdtree import compiled
 from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray
 
 FILL_WIDTH_PX = 320

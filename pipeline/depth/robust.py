@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.kdtree import compiled
+from pipeline.kernels.kdtree import compiled
 from pipeline.types import FloatArray, IntArray
 
 MAX_SAMPLES = 40_000

@@ -12,7 +12,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
-from pipeline.geometry import inverse
+from pipeline.kernels.geometry import inverse
 from pipeline.importing.bag_messages import (
     camera_in,
     color_of,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
-from pipeline.geometry import rigid
+from pipeline.kernels.geometry import rigid
 from pipeline.importing.rvl import decode_rvl
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 

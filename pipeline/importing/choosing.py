@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.geometry import apply, inverse, pixel_rays, scaled
+from pipeline.kernels.geometry import apply, inverse, pixel_rays, scaled
 from pipeline.importing.sequence import Sequence
 from pipeline.types import CameraIntrinsics, FloatArray
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
-from pipeline.geometry import rigid
+from pipeline.kernels.geometry import rigid
 from pipeline.importing.bag import is_bag, iterate_bag
 from pipeline.importing.choosing import choose
 from pipeline.importing.depth_units import depth_in

@@ -10,7 +10,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, read_bytes, read_text
-from pipeline.geometry import inverse
+from pipeline.kernels.geometry import inverse
 from pipeline.importing.cameras import PRIMESENSE, camera_of
 from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, posed
 from pipeline.io.images import read_color, read_depth_values

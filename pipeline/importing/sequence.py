@@ -7,7 +7,7 @@ from pathlib import Path
 
 from packetmesh.errors import InputError
 from packetmesh.files import path_below
-from pipeline.geometry import rigid
+from pipeline.kernels.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
 DEPTH_SUFFIXES = (".png", ".tif", ".tiff", ".npy", ".pfm", ".exr", ".pgm")

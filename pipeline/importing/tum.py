@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, read_bytes
-from pipeline.geometry import rigid
+from pipeline.kernels.geometry import rigid
 from pipeline.importing.cameras import PRIMESENSE, camera_of
 from pipeline.importing.sequence import Candidate, Sequence, named_inside, posed
 from pipeline.types import CameraIntrinsics, FloatArray

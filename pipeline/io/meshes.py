@@ -13,9 +13,9 @@ from PIL import Image
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
-from pipeline.geometry import rigid
+from pipeline.kernels.geometry import rigid
 from pipeline.io.images import jpeg_of
-from pipeline.texture import Texture
+from pipeline.types import Texture
 from pipeline.types import AnyPath, Surface
 
 MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")

@@ -10,8 +10,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from packetmesh.errors import InputError
-from pipeline.depth_to_color import register_depth
-from pipeline.geometry import LEVEL_POSE
+from pipeline.io.depth_to_color import register_depth
+from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.io.calibrations import FILES, NodeFiles, calibration_files, node_files
 from pipeline.io.depth_correction import (
     DepthCorrection,

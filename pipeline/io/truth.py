@@ -13,7 +13,7 @@ from packetmesh.errors import InputError
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.io.poses import read_pose, write_pose
-from pipeline.rays import Camera, hit_depths
+from pipeline.kernels.rays import Camera, hit_depths
 from pipeline.types import CameraIntrinsics, RgbdFrame, RigTruth, Surface
 
 MESH_NAME = "truth.ply"

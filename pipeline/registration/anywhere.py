@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.registration.loop import register
 from pipeline.registration.neighbourhood import median_spacing_m, pca_normals

@@ -12,8 +12,8 @@ import numpy as np
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import drain
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import apply, rotation_angle_rad
-from pipeline.kdtree import compiled
+from pipeline.kernels.geometry import apply, rotation_angle_rad
+from pipeline.kernels.kdtree import compiled
 from pipeline.registration.anderson import Acceleration
 from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.registration.matching import Matcher, Matching

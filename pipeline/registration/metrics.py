@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.geometry import apply, rotation_angle_rad
+from pipeline.kernels.geometry import apply, rotation_angle_rad
 from pipeline.types import FloatArray
 
 

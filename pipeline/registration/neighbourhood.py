@@ -7,9 +7,9 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from pipeline.kdtree import KdTree, compiled, tree_of
-from pipeline.patches import patch_normals
-from pipeline.points import neighbour_distances_m
+from pipeline.kernels.kdtree import KdTree, compiled, tree_of
+from pipeline.kernels.patches import patch_normals
+from pipeline.kernels.points import neighbour_distances_m
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 NORMAL_NEIGHBOURS, SPACING_NEIGHBOURS = 20, 4

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.geometry import apply, rigid
-from pipeline.open3d_runtime import o3d
+from pipeline.kernels.geometry import apply, rigid
+from pipeline.kernels.open3d_runtime import o3d
 from pipeline.registration.sample import draw
 from pipeline.types import FloatArray, PointCloud
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import apply, rigid
-from pipeline.kdtree import compiled, squared_distance
+from pipeline.kernels.geometry import apply, rigid
+from pipeline.kernels.kdtree import compiled, squared_distance
 from pipeline.registration.matching import Matcher, Matching
 from pipeline.registration.neighbourhood import Normals
 from pipeline.registration.observability import open_motions

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.kdtree import compiled
+from pipeline.kernels.kdtree import compiled
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 _KEY_PERIODS = (1e5, 2e5)

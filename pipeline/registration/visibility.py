@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.geometry import apply, project
+from pipeline.kernels.geometry import apply, project
 from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, FloatArray, PointCloud
 
 BEHIND = 1.1

@@ -8,7 +8,7 @@ import numpy as np
 
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain
-from pipeline.rays import Camera
+from pipeline.kernels.rays import Camera
 from pipeline.surface.pivoting import ALL_AT_ONCE, BallPivotStep, iterate_roll
 from pipeline.surface.quality import measured
 from pipeline.surface.radii import spacing

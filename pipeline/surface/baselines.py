@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError, ReconstructionError
-from pipeline.open3d_runtime import o3d
+from pipeline.kernels.open3d_runtime import o3d
 from pipeline.surface.quality import measured
 from pipeline.types import FloatArray, IntArray, PointCloud, Surface, SurfaceResult
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from pipeline.ordering import stable_order
+from pipeline.kernels.ordering import stable_order
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 LONGEST_HOLE_M = 1.0

@@ -12,11 +12,11 @@ from typing import TypeVar
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.rays import triangle_areas_m2
+from pipeline.kernels.rays import triangle_areas_m2
+from pipeline.surface.findings import SEAM_M
 from pipeline.surface.holes import find_holes
 from pipeline.surface.quality import measure_quality
 from pipeline.surface.truth import sample_surface
-from pipeline.texture import SEAM_M
 from pipeline.types import BoolArray, FloatArray, IntArray, Surface, SurfaceResult
 
 AnySurface = TypeVar("AnySurface", bound=Surface)

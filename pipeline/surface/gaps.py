@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from pipeline.rays import Camera
+from pipeline.kernels.rays import Camera
 from pipeline.types import BoolArray, DepthMap, FloatArray, Gaps
 
 LARGE_M2 = 0.01

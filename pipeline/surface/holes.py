@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.ordering import stable_order
+from pipeline.kernels.ordering import stable_order
 from pipeline.surface.boundary import (
     LONGEST_HOLE_M,
     boundary_loops,

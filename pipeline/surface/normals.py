@@ -10,8 +10,8 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
-from pipeline.kdtree import KdTree
-from pipeline.patches import patch_normals
+from pipeline.kernels.kdtree import KdTree
+from pipeline.kernels.patches import patch_normals
 from pipeline.surface.boundary import connected_parts
 from pipeline.types import FloatArray, IntArray, PointCloud
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from pipeline.rays import (
+from pipeline.kernels.rays import (
     Camera,
     camera_hits,
     depth_of,

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.geometry import apply, inverse
-from pipeline.open3d_runtime import o3d
-from pipeline.rays import Camera, hit_depths, tensor, triangle_areas_m2, triangle_scene
+from pipeline.kernels.geometry import apply, inverse
+from pipeline.kernels.open3d_runtime import o3d
+from pipeline.kernels.rays import Camera, hit_depths, tensor, triangle_areas_m2, triangle_scene
 from pipeline.surface.ray_parts import sight
 from pipeline.types import FloatArray, IntArray, RigTruth
 

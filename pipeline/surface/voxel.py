@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.ordering import stable_order
+from pipeline.kernels.ordering import stable_order
 from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray, PointCloud
 
 _COUNT_TOLERANCE = 0.02

@@ -11,7 +11,7 @@ import numpy as np
 
 from lab.claims.calibration.photograph import photograph
 from pipeline.calibration.board import Board
-from pipeline.geometry import inverse, look_at, rigid, rotation_exp
+from pipeline.kernels.geometry import inverse, look_at, rigid, rotation_exp
 from pipeline.io.images import write_color, write_depth_mm
 from pipeline.io.rigs import save_rig
 from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, FloatArray, RgbdFrame, Rig

@@ -9,7 +9,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from packetmesh.settings import with_settings
 from pipeline.sources import Demo
-from pipeline.surface import radii
+from pipeline.surface.radii import radii
 from tests.app.gltf import arrays
 
 SPEC = Spec(Demo("box-on-table"))

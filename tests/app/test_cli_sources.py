@@ -5,7 +5,7 @@ import pytest
 import tyro
 
 from app.cli.options import SourceOptions
-from pipeline.geometry import rigid
+from pipeline.kernels.geometry import rigid
 from pipeline.io.calibrations import CalibratedNode, write_calibration
 from pipeline.io.extrinsics import write_extrinsics
 from pipeline.io.images import write_color, write_depth_mm

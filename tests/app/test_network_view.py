@@ -17,9 +17,9 @@ from app.screens.network.numbers import metric_tables, runs_summary, value_text
 from app.screens.network.run_view import run_view
 from app.screens.network.view import What
 from network_sim.config import NetworkConfig, RunConfig
-from network_sim.metrics import Metric
+from network_sim.metrics.metrics import Metric
 from network_sim.presets import PRESETS
-from network_sim.trace import Recorder
+from network_sim.trace.log import Recorder
 from network_sim.types import Cause, EventKind, PacketKind
 from packetmesh.progress import Progress
 from packetmesh.progress import drain as end

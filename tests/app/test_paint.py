@@ -15,7 +15,7 @@ from packetmesh.progress import drain as end
 from pipeline.config import PipelineConfig
 from pipeline.sources import Demo
 from pipeline.stages import cameras_of
-from pipeline.surface import distances_to_truth_m
+from pipeline.surface.truth import distances_to_truth_m
 from pipeline.types import PointSource
 from tests.app.gltf import arrays
 

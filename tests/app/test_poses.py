@@ -3,7 +3,7 @@
 import numpy as np
 
 from app.drawing.poses import place, wxyz_of
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 
 
 class Recorder:

@@ -16,7 +16,7 @@ from app.screens.fuse.labels import COMPARISONS, RIVALS
 from app.screens.fuse.methods import METHODS, color_of
 from app.screens.fuse.view import SUCCESS_M, Race, Reference
 from pipeline import config
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 from tests.app.test_fuse_numbers import lane
 
 

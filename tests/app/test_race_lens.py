@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from app.screens.fuse.distances import Distances
 from app.screens.fuse.lens import WINDOW_M, lens_of
-from pipeline.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 
 CORNER_M = np.array([0.3, 0.1, 2.0])
 T_TRUE = rigid(rotation_exp(np.array([0.2, -0.1, 0.1])), np.array([0.5, 0.2, 0.1]))

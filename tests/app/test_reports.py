@@ -7,7 +7,8 @@ from app.drawing.colors import HOLE
 from app.reports.html import page, picture, table
 from app.reports.reproduction import write_reproduction_report
 from lab.claims.claim import Verdict
-from pipeline.surface import Camera, measure_quality
+from pipeline.kernels.rays import Camera
+from pipeline.surface.quality import measure_quality
 from pipeline.surface.pictures import mesh_picture
 from pipeline.types import CameraIntrinsics, SurfaceResult
 

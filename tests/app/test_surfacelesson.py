@@ -16,7 +16,10 @@ from pipeline.nodes import NodeClouds
 from pipeline.sources import Demo
 from pipeline.spec import Spec
 from pipeline.stages import run
-from pipeline.surface import Camera, compare_with_truth, radii, reconstruct_surface
+from pipeline.kernels.rays import Camera
+from pipeline.surface.truth import compare_with_truth
+from pipeline.surface.radii import radii
+from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.baselines import poisson_surface
 from pipeline.surface.quality import no_hit_ray_share
 from pipeline.surface.ray_parts import View, ray_parts

@@ -15,7 +15,7 @@ from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
 from app.screens.surface.view import SpacingView, SweepView
 from packetmesh.progress import Progress, drain
 from pipeline.config import PipelineConfig, SurfaceConfig
-from pipeline.findings import Suggestion, SweepPoint
+from pipeline.surface.findings import Suggestion, SweepPoint
 from pipeline.sources import Demo
 from tests.app.fakes import ui_of
 

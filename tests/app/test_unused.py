@@ -9,7 +9,7 @@ import pytest
 
 from app.screens.surface.unused import resting_ball_m, unused_view
 from app.screens.surface.view import Ray
-from pipeline.surface import roll_or_nothing
+from pipeline.surface.ball_pivoting import roll_or_nothing
 from pipeline.types import PointCloud, PointSource
 
 

@@ -20,7 +20,7 @@ import pye57
 import trimesh
 from PIL import Image
 
-from network_sim.link_trace import read_link_trace
+from network_sim.radio.link_trace import read_link_trace
 from packetmesh.files import write_json
 from packetmesh.progress import drain
 from packetmesh.settings import config_named, settings
@@ -39,7 +39,7 @@ from pipeline.io.images import read_color, read_depth
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.io.poses import read_pose, write_pose
-from pipeline.open3d_runtime import o3d
+from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import CameraIntrinsics, DepthMap, RgbdFrame, Rig, Surface
 from tests.pipeline.depth.networks import channel
 from tests.pipeline.importing.bags import write_bag

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from pipeline.ordering import stable_order
+from pipeline.kernels.ordering import stable_order
 
 ROUNDS = 15
 POINTS = 300_000

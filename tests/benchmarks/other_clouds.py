@@ -19,9 +19,9 @@ from scipy.spatial import cKDTree
 
 from packetmesh.progress import drain
 from pipeline.config import SurfaceConfig
-from pipeline.mesh_cloud import MeshOptions, iterate_mesh_cloud
-from pipeline.open3d_runtime import o3d
-from pipeline.surface import radii, spacing
+from pipeline.surface.mesh_cloud import MeshOptions, iterate_mesh_cloud
+from pipeline.kernels.open3d_runtime import o3d
+from pipeline.surface.radii import radii, spacing
 from pipeline.surface.boundary import boundary_loops
 from pipeline.types import PointCloud, Surface
 

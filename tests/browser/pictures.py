@@ -24,7 +24,7 @@ import packetmesh as pm
 from app.drawing.colors import INFERRED, TARGET
 from app.server import build_server
 from lab.claims.depth.scenes import DATA
-from pipeline.rays import Camera
+from pipeline.kernels.rays import Camera
 from pipeline.surface.pictures import mesh_picture
 from pipeline.types import PointSource
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from network_sim.config import EnergyConfig, Keep, NetworkConfig, RunConfig
-from network_sim.trace import NetworkTrace, Recorder
+from network_sim.trace.log import NetworkTrace, Recorder
 from network_sim.types import Cause, EventKind, PacketKind, to_ns
 
 E, C = EventKind, Cause

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from network_sim.arrivals import arrivals, energy_by_node_j, until
+from network_sim.metrics.arrivals import arrivals, energy_by_node_j, until
 from network_sim.config import NetworkConfig
-from network_sim.metrics import camera_nodes, metrics
+from network_sim.metrics.metrics import camera_nodes, metrics
 from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
-from network_sim.states import State
+from network_sim.trace.states import State
 from network_sim.types import NS_PER_S, EventKind, to_ns
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from network_sim.config import NetworkConfig, NodesConfig
-from network_sim.places import FixedPlaces, place_nodes
+from network_sim.radio.places import FixedPlaces, place_nodes
 from network_sim.simulate import simulate
 from network_sim.types import EventKind
 from packetmesh.errors import InputError

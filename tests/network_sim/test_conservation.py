@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from network_sim.config import Keep
-from network_sim.conservation import Balance, InternalError, balance, check, image_balance
-from network_sim.trace import NetworkTrace, Recorder
+from network_sim.trace.conservation import Balance, InternalError, balance, check, image_balance
+from network_sim.trace.log import NetworkTrace, Recorder
 from network_sim.types import Cause, EventKind, to_ns
 from tests.network_sim.by_hand import Story, hop, random_run, small_run, trace_of
 

@@ -13,9 +13,9 @@ from network_sim.config import MacConfig, NetworkConfig, RadioConfig
 from network_sim.mac.context import MacContext
 from network_sim.mac.dcf import Dcf, data_ns
 from network_sim.mac.medium import Medium
-from network_sim.places import FixedPlaces
-from network_sim.radio import Radio
-from network_sim.trace import Recorder
+from network_sim.radio.places import FixedPlaces
+from network_sim.radio.propagation import Radio
+from network_sim.trace.log import Recorder
 from network_sim.types import Cause, Delivery, EventKind, Packet, PacketKind
 from tests.network_sim.fixed_backoffs import FixedBackoffs
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from network_sim import energy as e
+from network_sim.metrics.metrics import energy as e
 from network_sim.config import EnergyConfig
-from network_sim.metrics import camera_nodes, metrics
+from network_sim.metrics.metrics import camera_nodes, metrics
 from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
-from network_sim.states import State
+from network_sim.trace.states import State
 from network_sim.types import NS_PER_S
 from packetmesh.settings import with_settings
 from tests.network_sim.by_hand import small_run, trace_of

@@ -14,9 +14,9 @@ from network_sim.mac.context import MacContext
 from network_sim.mac.ieee802154 import Ieee802154
 from network_sim.mac.medium import Medium
 from network_sim.mac.saturation import saturation
-from network_sim.places import FixedPlaces
-from network_sim.radio import Radio
-from network_sim.trace import Recorder
+from network_sim.radio.places import FixedPlaces
+from network_sim.radio.propagation import Radio
+from network_sim.trace.log import Recorder
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet, PacketKind
 from tests.network_sim.fixed_backoffs import FixedBackoffs
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from network_sim.metrics import image_delays_s
+from network_sim.metrics.metrics import image_delays_s
 from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
 from packetmesh.errors import InputError

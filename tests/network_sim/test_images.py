@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import simpy
 
-from network_sim.images import Book, Fragments, encoded_bytes, pgm_bytes, ppm_bytes
-from network_sim.trace import Recorder
+from network_sim.fixed.images import Book, Fragments, encoded_bytes, pgm_bytes, ppm_bytes
+from network_sim.trace.log import Recorder
 from network_sim.types import Cause
 from packetmesh.errors import InputError
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from network_sim.link_trace import LinkTrace, Replay, constant_link, read_link_trace
+from network_sim.radio.link_trace import LinkTrace, Replay, constant_link, read_link_trace
 from network_sim.types import NS_PER_S
 from packetmesh.errors import InputError
 

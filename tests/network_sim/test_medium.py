@@ -12,8 +12,8 @@ import simpy
 
 from network_sim.config import MacConfig, RadioConfig
 from network_sim.mac.medium import MEMORY_NS, REFRESH_NS, Medium
-from network_sim.places import FixedPlaces
-from network_sim.radio import Radio, oqpsk_bit_error_rate
+from network_sim.radio.places import FixedPlaces
+from network_sim.radio.propagation import Radio, oqpsk_bit_error_rate
 from network_sim.types import Cause
 
 US = 1000

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from network_sim.config import StreetConfig
-from network_sim.mobility import (
+from network_sim.street.mobility import (
     STEPS,
     StreetPlaces,
     access_points_m,

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from network_sim import radio as r
+from network_sim.radio.propagation import propagation as r
 from network_sim.config import MacConfig, NetworkConfig, Propagation, RadioConfig
-from network_sim.places import FixedPlaces
+from network_sim.radio.places import FixedPlaces
 from packetmesh.errors import InputError
 
 # The ns-2 simulator's WaveLAN card; ns-2 rounds the speed of light.

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from network_sim.metrics import Metric
+from network_sim.metrics.metrics import Metric
 from network_sim.presets import PRESETS
 from network_sim.replicate import (
     estimates_of,

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from network_sim.config import SchemeConfig
-from network_sim.schemes import make_scheme
-from network_sim.schemes.greedy import Coverage, Greedy, select
-from network_sim.schemes.pdc import FLOOR, Pdc, adapted, probabilities
+from network_sim.street.schemes import make_scheme
+from network_sim.street.schemes.greedy import Coverage, Greedy, select
+from network_sim.street.schemes.pdc import FLOOR, Pdc, adapted, probabilities
 from network_sim.types import to_ns
 
 VALIDITY_S = 10

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from network_sim import selection as s
+from network_sim.fixed import selection as s
 from packetmesh.errors import InputError
 
 SHARE = 1.0 - 1.0 / math.e

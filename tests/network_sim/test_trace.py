@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from network_sim.config import Keep
-from network_sim.conservation import recount
-from network_sim.states import State, StateTimes, disjoint
-from network_sim.trace import IMAGE_EVENTS, Recorder
+from network_sim.trace.conservation import recount
+from network_sim.trace.states import State, StateTimes, disjoint
+from network_sim.trace.log import IMAGE_EVENTS, Recorder
 from network_sim.types import Cause, EventKind, PacketKind, to_ns
 from tests.network_sim.by_hand import HORIZON_S, NAMES, ROLES, config_of, random_run, small_run, trace_of
 
@@ -106,7 +106,7 @@ def test_what_happens_at_the_horizon_belongs_to_the_last_minute() -> None:
 
 def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = trace_of(small_run)
-    monkeypatch.setattr("network_sim.trace._BLOCK_BYTES", 1)
+    monkeypatch.setattr("network_sim.trace.log._BLOCK_BYTES", 1)
     pieces = trace_of(small_run)
     np.testing.assert_equal(asdict(pieces.counters), asdict(whole.counters))
     for left, right in zip(whole.events.columns(), pieces.events.columns(), strict=True):

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.depth_to_color import register_depth
-from pipeline.geometry import inverse, project, rigid, rotation_exp
-from pipeline.rays import Camera, hit_depths
+from pipeline.io.depth_to_color import register_depth
+from pipeline.kernels.geometry import inverse, project, rigid, rotation_exp
+from pipeline.kernels.rays import Camera, hit_depths
 from pipeline.types import CameraIntrinsics, DepthMap
 
 DEPTH = CameraIntrinsics(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline import geometry
+from pipeline.kernels import geometry
 from pipeline.types import CameraIntrinsics, PointCloud
 
 vectors = st.tuples(*[st.floats(-3, 3)] * 3).map(np.array)

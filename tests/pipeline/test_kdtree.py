@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.kdtree import SERIAL_POINTS, KdTree, room_for, search_many, working_space
+from pipeline.kernels.kdtree import SERIAL_POINTS, KdTree, room_for, search_many, working_space
 
 
 def _all_distances_m(places_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:

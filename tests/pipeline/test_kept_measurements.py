@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.config import PRESETS, AcquisitionConfig
 from pipeline.io.demos import DEMO_SCENES, load_demo
-from pipeline.rays import Camera, hit_depths
+from pipeline.kernels.rays import Camera, hit_depths
 from pipeline.reconstruct import Reconstruction, reconstruct
 from pipeline.surface.ray_parts import View, ray_parts
 from pipeline.types import PointSource, Rig

@@ -8,7 +8,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
-from pipeline.mesh_cloud import (
+from pipeline.surface.mesh_cloud import (
     ESTIMATED_OUTWARDS,
     ESTIMATED_VIEWPOINT,
     GIVEN,
@@ -21,7 +21,7 @@ from pipeline.mesh_cloud import (
     usable_points,
     width_of,
 )
-from pipeline.surface import spacing
+from pipeline.surface.radii import spacing
 from pipeline.surface.surrounding import surrounding_radii
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import lidar_room, perforated_plane, sphere, with_outliers

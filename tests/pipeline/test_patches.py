@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.kdtree import KdTree
-from pipeline.patches import patch_normals
+from pipeline.kernels.kdtree import KdTree
+from pipeline.kernels.patches import patch_normals
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.geometry import look_at, pixel_rays, rigid, rotation_exp
-from pipeline.surface import Camera, hit_depth, measure_quality
+from pipeline.kernels.geometry import look_at, pixel_rays, rigid, rotation_exp
+from pipeline.kernels.rays import Camera, hit_depth
+from pipeline.surface.quality import measure_quality
 from pipeline.types import CameraIntrinsics
 from tests.pipeline.surface.shapes import rectangle
 

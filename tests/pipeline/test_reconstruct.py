@@ -7,7 +7,7 @@ import pytest
 
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress
-from pipeline import geometry
+from pipeline.kernels import geometry
 from pipeline.config import PRESETS, AcquisitionConfig, SurfaceConfig
 from pipeline.io.demos import load_demo
 from pipeline.reconstruct import iterate_reconstruction, reconstruct

@@ -7,7 +7,7 @@ import pytest
 
 from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.geometry import LEVEL_POSE, inverse, pixel_rays, rigid, rotation_exp
+from pipeline.kernels.geometry import LEVEL_POSE, inverse, pixel_rays, rigid, rotation_exp
 from pipeline.io.demos import load_demo
 from pipeline.io.rigs import load_rig, save_rig
 from pipeline.reconstruct import reconstruct

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import inverse, rigid, rotation_exp
-from pipeline.open3d_runtime import o3d
+from pipeline.kernels.geometry import inverse, rigid, rotation_exp
+from pipeline.kernels.open3d_runtime import o3d
 from pipeline.registration import register
 from pipeline.registration.neighbourhood import pca_normals
 from pipeline.types import PointCloud

@@ -11,7 +11,7 @@ from packetmesh.progress import drain
 from pipeline.calibration.board import Board
 from pipeline.calibration.rig_from_images import iterate_rig_calibration
 from pipeline.calibration.shots import node_shots
-from pipeline.geometry import inverse, rigid, rotation_angle_rad
+from pipeline.kernels.geometry import inverse, rigid, rotation_angle_rad
 from tests.real.debian import opencv_doc, visp_images
 
 BOARD = Board("chessboard", 9, 6, 0.025)

@@ -18,7 +18,7 @@ from app.screens.calibrate.view import DepthErrorView
 from packetmesh.progress import Progress
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import Calibration
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from pipeline.io.images import read_depth
 from pipeline.types import FloatArray
 

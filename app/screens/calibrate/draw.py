@@ -17,7 +17,7 @@ from app.screens.calibrate.labels import Around
 from app.screens.calibrate.photograph import decoded, picture_of
 from app.screens.calibrate.view import CalibrationView, CameraView, RigView
 from pipeline.calibration.board import Board
-from pipeline.geometry import LEVEL_POSE, inverse
+from pipeline.kernels.geometry import LEVEL_POSE, inverse
 from pipeline.types import FloatArray
 
 BELOW = "/calibrate"

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from app.drawing.colors import MOST_DISTANCE_M
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from pipeline.types import ByteArray, FloatArray
 
 REACH_M = 0.5

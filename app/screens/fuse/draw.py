@@ -15,7 +15,7 @@ from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import DISTANCE_STOPS, NEUTRAL, ramp
 from app.drawing.poses import move, place
 from app.screens.fuse.view import LensView, RaceStep, RaceView, Start
-from pipeline.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.types import ByteArray, FloatArray
 
 FAINT, STRONG = np.array([235.0, 235.0, 235.0]), np.array([20.0, 20.0, 20.0])

@@ -18,7 +18,7 @@ from app.screens.fuse.numbers import verdict
 from app.screens.fuse.race_job import race_job
 from app.screens.fuse.view import SUCCESS_M, Race, RaceLane, RaceView
 from packetmesh.progress import Progress
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 
 
 def page_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, bytes]:

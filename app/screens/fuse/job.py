@@ -8,9 +8,9 @@ from app.compute.state import Spec
 from app.compute.store import Store
 from app.screens.fuse.view import FuseView, RegistrationRow
 from packetmesh.progress import Progress
-from pipeline import geometry
+from pipeline.kernels import geometry
 from pipeline.nodes import NodeClouds
-from pipeline.placement import NodeRegistration
+from pipeline.placement.outcome import NodeRegistration
 from pipeline.registration import point_error_m
 from pipeline.types import FloatArray, Rig
 

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from app.screens.fuse.distances import Distances, shades_of
 from app.screens.fuse.view import LensView
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from pipeline.registration.neighbourhood import pca_normals
 from pipeline.types import BoolArray, ByteArray, FloatArray
 

@@ -27,7 +27,7 @@ from app.screens.network.delivery_view import (
     PacketView,
 )
 from app.screens.network.run_view import run_view
-from network_sim.arrivals import energy_by_node_j
+from network_sim.metrics.arrivals import energy_by_node_j
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import Progress, part
 from pipeline.acquisition import back_project

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from app.screens.network.view import NetworkView
 from app.web.markup import Markdown, Markup
 from app.window.tables import Row, table
-from network_sim.metrics import Metric
+from network_sim.metrics.metrics import Metric
 
 FIRST = (
     "image_delivery_ratio",

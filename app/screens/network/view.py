@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from app.drawing.levels import Levels
 from network_sim.config import NetworkConfig
-from network_sim.coverage import RoadCoverage
-from network_sim.metrics import Metric
+from network_sim.metrics.coverage import RoadCoverage
+from network_sim.metrics.metrics import Metric
 from pipeline.types import FloatArray
 
 

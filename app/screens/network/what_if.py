@@ -13,8 +13,8 @@ from app.drawing.poses import place
 from app.screens.network.delivery_view import DeliveryView
 from app.web.markup import Markdown
 from app.window.ui import Ui
-from network_sim.radio import IEEE80211B
-from pipeline.geometry import rigid, rotation_exp
+from network_sim.radio.propagation import IEEE80211B
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
 NOBODY = "nobody"

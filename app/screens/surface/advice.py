@@ -9,7 +9,7 @@ from app.screens.surface.view import SweepView
 from app.web.markup import Markdown, Markup
 from app.window.tables import number, table
 from app.window.ui import Ui
-from pipeline.findings import Suggestion
+from pipeline.surface.findings import Suggestion
 
 TEXT = Markdown(
     """A ball bridges the triangles around a point if it is as wide as the largest of their circumcircles.

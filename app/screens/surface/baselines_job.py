@@ -13,7 +13,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.merging import FusedCloud
 from pipeline.stages import compared, compute
-from pipeline.surface import radii
+from pipeline.surface.radii import radii
 from pipeline.surface.baselines import TRIM_SPACINGS, poisson_depth
 
 

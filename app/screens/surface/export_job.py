@@ -24,10 +24,10 @@ from app.screens.surface.paint_job import colored_glb, vertex_colors
 from app.screens.surface.view import Coloring
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
-from pipeline.geometry import rigid, scaled
-from pipeline.placement import Placement
+from pipeline.kernels.geometry import rigid, scaled
+from pipeline.placement.outcome import Placement
 from pipeline.stages import cameras_of, dressed
-from pipeline.surface import Camera
+from pipeline.kernels.rays import Camera
 from pipeline.surface.pictures import beside, mesh_picture
 from pipeline.types import ByteArray, PointSource, Rig, Surface, SurfaceResult
 

@@ -11,7 +11,7 @@ from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
 from app.web.markup import Markdown, Markup
 from app.window.tables import number, table
 from app.window.ui import Ui
-from pipeline.findings import Explanation, RayParts
+from pipeline.surface.findings import Explanation, RayParts
 from pipeline.types import FloatArray
 
 TEXT = Markdown(

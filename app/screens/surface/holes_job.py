@@ -14,7 +14,7 @@ from app.drawing.meshes import mesh_view, surface_glb
 from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
-from pipeline.findings import RayParts
+from pipeline.surface.findings import RayParts
 from pipeline.spec import key
 from pipeline.stages import cameras_of, compared, with_rays
 from pipeline.surface.fill import Filled, fill_holes

@@ -9,7 +9,7 @@ from app.screens.surface.labels import OWN_COLORS
 from app.screens.surface.view import Coloring
 from app.web.markup import Markup
 from app.window.tables import bar_html
-from pipeline.texture import SEAM_M
+from pipeline.surface.findings import SEAM_M
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"
 CLOSED = f"Holes of up to {100 * SEAM_M:.0f} cm around are closed here, not in the numbers."

@@ -12,7 +12,7 @@ from app.drawing.colors import DELIVERED, INFERRED, LOSS, NEUTRAL, SOURCE, TARGE
 from app.drawing.marks import mark
 from app.screens.surface.view import SweepView
 from app.web.markup import Markdown
-from pipeline.findings import SweepPoint
+from pipeline.surface.findings import SweepPoint
 
 NO_HIT, ACCURATE, LEFT, RIGHT = css(LOSS), css(TARGET), css(NEUTRAL), css(INFERRED)
 WORK, POINTS = "triangles and time", "unused points and hole area"

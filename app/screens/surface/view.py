@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from app.compute.records import MeshView
-from pipeline.findings import Explanation, RayParts, Suggestion, SweepPoint
+from pipeline.surface.findings import Explanation, RayParts, Suggestion, SweepPoint
 from pipeline.types import FloatArray, IntArray
 
 Coloring = Literal["photo", "violet", "color", "source", "distance", "normal"]

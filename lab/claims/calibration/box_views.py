@@ -26,7 +26,7 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.depth_from_images import depth_beside, depth_fit
 from pipeline.calibration.from_images import image_files, iterate_calibration
 from pipeline.config import PRESETS
-from pipeline.geometry import look_at
+from pipeline.kernels.geometry import look_at
 from pipeline.io.depth_correction import DepthCorrection
 from pipeline.types import CameraIntrinsics, DepthMap, FloatArray, RgbdFrame
 

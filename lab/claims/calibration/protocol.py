@@ -15,7 +15,7 @@ from packetmesh.progress import Progress
 from pipeline.calibration.board import Board
 from pipeline.calibration.detect import detect
 from pipeline.calibration.estimate import View, calibrate, place, rms_px
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.registration import rotation_error_rad
 from pipeline.types import CameraIntrinsics, FloatArray
 

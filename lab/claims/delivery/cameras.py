@@ -18,7 +18,7 @@ from lab.claims.delivery.views import rig_quality
 from lab.claims.exhibits import Table
 from lab.trials import iterate_trials
 from network_sim.presets import PRESETS
-from network_sim.selection import FloatArray, greedy, greedy_by_cost, nearest
+from network_sim.fixed.selection import FloatArray, greedy, greedy_by_cost, nearest
 from packetmesh.progress import Progress
 from pipeline.delivery import coding_named
 from pipeline.delivery.plan import places_of

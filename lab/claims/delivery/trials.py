@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from network_sim.losses import LinkLosses, LossConfig
+from network_sim.radio.losses import LinkLosses, LossConfig
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain
 from pipeline.config import AlignmentMode, DepthConfig, PipelineConfig
@@ -18,11 +18,11 @@ from pipeline.delivery import coding_named
 from pipeline.delivery.coding import Received
 from pipeline.delivery.sink import frame_at_sink, heard, images_of
 from pipeline.io.demos import load_demo
-from pipeline.placement import whole_placement
+from pipeline.placement.outcome import whole_placement
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import compared, run, with_rays, yardstick_of_rig
-from pipeline.surface import Yardstick
+from pipeline.surface.truth import Yardstick
 from pipeline.types import BoolArray, DepthMap, RgbdFrame, Rig
 
 Loss = Literal["random", "burst", "deadline"]

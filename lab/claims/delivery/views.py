@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from network_sim.selection import view_quality
-from pipeline import geometry
+from network_sim.fixed.selection import view_quality
+from pipeline.kernels import geometry
 from pipeline.acquisition import back_project
-from pipeline.surface import estimate_normals
+from pipeline.surface.normals import estimate_normals
 from pipeline.types import BoolArray, FloatArray, PointCloud, RgbdFrame, Rig
 
 STRIDE_PX = 8

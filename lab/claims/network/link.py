@@ -15,7 +15,7 @@ from lab.claims.network.intervals import curve, interval
 from lab.claims.network.tasks import transfer
 from lab.trials import iterate_trials
 from network_sim.config import NetworkConfig
-from network_sim.images import encoded_bytes, pgm_bytes, ppm_bytes
+from network_sim.fixed.images import encoded_bytes, pgm_bytes, ppm_bytes
 from network_sim.mac.ieee802154 import LINK_BPS
 from network_sim.presets import PRESETS
 from network_sim.replicate import replications

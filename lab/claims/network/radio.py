@@ -15,7 +15,7 @@ from network_sim.config import NodesConfig
 from network_sim.mac.bianchi import bianchi
 from network_sim.mac.dcf import EIFS_NS
 from network_sim.presets import PRESETS
-from network_sim.radio import crossover_m, ground_reflection, wavelength_m
+from network_sim.radio.propagation import crossover_m, ground_reflection, wavelength_m
 from packetmesh.progress import Progress
 
 STREET = PRESETS["street-grid"]

@@ -14,7 +14,7 @@ import numpy as np
 from lab.claims.claim import Claim, Outcome
 from lab.claims.exhibits import Chart, Table
 from lab.claims.network.intervals import curve, interval
-from network_sim.selection import (
+from network_sim.fixed.selection import (
     FloatArray,
     all_cameras,
     at_random,

@@ -11,7 +11,7 @@ import numpy as np
 from lab.claims.registration.cases import Condition, make_case, wrong_start
 from lab.claims.registration.entrants import Entrant
 from packetmesh.errors import PacketMeshError
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from pipeline.registration import point_error_m, register, rotation_error_rad
 
 ROTATIONS_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)

@@ -14,7 +14,7 @@ from lab.worlds.render import render
 from lab.worlds.scene import Scene
 from lab.worlds.sensor import sense_depth
 from pipeline.acquisition import back_project
-from pipeline.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.registration import fuse
 from pipeline.registration.degradation import Degradation, degrade
 from pipeline.types import DepthMap, FloatArray, PointCloud, PointSource, RgbdFrame

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from packetmesh.errors import ReconstructionError
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from pipeline.registration.residual import weighted_procrustes
 from pipeline.types import FloatArray, IntArray, PointCloud
 

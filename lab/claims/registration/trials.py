@@ -14,10 +14,10 @@ from lab.claims.registration.entrants import PIXEL_PAIRS, Entrant, Lineup
 from lab.claims.registration.pixel_pairs import pixel_pair_poses
 from packetmesh.errors import PacketMeshError
 from pipeline.config import Direction
-from pipeline.geometry import apply, inverse
+from pipeline.kernels.geometry import apply, inverse
 from pipeline.registration import register_timed
 from pipeline.registration.peers import run_peer
-from pipeline.surface import voxel_average
+from pipeline.surface.voxel import voxel_average
 from pipeline.types import FloatArray, PointCloud
 
 AHD_VOXEL_M = 0.01

@@ -11,7 +11,8 @@ from pipeline.merging import MergedClouds
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import run
-from pipeline.surface import Camera, reconstruct_surface
+from pipeline.kernels.rays import Camera
+from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.types import DepthMap, Rig, SurfaceResult
 
 CHAINS = {"thesis": "the thesis's union", "packetmesh": "filling only the holes"}

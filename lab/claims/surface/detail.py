@@ -16,8 +16,9 @@ from lab.claims.exhibits import Chart, Table, plain_curve
 from lab.claims.surface.stairs import feet_samples, stairs, stairs_cloud
 from lab.trials import iterate_trials
 from packetmesh.progress import Progress
-from pipeline.rays import tensor, triangle_scene
-from pipeline.surface import reconstruct_surface, spacing
+from pipeline.kernels.rays import tensor, triangle_scene
+from pipeline.surface.ball_pivoting import reconstruct_surface
+from pipeline.surface.radii import spacing
 from pipeline.surface.truth import sample_surface
 from pipeline.types import FloatArray
 

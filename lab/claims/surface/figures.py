@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from lab.claims.exhibits import Picture
 from lab.claims.surface.clouds import ChainClouds
-from pipeline.geometry import scaled
-from pipeline.surface import Camera, hit_depth
+from pipeline.kernels.geometry import scaled
+from pipeline.kernels.rays import Camera, hit_depth
 from pipeline.surface.pictures import mesh_picture
 
 FIGURES: tuple[tuple[str, str, str, float], ...] = (

@@ -20,7 +20,7 @@ from pipeline.config import PRESETS
 from pipeline.depth.completion import SHIPPED_COMPLETION
 from pipeline.depth.inference import SHIPPED_MODEL
 from pipeline.io.demos import CALIBRATED_SCENES, SCENES, load_demo
-from pipeline.surface import hit_depth
+from pipeline.kernels.rays import hit_depth
 from pipeline.surface.radii import SIGMAS
 from pipeline.types import FloatArray
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.surface import estimate_normals
+from pipeline.surface.normals import estimate_normals
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 RISES_M = (0.03, 0.04, 0.05, 0.06, 0.08)

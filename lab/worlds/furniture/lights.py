@@ -8,7 +8,7 @@ from lab.worlds.furniture.finishes import PAINTS, black_plastic, chrome, enamel,
 from lab.worlds.furniture.placing import ORIGIN, place, solid
 from lab.worlds.primitives import cylinder, lathe, merged, moved, sphere, transformed, tube
 from lab.worlds.scene import Part, Rng
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
 

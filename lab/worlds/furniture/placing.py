@@ -6,7 +6,7 @@ import numpy as np
 
 from lab.worlds.primitives import Mesh, Vector, box, rounded_box
 from lab.worlds.scene import Material, Part
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
 ORIGIN = np.eye(4)

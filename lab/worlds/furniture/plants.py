@@ -9,7 +9,7 @@ from lab.worlds.furniture.placing import ORIGIN, solid
 from lab.worlds.primitives import Mesh, lathe, merged, quads_of, thickened, transformed, tube
 from lab.worlds.scene import Part, Rng
 from lab.worlds.textures.mixing import linear
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
 POTS = ("#a65a3a", "#e6e1d6", "#4a5357", "#c9b28a", "#8fa79b")

@@ -12,7 +12,7 @@ from lab.worlds.primitives import Mesh, box, rounded_box
 from lab.worlds.primitives import moved as shifted
 from lab.worlds.room_finishes import random_material
 from lab.worlds.scene import Part, Rng
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 
 
 def sofa(rng: Rng) -> list[Part]:

@@ -13,7 +13,7 @@ from lab.worlds.primitives import Mesh, box, cylinder, frustum, lathe, rounded_b
 from lab.worlds.primitives import moved as shifted
 from lab.worlds.room_finishes import random_material
 from lab.worlds.scene import Part, Rng
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 
 
 def random_solid(rng: Rng, smallest_m: float, largest_m: float) -> list[Part]:

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from lab.worlds.scene import Part, Rng
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from pipeline.types import FloatArray
 
 _Made = TypeVar("_Made")

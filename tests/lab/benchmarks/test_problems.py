@@ -17,8 +17,8 @@ from lab.benchmarks.problems import (
     write_problems,
 )
 from packetmesh.errors import InputError
-from pipeline.geometry import apply, rigid, rotation_exp
-from pipeline.register_pair import Pair
+from pipeline.kernels.geometry import apply, rigid, rotation_exp
+from pipeline.pairs.register import Pair
 from pipeline.types import PointCloud
 
 

@@ -6,7 +6,7 @@ import pytest
 from lab.benchmarks import Benchmark
 from lab.benchmarks.registration import GATE_M, POINTS, speed_pair, thinned
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import rotation_angle_rad
+from pipeline.kernels.geometry import rotation_angle_rad
 from pipeline.registration import point_error_m, register
 
 

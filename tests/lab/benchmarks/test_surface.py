@@ -18,7 +18,7 @@ from lab.benchmarks.surface import (
     time_alone,
 )
 from lab.claims.surface import growth
-from pipeline.surface import spacing
+from pipeline.surface.radii import spacing
 
 BOTH = (OURS, "open3d")
 

@@ -12,7 +12,7 @@ from lab.claims.network import link, radio, selection, street, study
 from lab.claims.network.intervals import interval
 from lab.claims.network.tasks import STREET_METRICS, saturated, transfer
 from network_sim.presets import PRESETS
-from network_sim.selection import all_cameras
+from network_sim.fixed.selection import all_cameras
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, drain
 from packetmesh.settings import with_settings

@@ -24,8 +24,8 @@ from lab.claims.surface.stairs import (
 from packetmesh.files import finite
 from pipeline.config import PRESETS
 from pipeline.io.demos import load_demo
-from pipeline.rays import tensor, triangle_areas_m2, triangle_scene
-from pipeline.surface import spacing
+from pipeline.kernels.rays import tensor, triangle_areas_m2, triangle_scene
+from pipeline.surface.radii import spacing
 from pipeline.surface.pictures import MISSED
 
 

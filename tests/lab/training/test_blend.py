@@ -10,7 +10,7 @@ from lab.worlds.primitives import box, sphere
 from lab.worlds.render import Renderer
 from lab.worlds.scene import Light, Material, Part, Scene
 from packetmesh.errors import InputError
-from pipeline.geometry import apply, inverse, look_at, pixel_rays, project, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, look_at, pixel_rays, project, rigid, rotation_exp
 from pipeline.types import CameraIntrinsics
 
 K = CameraIntrinsics.pinhole(260.0, 265.0, 150.0, 120.0, 304, 228)

@@ -14,7 +14,7 @@ from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
 from pipeline.calibration.detect import detect
 from pipeline.calibration.estimate import View, calibrate
-from pipeline.geometry import apply, inverse, look_at, pixel_rays, project, rigid, scaled
+from pipeline.kernels.geometry import apply, inverse, look_at, pixel_rays, project, rigid, scaled
 from pipeline.types import CameraIntrinsics, DepthMap
 
 LENS = CameraIntrinsics(

@@ -11,7 +11,7 @@ import pytest
 from lab.worlds import furniture
 from lab.worlds import primitives as p
 from lab.worlds.furniture.placing import place
-from pipeline import geometry
+from pipeline.kernels import geometry
 
 MODULES = [
     import_module(f"lab.worlds.furniture.{module.name}") for module in iter_modules(furniture.__path__)

@@ -9,7 +9,7 @@ from lab.worlds.primitives import box, sphere
 from lab.worlds.render import Renderer, render
 from lab.worlds.scene import Light, Material, Part, Scene
 from lab.worlds.textures import solid
-from pipeline.geometry import look_at, pixel_rays, rigid, scaled
+from pipeline.kernels.geometry import look_at, pixel_rays, rigid, scaled
 from pipeline.types import CameraIntrinsics
 
 CAMERA = CameraIntrinsics(

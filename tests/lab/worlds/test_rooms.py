@@ -10,7 +10,7 @@ from lab.worlds.render import Renderer
 from lab.worlds.rooms import random_room
 from lab.worlds.viewpoints import random_views
 from packetmesh.errors import InputError
-from pipeline.geometry import apply, inverse, pixel_rays, project, rotation_angle_rad, scaled
+from pipeline.kernels.geometry import apply, inverse, pixel_rays, project, rotation_angle_rad, scaled
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -8,7 +8,7 @@ import pytest
 from lab.worlds import box_room, render
 from lab.worlds.render import View
 from lab.worlds.sensor import SensorConfig, axial_sigma_m, projector_shadow, sense_depth
-from pipeline.geometry import pixel_rays
+from pipeline.kernels.geometry import pixel_rays
 from pipeline.types import CameraIntrinsics, FloatArray
 
 CAMERA = CameraIntrinsics.pinhole(525.0, 525.0, 319.5, 239.5, 640, 480)

@@ -4,7 +4,7 @@ import numpy as np
 
 from lab.worlds.render import View
 from lab.worlds.sensor import SensorConfig, axial_sigma_m, sense_depth
-from pipeline.geometry import pixel_rays
+from pipeline.kernels.geometry import pixel_rays
 from pipeline.types import CameraIntrinsics, DepthMap
 
 CAMERA = CameraIntrinsics.pinhole(262.5, 262.5, 159.5, 119.5, 320, 240)

@@ -6,7 +6,7 @@ import pytest
 from packetmesh.errors import InputError
 from pipeline.acquisition import back_project, depth_sigma_m
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import project
+from pipeline.kernels.geometry import project
 from pipeline.registration.ceicp import CeicpA
 from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, PointSource, RgbdFrame
 

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import Calibration, View, calibrate
 from pipeline.calibration.rig import Seen
-from pipeline.geometry import apply, inverse, look_at, project, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, look_at, project, rigid, rotation_exp
 from pipeline.types import CameraIntrinsics, FloatArray
 
 BOARD = Board()

@@ -7,7 +7,7 @@ from packetmesh.errors import ReconstructionError
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import View, calibrate, held_out, place, rms_px
 from pipeline.calibration.lens import FREE, Optics
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 
 MATRIX = np.array([[420.0, 0.0, 318.0], [0.0, 424.0, 243.0], [0.0, 0.0, 1.0]])
 LENSES = {

@@ -7,7 +7,7 @@ from pipeline.calibration.estimate import View, calibrate, settle
 from pipeline.calibration.lens import Optics
 from pipeline.calibration.next_view import candidates, next_view
 from pipeline.calibration.trust import sight
-from pipeline.geometry import apply
+from pipeline.kernels.geometry import apply
 from tests.pipeline.calibration.test_trust import BOARD, SIZE, board_poses
 from tests.pipeline.calibration.views import CAMERA
 

@@ -9,7 +9,7 @@ from pipeline.calibration.detect import detect
 from pipeline.calibration.estimate import View, calibrate, held_out, place, rms_px
 from pipeline.calibration.lens import Optics
 from pipeline.calibration.refine import refined_px
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 from tests.pipeline.calibration.views import CAMERA, photograph, seen
 
 OPTICS = Optics("thesis", CAMERA.matrix, CAMERA.distortion)

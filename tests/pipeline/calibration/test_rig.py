@@ -8,7 +8,7 @@ from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import View
 from pipeline.calibration.rig import Seen, calibrate_rig
-from pipeline.geometry import apply, inverse, project, rigid, rotation_angle_rad, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, project, rigid, rotation_angle_rad, rotation_exp
 from tests.pipeline.calibration.rigs import BOARD, session
 
 

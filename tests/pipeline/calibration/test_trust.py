@@ -8,7 +8,7 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import View, calibrate, settle
 from pipeline.calibration.lens import Optics
 from pipeline.calibration.trust import half_difference_px, projected_sd_px, sight
-from pipeline.geometry import apply, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, rigid, rotation_exp
 from tests.pipeline.calibration.views import CAMERA
 
 BOARD = Board("circles", 7, 5, 0.05)

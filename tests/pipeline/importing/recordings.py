@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.geometry import look_at
+from pipeline.kernels.geometry import look_at
 from pipeline.io.images import write_color
 from pipeline.types import CameraIntrinsics, DepthMap, RgbdFrame, Rig
 

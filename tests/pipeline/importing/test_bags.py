@@ -5,7 +5,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.importing import iterate_import
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import read_depth

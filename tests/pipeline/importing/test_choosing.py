@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.geometry import look_at
+from pipeline.kernels.geometry import look_at
 from pipeline.importing.choosing import LEAST_OVERLAP, apart_but_overlapping, choose, overlaps
 from pipeline.importing.sequence import Candidate, Sequence
 from tests.pipeline.importing.recordings import CAMERA, orbit

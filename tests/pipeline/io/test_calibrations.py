@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.geometry import look_at, rigid, rotation_exp
+from pipeline.kernels.geometry import look_at, rigid, rotation_exp
 from pipeline.io.calibrations import CalibratedNode, write_calibration
 from pipeline.io.demos import SCENES
 from pipeline.io.depth_correction import DepthCorrection, write_depth_correction

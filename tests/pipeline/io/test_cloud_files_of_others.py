@@ -13,7 +13,7 @@ import trimesh
 from packetmesh.errors import InputError
 from pipeline.io.clouds import read_cloud
 from pipeline.io.meshes import write_mesh
-from pipeline.open3d_runtime import o3d
+from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import Surface
 
 RNG = np.random.default_rng(3)

@@ -8,7 +8,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.io.clouds import read_cloud
-from pipeline.open3d_runtime import o3d
+from pipeline.kernels.open3d_runtime import o3d
 
 RNG = np.random.default_rng(11)
 POINTS = RNG.normal(size=(40, 3)).astype(np.float32).astype(np.float64)

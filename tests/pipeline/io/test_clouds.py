@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from pipeline.io.clouds import read_cloud, write_cloud
-from pipeline.open3d_runtime import o3d
+from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import PointCloud
 
 

@@ -94,7 +94,7 @@ def test_open3d_style_is_column_major(tmp_path):
 
 
 def test_open3d_reads_the_style_as_we_do(tmp_path):
-    from pipeline.open3d_runtime import o3d
+    from pipeline.kernels.open3d_runtime import o3d
 
     o3d.io.write_pinhole_camera_intrinsic(
         str(tmp_path / "camera.json"), o3d.camera.PinholeCameraIntrinsic(640, 480, FX, FY, CX, CY)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.geometry import LEVEL_POSE, look_at
+from pipeline.kernels.geometry import LEVEL_POSE, look_at
 from pipeline.io.depth_correction import DepthCorrection, write_depth_correction
 from pipeline.io.rigs import load_frame, load_rig, save_rig
 from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, RgbdFrame, Rig

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.types import PointCloud
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from lab.worlds.render import Renderer
 from lab.worlds.scene import Scene
-from pipeline.geometry import pixel_rays
+from pipeline.kernels.geometry import pixel_rays
 from pipeline.types import PointCloud
 
 

@@ -10,7 +10,7 @@ from lab.worlds.render import render
 from lab.worlds.sensor import sense_depth
 from pipeline.acquisition import back_project
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.registration import point_error_m, register
 from pipeline.types import DepthMap, PointCloud, RgbdFrame
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.geometry import pixel_rays, rigid
-from pipeline.registration.agreement import NOTHING_SHARED, Agreement, agreement
+from pipeline.kernels.geometry import pixel_rays, rigid
+from pipeline.placement.agreement import NOTHING_SHARED, Agreement, agreement
 from pipeline.types import CameraIntrinsics, DepthMap, PointCloud
 
 CAMERA = CameraIntrinsics.pinhole(100, 100, 49.5, 49.5, 100, 100)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.registration.anderson import Anderson, similarity_exp, similarity_log
 
 FIXED = np.array([0.2, -0.1, 0.3, 0.5, -0.4, 0.1, 0.0])

@@ -5,7 +5,7 @@ import pytest
 
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import rigid
+from pipeline.kernels.geometry import rigid
 from pipeline.registration import iterate_registration, register
 from pipeline.types import PointCloud
 

@@ -7,7 +7,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import inverse
+from pipeline.kernels.geometry import inverse
 from pipeline.registration import point_error_m, register
 from pipeline.registration.ceicp_literal import CeicpLiteral, density_information
 from pipeline.registration.residual import DegenerateError

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.registration import iterate_registration, point_error_m, register
 from pipeline.registration.ceicp import CeicpA, CeicpR, entropy_weights
 from pipeline.registration.ceicp_ml import CeicpMl, box_volume_m3, responsibilities

@@ -8,9 +8,9 @@ import pytest
 from lab.worlds import box_room
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import apply, inverse, rigid, rotation_exp
-from pipeline.register_draws import DRAWS, run_draws, with_gate
-from pipeline.register_pair import AGREEMENT_M, Pair, config_for
+from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.pairs.draws import DRAWS, run_draws, with_gate
+from pipeline.pairs.register import AGREEMENT_M, Pair, config_for
 from pipeline.registration import point_error_m
 from pipeline.registration.gate import Misfit, best_gate_m, ladder
 from pipeline.types import PointCloud

@@ -6,7 +6,7 @@ import pytest
 from lab.worlds import box_room
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.registration import iterate_registration, point_error_m, register
 from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.types import PointCloud

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.registration import iterate_registration, point_error_m, register
 from pipeline.types import PointCloud
 

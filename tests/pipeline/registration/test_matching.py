@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from pipeline.geometry import apply, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, rigid, rotation_exp
 from pipeline.registration.matching import Matcher
 from pipeline.types import PointCloud
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.registration import average_hausdorff_m, point_error_m, rotation_error_rad
 
 

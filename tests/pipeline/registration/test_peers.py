@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.geometry import inverse
+from pipeline.kernels.geometry import inverse
 from pipeline.registration.metrics import point_error_m
 from pipeline.registration.peers import PEERS, available_peers, run_peer
 from pipeline.types import PointCloud

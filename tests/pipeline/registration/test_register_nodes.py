@@ -8,11 +8,11 @@ import pytest
 from lab.worlds import box_room
 from lab.worlds.demos import disturbed
 from lab.worlds.render import Renderer
-from pipeline import placing
+from pipeline.placement.outcome import place_nodes as placing
 from pipeline.config import PRESETS, RegistrationConfig
-from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.nodes import NodeClouds
-from pipeline.placing import place_nodes
+from pipeline.placement.place_nodes import place_nodes
 from pipeline.registration import point_error_m, register
 from pipeline.types import DepthMap, RgbdFrame
 from tests.pipeline.registration.rooms import seen_by

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.geometry import apply, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, rigid, rotation_exp
 from pipeline.registration.residual import DegenerateError, solve_plane, weighted_procrustes
 
 seeds = st.integers(0, 2**32 - 1)

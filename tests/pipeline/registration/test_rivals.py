@@ -8,7 +8,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.config import RegistrationConfig
-from pipeline.geometry import inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.registration import iterate_registration, point_error_m, register
 from pipeline.registration.fast_robust import FastRobustIcp, neighbourhood_m
 from pipeline.registration.ficp import Ficp, inlier_fraction

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.geometry import rigid
+from pipeline.kernels.geometry import rigid
 from pipeline.registration import hidden_from
 from pipeline.types import CameraIntrinsics, DepthMap, PointCloud
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
-from pipeline.surface import reconstruct_surface
+from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import perforated_plane, sphere

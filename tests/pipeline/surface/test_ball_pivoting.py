@@ -5,8 +5,10 @@ import pytest
 
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import drain
-from pipeline.geometry import rigid, rotation_exp
-from pipeline.surface import boundary_loops, reconstruct_surface, spacing
+from pipeline.kernels.geometry import rigid, rotation_exp
+from pipeline.surface.boundary import boundary_loops
+from pipeline.surface.ball_pivoting import reconstruct_surface
+from pipeline.surface.radii import spacing
 from pipeline.surface.ball_pivoting import iterate_ball, roll_ball
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.types import PointCloud

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError, ReconstructionError
-from pipeline.surface import spacing
+from pipeline.surface.radii import spacing
 from pipeline.surface.baselines import TRIM_SPACINGS, alpha_surface, poisson_depth, poisson_surface
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.types import PointCloud

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.rays import triangle_areas_m2
-from pipeline.surface import measure_quality, reconstruct_surface
+from pipeline.kernels.rays import triangle_areas_m2
+from pipeline.surface.quality import measure_quality
+from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.fill import fill_holes, least_area, skin_points_m, without_seams
 from pipeline.surface.holes import find_holes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.rays import Camera
+from pipeline.kernels.rays import Camera
 from pipeline.surface.gaps import LARGE_M2, gaps_of
 from pipeline.types import CameraIntrinsics, DepthMap
 

@@ -7,8 +7,9 @@ import pytest
 from scipy.spatial import Delaunay
 
 from packetmesh.errors import InputError
-from pipeline.geometry import look_at, rigid, rotation_exp
-from pipeline.surface import Camera, reconstruct_surface
+from pipeline.kernels.geometry import look_at, rigid, rotation_exp
+from pipeline.kernels.rays import Camera
+from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.hole_diagnosis import GROWTH, explain_hole
 from pipeline.surface.holes import find_holes
 from pipeline.surface.ray_parts import View

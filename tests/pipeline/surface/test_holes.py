@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.surface import measure_quality, reconstruct_surface
+from pipeline.surface.quality import measure_quality
+from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.holes import beyond_m, find_holes, half_edges, is_closed
 from tests.pipeline.surface.shapes import grid_mesh, perforated_plane, rectangle
 

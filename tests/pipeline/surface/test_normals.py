@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.surface.normals import oriented_normals, turned_to_viewpoint
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import lidar_room, perforated_plane, sphere, torus_knot

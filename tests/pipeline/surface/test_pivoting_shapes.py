@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.open3d_runtime import o3d
-from pipeline.rays import triangle_areas_m2
-from pipeline.surface import boundary_loops, estimate_normals, spacing, voxel_average
+from pipeline.kernels.open3d_runtime import o3d
+from pipeline.kernels.rays import triangle_areas_m2
+from pipeline.surface.boundary import boundary_loops
+from pipeline.surface.normals import estimate_normals
+from pipeline.surface.radii import spacing
+from pipeline.surface.voxel import voxel_average
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.pivoting import Roller, iterate_roll, roll
 from pipeline.types import PointCloud

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.geometry import look_at
-from pipeline.surface import Camera, measure_quality
+from pipeline.kernels.geometry import look_at
+from pipeline.kernels.rays import Camera
+from pipeline.surface.quality import measure_quality
 from pipeline.surface.ray_parts import View, known_there, ray_parts
 from pipeline.types import CameraIntrinsics, PointSource, SurfaceResult
 from tests.pipeline.surface.shapes import rectangle

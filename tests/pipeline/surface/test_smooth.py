@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.geometry import rigid, rotation_exp
-from pipeline.surface import smooth
+from pipeline.kernels.geometry import rigid, rotation_exp
+from pipeline.surface.smooth import smooth
 from pipeline.types import PointCloud
 
 

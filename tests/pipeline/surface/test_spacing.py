@@ -5,7 +5,8 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.config import SurfaceConfig
-from pipeline.surface import estimate_normals, radii, spacing
+from pipeline.surface.normals import estimate_normals
+from pipeline.surface.radii import radii, spacing
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import sphere
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.surface import spacing
+from pipeline.surface.radii import spacing
 from pipeline.surface.normals import oriented_normals
 from pipeline.surface.surrounding import surrounding_distances_m, surrounding_radii
 from pipeline.types import PointCloud

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.surface import Camera, compare_with_truth, reconstruct_surface
+from pipeline.kernels.rays import Camera
+from pipeline.surface.truth import compare_with_truth
+from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.sweep import iterate_sweep, sweep_radii_m
 from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RigTruth
 from tests.pipeline.surface.shapes import perforated_plane, rectangle

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from pipeline.geometry import apply, inverse, look_at, project
+from pipeline.kernels.geometry import apply, inverse, look_at, project
 from pipeline.io.meshes import read_mesh, write_mesh
-from pipeline.rays import Camera
-from pipeline.surface import photographed
+from pipeline.kernels.rays import Camera
+from pipeline.surface.texture import photographed
 from pipeline.surface.pictures import MISSED, beside, mesh_picture
 from pipeline.types import CameraIntrinsics, Surface
 

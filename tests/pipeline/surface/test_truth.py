@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.geometry import apply, look_at, rigid, rotation_exp
-from pipeline.surface import Camera, compare_with_truth, hit_depth
+from pipeline.kernels.geometry import apply, look_at, rigid, rotation_exp
+from pipeline.kernels.rays import Camera, hit_depth
+from pipeline.surface.truth import compare_with_truth
 from pipeline.surface.truth import sample_surface, yardstick_of
 from pipeline.types import CameraIntrinsics, RigTruth
 from tests.pipeline.surface.shapes import rectangle

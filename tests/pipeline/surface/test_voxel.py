@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.surface import in_cubes_of, voxel_average, voxel_for_count
+from pipeline.surface.voxel import in_cubes_of, voxel_average, voxel_for_count
 from pipeline.types import PointCloud, PointSource
 
 SENSOR, INFERRED = PointSource.SENSOR, PointSource.INFERRED

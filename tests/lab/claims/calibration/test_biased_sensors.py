@@ -6,7 +6,7 @@ import pytest
 from lab.claims.calibration import biased_sensors
 from lab.claims.calibration.biased_sensors import CASES, RANGES_M, judge
 from lab.worlds.depth_bias import DepthBias
-from pipeline.geometry import rigid
+from pipeline.kernels.geometry import rigid
 from pipeline.types import CameraIntrinsics, DepthMap
 
 

@@ -10,8 +10,8 @@ from lab.claims.calibration.box_views import SIZES_M, bought, box_depth, calibra
 from lab.claims.registry import CLAIMS
 from lab.worlds.primitives import box, merged, moved
 from packetmesh.errors import ReconstructionError
-from pipeline.geometry import apply, inverse, look_at, pixel_rays, rigid, rotation_exp
-from pipeline.rays import hit_depth
+from pipeline.kernels.geometry import apply, inverse, look_at, pixel_rays, rigid, rotation_exp
+from pipeline.kernels.rays import hit_depth
 from pipeline.types import CameraIntrinsics, DepthMap
 
 LENS = CameraIntrinsics.pinhole(525.0, 525.0, 319.5, 239.5, 640, 480)

@@ -23,7 +23,7 @@ from lab.claims.calibration.protocol import (
     pose_trials,
     random_pose,
 )
-from pipeline.geometry import rigid, rotation_exp
+from pipeline.kernels.geometry import rigid, rotation_exp
 
 
 def test_boards_are_wholly_in_the_picture_and_tilted_as_asked():

@@ -18,8 +18,8 @@ from lab.claims.delivery.trials import (
     rebuilt,
 )
 from lab.claims.surface.clouds import single_node
-from network_sim.losses import LossConfig
-from pipeline.geometry import scaled
+from network_sim.radio.losses import LossConfig
+from pipeline.kernels.geometry import scaled
 from pipeline.io.demos import load_demo
 from pipeline.reconstruct import reconstruct
 from pipeline.types import DepthMap, Rig

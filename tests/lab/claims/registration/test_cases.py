@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lab.claims.registration.cases import CONDITIONS, Condition, make_case, wrong_start
-from pipeline.geometry import apply, inverse
+from pipeline.kernels.geometry import apply, inverse
 from pipeline.registration import point_error_m, rotation_error_rad
 
 ROOM = 2000

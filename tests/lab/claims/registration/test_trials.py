@@ -16,10 +16,10 @@ from lab.claims.registration.trials import AHD_VOXEL_M, CaseTask, Ruler, k90, ru
 from lab.claims.registration.tuned import TUNED
 from lab.claims.registration.tuning import CANDIDATES, tuning_lineup, write_tuned
 from packetmesh.errors import ReconstructionError
-from pipeline.geometry import apply, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, rigid, rotation_exp
 from pipeline.registration import point_error_m
 from pipeline.registration.methods import METHODS
-from pipeline.surface import voxel_average
+from pipeline.surface.voxel import voxel_average
 from pipeline.types import PointCloud
 
 EASY = CONDITIONS["easy"]

@@ -1,0 +1,1 @@
+"""Fixed cameras around one sink: nodes, routes, images, sink and uplink."""

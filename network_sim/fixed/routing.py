@@ -1,0 +1,120 @@
+"""Routes to the sink: shortest paths over links, by expected transmissions."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincinv
+
+from network_sim.config import NetworkConfig
+from network_sim.radio.places import Places
+from network_sim.radio.propagation import Radio, modulation
+
+_QUANTILES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Routes:
+    """A tree of shortest paths to the sink."""
+
+    sink: int
+    parents: tuple[int, ...]
+    """The next node towards the sink; -1 for the sink and for nodes without a route."""
+    cost: tuple[float, ...]
+    """Expected transmissions to the sink; infinite without a route."""
+
+    def hops(self, node: int) -> int:
+        """Links between a node and the sink; -1 without a route."""
+        if math.isinf(self.cost[node]):
+            return -1
+        count = 0
+        while node != self.sink:
+            node, count = self.parents[node], count + 1
+        return count
+
+    def next_hop(self, at: int, destination: int) -> int:
+        """The next node of a packet, towards the sink or down its tree; -1 without a route."""
+        if destination == self.sink:
+            return self.parents[at]
+        node = destination
+        while node >= 0 and self.parents[node] != at:
+            node = self.parents[node]
+        return node
+
+    @property
+    def unreachable(self) -> tuple[int, ...]:
+        """Nodes without a route to the sink."""
+        return tuple(node for node, cost in enumerate(self.cost) if math.isinf(cost))
+
+
+def shortest_paths(success: NDArray, sink: int) -> Routes:
+    """The cheapest route of every node (Dijkstra); a link costs its expected transmissions (ETX).
+
+    Args:
+        success: (N, N) probability that a frame from row to column arrives; 0 is no link. Booleans give the
+            fewest hops.
+        sink: where all routes end.
+
+    Returns:
+        Of equally cheap routes the one over the lower-numbered node, nearer to the sink.
+    """
+    both = np.asarray(success, float) * np.asarray(success, float).T
+    with np.errstate(divide="ignore"):
+        links = (1.0 / both).tolist()
+    count = len(links)
+    parents, cost = [-1] * count, [math.inf] * count
+    cost[sink] = 0.0
+    heap, settled = [(0.0, 0, sink)], [False] * count
+    while heap:
+        _, hops, node = heapq.heappop(heap)
+        if settled[node]:
+            continue
+        settled[node] = True
+        for other, link in enumerate(links[node]):
+            if not settled[other] and cost[node] + link < cost[other]:
+                cost[other], parents[other] = cost[node] + link, node
+                heapq.heappush(heap, (cost[other], hops + 1, other))
+    return Routes(sink, tuple(parents), tuple(cost))
+
+
+def link_success(config: NetworkConfig, radio: Radio, places: Places) -> NDArray[np.float64]:
+    """How likely an undisturbed data frame arrives over each link.
+
+    Args:
+        config: Size and medium access of the packets. Serial lines and recorded links join every two nodes.
+        radio: Powers, threshold and noise.
+        places: Where the nodes are.
+
+    Returns:
+        (N, N) probabilities, the mean over fading; 0 where the mean power is below the receive threshold.
+    """
+    count = places.count
+    if config.mac.kind in ("serial", "replay"):
+        return 1.0 - np.eye(count)
+    success = np.zeros((count, count))
+    for a in range(count):
+        for b in range(a):
+            power_w = radio.between_w(places, a, b, 0)
+            if power_w >= radio.rx_threshold_w:
+                success[a, b] = success[b, a] = _frame_success(config, radio, power_w)
+    return success
+
+
+def _frame_success(config: NetworkConfig, radio: Radio, power_w: float) -> float:
+    if config.mac.kind == "ideal":
+        return 1.0
+    shape = config.radio.nakagami_m
+    gains = np.ones(1)
+    if shape is not None:
+        gains = gammaincinv(shape, (np.arange(_QUANTILES) + 0.5) / _QUANTILES) / shape
+    received_w = [gain * power_w for gain in gains.tolist() if gain * power_w >= radio.rx_threshold_w]
+    if radio.noise_w is None:
+        return len(received_w) / len(gains)
+    size_bytes = config.nodes.payload_bytes
+    kind = modulation(config.mac)
+    good = sum(1.0 - radio.error_rate(one_w / radio.noise_w, size_bytes, kind) for one_w in received_w)
+    return good / len(gains)

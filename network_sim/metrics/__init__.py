@@ -1,0 +1,1 @@
+"""Numbers of a run, computed from its trace: metrics, energy, coverage, arrivals."""

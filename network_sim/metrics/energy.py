@@ -1,0 +1,117 @@
+"""Joules of radios and platforms, from the time that each radio spends in each state (SPEC 6.3)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from network_sim.config import EnergyConfig
+from network_sim.trace.counters import Counters
+from network_sim.trace.states import State
+from network_sim.types import NS_PER_S
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class RadioTimes:
+    """How long each radio was in each state, arrays of one shape; the platform sleeps with its radio."""
+
+    tx_s: FloatArray
+    """Sending."""
+    rx_s: FloatArray
+    """Receiving."""
+    idle_s: FloatArray
+    """Listening to a channel on which nothing for it was sent."""
+    sleep_s: FloatArray
+    """Asleep or down."""
+
+    @property
+    def elapsed_s(self) -> FloatArray:
+        """All states together."""
+        return self.tx_s + self.rx_s + self.idle_s + self.sleep_s
+
+
+def radio_times(states_ns: NDArray[np.int64], elapsed_s: float | FloatArray) -> RadioTimes:
+    """Times of radios that listen whenever they do nothing else.
+
+    Args:
+        states_ns: (..., S) time in each ``State``.
+        elapsed_s: simulated time in which they were counted; broadcasts to (...).
+    """
+    states_s = states_ns / NS_PER_S
+    tx_s, rx_s, sleep_s = (states_s[..., s] for s in (State.SENDING, State.RECEIVING, State.ASLEEP))
+    return RadioTimes(tx_s, rx_s, np.maximum(elapsed_s - (tx_s + rx_s + sleep_s), 0.0), sleep_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Energy:
+    """Joules of each node by state: of its radio, and of the computer and camera that carry it."""
+
+    tx_j: FloatArray
+    """Radio sending."""
+    rx_j: FloatArray
+    """Radio receiving."""
+    idle_j: FloatArray
+    """Radio listening."""
+    sleep_j: FloatArray
+    """Radio asleep."""
+    platform_j: FloatArray
+    """Platform awake."""
+    platform_sleep_j: FloatArray
+    """Platform asleep."""
+
+    @property
+    def radio_j(self) -> FloatArray:
+        """The radio in all its states."""
+        return self.tx_j + self.rx_j + self.idle_j + self.sleep_j
+
+    @property
+    def total_j(self) -> FloatArray:
+        """Radio and platform."""
+        return self.radio_j + self.platform_j + self.platform_sleep_j
+
+
+def joules(times: RadioTimes, config: EnergyConfig) -> Energy:
+    """Energy of times in states."""
+    return Energy(
+        tx_j=times.tx_s * config.tx_w,
+        rx_j=times.rx_s * config.rx_w,
+        idle_j=times.idle_s * config.idle_w,
+        sleep_j=times.sleep_s * config.sleep_w,
+        platform_j=(times.tx_s + times.rx_s + times.idle_s) * config.platform_w,
+        platform_sleep_j=times.sleep_s * config.platform_sleep_w,
+    )
+
+
+def cumulative_radio_j(counters: Counters, nodes: NDArray[np.bool_], config: EnergyConfig) -> FloatArray:
+    """Energy of the radios of the chosen nodes together, from the end of the warm-up on.
+
+    Args:
+        counters: of a run.
+        nodes: (N,) which nodes.
+        config: power of each state.
+
+    Returns:
+        (M + 1,) joules until each of ``counters.edges_ns`` from the end of the warm-up, where they are 0.
+    """
+    after = slice(counters.warmup_minutes, None)
+    elapsed_s = np.diff(counters.edges_ns[after]) / NS_PER_S
+    times = radio_times(counters.states_ns[after][:, nodes], elapsed_s[:, None])
+    return np.append(0.0, np.cumsum(joules(times, config).radio_j.sum(axis=1)))
+
+
+def lifetimes_s(times: RadioTimes, config: EnergyConfig) -> FloatArray:
+    """(N,) how long each node's battery lasts if it goes on as it did.
+
+    Infinite without a battery or without consumption. The network's lifetime, until the first node is empty,
+    is the least of them.
+    """
+    total_j = joules(times, config).total_j
+    if config.battery_j is None:
+        return np.full(total_j.shape, math.inf)
+    share = np.divide(config.battery_j, total_j, out=np.full(total_j.shape, math.inf), where=total_j > 0.0)
+    return share * times.elapsed_s

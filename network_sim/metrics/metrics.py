@@ -1,0 +1,220 @@
+"""Metrics of a run: pure functions of its trace, each number with its unit and its definition.
+
+Nearly all come from the counters, so that they are the same whether the log was kept or not. A metric whose
+data are missing is absent. Events of the warm-up do not count, nor do packets and images created in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from network_sim.metrics.metrics import energy
+from network_sim.metrics.coverage import NEVER_NS, road_coverage
+from network_sim.trace.ledger import Outcomes
+from network_sim.trace.states import State
+from network_sim.trace.log import NetworkTrace
+from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns, to_s
+from packetmesh.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A number with its unit and definition."""
+
+    value: float
+    unit: str
+    """ "1" for a share or a count."""
+    definition: str
+
+
+Rows = Iterator[tuple[str, float, str, str]]
+
+
+def metrics(trace: NetworkTrace) -> dict[str, Metric]:
+    """All metrics that the trace can give, by name; none if the run ended within the warm-up.
+
+    >>> import packetmesh as pm
+    >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
+    >>> pm.network_metrics(pm.simulate(config))["image_delivery_ratio"].value
+    1.0
+    """
+    if trace.horizon_ns <= to_ns(trace.config.run.warmup_s):
+        return {}
+    groups = (_outcomes, _rates, _losses, _airtime, _queue, _energy, _overheads, _coverage)
+    return {
+        name: Metric(float(value), unit, definition)
+        for group in groups
+        for name, value, unit, definition in group(trace)
+        if np.isfinite(value)
+    }
+
+
+def image_delays_s(trace: NetworkTrace) -> NDArray[np.float64]:
+    """(A,) seconds from capture to arrival of each image that arrived, in the order of arrival.
+
+    As in the metrics, images that were captured during the warm-up do not count.
+
+    Raises:
+        InputError: the run kept no events.
+
+    >>> import packetmesh as pm
+    >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
+    >>> delays_s = pm.image_delays_s(pm.simulate(config))
+    >>> len(delays_s), bool((delays_s > 0.0).all())
+    (3, True)
+    """
+    if trace.config.run.keep == "counters":
+        raise InputError("The run kept counters only, not its images' delays; try run.keep=images")
+    captured, arrived = trace.events.of(EventKind.CAPTURE), trace.events.of(EventKind.ARRIVE)
+    by_image = np.argsort(captured.image)
+    of_arrived = by_image[np.searchsorted(captured.image, arrived.image, sorter=by_image)]
+    captured_ns = captured.t_ns[of_arrived]
+    counts = captured_ns >= to_ns(trace.config.run.warmup_s)
+    return (arrived.t_ns - captured_ns)[counts] / NS_PER_S
+
+
+def elapsed_s(trace: NetworkTrace) -> float:
+    """Seconds from the end of the warm-up to the end of the run."""
+    return to_s(trace.horizon_ns - to_ns(trace.config.run.warmup_s))
+
+
+def _outcomes(trace: NetworkTrace) -> Rows:
+    """Delivery and delay of images and of their packets."""
+    yield from _outcome("image", trace.counters.images, "taken")
+    yield from _outcome("packet", trace.counters.packets, "first queued")
+
+
+def _outcome(noun: str, outcomes: Outcomes, began: str) -> Rows:
+    if outcomes.created:
+        share = outcomes.arrived / outcomes.created
+        still = "those still on their way at the end count as not arrived"
+        yield f"{noun}_delivery_ratio", share, "1", f"{noun}s that arrived, of all that were {began}; {still}"
+    delays = outcomes.delays
+    took = f"from when the {noun} was {began} until it arrived"
+    yield f"{noun}_delay_mean", delays.mean_s, "s", f"Mean time {took}"
+    yield f"{noun}_delay_deviation", delays.deviation_s, "s", f"Standard deviation of the time {took}"
+    for name, percent in (("median", 50.0), ("p95", 95.0)):
+        definition = f"Time within which {percent:g} % of those that arrived did, {took}, to 1.2 %"
+        yield f"{noun}_delay_{name}", delays.percentile_s(percent), "s", definition
+
+
+def _rates(trace: NetworkTrace) -> Rows:
+    time_s = elapsed_s(trace)
+    goodput_bps = 8 * _bytes(trace, EventKind.ARRIVE) / time_s
+    throughput_bps = 8 * _bytes(trace, EventKind.RECEIVE, PacketKind.IMAGE) / time_s
+    yield "goodput", goodput_bps, "bit/s", "Bits of complete images at their destination, over time"
+    yield "throughput", throughput_bps, "bit/s", "Bits of image packets at their last node, over time"
+    taken, arrived = (60 * _count(trace, kind) / time_s for kind in (EventKind.CAPTURE, EventKind.ARRIVE))
+    yield "images_taken_per_minute", taken, "1/min", "Images that cameras took"
+    yield "images_per_minute", arrived, "1/min", "Images that arrived complete"
+
+
+def _losses(trace: NetworkTrace) -> Rows:
+    """Frames, packets and images that failed, by cause. Zeros too, so that runs can be averaged."""
+    delivered = _count(trace, EventKind.DELIVER)
+    for kind, name, what in (
+        (EventKind.LOSS, "attempts_lost", "Attempts to send that failed, others may have followed"),
+        (EventKind.DROP, "packets_dropped", "Packets that were given up"),
+        (EventKind.EXPIRE, "images_expired", "Images that were given up or thrown away"),
+    ):
+        yield name, _count(trace, kind), "1", f"{what}, for any cause"
+        counts = _after(trace, trace.counters.count)[:, kind].sum(axis=(0, 1))
+        for cause in tuple(Cause)[1:]:
+            words = cause.name.lower()
+            yield f"{name}_{words}", counts[cause], "1", f"{what}, cause: {words.replace('_', ' ')}"
+        if kind == EventKind.LOSS and delivered:
+            ratio = counts[Cause.COLLISION] / delivered
+            yield "collisions_per_delivery", ratio, "1", "Attempts lost to collisions, per packet and hop"
+
+
+def _airtime(trace: NetworkTrace) -> Rows:
+    sending_s = _states_ns(trace)[:, State.SENDING] / NS_PER_S
+    share = "acknowledgements included, over time; far nodes that send at once can make it exceed 1"
+    yield "airtime_share", sending_s.sum() / elapsed_s(trace), "1", f"Time on the air of all frames, {share}"
+    yield "frames", _count(trace, EventKind.AIR), "1", "Frames sent, retries included, replies not"
+
+
+def _queue(trace: NetworkTrace) -> Rows:
+    """From sums alone: a packet adds the time from when it came to the end, less that from when it left."""
+    counters = trace.counters
+    rest_ns = trace.horizon_ns - counters.edges_ns[1:, None, None, None]
+    weights_s = (counters.until_end_ns + counters.count * rest_ns) / NS_PER_S
+    weights_s[: counters.warmup_minutes] = counters.count[: counters.warmup_minutes] * elapsed_s(trace)
+    came, went, dropped = (
+        weights_s[:, kind].sum() for kind in (EventKind.ENQUEUE, EventKind.DELIVER, EventKind.DROP)
+    )
+    mean = (came - went - dropped) / elapsed_s(trace)
+    yield "queue", mean, "1", "Packets in all buffers together, those being sent included, averaged over time"
+
+
+def _energy(trace: NetworkTrace) -> Rows:
+    cameras = camera_nodes(trace)
+    if not cameras.any():
+        return
+    times = energy.radio_times(_states_ns(trace)[cameras], elapsed_s(trace))
+    spent = energy.joules(times, trace.config.energy)
+    for name, joules, what in (
+        ("radio_sending", spent.tx_j, "radios that send"),
+        ("radio_receiving", spent.rx_j, "radios that receive what is addressed to them"),
+        ("radio_listening", spent.idle_j, "radios that listen"),
+        ("radio_sleeping", spent.sleep_j, "radios that sleep or have failed"),
+        ("radio", spent.radio_j, "radios in all states"),
+        ("platform_awake", spent.platform_j, "computers and cameras that are awake"),
+        ("platform_sleeping", spent.platform_sleep_j, "computers and cameras that sleep or have failed"),
+        ("total", spent.total_j, "radios, computers and cameras"),
+    ):
+        yield f"energy_{name}", joules.sum(), "J", f"Energy of {what}, all camera nodes together"
+    total_j = spent.total_j
+    yield "energy_per_node", total_j.mean(), "J", "Energy of a camera node, their mean"
+    if arrived := _count(trace, EventKind.ARRIVE):
+        yield "energy_per_image", total_j.sum() / arrived, "J", "Energy of all camera nodes per arrived image"
+    least_s = energy.lifetimes_s(times, trace.config.energy).min()
+    yield "lifetime", least_s, "s", "Until the first camera node's battery is empty, if all goes on like this"
+
+
+def _overheads(trace: NetworkTrace) -> Rows:
+    for kind in (PacketKind.SUMMARY, PacketKind.REQUEST, PacketKind.STATUS):
+        words = kind.name.lower()
+        per_minute = 60 * _bytes(trace, EventKind.ENQUEUE, kind) / elapsed_s(trace)
+        yield f"{words}_bytes", per_minute, "B/min", f"Bytes of {words} packets queued, at every hop"
+
+
+def _coverage(trace: NetworkTrace) -> Rows:
+    """Which pieces of road were seen when; needs the images' events and cells."""
+    sights = road_coverage(trace)
+    if sights is None:
+        return
+    covered = int((sights.covered_ns != NEVER_NS).sum())
+    windows = f"Pairs of a road cell and a span of {trace.config.scheme.validity_s:g} s"
+    share = covered / len(sights.cell)
+    yield "coverage", share, "1", f"{windows} of which an image arrived, of all that cameras saw"
+    if sights.arrived:
+        share = 1.0 - covered / sights.arrived
+        yield "redundancy", share, "1", f"Arrived images beyond the first of its kind. {windows} are a kind"
+
+
+def _after(trace: NetworkTrace, sums: NDArray[np.int64]) -> NDArray[np.int64]:
+    return sums[trace.counters.warmup_minutes :]
+
+
+def _count(trace: NetworkTrace, kind: EventKind) -> int:
+    return int(_after(trace, trace.counters.count)[:, kind].sum())
+
+
+def _bytes(trace: NetworkTrace, kind: EventKind, packet_kind: PacketKind | None = None) -> int:
+    sums = _after(trace, trace.counters.size_bytes)[:, kind]
+    return int(sums.sum() if packet_kind is None else sums[:, packet_kind].sum())
+
+
+def _states_ns(trace: NetworkTrace) -> NDArray[np.int64]:
+    """(N, S) time in each state."""
+    return _after(trace, trace.counters.states_ns).sum(axis=0)
+
+
+def camera_nodes(trace: NetworkTrace) -> NDArray[np.bool_]:
+    """(N,) the nodes with a camera and a battery; sinks, access points and the cloud have mains."""
+    return np.isin(trace.roles, ("node", "vehicle"))

@@ -1,0 +1,1 @@
+"""Links: positions, propagation, and losses that are set or recorded."""

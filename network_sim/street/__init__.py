@@ -1,0 +1,1 @@
+"""Vehicles with cameras that meet roadside access points, and the schemes that choose what they upload."""

@@ -1,0 +1,229 @@
+"""The trace: one append-only log of events, and counters that stay when the log is not kept.
+
+The log keeps these invariants; ``network_sim.trace.conservation`` checks them on every run.
+
+1. Ids of packets and of images count up from 0. A fragment that is sent again by its camera is a new packet.
+2. Every packet that is handed to a node's buffer is ENQUEUEd there, on relays too, and also when the buffer
+   is full: then a DROP with ``Cause.BUFFER``, of that packet or of the oldest, follows.
+3. It leaves that node once, by DELIVER (``node`` to ``peer``) or by DROP (``node``). A packet that has
+   arrived is never DROPped by its sender, even if the acknowledgement is lost.
+4. At the instant of DELIVER the next node ENQUEUEs the packet, or, if it is the last, RECEIVE is recorded
+   (``node`` is the source, ``peer`` the last node).
+5. An image is CAPTUREd once (``node`` took it, ``peer`` is the road cell that it shows, or -1) and ends at
+   most once, by ARRIVE (``node`` took it, ``peer`` has it now, all its bytes) or EXPIRE (``node`` took it).
+6. AIR and ACK carry the time when they start and their duration, and are recorded within a second of it.
+7. DOWN with ``Cause.NODE_DOWN`` is a failure, with ``Cause.NONE`` sleep; UP ends either.
+
+Late records (a CAPTURE that is only computed when it matters) are sorted in at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from struct import Struct, calcsize
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from network_sim.config import Keep, NetworkConfig
+from network_sim.trace.counters import Counters, Tally
+from network_sim.types import Cause, EventKind, Packet, PacketKind, to_ns
+
+COLUMNS = (
+    ("t_ns", "<i8"),
+    ("duration_ns", "<i8"),
+    ("packet", "<i4"),
+    ("image", "<i4"),
+    ("first_byte", "<i4"),
+    ("size_bytes", "<i4"),
+    ("node", "<i2"),
+    ("peer", "<i2"),
+    ("kind", "i1"),
+    ("cause", "i1"),
+    ("packet_kind", "i1"),
+)
+_ROW = np.dtype(list(COLUMNS))
+_FORMAT = "<qqiiiihhbbb"
+_BLOCK_BYTES = 65536 * calcsize(_FORMAT)
+
+IMAGE_EVENTS = (
+    EventKind.CAPTURE,
+    EventKind.ARRIVE,
+    EventKind.EXPIRE,
+    EventKind.DOWN,
+    EventKind.UP,
+    EventKind.JOIN,
+    EventKind.LEAVE,
+)
+"""What is kept of the log when ``keep`` is "images"."""
+
+
+@dataclass(frozen=True, slots=True)
+class Events:
+    """Columns of the log (E,), by time and, at the same time, in the order of recording."""
+
+    t_ns: NDArray[np.int64]
+    duration_ns: NDArray[np.int64]
+    packet: NDArray[np.int32]
+    image: NDArray[np.int32]
+    first_byte: NDArray[np.int32]
+    size_bytes: NDArray[np.int32]
+    node: NDArray[np.int16]
+    peer: NDArray[np.int16]
+    kind: NDArray[np.int8]
+    cause: NDArray[np.int8]
+    packet_kind: NDArray[np.int8]
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+    def columns(self) -> Iterator[NDArray[np.generic]]:
+        """The columns in the order of ``COLUMNS``."""
+        return (getattr(self, field.name) for field in fields(self))
+
+    def rows(self, start: int, stop: int) -> NDArray[Any]:
+        """Some of the events as rows, as a ``Tally`` takes them."""
+        rows = np.empty(len(self.t_ns[start:stop]), _ROW)
+        for name, _ in COLUMNS:
+            rows[name] = getattr(self, name)[start:stop]
+        return rows
+
+    def where(self, mask: NDArray[np.bool_]) -> Events:
+        """The events that ``mask`` (E,) selects."""
+        return Events(*(column[mask] for column in self.columns()))  # type: ignore[arg-type]
+
+    def of(self, *kinds: EventKind) -> Events:
+        """The events of these kinds."""
+        return self.where(np.isin(self.kind, np.array(kinds, np.int8)))
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkTrace:
+    """The result of one run."""
+
+    events: Events
+    """The log: everything, only ``IMAGE_EVENTS`` or nothing, as ``config.run.keep`` says."""
+    counters: Counters
+    names: tuple[str, ...]
+    """Names of the nodes, sink and cloud included, in the order of their numbers."""
+    roles: tuple[str, ...]
+    """"node", "vehicle", "access-point", "sink" or "cloud", one per name."""
+    positions_m: NDArray[np.float64] | None
+    """(N, 2), or None where the nodes move."""
+    config: NetworkConfig
+    horizon_ns: int
+    """When the run ended."""
+
+
+class Recorder:
+    """Appends events to the log and counts them.
+
+    Args:
+        keep: "all" keeps the log, "images" only ``IMAGE_EVENTS``, "counters" none of it.
+        nodes: how many nodes there are, sink, access points and cloud included.
+        warmup_ns: events before it are counted apart (``config.run.warmup_s``).
+    """
+
+    def __init__(self, keep: Keep, nodes: int, warmup_ns: int = 0) -> None:
+        self._keep = keep
+        self._warmup_ns = warmup_ns
+        self._tally = Tally(nodes, warmup_ns)
+        self._rows = bytearray()
+        self._pack = Struct(_FORMAT).pack
+        self._blocks: list[NDArray[Any]] = []
+
+    def add(
+        self,
+        t_ns: int,
+        kind: EventKind,
+        node: int,
+        peer: int = -1,
+        packet: int = -1,
+        image: int = -1,
+        first_byte: int = 0,
+        size_bytes: int = 0,
+        cause: Cause = Cause.NONE,
+        duration_ns: int = 0,
+        packet_kind: PacketKind = PacketKind.IMAGE,
+    ) -> None:
+        """Records one event. Bytes straight into a row: a third of the time of a tuple in a list."""
+        rows = self._rows
+        rows += self._pack(
+            t_ns, duration_ns, packet, image, first_byte, size_bytes, node, peer, kind, cause, packet_kind
+        )
+        if len(rows) >= _BLOCK_BYTES:
+            self._flush()
+
+    def add_packet(
+        self,
+        t_ns: int,
+        kind: EventKind,
+        packet: Packet,
+        node: int,
+        peer: int,
+        size_bytes: int,
+        cause: Cause = Cause.NONE,
+        duration_ns: int = 0,
+    ) -> None:
+        """Records an event of a packet at ``node``, towards ``peer``; ``size_bytes`` as in ``add``."""
+        number, packet_kind, _, _, _, image, first_byte, _ = packet
+        rows = self._rows
+        rows += self._pack(
+            t_ns, duration_ns, number, image, first_byte, size_bytes, node, peer, kind, cause, packet_kind
+        )
+        if len(rows) >= _BLOCK_BYTES:
+            self._flush()
+
+    def add_many(self, t_ns: ArrayLike, kind: EventKind, node: ArrayLike, **values: ArrayLike) -> None:
+        """Records many events of one kind at once: numbers or arrays (E,), named as in ``add``."""
+        block = np.zeros(np.size(t_ns), _ROW)
+        columns = {"peer": -1, "packet": -1, "image": -1, **values, "t_ns": t_ns, "kind": kind, "node": node}
+        for name, column in columns.items():
+            block[name] = column
+        self._rows += block.tobytes()
+        if len(self._rows) >= _BLOCK_BYTES:
+            self._flush()
+
+    def trace(
+        self,
+        config: NetworkConfig,
+        names: tuple[str, ...],
+        positions_m: NDArray[np.float64] | None,
+        horizon_ns: int,
+        roles: tuple[str, ...],
+    ) -> NetworkTrace:
+        """The record of the run, which ended at ``horizon_ns``; nothing more can be added.
+
+        Raises:
+            ValueError: the recorder was made for another warm-up.
+        """
+        if self._warmup_ns != to_ns(config.run.warmup_s):
+            raise ValueError(f"The recorder's warm-up is {self._warmup_ns} ns, run.warmup_s another")
+        self._flush()
+        counters = self._tally.counters(horizon_ns)
+        events = _sorted_columns(self._blocks)
+        return NetworkTrace(events, counters, names, roles, positions_m, config, horizon_ns)
+
+    def _flush(self) -> None:
+        if not self._rows:
+            return
+        block = np.frombuffer(self._rows, _ROW)
+        self._rows = bytearray()
+        self._tally.take(block)
+        if self._keep == "images":
+            block = block[np.isin(block["kind"], np.array(IMAGE_EVENTS, np.int8))]
+        if self._keep != "counters" and len(block):
+            self._blocks.append(block)
+
+
+def _sorted_columns(blocks: list[NDArray[Any]]) -> Events:
+    """The blocks as sorted columns; ``blocks`` is emptied, one column's worth at a time."""
+    rows = np.concatenate(blocks) if blocks else np.zeros(0, _ROW)
+    blocks.clear()
+    t_ns = rows["t_ns"].copy()
+    if (t_ns[1:] >= t_ns[:-1]).all():
+        return Events(t_ns, *(rows[name].copy() for name, _ in COLUMNS[1:]))
+    order = np.argsort(t_ns, kind="stable")
+    return Events(t_ns[order], *(rows[name][order] for name, _ in COLUMNS[1:]))

@@ -1,0 +1,1 @@
+"""Two clouds registered from the command line, by our methods and by peers."""

@@ -1,0 +1,100 @@
+"""What the registration of two clouds leaves on disk: pose, numbers, steps and the moved cloud."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from packetmesh.errors import ReconstructionError
+from packetmesh.files import atomic_path, write_json
+from packetmesh.settings import settings
+from pipeline.config import PipelineConfig, RegistrationConfig
+from pipeline.io.clouds import write_cloud
+from pipeline.io.poses import write_pose
+from pipeline.pairs.register import DEFAULT_METHOD, Answer
+from pipeline.types import FloatArray, PointCloud
+
+_STEP_COLUMNS = (
+    "index", "sigma_m", "gate_m", "objective", "rmse_m", "mean_distance_m", "effective_pairs", "entropy_nat",
+    "rotation_step_rad", "translation_step_m",
+)  # fmt: skip
+
+
+def answer_metrics(answers: Iterable[Answer], with_truth: bool) -> dict[str, dict[str, Any]]:
+    """The numbers by method, as ``metrics.json`` has them."""
+    names = ["T_target_source", "iterations", "stop_reason", "rmse_m", "average_hausdorff_m", "elapsed_s"]
+    if with_truth:
+        names.append("point_error_m")
+    return {
+        answer.method: {name: getattr(answer, name) for name in names} | _draws(answer) for answer in answers
+    }
+
+
+def _draws(answer: Answer) -> dict[str, Any]:
+    """How far the draws of the points agree, where there were several."""
+    if answer.draws == 1:
+        return {}
+    return {"draws": answer.draws, "spread_m": answer.spread_m, "draws_agree": answer.agreed}
+
+
+def chosen_pose(answers: Sequence[Answer]) -> FloatArray:
+    """The (4, 4) pose of the only answer, or of CEICP-A, or of the first method that has one.
+
+    Raises:
+        ReconstructionError: no method determined the pose; the sentence says why.
+    """
+    good = [answer for answer in answers if not answer.failed]
+    if not good:
+        reason = answers[0].stop_reason.partition(": ")[2].rstrip(".")
+        raise ReconstructionError(f"{answers[0].method} found no pose: {reason}")
+    best = next((answer for answer in good if answer.method == DEFAULT_METHOD), good[0])
+    assert best.T_target_source is not None
+    return best.T_target_source
+
+
+def write_register_folder(
+    folder: Path,
+    answers: Sequence[Answer],
+    source: PointCloud,
+    config: RegistrationConfig,
+    command: dict[str, Any],
+    with_truth: bool,
+) -> None:
+    """Write config.json, steps.csv, transform.txt, aligned.ply and metrics.json, each whole or not at all.
+
+    Args:
+        folder: made if it is missing.
+        answers: of all methods that ran.
+        source: the cloud as it was read, to be moved by ``chosen_pose``.
+        config: settings of the registration.
+        command: how the command line was called; ``config.json`` holds it beside the settings.
+        with_truth: whether ``metrics.json`` holds errors against a true pose.
+
+    Raises:
+        InputError: the folder cannot be written.
+        ReconstructionError: there is no pose to write.
+    """
+    pose = chosen_pose(answers)
+    write_json(
+        folder / "config.json",
+        command | {"settings": settings(replace(PipelineConfig(), node_registration=config))},
+    )
+    _write_steps(folder / "steps.csv", answers)
+    write_pose(folder / "transform.txt", pose)
+    write_cloud(folder / "aligned.ply", source.transformed(pose))
+    write_json(folder / "metrics.json", answer_metrics(answers, with_truth))
+
+
+def _write_steps(path: Path, answers: Iterable[Answer]) -> None:
+    """One line an iteration; the pose after it row by row, blanks between its numbers."""
+    with atomic_path(path) as sibling, sibling.open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["method", "elapsed_s", "pairs", *_STEP_COLUMNS, "T_target_source"])
+        for answer in answers:
+            for step, elapsed_s in zip(answer.steps, answer.step_times_s, strict=True):
+                values = [getattr(step, name) for name in _STEP_COLUMNS]
+                pose = " ".join(format(value, ".17g") for value in step.T_target_source.ravel())
+                table.writerow([answer.method, elapsed_s, len(step.pairs), *values, pose])

@@ -1,0 +1,261 @@
+"""Any two clouds: whether they can be registered, and where our methods and the peers place them."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
+from pipeline.config import Metric, RegistrationConfig
+from pipeline.kernels.geometry import apply
+from pipeline.kernels.points import distinct_rows, middle_extent_m
+from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
+from pipeline.registration.global_start import default_voxel_m, global_start
+from pipeline.registration.methods import METHODS
+from pipeline.registration.neighbourhood import pca_normals
+from pipeline.registration.observability import open_motions
+from pipeline.registration.peers import PEERS, available_peers, run_peer
+from pipeline.surface.voxel import voxel_average, voxel_for_count
+from pipeline.types import FloatArray, PointCloud, RegistrationStep
+
+_log = logging.getLogger(__name__)
+
+ALL = "all"
+DEFAULT_METHOD = "ceicp-a"
+ALIASES = {"ceicp": DEFAULT_METHOD}
+LEAST_POINTS = 6
+LARGEST_M, SMALLEST_M = 1000.0, 0.001
+"""Clouds larger or smaller than this are hardly in metres."""
+UNIT_RATIOS = (300.0, 3000.0)
+"""If one cloud is about a thousand times as large as the other, one of them is in millimetres."""
+EVALUATED_POINTS = 20_000
+"""The clouds are thinned alike to about this many points before their distance is measured."""
+SHAPE_POINTS = 3000
+AGREEMENT_M = 0.005
+"""Draws of the points whose answers are nearer to each other than this agree."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The outcome of one method on a pair; ``T_target_source`` is None if it failed."""
+
+    method: str
+    T_target_source: FloatArray | None
+    """(4, 4)."""
+    iterations: int | None
+    stop_reason: str
+    elapsed_s: float
+    rmse_m: float = float("nan")
+    """Root mean square distance of the moved source points from the target, of those within the gate; the
+    same measure for every method."""
+    average_hausdorff_m: float = float("nan")
+    """Both clouds thinned alike (SPEC 4.7)."""
+    point_error_m: float = float("nan")
+    """NaN without the truth."""
+    steps: tuple[RegistrationStep, ...] = ()
+    """None of a peer."""
+    step_times_s: tuple[float, ...] = ()
+    """Since the start, for every step."""
+    draws: int = 1
+    """How many draws of the points were registered; this is the answer of one of them."""
+    spread_m: float = float("nan")
+    """Largest point error of another draw's answer from this one; infinite if one has none, NaN of one."""
+
+    @property
+    def agreed(self) -> bool:
+        """Whether all draws of the points lead to one place."""
+        return self.spread_m <= AGREEMENT_M
+
+    @property
+    def failed(self) -> bool:
+        """No pose, or one that the points do not determine."""
+        return self.T_target_source is None or self.stop_reason.startswith("degenerate")
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two clouds that may be registered."""
+
+    source: PointCloud
+    target: PointCloud
+    T_init: FloatArray
+    """(4, 4) start pose T_target_source."""
+    T_true: FloatArray | None = None
+
+
+def chosen_methods(name: str) -> tuple[str, ...]:
+    """The methods behind a name: one, or for ``all`` every method and every peer that is installed.
+
+    Raises:
+        InputError: no such method; the sentence lists them.
+    """
+    known = (*METHODS, *available_peers())
+    if name == ALL:
+        return known
+    name = ALIASES.get(name, name)
+    if name not in known:
+        raise InputError(f"There is no method '{name}'; try one of {', '.join((ALL, *ALIASES, *known))}")
+    return (name,)
+
+
+def config_for(
+    methods: tuple[str, ...],
+    metric: Metric | None,
+    gate_m: float | None,
+    start: Literal["given", "global"],
+    with_scale: bool,
+) -> RegistrationConfig:
+    """The settings of a comparison.
+
+    A scale needs the point metric, and pairs of both directions: source points that look for their
+    nearest partners come nearer to them by shrinking. Without a gate it is the default one, until the data
+    give another (``with_gate``).
+
+    Raises:
+        InputError: settings that do not go together.
+    """
+    method = methods[0] if len(methods) == 1 and methods[0] in METHODS else DEFAULT_METHOD
+    return RegistrationConfig(
+        method=method,
+        metric=metric or ("point" if with_scale else "plane"),
+        gate_m=RegistrationConfig().gate_m if gate_m is None else gate_m,
+        start=start,
+        with_scale=with_scale,
+        direction="both" if with_scale else "q2p",
+    )
+
+
+def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> PointCloud:
+    """Without repeated points and, if asked, thinned.
+
+    Raises:
+        InputError: fewer than six distinct points, or a size that no cloud in metres has.
+    """
+    first = distinct_rows(cloud.points_m)
+    if len(first) < LEAST_POINTS:
+        raise InputError(
+            f"The {name} cloud has {len(first)} distinct points; registration needs at least {LEAST_POINTS}, "
+            "so check its file"
+        )
+    if len(first) < len(cloud):
+        _log.warning("%d repeated points of the %s cloud are left out", len(cloud) - len(first), name)
+        cloud = cloud.select(first)
+    extent_m = middle_extent_m(cloud.points_m)
+    if not SMALLEST_M <= extent_m <= LARGEST_M:
+        unit = "millimetres" if extent_m > LARGEST_M else "kilometres"
+        raise InputError(
+            f"The {name} cloud is {extent_m:.3g} m across, as if its numbers were {unit}; "
+            "try --metres-per-unit with those of source and target"
+        )
+    return cloud if voxel_m is None else voxel_average(cloud, voxel_m)
+
+
+def prepared_pair(
+    source: PointCloud,
+    target: PointCloud,
+    config: RegistrationConfig,
+    voxel_m: float | None = None,
+    T_init: FloatArray | None = None,
+    T_true: FloatArray | None = None,
+) -> Pair:
+    """The clouds checked, thinned and given a start pose.
+
+    Raises:
+        InputError: points that cannot be used, or two units.
+        ReconstructionError: a target whose shape leaves the motion open, or no global start was found.
+    """
+    ratio = middle_extent_m(source.points_m) / max(middle_extent_m(target.points_m), 1e-300)
+    if UNIT_RATIOS[0] < max(ratio, 1.0 / max(ratio, 1e-300)) < UNIT_RATIOS[1]:
+        larger, units = ("source", "0.001 1") if ratio > 1.0 else ("target", "1 0.001")
+        raise InputError(
+            f"The {larger} cloud is {max(ratio, 1.0 / ratio):.0f} times as large as the other, as if it were "
+            f"in millimetres and the other in metres; try --metres-per-unit {units}"
+        )
+    source, target = (
+        prepared_cloud(cloud, name, voxel_m) for cloud, name in ((source, "source"), (target, "target"))
+    )
+    _check_shape(target, config.seed)
+    if config.start == "global":
+        T_init = global_start(source, target, voxel_m or default_voxel_m(target), config.seed)
+    return Pair(source, target, np.eye(4) if T_init is None else T_init, T_true)
+
+
+def run_methods(methods: tuple[str, ...], pair: Pair, config: RegistrationConfig) -> Iterator[Answer]:
+    """Every method's answer from the same start; a method that fails gives the reason as its stop reason."""
+    evaluate = _Evaluation(pair, config.gate_m)
+    for name in methods:
+        try:
+            answer = _peer(name, pair, config) if name in PEERS else _ours(name, pair, config)
+        except PacketMeshError as error:
+            yield Answer(name, None, 0, f"failed: {error}", float("nan"))
+            continue
+        yield evaluate(answer)
+
+
+def _ours(name: str, pair: Pair, config: RegistrationConfig) -> Answer:
+    config = replace(config, method=name, start="given")
+    result, times_s = register_timed(pair.source, pair.target, config, pair.T_init)
+    elapsed_s = float(times_s[-1]) if len(times_s) else float("nan")
+    T = result.T_target_source if result.steps else None
+    times = tuple(map(float, times_s))
+    return Answer(
+        name, T, len(result.steps), result.stop_reason, elapsed_s, steps=result.steps, step_times_s=times
+    )
+
+
+def _peer(name: str, pair: Pair, config: RegistrationConfig) -> Answer:
+    result = run_peer(name, pair.source, pair.target, config.gate_m, pair.T_init, config.max_iterations)
+    return Answer(name, result.T_target_source, result.iterations, result.stop_reason, result.elapsed_s)
+
+
+class _Evaluation:
+    """Measures answers by the distances they leave; thins the clouds and builds the tree once."""
+
+    def __init__(self, pair: Pair, gate_m: float) -> None:
+        self._pair, self._gate_m = pair, gate_m
+        voxel_m = voxel_for_count(pair.target.points_m, EVALUATED_POINTS)
+        if max(len(pair.source), len(pair.target)) > EVALUATED_POINTS:
+            thin = [
+                voxel_average(PointCloud(cloud.points_m), voxel_m) for cloud in (pair.source, pair.target)
+            ]
+        else:
+            thin = [pair.source, pair.target]
+        self._source_m, self._target_m = thin[0].points_m, thin[1].points_m
+        self._tree = cKDTree(self._target_m)
+
+    def __call__(self, answer: Answer) -> Answer:
+        """The answer with its distances."""
+        if answer.T_target_source is None:
+            return answer
+        moved_m = apply(answer.T_target_source, self._source_m)
+        distances_m = self._tree.query(moved_m, workers=-1)[0]
+        close_m = distances_m[distances_m <= self._gate_m]
+        T_true = self._pair.T_true
+        return replace(
+            answer,
+            rmse_m=float(np.sqrt(np.mean(close_m**2))) if len(close_m) else float("nan"),
+            average_hausdorff_m=average_hausdorff_m(moved_m, self._target_m),
+            point_error_m=(
+                float("nan")
+                if T_true is None
+                else point_error_m(answer.T_target_source, T_true, self._source_m)
+            ),
+        )
+
+
+def _check_shape(target: PointCloud, seed: int) -> None:
+    """Refuse a target that any motion within its own surface leaves as it is."""
+    count = min(len(target), SHAPE_POINTS)
+    rows = np.random.default_rng(seed).choice(len(target), count, replace=False)
+    points_m = target.points_m[rows]
+    motions = open_motions(points_m, pca_normals(points_m))
+    if motions:
+        raise ReconstructionError(
+            f"The target cloud's shape does not determine the pose: {motions} changes nothing; "
+            "try a cloud that shows more of the place"
+        )

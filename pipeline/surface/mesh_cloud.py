@@ -1,0 +1,315 @@
+"""From the file of any point cloud to the file of its surface: what `packetmesh mesh` does."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from pipeline.config import SurfaceConfig
+from pipeline.io.clouds import read_cloud
+from pipeline.io.meshes import mesh_suffix, write_mesh
+from pipeline.kernels.points import distinct_rows
+from pipeline.surface.radii import radii, spacing
+from pipeline.surface.ball_pivoting import reconstruct_surface
+from pipeline.surface.smooth import smooth
+from pipeline.surface.voxel import voxel_average, voxel_for_count
+from pipeline.surface.boundary import edges_and_faces
+from pipeline.surface.normals import oriented_normals, turned_to_viewpoint
+from pipeline.surface.surrounding import surrounding_radii
+from pipeline.types import FloatArray, PointCloud, SurfaceResult
+
+_log = logging.getLogger(__name__)
+
+LEAST_POINTS = 3
+USUAL_M = 0.05, 50.0
+"""Between these widths are things, rooms and houses."""
+OUTER_PERCENT = 1.0
+"""On either side of the middle of a cloud: what may be outliers does not count for its width."""
+LARGEST_M, SMALLEST_M = 1e9, 1e-12
+"""No place is farther from the origin; a smaller cloud is a point."""
+_COARSE = 0.1
+"""A mesh file's numbers must be finer than this share of the smallest ball."""
+_LINE = 1e-6
+"""A cloud is a line if it is thinner than this share of its length."""
+
+GIVEN = "given"
+GIVEN_TURNED = "given, turned to the viewpoint"
+ESTIMATED_VIEWPOINT = "estimated, turned to the viewpoint"
+ESTIMATED_OUTWARDS = "estimated, consistent among neighbours and outwards"
+
+
+@dataclass(frozen=True, slots=True)
+class MeshOptions:
+    """How a cloud becomes a mesh.
+
+    Raises:
+        InputError: a radius or a viewpoint that is no such thing, or counts that are too small.
+    """
+
+    radii_m: tuple[float, ...] | None = None
+    """Ball radii; None takes them from the points (``chosen_radii``)."""
+    viewpoint_m: tuple[float, float, float] | None = None
+    """Where the normals point to; without it they stay as given, or are estimated to point outwards."""
+    max_points: int | None = None
+    """Thin to about this many points first."""
+    smoothing_passes: int = 0
+    metres_per_unit: float = 1.0
+    """Of the cloud's coordinates; 0.001 for millimetres."""
+
+    def __post_init__(self) -> None:
+        for radius_m in self.radii_m or ():
+            if not (math.isfinite(radius_m) and radius_m > 0.0):
+                raise InputError(
+                    f"A ball radius is {radius_m} m; try about one to four times the point spacing, or auto"
+                )
+        if self.viewpoint_m is not None and not np.isfinite(self.viewpoint_m).all():
+            raise InputError(f"The viewpoint is {list(self.viewpoint_m)} m; try three finite numbers X Y Z")
+        if self.max_points is not None and self.max_points < LEAST_POINTS:
+            raise InputError(f"At most {self.max_points} points make no surface; try at least {LEAST_POINTS}")
+        if self.smoothing_passes < 0:
+            raise InputError(f"There cannot be {self.smoothing_passes} smoothing passes; try 0 or more")
+        check_unit(self.metres_per_unit)
+
+
+@dataclass(frozen=True, slots=True)
+class MeshedCloud:
+    """The surface of a cloud, and what it was made from."""
+
+    surface: SurfaceResult
+    points: int
+    """How many points the ball rolled over."""
+    normals: str
+    """Origin of the points' normals: ``GIVEN``, ``GIVEN_TURNED``, ``ESTIMATED_...``."""
+    width_m: float
+    """Of the cloud, without its outermost points."""
+    doubt: str | None
+    """Why its unit may be another than the metre."""
+
+
+def iterate_mesh_file(
+    path: Path, out: Path, options: MeshOptions
+) -> Generator[Progress, None, dict[str, Any]]:
+    """Read a cloud, roll the ball over it, write the mesh.
+
+    Args:
+        path: whatever ``read_cloud`` reads.
+        out: whatever ``write_mesh`` writes; whole or not at all.
+
+    Returns:
+        The quality report, at the generator's end.
+
+    Raises:
+        InputError: a file, points or options that cannot be used.
+        ReconstructionError: the balls fall through everywhere.
+    """
+    started = time.perf_counter()
+    suffix = mesh_suffix(out)
+    yield Progress(f"reading {path}", 0.0)
+    meshed = yield from iterate_mesh_cloud(read_cloud(path), options)
+    if suffix == ".stl" and meshed.surface.colors is not None:
+        _log.warning("STL has no place for the colours; a .ply, .obj or .glb keeps them")
+    yield Progress(f"writing {out}", 0.95)
+    write_mesh(out, meshed.surface)
+    files = {"input": str(path), "out": str(out)}
+    return files | mesh_report(meshed) | {"elapsed_s": time.perf_counter() - started}
+
+
+def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Progress, None, MeshedCloud]:
+    """The surface of a cloud with or without normals.
+
+    Raises:
+        InputError: points that make no surface, or a ball larger than the cloud.
+        ReconstructionError: the balls fall through everywhere.
+    """
+    yield Progress("looking for repeated points", 0.05)
+    cloud = in_metres(usable_points(cloud), options.metres_per_unit)
+    width_m = width_of(cloud)
+    doubt = doubtful_unit(width_m, options.metres_per_unit)
+    if doubt is not None:
+        _log.warning(doubt)
+    if options.max_points is not None and len(cloud) > options.max_points:
+        yield Progress(f"thinning {len(cloud)} points", 0.1)
+        cloud = voxel_average(cloud, voxel_for_count(cloud.points_m, options.max_points))
+        _check_shape(cloud.points_m)
+    yield Progress(f"normals of {len(cloud)} points", 0.15)
+    cloud, normals = with_normals(cloud, options.viewpoint_m)
+    yield Progress(f"the normals are {normals}", 0.35)
+    if options.smoothing_passes:
+        yield Progress(f"smoothing {len(cloud)} points", 0.4)
+        cloud = smooth(cloud, options.smoothing_passes)
+    yield Progress("spacing of the points", 0.5)
+    radii_m = chosen_radii(cloud, options.radii_m)
+    _check_resolution(cloud.points_m, radii_m[0])
+    sizes = ", ".join(f"{1000.0 * radius_m:.4g}" for radius_m in radii_m)
+    yield Progress(f"rolling balls of {sizes} mm over {len(cloud)} points", 0.55)
+    return MeshedCloud(reconstruct_surface(cloud, radii_m), len(cloud), normals, width_m, doubt)
+
+
+def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
+    """The numbers of a mesh; its genus only if it is closed and in one piece, None otherwise."""
+    surface, quality = meshed.surface, meshed.surface.quality
+    euler = len(surface.vertices_m) - len(edges_and_faces(surface.triangles)[0]) + len(surface.triangles)
+    closed = quality.boundary_loops == 0 and quality.non_manifold_edges == 0 and quality.components == 1
+    measures = asdict(quality)
+    shares = "no_hit_ray_share", "within_2pct_share", "within_5pct_share", "guessed_ray_share"
+    for of_cameras in (*shares, "gaps"):
+        del measures[of_cameras]  # a cloud from a file has none
+    return {
+        "points": meshed.points,
+        "width_m": meshed.width_m,
+        "unit_doubt": meshed.doubt,
+        "normals": meshed.normals,
+        "radii_m": surface.radii_m,
+        "vertices": len(surface.vertices_m),
+        "triangles": len(surface.triangles),
+        **measures,
+        "euler": euler,
+        "genus": (2 - euler) // 2 if closed else None,
+    }
+
+
+def usable_points(cloud: PointCloud) -> PointCloud:
+    """The distinct points, in their order; with normals only where they are known.
+
+    Raises:
+        InputError: fewer than three points, or all of them in one place or on a line.
+    """
+    first = distinct_rows(cloud.points_m)
+    if len(first) < len(cloud):
+        _log.warning("%d repeated points are left out", len(cloud) - len(first))
+        cloud = cloud.select(first)
+    cloud = _known_normals(cloud)
+    _check_shape(cloud.points_m)
+    return cloud
+
+
+def check_unit(metres_per_unit: float) -> None:
+    """Refuse what is no length.
+
+    Raises:
+        InputError: not finite or not positive.
+    """
+    if not (math.isfinite(metres_per_unit) and metres_per_unit > 0.0):
+        raise InputError(f"There cannot be {metres_per_unit:g} metres in a unit; try 0.001 for millimetres")
+
+
+def in_metres(cloud: PointCloud, metres_per_unit: float) -> PointCloud:
+    """The cloud in metres.
+
+    Raises:
+        InputError: a unit that is no length.
+    """
+    check_unit(metres_per_unit)
+    if metres_per_unit == 1.0:
+        return cloud
+    return replace(cloud, points_m=metres_per_unit * cloud.points_m)
+
+
+def width_of(cloud: PointCloud) -> float:
+    """Longest side of the box around all but the outermost percents of the points along each axis."""
+    low_m, high_m = np.percentile(cloud.points_m, [OUTER_PERCENT, 100.0 - OUTER_PERCENT], axis=0)
+    return float((high_m - low_m).max())
+
+
+def doubtful_unit(width_m: float, metres_per_unit: float) -> str | None:
+    """What to say of a cloud that is larger than houses, or smaller than what a depth camera measures."""
+    if USUAL_M[0] <= width_m <= USUAL_M[1]:
+        return None
+    if width_m > USUAL_M[1]:
+        advice = f"if its numbers are millimetres, try --metres-per-unit {0.001 * metres_per_unit:.3g}"
+    else:
+        advice = "if it is wider in truth, say so with --metres-per-unit"
+    return f"The cloud is {width_m:.3g} m wide; {advice}"
+
+
+def with_normals(cloud: PointCloud, viewpoint_m: Sequence[float] | None) -> tuple[PointCloud, str]:
+    """The cloud with unit normals, and where they came from."""
+    place_m = None if viewpoint_m is None else np.array(viewpoint_m, dtype=np.float64)
+    if cloud.normals is None:
+        cloud = oriented_normals(cloud, place_m)
+        return cloud, ESTIMATED_OUTWARDS if place_m is None else ESTIMATED_VIEWPOINT
+    if place_m is None:
+        return cloud, GIVEN
+    return turned_to_viewpoint(cloud, place_m), GIVEN_TURNED
+
+
+def chosen_radii(cloud: PointCloud, radii_m: tuple[float, ...] | None) -> tuple[float, ...]:
+    """The ball radii, ascending and no larger than the cloud.
+
+    Without given ones those by which a point's neighbours surround it; for a cloud whose points are not
+    surrounded the rule r_F + {0, 1, 2, 4} sigma_D.
+
+    Raises:
+        InputError: a given radius larger than the cloud.
+    """
+    points_m = cloud.points_m
+    extent_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
+    assert cloud.normals is not None
+    surrounding_m = surrounding_radii(points_m, cloud.normals)
+    if radii_m is None:
+        by_rule_m = surrounding_m or radii(SurfaceConfig("thesis+"), *spacing(points_m))
+        return tuple(radius_m for radius_m in by_rule_m if radius_m <= extent_m)
+    if max(radii_m) > extent_m:
+        fits_m = surrounding_m[-1] if surrounding_m else spacing(points_m)[0]
+        raise InputError(
+            f"The ball radius {max(radii_m):.4g} m is larger than the cloud, which is {extent_m:.4g} m "
+            f"across; try about {min(fits_m, extent_m):.3g} m"
+        )
+    return tuple(sorted(radii_m))
+
+
+def _known_normals(cloud: PointCloud) -> PointCloud:
+    """Normals made unit; points without one left out, or all normals if no point has one."""
+    if cloud.normals is None:
+        return cloud
+    lengths = np.linalg.norm(cloud.normals, axis=1)
+    known = np.isfinite(lengths) & (lengths > 0.0)
+    if not known.any():
+        _log.warning("All normals of the file are zero or not finite; they are estimated from the points")
+        return replace(cloud, normals=None)
+    if not known.all():
+        _log.warning("%d points are left out: their normals are zero or not finite", (~known).sum())
+        cloud = cloud.select(known)
+    assert cloud.normals is not None
+    return replace(cloud, normals=cloud.normals / lengths[known, None])
+
+
+def _check_shape(points_m: FloatArray) -> None:
+    reach_m, extent_m = float(np.abs(points_m).max()), float(np.ptp(points_m, axis=0).max())
+    if reach_m > LARGEST_M:
+        raise InputError(
+            f"A point of the cloud has a coordinate of {reach_m:.3g} m; check its file and its units"
+        )
+    if extent_m < SMALLEST_M:
+        raise InputError("All points of the cloud are in one place; check its file")
+    if len(points_m) < LEAST_POINTS:
+        raise InputError(
+            f"The cloud has {len(points_m)} distinct points; a surface needs at least {LEAST_POINTS}, "
+            "so check its file"
+        )
+    centered = (points_m - points_m.mean(axis=0)) / extent_m
+    widths = np.sqrt(np.maximum(np.linalg.eigvalsh(centered.T @ centered), 0.0))
+    if widths[1] <= _LINE * widths[2]:
+        raise InputError(
+            f"The {len(points_m)} points of the cloud lie on one line; a surface needs points beside it"
+        )
+
+
+def _check_resolution(points_m: FloatArray, radius_m: float) -> None:
+    """Refuse points so far away that the 32 bits of a mesh file would round their surface off."""
+    reach_m = float(np.abs(points_m).max())
+    step_m = float(np.spacing(np.float32(reach_m)))
+    if step_m > _COARSE * radius_m:
+        raise InputError(
+            f"The cloud reaches {reach_m:.4g} m from the origin, where the numbers of a mesh file are "
+            f"{step_m:.2g} m apart; try to move it nearer to the origin"
+        )
