@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from packetmesh.checks import above, at_least, finite, one_each, one_of, several, share
 from network_sim.radio.losses import LossConfig
+from packetmesh.checks import above, at_least, finite, one_each, one_of, several, share
 from packetmesh.errors import InputError
 
 Propagation = Literal["friis", "two-ray", "log-distance"]

@@ -8,10 +8,10 @@ import numpy as np
 import simpy
 from simpy.core import StopSimulation
 
-from network_sim.fixed.collection import Collection, collection_names
 from network_sim.config import NetworkConfig
-from network_sim.trace.conservation import check
+from network_sim.fixed.collection import Collection, collection_names
 from network_sim.street.street import start_street
+from network_sim.trace.conservation import check
 from network_sim.trace.log import NetworkTrace, Recorder
 from network_sim.types import to_ns
 from packetmesh.progress import Progress, drain

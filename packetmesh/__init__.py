@@ -14,7 +14,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from network_sim.metrics.arrivals import Arrivals, arrivals
     from network_sim.config import (
         EnergyConfig,
         LossConfig,
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
         StreetConfig,
         UplinkConfig,
     )
+    from network_sim.metrics.arrivals import Arrivals, arrivals
     from network_sim.metrics.metrics import Metric, image_delays_s
     from network_sim.metrics.metrics import metrics as network_metrics
     from network_sim.presets import PRESETS as NETWORK_PRESETS

@@ -8,15 +8,15 @@ from functools import partial
 
 import numpy as np
 
+from pipeline.config import FusionMode
 from pipeline.kernels import geometry
 from pipeline.kernels.threads import threads
-from pipeline.config import FusionMode
 from pipeline.nodes import NodeClouds
 from pipeline.registration import hidden_from
 from pipeline.surface.normals import estimate_normals
-from pipeline.surface.voxel import in_cubes_of, voxel_average, voxel_for_count
-from pipeline.surface.smooth import smooth
 from pipeline.surface.radii import spacing
+from pipeline.surface.smooth import smooth
+from pipeline.surface.voxel import in_cubes_of, voxel_average, voxel_for_count
 from pipeline.types import FloatArray, IntArray, PointCloud, PointSource, RgbdFrame
 
 NOISE_VOXELS = 2.0

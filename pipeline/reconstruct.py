@@ -8,13 +8,13 @@ import numpy as np
 
 from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.surface.findings import Kept
 from pipeline.merging import MergedClouds
 from pipeline.nodes import NodeClouds
 from pipeline.placement.outcome import Placement
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import Cache, Steps, run
+from pipeline.surface.findings import Kept
 from pipeline.types import Rig, SurfaceResult
 
 

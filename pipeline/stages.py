@@ -18,7 +18,6 @@ import numpy as np
 
 from packetmesh.progress import Progress, drain
 from pipeline.acquisition import Acquired, acquire
-from pipeline.kernels.threads import threads
 from pipeline.config import (
     AcquisitionConfig,
     DepthConfig,
@@ -28,6 +27,8 @@ from pipeline.config import (
     SurfaceConfig,
 )
 from pipeline.depth import DepthNetwork
+from pipeline.kernels.rays import Camera
+from pipeline.kernels.threads import threads
 from pipeline.merging import FusedCloud, MergedClouds, merge, merge_fused
 from pipeline.nodes import (
     InferredDepth,
@@ -37,18 +38,16 @@ from pipeline.nodes import (
     prepare_node,
 )
 from pipeline.placement.outcome import Placement, whole_placement
-from pipeline.placement.place_nodes import place_nodes
+from pipeline.placement.pairwise import place_nodes
 from pipeline.sources import Source
 from pipeline.spec import CHAIN, NEEDS, SIDE_BY_SIDE, Spec, StageName, key
-from pipeline.kernels.rays import Camera
-from pipeline.surface.truth import Yardstick, compare_with_truth, yardstick_of
-from pipeline.surface.quality import measured
-from pipeline.surface.texture import photographed
-from pipeline.surface.radii import radii
 from pipeline.surface.ball_pivoting import roll_or_nothing
 from pipeline.surface.baselines import alpha_surface, poisson_surface
-from pipeline.types import Texture
-from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult
+from pipeline.surface.quality import measured
+from pipeline.surface.radii import radii
+from pipeline.surface.texture import photographed
+from pipeline.surface.truth import Yardstick, compare_with_truth, yardstick_of
+from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult, Texture
 
 Result = TypeVar("Result")
 _NODES_AT_A_TIME = 3

@@ -53,9 +53,9 @@ def deliver(
     from app.reports.hand_out_of import write_hand_out
     from packetmesh.files import writable_folder
     from pipeline.deliver import iterate_delivery
-    from pipeline.delivery.folder import delivery_metrics, summary, write_delivery_folder
     from pipeline.delivery.sending import DeliverySpec
-    from pipeline.run_folder import clear_run_folder
+    from pipeline.folders.delivery import delivery_metrics, summary, write_delivery_folder
+    from pipeline.folders.run import clear_run_folder
     from pipeline.spec import Spec
 
     source, imported = drain(iterate_imported(named, out), say_progress)

@@ -82,7 +82,9 @@ def _packages() -> Iterator[Finding]:
 
 def _open3d() -> Iterator[Finding]:
     advice = f"on Debian or Ubuntu: apt-get install {LINUX_LIBRARIES}"
-    yield _tried("open3d", lambda: importlib.import_module("pipeline.kernels.open3d_runtime").o3d.__version__, advice)
+    yield _tried(
+        "open3d", lambda: importlib.import_module("pipeline.kernels.open3d_runtime").o3d.__version__, advice
+    )
 
 
 def _network() -> Iterator[Finding]:

@@ -49,13 +49,13 @@ def register(
         json: Print the metrics as one JSON object.
     """
     from packetmesh.files import writable_folder
+    from pipeline.folders.pair import answer_metrics, chosen_pose, write_register_folder
     from pipeline.io.clouds import read_cloud
     from pipeline.io.poses import read_pose
-    from pipeline.surface.mesh_cloud import in_metres
     from pipeline.pairs.draws import run_draws, with_gate
-    from pipeline.pairs.folder import answer_metrics, chosen_pose, write_register_folder
     from pipeline.pairs.register import chosen_methods, config_for, prepared_pair, run_methods
     from pipeline.registration.methods import METHODS
+    from pipeline.surface.mesh_cloud import in_metres
 
     try:
         methods = chosen_methods(method)

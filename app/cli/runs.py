@@ -23,11 +23,11 @@ from packetmesh.files import atomic_path, finite, writable_folder, write_json
 from packetmesh.progress import Progress, drain, part
 from packetmesh.settings import settings
 from pipeline.config import Baseline, PipelineConfig
+from pipeline.folders.run import METRICS, clear_run_folder, metrics_of, write_baseline, write_run_folder
 from pipeline.importing import ImportReport, is_recording, iterate_import
 from pipeline.io.rigs import is_rig
 from pipeline.placement.outcome import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.run_folder import METRICS, clear_run_folder, metrics_of, write_baseline, write_run_folder
 from pipeline.sources import Calibrated, FileSource, RigFolder
 from pipeline.spec import Spec
 from pipeline.stages import RunCache, cameras_of, compute, run

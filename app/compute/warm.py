@@ -1,4 +1,4 @@
-"""``python -m pipeline.warm``: compile what is compiled, so that its first use is not a wait."""
+"""``python -m app.compute.warm``: compile what is compiled, so that its first use is not a wait."""
 
 from __future__ import annotations
 

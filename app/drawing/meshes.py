@@ -8,8 +8,7 @@ from app.compute.records import MeshView
 from app.drawing.colors import LOSS, NEUTRAL
 from app.drawing.glb import lines_glb, mesh_glb, textured_glb
 from pipeline.io.images import jpeg_of
-from pipeline.types import Texture
-from pipeline.types import ByteArray, FloatArray, PointSource, Surface, SurfaceResult
+from pipeline.types import ByteArray, FloatArray, PointSource, Surface, SurfaceResult, Texture
 
 DARKEST = {True: 0.75, False: 0.45}
 """How dark a surface gets that turns from the light: the camera's own colours have shadows already."""

@@ -13,9 +13,9 @@ from network_sim.trace.log import NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind, to_s
 from packetmesh.files import atomic_path
 from pipeline.deliver import Delivery
-from pipeline.delivery.folder import summary
 from pipeline.delivery.moments import Moment
 from pipeline.delivery.sending import Sending, received_at
+from pipeline.folders.delivery import summary
 
 RECEIVED = "received"
 PAGE, ANIMATION = "delivery.html", "delivery.gif"

@@ -14,9 +14,9 @@ import numpy as np
 
 from lab.benchmarks.problems import write_problems
 from lab.claims.registration.cases import CONDITIONS, make_case, random_subset
-from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.io.clouds import read_cloud
 from pipeline.io.poses import read_pose
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.kernels.points import middle_extent_m
 from pipeline.pairs.register import Pair
 from pipeline.types import FloatArray, PointCloud

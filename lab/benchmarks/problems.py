@@ -19,8 +19,8 @@ from lab.trials import iterate_trials
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.config import RegistrationConfig
-from pipeline.kernels.geometry import apply
 from pipeline.io.clouds import read_cloud, write_cloud
+from pipeline.kernels.geometry import apply
 from pipeline.pairs.draws import with_gate
 from pipeline.pairs.register import Pair, prepared_pair
 from pipeline.registration import register

@@ -19,17 +19,17 @@ from packetmesh.memory import peak_memory_bytes
 from packetmesh.progress import drain
 from pipeline.config import PRESETS
 from pipeline.io.demos import load_demo
-from pipeline.merging import merge_fused
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.rays import tensor, triangle_scene
+from pipeline.merging import merge_fused
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import run
-from pipeline.surface.quality import measure_quality
-from pipeline.surface.smooth import smooth
-from pipeline.surface.radii import spacing
-from pipeline.surface.voxel import voxel_average, voxel_for_count
 from pipeline.surface.pivoting import roll
+from pipeline.surface.quality import measure_quality
+from pipeline.surface.radii import spacing
+from pipeline.surface.smooth import smooth
+from pipeline.surface.voxel import voxel_average, voxel_for_count
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 logger = logging.getLogger(__name__)

@@ -18,8 +18,8 @@ from lab.worlds.scene import Scene
 from lab.worlds.sensor import sense_depth
 from lab.worlds.workshop import workshop
 from packetmesh.errors import InputError
-from pipeline.kernels.geometry import rotation_exp
 from pipeline.io.demos import DEMO_SCENES
+from pipeline.kernels.geometry import rotation_exp
 from pipeline.types import DepthMap, FloatArray, RgbdFrame, Rig, RigTruth
 
 POSE_ERROR_RAD = np.radians(3.0)

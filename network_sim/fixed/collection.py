@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from network_sim.config import NetworkConfig
 from network_sim.fixed.images import Book
+from network_sim.fixed.nodes import Camera, Shared, Station
+from network_sim.fixed.routing import link_success, shortest_paths
+from network_sim.fixed.sink import Sink
 from network_sim.mac import make_mac
 from network_sim.mac.context import MacContext
 from network_sim.mac.medium import Medium
-from network_sim.fixed.nodes import Camera, Shared, Station
 from network_sim.radio.places import FixedPlaces, place_nodes
 from network_sim.radio.propagation import Radio
-from network_sim.fixed.routing import link_success, shortest_paths
-from network_sim.fixed.sink import Sink
 from network_sim.types import BEGIN_WITHIN_NS, Cause, Delivery, EventKind, Packet, to_ns
 
 if TYPE_CHECKING:

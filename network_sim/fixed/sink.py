@@ -11,8 +11,8 @@ import simpy
 from network_sim.config import UplinkConfig
 from network_sim.fixed.images import Image
 from network_sim.fixed.nodes import Shared, Station
-from network_sim.types import Cause, Packet
 from network_sim.fixed.uplink import Uplink
+from network_sim.types import Cause, Packet
 
 if TYPE_CHECKING:
     from network_sim.trace.log import Recorder

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import simpy
 
-from network_sim.radio.losses import LinkLosses
 from network_sim.mac.context import MacContext, random_below
+from network_sim.radio.losses import LinkLosses
 from network_sim.radio.propagation import IEEE80211B
 from network_sim.types import Cause, Delivery, EventKind, Packet
 

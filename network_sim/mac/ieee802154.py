@@ -13,8 +13,8 @@ from typing import Any
 
 import simpy
 
-from network_sim.radio.losses import LinkLosses
 from network_sim.mac.context import MacContext, random_below
+from network_sim.radio.losses import LinkLosses
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet
 
 SYMBOL_NS = 16_000

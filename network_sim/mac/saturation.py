@@ -14,13 +14,13 @@ import numpy as np
 import simpy
 
 from network_sim.config import NetworkConfig, RunConfig
-from network_sim.trace.counters import Counters
 from network_sim.mac import Mac, make_mac
 from network_sim.mac.context import MacContext
 from network_sim.mac.dcf import Dcf
 from network_sim.mac.medium import Medium
 from network_sim.radio.places import place_nodes
 from network_sim.radio.propagation import Radio
+from network_sim.trace.counters import Counters
 from network_sim.trace.log import Recorder
 from network_sim.types import BEGIN_WITHIN_NS, Cause, EventKind, Packet, PacketKind, to_ns
 

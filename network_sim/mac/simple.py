@@ -7,8 +7,8 @@ from typing import Any
 
 import simpy
 
-from network_sim.radio.losses import LinkLosses
 from network_sim.mac.context import MacContext
+from network_sim.radio.losses import LinkLosses
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet
 
 IDEAL_BITS = 8

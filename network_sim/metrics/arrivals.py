@@ -11,10 +11,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from network_sim.metrics.metrics import energy
-from network_sim.metrics.metrics import camera_nodes
-from network_sim.trace.states import State, disjoint
+from network_sim.metrics.metrics import camera_nodes, energy
 from network_sim.trace.log import Events, NetworkTrace
+from network_sim.trace.states import State, disjoint
 from network_sim.types import NS_PER_S, EventKind, PacketKind
 from packetmesh.errors import InputError
 

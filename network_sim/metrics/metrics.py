@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from network_sim.metrics.metrics import energy
+from network_sim.metrics import energy
 from network_sim.metrics.coverage import NEVER_NS, road_coverage
 from network_sim.trace.ledger import Outcomes
-from network_sim.trace.states import State
 from network_sim.trace.log import NetworkTrace
+from network_sim.trace.states import State
 from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns, to_s
 from packetmesh.errors import InputError
 

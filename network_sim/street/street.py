@@ -20,8 +20,16 @@ from network_sim.config import NetworkConfig
 from network_sim.mac import make_mac
 from network_sim.mac.context import MacContext
 from network_sim.mac.medium import Medium
-from network_sim.street.mobility import Contact, Routes, StreetPlaces, access_points_m, cell_numbers, contacts, drive
 from network_sim.radio.propagation import Radio, reach_m
+from network_sim.street.mobility import (
+    Contact,
+    Routes,
+    StreetPlaces,
+    access_points_m,
+    cell_numbers,
+    contacts,
+    drive,
+)
 from network_sim.street.schemes import make_scheme
 from network_sim.street.snapshots import Snapshots
 from network_sim.trace.log import Recorder

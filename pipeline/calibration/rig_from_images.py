@@ -15,8 +15,8 @@ from pipeline.calibration.from_images import CameraReport, iterate_calibration
 from pipeline.calibration.rig import RelativePose, RigCalibration, Seen, calibrate_rig
 from pipeline.calibration.shots import INFRARED, NodeShots, camera_images
 from pipeline.config import Lens
-from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.io.calibrations import CalibratedNode
+from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import CameraIntrinsics, FloatArray
 
 ALONE, DEPTH = 0.7, 0.85

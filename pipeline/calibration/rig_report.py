@@ -13,9 +13,9 @@ from pipeline.calibration.assess import Trust
 from pipeline.calibration.report import metrics, write_camera_folder
 from pipeline.calibration.rig_from_images import RigReport
 from pipeline.calibration.shots import INFRARED
-from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.io.calibrations import write_calibration
 from pipeline.io.poses import read_pose
+from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import AnyPath, FloatArray
 
 NO_TRUST: Mapping[str, Trust] = {}

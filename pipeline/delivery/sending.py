@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from network_sim.metrics.arrivals import Arrivals, Spent, arrivals, until
 from network_sim.config import NetworkConfig
+from network_sim.metrics.arrivals import Arrivals, Spent, arrivals, until
 from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
 from network_sim.trace.log import NetworkTrace

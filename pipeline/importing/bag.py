@@ -12,7 +12,6 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
-from pipeline.kernels.geometry import inverse
 from pipeline.importing.bag_messages import (
     camera_in,
     color_of,
@@ -24,6 +23,7 @@ from pipeline.importing.bag_messages import (
 from pipeline.importing.depth_units import depth_of
 from pipeline.importing.rig_folder import NodeImages
 from pipeline.io.depth_scale import known_in, usual_scale
+from pipeline.kernels.geometry import inverse
 from pipeline.types import MAX_NODES, CameraIntrinsics, FloatArray
 
 PROGRESS_EVERY = 20

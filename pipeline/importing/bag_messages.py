@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
-from pipeline.kernels.geometry import rigid
 from pipeline.importing.rvl import decode_rvl
+from pipeline.kernels.geometry import rigid
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
 _COLORS = {"rgb8": (3, [0, 1, 2]), "bgr8": (3, [2, 1, 0]), "rgba8": (4, [0, 1, 2]), "bgra8": (4, [2, 1, 0])}

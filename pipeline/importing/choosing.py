@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.kernels.geometry import apply, inverse, pixel_rays, scaled
 from pipeline.importing.sequence import Sequence
+from pipeline.kernels.geometry import apply, inverse, pixel_rays, scaled
 from pipeline.types import CameraIntrinsics, FloatArray
 
 LEAST_OVERLAP = 0.5

@@ -15,11 +15,11 @@ from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes
-from pipeline.kernels.geometry import inverse, rigid, scaled
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, named_inside
 from pipeline.io.depth_scale import usual_scale
 from pipeline.io.images import read_depth_units, read_depth_values
+from pipeline.kernels.geometry import inverse, rigid, scaled
 from pipeline.types import CameraIntrinsics, FloatArray
 
 CENTRE_PX = 0.5

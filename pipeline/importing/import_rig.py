@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
-from pipeline.kernels.geometry import rigid
 from pipeline.importing.bag import is_bag, iterate_bag
 from pipeline.importing.choosing import choose
 from pipeline.importing.depth_units import depth_in
@@ -19,6 +18,7 @@ from pipeline.importing.kinds import kind_of, recognise
 from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
 from pipeline.importing.sequence import Candidate, Sequence
 from pipeline.io.images import read_color
+from pipeline.kernels.geometry import rigid
 from pipeline.types import MAX_NODES, AnyPath, FloatArray
 
 MOST_TILT_DEG = 35.0

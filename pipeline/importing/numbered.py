@@ -10,12 +10,12 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, read_bytes, read_text
-from pipeline.kernels.geometry import inverse
 from pipeline.importing.cameras import PRIMESENSE, camera_of
 from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, posed
 from pipeline.io.images import read_color, read_depth_values
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.poses import read_pose, rigid_or_none
+from pipeline.kernels.geometry import inverse
 from pipeline.types import CameraIntrinsics, FloatArray
 
 MOST_CANDIDATES = 600

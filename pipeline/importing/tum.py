@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, read_bytes
-from pipeline.kernels.geometry import rigid
 from pipeline.importing.cameras import PRIMESENSE, camera_of
 from pipeline.importing.sequence import Candidate, Sequence, named_inside, posed
+from pipeline.kernels.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
 UNITS_PER_METRE = 5000.0

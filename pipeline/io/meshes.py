@@ -13,10 +13,9 @@ from PIL import Image
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
-from pipeline.kernels.geometry import rigid
 from pipeline.io.images import jpeg_of
-from pipeline.types import Texture
-from pipeline.types import AnyPath, Surface
+from pipeline.kernels.geometry import rigid
+from pipeline.types import AnyPath, Surface, Texture
 
 MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")
 _MAX_HEADER_BYTES = 10_000

@@ -10,19 +10,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from packetmesh.errors import InputError
-from pipeline.io.depth_to_color import register_depth
-from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.io.calibrations import FILES, NodeFiles, calibration_files, node_files
 from pipeline.io.depth_correction import (
     DepthCorrection,
     read_depth_correction,
     write_depth_correction,
 )
+from pipeline.io.depth_to_color import register_depth
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import read_color, read_depth_noted, write_color, write_depth_mm
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
 from pipeline.io.poses import read_pose, write_pose
 from pipeline.io.truth import read_truth, write_truth
+from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import MAX_NODES, AnyPath, CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".tif", ".tiff", ".npy", ".pfm", ".exr")

@@ -1,1 +1,1 @@
-"""Nodes of a rig placed next to each other: pair by pair, by a graph of poses, and judged by what both measured."""
+"""Nodes of a rig placed next to each other: pair by pair, by a pose graph, judged by what both measured."""

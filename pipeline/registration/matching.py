@@ -10,7 +10,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.config import Direction
-from pipeline.kernels.kdtree import KdTree, compiled, in_parts, search, squared_distance, tree_of, working_space
+from pipeline.kernels.kdtree import (
+    KdTree,
+    compiled,
+    in_parts,
+    search,
+    squared_distance,
+    tree_of,
+    working_space,
+)
 from pipeline.registration.sample import random_keys
 from pipeline.types import ByteArray, FloatArray, IntArray, PointCloud
 

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
-from pipeline.surface.findings import Suggestion
 from pipeline.surface.boundary import edges_and_faces
+from pipeline.surface.findings import Suggestion
 from pipeline.surface.pivoting import roll
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud
 

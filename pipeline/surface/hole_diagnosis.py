@@ -9,10 +9,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
-from pipeline.surface.findings import Explanation, Reason
 from pipeline.kernels.points import distinct_rows
 from pipeline.kernels.rays import first_hits, triangle_scene
 from pipeline.surface.fill import skin_points_m
+from pipeline.surface.findings import Explanation, Reason
 from pipeline.surface.holes import Hole, beyond_m, half_edges, is_closed
 from pipeline.surface.pivoting import Rolled, Roller, roll
 from pipeline.surface.ray_parts import Known, View, known_there

@@ -18,13 +18,13 @@ from pipeline.config import SurfaceConfig
 from pipeline.io.clouds import read_cloud
 from pipeline.io.meshes import mesh_suffix, write_mesh
 from pipeline.kernels.points import distinct_rows
-from pipeline.surface.radii import radii, spacing
 from pipeline.surface.ball_pivoting import reconstruct_surface
-from pipeline.surface.smooth import smooth
-from pipeline.surface.voxel import voxel_average, voxel_for_count
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.normals import oriented_normals, turned_to_viewpoint
+from pipeline.surface.radii import radii, spacing
+from pipeline.surface.smooth import smooth
 from pipeline.surface.surrounding import surrounding_radii
+from pipeline.surface.voxel import voxel_average, voxel_for_count
 from pipeline.types import FloatArray, PointCloud, SurfaceResult
 
 _log = logging.getLogger(__name__)

@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.kernels.geometry import pixel_rays, rigid
 from pipeline.kernels.rays import Camera, camera_hits, triangle_scene
-from pipeline.types import Texture
-from pipeline.types import ByteArray, Surface
+from pipeline.types import ByteArray, Surface, Texture
 
 MISSED = (255, 0, 255)
 """Magenta: a ray that hits nothing."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.surface.findings import RayParts
 from pipeline.kernels.geometry import apply, inverse, project, undistorted_rays
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.rays import Camera, camera_hits, first_hits, guessed_triangles, triangle_scene
+from pipeline.surface.findings import RayParts
 from pipeline.types import BoolArray, FloatArray, IntArray, SurfaceResult
 
 _FOLDED = 1e-3

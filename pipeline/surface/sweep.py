@@ -8,8 +8,8 @@ from collections.abc import Generator, Iterable, Sequence
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.surface.findings import SweepPoint
 from pipeline.kernels.rays import Camera
+from pipeline.surface.findings import SweepPoint
 from pipeline.surface.holes import open_area_m2
 from pipeline.surface.pivoting import compile_all, roll
 from pipeline.surface.quality import no_hit_ray_share

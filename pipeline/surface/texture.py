@@ -14,8 +14,7 @@ import numpy as np
 
 from pipeline.kernels.geometry import apply, inverse, project, scaled
 from pipeline.kernels.rays import Camera, hit_depths
-from pipeline.types import WHITE_ROWS, Texture
-from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray, Surface
+from pipeline.types import WHITE_ROWS, BoolArray, ByteArray, FloatArray, IntArray, Surface, Texture
 
 DEPTH_WIDTH_PX = 320
 """Of the depth images that tell what hides what, at most."""

@@ -11,9 +11,9 @@ import numpy as np
 
 from lab.claims.calibration.photograph import photograph
 from pipeline.calibration.board import Board
-from pipeline.kernels.geometry import inverse, look_at, rigid, rotation_exp
 from pipeline.io.images import write_color, write_depth_mm
 from pipeline.io.rigs import save_rig
+from pipeline.kernels.geometry import inverse, look_at, rigid, rotation_exp
 from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, FloatArray, RgbdFrame, Rig
 
 BOARD = Board("circles", 7, 5, 0.05)

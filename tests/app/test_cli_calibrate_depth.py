@@ -8,8 +8,8 @@ import pytest
 
 from app.cli import main
 from pipeline.calibration.board import Board
-from pipeline.kernels.geometry import pixel_rays
 from pipeline.io.depth_correction import read_depth_correction
+from pipeline.kernels.geometry import pixel_rays
 from pipeline.types import DepthMap
 from tests.pipeline.calibration.views import CAMERA, photograph, poses
 

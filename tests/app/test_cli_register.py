@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.io.clouds import read_cloud, write_cloud
+from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.registration import point_error_m
 from pipeline.registration.methods import METHODS
 from pipeline.registration.peers import available_peers

@@ -128,7 +128,7 @@ def test_a_folder_that_cannot_be_written_is_named_before_anything_runs(capsys, t
 
 
 def test_a_full_disk_is_one_sentence(capsys, tmp_path, monkeypatch):
-    from network_sim.trace.log import files as trace_files
+    from network_sim.trace import files as trace_files
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")

@@ -5,11 +5,11 @@ import pytest
 import tyro
 
 from app.cli.options import SourceOptions
-from pipeline.kernels.geometry import rigid
 from pipeline.io.calibrations import CalibratedNode, write_calibration
 from pipeline.io.extrinsics import write_extrinsics
 from pipeline.io.images import write_color, write_depth_mm
 from pipeline.io.intrinsics import write_intrinsics
+from pipeline.kernels.geometry import rigid
 from pipeline.sources import Calibrated, Demo, ImagePair, RigFolder
 from pipeline.types import CameraIntrinsics, DepthMap
 from tests.app.commands import check_one_sentence, run

@@ -9,9 +9,9 @@ from app.compute.records import MeshView
 from app.screens.surface.draw_holes import picked_hole, tape
 from app.screens.surface.holes import FILL_OFF, NONE, HolesFolder, filled_sentence, hole_name, parts_sentence
 from app.screens.surface.view import ExplainView, FilledView, HoleView
-from pipeline.surface.findings import Explanation, RayParts
 from pipeline.kernels.geometry import rotation_exp
 from pipeline.surface.boundary import boundary_loops
+from pipeline.surface.findings import Explanation, RayParts
 from pipeline.types import SurfaceQuality
 from tests.app.fakes import ui_of
 

@@ -8,8 +8,8 @@ from app.reports.html import page, picture, table
 from app.reports.reproduction import write_reproduction_report
 from lab.claims.claim import Verdict
 from pipeline.kernels.rays import Camera
-from pipeline.surface.quality import measure_quality
 from pipeline.surface.pictures import mesh_picture
+from pipeline.surface.quality import measure_quality
 from pipeline.types import CameraIntrinsics, SurfaceResult
 
 CAMERA = Camera(CameraIntrinsics.pinhole(50, 50, 49.5, 49.5, 100, 100), np.eye(4))

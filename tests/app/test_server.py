@@ -41,7 +41,9 @@ def test_a_folder_is_a_rig_and_a_name_is_a_demo(tmp_path):
 
 
 def test_the_serving_process_loads_nothing_heavy():
-    heavy = "{'onnxruntime', 'trimesh', 'open3d', 'numba', 'pipeline.surface.ball_pivoting', 'pipeline.depth'}"
+    heavy = (
+        "{'onnxruntime', 'trimesh', 'open3d', 'numba', 'pipeline.surface.ball_pivoting', 'pipeline.depth'}"
+    )
     script = f"import sys, app.server; print({heavy} & set(sys.modules))"
     text = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert text.stdout.strip() == "set()"

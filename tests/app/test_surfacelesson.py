@@ -11,19 +11,18 @@ from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from pipeline.config import PRESETS, SurfaceConfig
+from pipeline.kernels.rays import Camera
 from pipeline.merging import merge, merge_fused
 from pipeline.nodes import NodeClouds
 from pipeline.sources import Demo
 from pipeline.spec import Spec
 from pipeline.stages import run
-from pipeline.kernels.rays import Camera
-from pipeline.surface.truth import compare_with_truth
-from pipeline.surface.radii import radii
 from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.baselines import poisson_surface
 from pipeline.surface.quality import no_hit_ray_share
+from pipeline.surface.radii import radii
 from pipeline.surface.ray_parts import View, ray_parts
-from pipeline.surface.truth import distances_to_truth_m
+from pipeline.surface.truth import compare_with_truth, distances_to_truth_m
 from pipeline.types import FloatArray, PointCloud, PointSource, Rig, SurfaceResult
 
 pytestmark = pytest.mark.xdist_group("surface lesson")  # one worker makes the shared clouds once

@@ -15,8 +15,8 @@ from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
 from app.screens.surface.view import SpacingView, SweepView
 from packetmesh.progress import Progress, drain
 from pipeline.config import PipelineConfig, SurfaceConfig
-from pipeline.surface.findings import Suggestion, SweepPoint
 from pipeline.sources import Demo
+from pipeline.surface.findings import Suggestion, SweepPoint
 from tests.app.fakes import ui_of
 
 SPEC = Spec(Demo("box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))

@@ -30,9 +30,9 @@ from pipeline.calibration.estimate import calibrate, held_out
 from pipeline.calibration.from_images import CameraReport
 from pipeline.calibration.outliers import OutlierView
 from pipeline.config import PRESETS
+from pipeline.folders.run import metrics_of
 from pipeline.io.demos import load_demo
 from pipeline.reconstruct import iterate_reconstruction
-from pipeline.run_folder import metrics_of
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.types import Rig

@@ -19,10 +19,10 @@ from scipy.spatial import cKDTree
 
 from packetmesh.progress import drain
 from pipeline.config import SurfaceConfig
-from pipeline.surface.mesh_cloud import MeshOptions, iterate_mesh_cloud
 from pipeline.kernels.open3d_runtime import o3d
-from pipeline.surface.radii import radii, spacing
 from pipeline.surface.boundary import boundary_loops
+from pipeline.surface.mesh_cloud import MeshOptions, iterate_mesh_cloud
+from pipeline.surface.radii import radii, spacing
 from pipeline.types import PointCloud, Surface
 
 sys.path.insert(0, str(Path(__file__).parents[2]))

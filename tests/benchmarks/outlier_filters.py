@@ -26,8 +26,8 @@ from pipeline.acquisition import back_project, find_outliers
 from pipeline.acquisition.flying import flying_score
 from pipeline.acquisition.planes import FARTHEST_SD, local_planes
 from pipeline.config import AcquisitionConfig
-from pipeline.kernels.geometry import scaled
 from pipeline.io.demos import CALIBRATED_SCENES, load_demo
+from pipeline.kernels.geometry import scaled
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import DepthMap, RgbdFrame
 from tests.pipeline.acquisition.depths import off_everything

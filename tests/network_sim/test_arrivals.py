@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from network_sim.metrics.arrivals import arrivals, energy_by_node_j, until
 from network_sim.config import NetworkConfig
+from network_sim.metrics.arrivals import arrivals, energy_by_node_j, until
 from network_sim.metrics.metrics import camera_nodes, metrics
 from network_sim.presets import PRESETS
 from network_sim.simulate import simulate

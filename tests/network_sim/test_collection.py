@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from network_sim.config import NetworkConfig
-from network_sim.trace.conservation import balance, image_balance
 from network_sim.simulate import simulate
+from network_sim.trace.conservation import balance, image_balance
 from network_sim.types import BEGIN_WITHIN_NS, NS_PER_S, Cause, EventKind, PacketKind, to_ns
 from packetmesh.settings import with_settings
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from network_sim.metrics.metrics import energy as e
 from network_sim.config import EnergyConfig
+from network_sim.metrics import energy as e
 from network_sim.metrics.metrics import camera_nodes, metrics
 from network_sim.presets import PRESETS
 from network_sim.simulate import simulate

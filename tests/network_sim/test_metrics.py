@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from network_sim.config import Keep
 from network_sim.metrics.coverage import road_coverage
-from network_sim.trace.ledger import BINS_PER_DECADE, delays_of
 from network_sim.metrics.metrics import metrics
+from network_sim.trace.ledger import BINS_PER_DECADE, delays_of
 from network_sim.trace.log import Recorder
 from network_sim.types import Cause, EventKind, to_ns
 from tests.network_sim.by_hand import random_run, small_run, trace_of

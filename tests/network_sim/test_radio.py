@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from network_sim.radio.propagation import propagation as r
 from network_sim.config import MacConfig, NetworkConfig, Propagation, RadioConfig
+from network_sim.radio import propagation as r
 from network_sim.radio.places import FixedPlaces
 from packetmesh.errors import InputError
 

@@ -5,10 +5,10 @@ import pytest
 from scipy import stats
 
 from network_sim.config import NetworkConfig
-from network_sim.trace.conservation import balance, image_balance
-from network_sim.trace.frames import fates
 from network_sim.radio.link_trace import read_link_trace
 from network_sim.simulate import simulate
+from network_sim.trace.conservation import balance, image_balance
+from network_sim.trace.frames import fates
 from network_sim.trace.log import NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind
 from packetmesh.errors import InputError

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 
-from network_sim.fixed.collection import disconnected
 from network_sim.config import NetworkConfig, NodesConfig, RadioConfig
+from network_sim.fixed.collection import disconnected
+from network_sim.fixed.routing import link_success, shortest_paths
 from network_sim.radio.places import FixedPlaces
 from network_sim.radio.propagation import Radio
-from network_sim.fixed.routing import link_success, shortest_paths
 from packetmesh.settings import with_settings
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from network_sim.trace.conservation import balance, image_balance
 from network_sim.presets import PRESETS
 from network_sim.simulate import iterate_simulation, simulate
+from network_sim.trace.conservation import balance, image_balance
 from network_sim.types import NS_PER_S, EventKind
 from packetmesh.settings import with_settings
 

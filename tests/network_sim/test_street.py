@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from network_sim.config import MacConfig, NetworkConfig, RadioConfig, RunConfig, SchemeConfig, StreetConfig
-from network_sim.trace.conservation import balance, check
 from network_sim.mac.medium import Medium
 from network_sim.metrics.metrics import metrics
 from network_sim.simulate import simulate
 from network_sim.street.street import street_of
+from network_sim.trace.conservation import balance, check
 from network_sim.trace.log import NetworkTrace
 from network_sim.types import NS_PER_S, Cause, EventKind, PacketKind, to_ns
 

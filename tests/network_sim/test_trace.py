@@ -11,8 +11,8 @@ import pytest
 
 from network_sim.config import Keep
 from network_sim.trace.conservation import recount
-from network_sim.trace.states import State, StateTimes, disjoint
 from network_sim.trace.log import IMAGE_EVENTS, Recorder
+from network_sim.trace.states import State, StateTimes, disjoint
 from network_sim.types import Cause, EventKind, PacketKind, to_ns
 from tests.network_sim.by_hand import HORIZON_S, NAMES, ROLES, config_of, random_run, small_run, trace_of
 

@@ -17,8 +17,8 @@ import pytest
 
 from network_sim.config import Keep, NetworkConfig, SchemeConfig
 from network_sim.presets import PRESETS
-from network_sim.trace.log import COLUMNS
 from network_sim.trace.files import write_trace
+from network_sim.trace.log import COLUMNS
 from network_sim.types import Cause, EventKind, PacketKind
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings

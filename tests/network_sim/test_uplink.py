@@ -8,9 +8,9 @@ import simpy
 from scipy import stats
 
 from network_sim.config import NetworkConfig, UplinkConfig
+from network_sim.fixed.uplink import Uplink
 from network_sim.trace.log import Events, Recorder
 from network_sim.types import Cause, EventKind, Packet, PacketKind
-from network_sim.fixed.uplink import Uplink
 from packetmesh.errors import InputError
 
 MS = 1_000_000

@@ -9,9 +9,9 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.deliver import iterate_delivery
 from pipeline.delivery import CODINGS
-from pipeline.delivery.folder import delivery_metrics, summary
 from pipeline.delivery.moments import Rebuilder
 from pipeline.delivery.sending import arrived_bytes, moment_times_ns, received_at, send
+from pipeline.folders.delivery import delivery_metrics, summary
 from pipeline.reconstruct import iterate_reconstruction
 from tests.pipeline.delivery.small import delivery_spec, small_rig
 

@@ -7,9 +7,9 @@ import pytest
 
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress
-from pipeline.kernels import geometry
 from pipeline.config import PRESETS, AcquisitionConfig, SurfaceConfig
 from pipeline.io.demos import load_demo
+from pipeline.kernels import geometry
 from pipeline.reconstruct import iterate_reconstruction, reconstruct
 from pipeline.registration import point_error_m
 from pipeline.sources import LoadedRig

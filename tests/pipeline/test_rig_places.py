@@ -7,12 +7,12 @@ import pytest
 
 from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.kernels.geometry import LEVEL_POSE, inverse, pixel_rays, rigid, rotation_exp
+from pipeline.folders.run import metrics_of
 from pipeline.io.demos import load_demo
 from pipeline.io.rigs import load_rig, save_rig
+from pipeline.kernels.geometry import LEVEL_POSE, inverse, pixel_rays, rigid, rotation_exp
 from pipeline.reconstruct import reconstruct
 from pipeline.registration import rotation_error_rad
-from pipeline.run_folder import metrics_of
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import RunCache, run

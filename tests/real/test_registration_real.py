@@ -11,10 +11,10 @@ import pytest
 from app.cli import main
 from pipeline.acquisition import acquire, depth_sigma_m
 from pipeline.config import AcquisitionConfig, RegistrationConfig
-from pipeline.kernels.geometry import apply, pixel_rays, rigid, rotation_exp
 from pipeline.io.clouds import read_cloud
 from pipeline.io.poses import read_pose
 from pipeline.io.rigs import load_frame
+from pipeline.kernels.geometry import apply, pixel_rays, rigid, rotation_exp
 from pipeline.kernels.rays import hit_depth
 from pipeline.registration import point_error_m, register, rotation_error_rad
 from pipeline.types import DepthMap, PointCloud, RgbdFrame

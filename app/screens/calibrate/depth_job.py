@@ -18,8 +18,8 @@ from app.screens.calibrate.view import DepthErrorView
 from packetmesh.progress import Progress
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import Calibration
-from pipeline.kernels.geometry import apply
 from pipeline.io.images import read_depth
+from pipeline.kernels.geometry import apply
 from pipeline.types import FloatArray
 
 LEAST_SCALE_M = 0.01

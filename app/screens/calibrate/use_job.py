@@ -14,9 +14,9 @@ from app.screens.calibrate.request import inner
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.calibration.shots import INFRARED
-from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.io.calibrations import CalibratedNode, write_calibration
 from pipeline.io.depth_correction import DEPTH_CORRECTION, write_depth_correction
+from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import CameraIntrinsics, Rig
 
 

@@ -16,10 +16,7 @@ from app.reports.reconstruction import write_reconstruction_report
 from packetmesh.files import write_json
 from packetmesh.progress import Progress
 from pipeline.config import Baseline
-from pipeline.io.clouds import write_cloud
-from pipeline.io.meshes import write_mesh
-from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.run_folder import (
+from pipeline.folders.run import (
     CLOUD_FILES,
     clouds_of,
     config_of,
@@ -27,6 +24,9 @@ from pipeline.run_folder import (
     write_baseline,
     write_run_folder,
 )
+from pipeline.io.clouds import write_cloud
+from pipeline.io.meshes import write_mesh
+from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.stages import dressed
 from pipeline.types import SurfaceResult
 

@@ -28,8 +28,8 @@ from app.screens.fuse.view import (
 )
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import Progress
-from pipeline.kernels import geometry
 from pipeline.config import Method, RegistrationConfig
+from pipeline.kernels import geometry
 from pipeline.nodes import NodeClouds
 from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
 from pipeline.registration.degradation import Degradation, degrade

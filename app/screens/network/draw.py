@@ -15,8 +15,8 @@ from app.screens.network.labels import ANSWER, PACKET_COLORS
 from app.screens.network.view import NetworkView, Pieces, What
 from app.web.markup import Markup
 from network_sim.metrics.coverage import RoadCoverage
-from network_sim.street.mobility import cells_m
 from network_sim.radio.propagation import reach_m
+from network_sim.street.mobility import cells_m
 from network_sim.types import Cause
 from pipeline.types import ByteArray, FloatArray
 

@@ -28,16 +28,16 @@ from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_
 from app.screens.network.packets import Frames
 from app.screens.network.view import NetworkView
 from network_sim.simulate import iterate_simulation
-from network_sim.trace.log import NetworkTrace
 from network_sim.trace.files import write_trace
+from network_sim.trace.log import NetworkTrace
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.deliver import Delivery
 from pipeline.delivery.moments import Moment, Rebuilder
 from pipeline.delivery.sending import frames_at_sink, received_at
-from pipeline.kernels.geometry import apply
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
+from pipeline.kernels.geometry import apply
 from pipeline.reconstruct import iterate_reconstruction
 from pipeline.types import PointCloud
 

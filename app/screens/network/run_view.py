@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from app.drawing.levels import Levels, levels_of
 from app.screens.network.view import Curve, NetworkView, Pieces, Series, What
 from network_sim.config import NetworkConfig
+from network_sim.mac import FRAME_HEADER_BYTES
 from network_sim.metrics.coverage import road_coverage
 from network_sim.metrics.energy import cumulative_radio_j
-from network_sim.trace.frames import fates
-from network_sim.mac import FRAME_HEADER_BYTES
 from network_sim.metrics.metrics import camera_nodes, metrics
 from network_sim.street.street import street_of
+from network_sim.trace.frames import fates
 from network_sim.trace.log import Events, NetworkTrace
 from network_sim.types import NS_PER_S, EventKind, PacketKind, to_ns
 from pipeline.types import FloatArray

@@ -13,8 +13,8 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.merging import FusedCloud
 from pipeline.stages import compared, compute
-from pipeline.surface.radii import radii
 from pipeline.surface.baselines import TRIM_SPACINGS, poisson_depth
+from pipeline.surface.radii import radii
 
 
 def baseline_job(store: Store, spec: Spec, name: BaselineName) -> Generator[Progress, None, BaselineView]:

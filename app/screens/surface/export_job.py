@@ -25,9 +25,9 @@ from app.screens.surface.view import Coloring
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.kernels.geometry import rigid, scaled
+from pipeline.kernels.rays import Camera
 from pipeline.placement.outcome import Placement
 from pipeline.stages import cameras_of, dressed
-from pipeline.kernels.rays import Camera
 from pipeline.surface.pictures import beside, mesh_picture
 from pipeline.types import ByteArray, PointSource, Rig, Surface, SurfaceResult
 

@@ -14,10 +14,10 @@ from app.drawing.meshes import mesh_view, surface_glb
 from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
-from pipeline.surface.findings import RayParts
 from pipeline.spec import key
 from pipeline.stages import cameras_of, compared, with_rays
 from pipeline.surface.fill import Filled, fill_holes
+from pipeline.surface.findings import RayParts
 from pipeline.surface.hole_diagnosis import explain_hole
 from pipeline.surface.holes import find_holes
 from pipeline.surface.ray_parts import View, ray_parts

@@ -19,10 +19,9 @@ from app.screens.surface.view import SpacingView, SurfaceView, UnusedView, Which
 from packetmesh.progress import Progress
 from pipeline.merging import FusedCloud
 from pipeline.stages import compute, dressed
-from pipeline.surface.radii import nearest_distances_m
 from pipeline.surface.fill import without_seams
-from pipeline.types import Texture
-from pipeline.types import Surface, SurfaceResult
+from pipeline.surface.radii import nearest_distances_m
+from pipeline.types import Surface, SurfaceResult, Texture
 
 HISTOGRAM_BINS = 60
 

@@ -16,15 +16,15 @@ from app.drawing.meshes import photographed_glb, rim_segments_m, surface_glb
 from app.screens.surface.unused import POINT_SHARE, resting_ball_m, unused_view
 from app.screens.surface.view import Coloring, PaintedMesh, PaintedView, PaintRequest, Which
 from packetmesh.progress import Progress
+from pipeline.kernels.rays import Camera
 from pipeline.placement.outcome import Placement
 from pipeline.spec import key
 from pipeline.stages import cameras_of, dressed, run
-from pipeline.kernels.rays import Camera
-from pipeline.surface.truth import distances_to_truth_m
 from pipeline.surface.ball_pivoting import roll_or_nothing
-from pipeline.surface.radii import spacing
-from pipeline.surface.voxel import voxel_average, voxel_for_count
 from pipeline.surface.fill import without_seams
+from pipeline.surface.radii import spacing
+from pipeline.surface.truth import distances_to_truth_m
+from pipeline.surface.voxel import voxel_average, voxel_for_count
 from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
 PHOTOGRAPHED: tuple[Coloring, ...] = ("photo", "violet", "color")

@@ -8,10 +8,10 @@ from app.compute.state import Spec
 from app.compute.store import Store
 from app.screens.surface.view import SweepView
 from packetmesh.progress import Progress
-from pipeline.surface.findings import Suggestion
 from pipeline.spec import key
 from pipeline.stages import cameras_of
 from pipeline.surface.advice import suggest_radii
+from pipeline.surface.findings import Suggestion
 from pipeline.surface.sweep import iterate_sweep, sweep_radii_m
 
 

@@ -11,8 +11,8 @@ from app.compute.store import Store
 from app.screens.surface.walk_view import Happening, WalkRequest, WalkView
 from packetmesh.progress import Progress
 from pipeline.spec import key
-from pipeline.surface.radii import radii
 from pipeline.surface.pivoting import roll
+from pipeline.surface.radii import radii
 from pipeline.surface.walk import Kind, Walk, ball_on_arc, hole_on_flat_ground, iterate_walk, nearest_rows
 from pipeline.types import PointCloud
 

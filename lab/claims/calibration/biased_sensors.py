@@ -30,8 +30,8 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.depth_bias import fit_depth
 from pipeline.calibration.depth_samples import board_depth_samples
 from pipeline.calibration.estimate import Calibration, View, calibrate
-from pipeline.kernels.geometry import apply, inverse, pixel_rays, scaled
 from pipeline.io.depth_correction import DepthCorrection
+from pipeline.kernels.geometry import apply, inverse, pixel_rays, scaled
 from pipeline.registration import point_error_m
 from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, FloatArray, PointCloud, RgbdFrame
 

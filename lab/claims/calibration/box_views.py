@@ -26,8 +26,8 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.depth_from_images import depth_beside, depth_fit
 from pipeline.calibration.from_images import image_files, iterate_calibration
 from pipeline.config import PRESETS
-from pipeline.kernels.geometry import look_at
 from pipeline.io.depth_correction import DepthCorrection
+from pipeline.kernels.geometry import look_at
 from pipeline.types import CameraIntrinsics, DepthMap, FloatArray, RgbdFrame
 
 SIZES_M = ((0.30, 0.20, 0.15), (0.40, 0.30, 0.25), (0.20, 0.15, 0.10))

@@ -17,8 +17,8 @@ from lab.claims.delivery.trials import SubsetTask, Values, subset_trial
 from lab.claims.delivery.views import rig_quality
 from lab.claims.exhibits import Table
 from lab.trials import iterate_trials
-from network_sim.presets import PRESETS
 from network_sim.fixed.selection import FloatArray, greedy, greedy_by_cost, nearest
+from network_sim.presets import PRESETS
 from packetmesh.progress import Progress
 from pipeline.delivery import coding_named
 from pipeline.delivery.plan import places_of

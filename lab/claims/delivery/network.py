@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from lab.claims.delivery.trials import Values
-from network_sim.metrics.arrivals import until
 from network_sim.config import NetworkConfig
+from network_sim.metrics.arrivals import until
 from network_sim.presets import PRESETS
 from network_sim.types import to_s
 from pipeline.delivery.sending import DeliverySpec, packet_bytes_of, send

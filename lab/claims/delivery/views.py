@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from network_sim.fixed.selection import view_quality
-from pipeline.kernels import geometry
 from pipeline.acquisition import back_project
+from pipeline.kernels import geometry
 from pipeline.surface.normals import estimate_normals
 from pipeline.types import BoolArray, FloatArray, PointCloud, RgbdFrame, Rig
 

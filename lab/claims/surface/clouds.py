@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 from packetmesh.progress import drain
 from pipeline.config import PipelineConfig
+from pipeline.kernels.rays import Camera
 from pipeline.merging import MergedClouds
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
 from pipeline.stages import run
-from pipeline.kernels.rays import Camera
 from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.types import DepthMap, Rig, SurfaceResult
 

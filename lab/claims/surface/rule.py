@@ -11,8 +11,7 @@ from lab.claims.exhibits import Table
 from lab.claims.surface.clouds import CHAINS, chain_clouds
 from pipeline.config import PRESETS
 from pipeline.io.demos import CALIBRATED_SCENES, load_demo
-from pipeline.surface.radii import radii, spacing
-from pipeline.surface.radii import SIGMAS
+from pipeline.surface.radii import SIGMAS, radii, spacing
 
 PRINTED_M = (0.0102, 0.0131, 0.0156, 0.0209)
 """Thesis, figures 4.2 to 4.5: before fusion."""

@@ -11,8 +11,8 @@ from lab.claims import registry
 from lab.claims.network import link, radio, selection, street, study
 from lab.claims.network.intervals import interval
 from lab.claims.network.tasks import STREET_METRICS, saturated, transfer
-from network_sim.presets import PRESETS
 from network_sim.fixed.selection import all_cameras
+from network_sim.presets import PRESETS
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, drain
 from packetmesh.settings import with_settings

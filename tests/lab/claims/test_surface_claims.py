@@ -25,8 +25,8 @@ from packetmesh.files import finite
 from pipeline.config import PRESETS
 from pipeline.io.demos import load_demo
 from pipeline.kernels.rays import tensor, triangle_areas_m2, triangle_scene
-from pipeline.surface.radii import spacing
 from pipeline.surface.pictures import MISSED
+from pipeline.surface.radii import spacing
 
 
 def _distances_m(vertices_m, triangles, points_m):

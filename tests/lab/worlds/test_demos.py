@@ -13,9 +13,9 @@ from lab.worlds.render import render
 from lab.worlds.sensor import axial_sigma_m
 from lab.worlds.staging import VGA
 from packetmesh.errors import InputError
-from pipeline.kernels.geometry import apply, inverse, pixel_rays, project, rotation_angle_rad
 from pipeline.io.demos import CALIBRATED_SCENES, DEMO_SCENES, board_views_of, load_demo
 from pipeline.io.rigs import load_rig, save_rig
+from pipeline.kernels.geometry import apply, inverse, pixel_rays, project, rotation_angle_rad
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import CameraIntrinsics, Rig
 

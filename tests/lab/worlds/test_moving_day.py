@@ -12,8 +12,8 @@ from packetmesh.progress import drain
 from pipeline.acquisition import back_project
 from pipeline.calibration.detect import detect
 from pipeline.calibration.from_images import image_files, iterate_calibration
-from pipeline.kernels.geometry import apply, project
 from pipeline.io.demos import board_views_of, load_demo
+from pipeline.kernels.geometry import apply, project
 from pipeline.kernels.rays import tensor, triangle_scene
 from pipeline.types import DepthMap
 

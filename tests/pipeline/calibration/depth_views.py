@@ -7,8 +7,8 @@ from lab.claims.calibration.photograph import seen_px
 from pipeline.calibration.board import Board
 from pipeline.calibration.depth_samples import DepthSamples, board_depth_samples
 from pipeline.calibration.estimate import View, calibrate
-from pipeline.kernels.geometry import pixel_rays, project
 from pipeline.io.depth_correction import DepthCorrection
+from pipeline.kernels.geometry import pixel_rays, project
 from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise
 
 CAMERA = CameraIntrinsics(

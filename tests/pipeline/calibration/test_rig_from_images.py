@@ -10,12 +10,12 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.rig_from_images import iterate_rig_calibration
 from pipeline.calibration.rig_report import pose_like, rig_metrics, write_rig_folder
 from pipeline.calibration.shots import board_beside, node_shots
-from pipeline.kernels.geometry import LEVEL_POSE, inverse, rigid, rotation_angle_rad, rotation_exp
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import write_color
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.poses import read_pose
 from pipeline.io.rigs import load_rig
+from pipeline.kernels.geometry import LEVEL_POSE, inverse, rigid, rotation_angle_rad, rotation_exp
 from pipeline.types import CameraIntrinsics
 from tests.paths import ASSETS
 from tests.pipeline.calibration.views import CAMERA, poses

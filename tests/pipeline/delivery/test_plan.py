@@ -9,8 +9,8 @@ from network_sim.presets import PRESETS
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
 from pipeline.delivery.plan import network_of, placed, places_of, poses_known
-from pipeline.kernels.geometry import look_at
 from pipeline.io.demos import load_demo
+from pipeline.kernels.geometry import look_at
 from pipeline.types import Rig
 
 

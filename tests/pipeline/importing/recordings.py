@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.kernels.geometry import look_at
 from pipeline.io.images import write_color
+from pipeline.kernels.geometry import look_at
 from pipeline.types import CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
 CAMERA = CameraIntrinsics.pinhole(30.0, 30.5, 19.5, 14.5, 40, 30)

@@ -5,11 +5,11 @@ import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
-from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.importing import iterate_import
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import read_depth
 from pipeline.io.rigs import load_rig
+from pipeline.kernels.geometry import rigid, rotation_exp
 from tests.pipeline.importing.bags import DEPTHS, write_bag
 from tests.pipeline.importing.recordings import orbit
 

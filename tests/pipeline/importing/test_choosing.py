@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.kernels.geometry import look_at
 from pipeline.importing.choosing import LEAST_OVERLAP, apart_but_overlapping, choose, overlaps
 from pipeline.importing.sequence import Candidate, Sequence
+from pipeline.kernels.geometry import look_at
 from tests.pipeline.importing.recordings import CAMERA, orbit
 
 

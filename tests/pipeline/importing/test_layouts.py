@@ -8,10 +8,10 @@ import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
-from pipeline.kernels.geometry import LEVEL_POSE, look_at, rigid
 from pipeline.importing import iterate_import
 from pipeline.io.images import read_depth
 from pipeline.io.rigs import load_rig
+from pipeline.kernels.geometry import LEVEL_POSE, look_at, rigid
 from pipeline.types import DepthMap, RgbdFrame, Rig
 from tests.pipeline.importing.recordings import (
     CAMERA,

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.kernels.geometry import look_at, rigid, rotation_exp
 from pipeline.io.calibrations import CalibratedNode, write_calibration
 from pipeline.io.demos import SCENES
 from pipeline.io.depth_correction import DepthCorrection, write_depth_correction
@@ -14,6 +13,7 @@ from pipeline.io.extrinsics import read_extrinsics, write_extrinsics
 from pipeline.io.images import write_color, write_depth_mm
 from pipeline.io.intrinsics import write_intrinsics
 from pipeline.io.rigs import load_rig, save_rig
+from pipeline.kernels.geometry import look_at, rigid, rotation_exp
 from pipeline.sources import Calibrated, Demo, ImagePair, RigFolder
 from pipeline.spec import Spec
 from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, RgbdFrame, Rig

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.kernels.geometry import LEVEL_POSE, look_at
 from pipeline.io.depth_correction import DepthCorrection, write_depth_correction
 from pipeline.io.rigs import load_frame, load_rig, save_rig
+from pipeline.kernels.geometry import LEVEL_POSE, look_at
 from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, RgbdFrame, Rig
 
 

@@ -7,8 +7,8 @@ from lab.worlds import box_room
 from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.kernels.open3d_runtime import o3d
-from pipeline.registration import point_error_m, register
 from pipeline.placement.pose_graph import chained, graph_points, pose_edge, solve_pose_graph
+from pipeline.registration import point_error_m, register
 from tests.pipeline.registration.rooms import seen_by
 
 NODES = 6

@@ -8,11 +8,11 @@ import pytest
 from lab.worlds import box_room
 from lab.worlds.demos import disturbed
 from lab.worlds.render import Renderer
-from pipeline.placement.outcome import place_nodes as placing
 from pipeline.config import PRESETS, RegistrationConfig
 from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.nodes import NodeClouds
-from pipeline.placement.place_nodes import place_nodes
+from pipeline.placement import pairwise
+from pipeline.placement.pairwise import place_nodes
 from pipeline.registration import point_error_m, register
 from pipeline.types import DepthMap, RgbdFrame
 from tests.pipeline.registration.rooms import seen_by
@@ -71,7 +71,7 @@ def test_a_registration_that_went_wrong_is_left_out(six, monkeypatch):
         wrong = source is works[3].sensor and target is works[2].sensor
         return replace(result, T_target_source=damage @ result.T_target_source) if wrong else result
 
-    monkeypatch.setattr(placing, "register", misled)
+    monkeypatch.setattr(pairwise, "register", misled)
     registrations, poses = placed(frames, works)
     assert [(row.source, row.target) for row in registrations if not row.used] == [("node_03", "node_02")]
     assert max(row.loop_error_m for row in registrations) > 0.1

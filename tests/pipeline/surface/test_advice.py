@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial import Delaunay, cKDTree
 
 from packetmesh.errors import InputError
-from pipeline.surface.normals import estimate_normals
 from pipeline.surface.advice import NEIGHBOURS, closed_fans, needed_radii_m, suggest_radii
+from pipeline.surface.normals import estimate_normals
 from pipeline.surface.pivoting import roll
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import grid_mesh, perforated_plane, sphere

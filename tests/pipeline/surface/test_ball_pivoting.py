@@ -6,11 +6,9 @@ import pytest
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import drain
 from pipeline.kernels.geometry import rigid, rotation_exp
-from pipeline.surface.boundary import boundary_loops
-from pipeline.surface.ball_pivoting import reconstruct_surface
+from pipeline.surface.ball_pivoting import iterate_ball, reconstruct_surface, roll_ball
+from pipeline.surface.boundary import boundary_loops, edges_and_faces
 from pipeline.surface.radii import spacing
-from pipeline.surface.ball_pivoting import iterate_ball, roll_ball
-from pipeline.surface.boundary import edges_and_faces
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import perforated_plane, sphere
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError, ReconstructionError
-from pipeline.surface.radii import spacing
 from pipeline.surface.baselines import TRIM_SPACINGS, alpha_surface, poisson_depth, poisson_surface
 from pipeline.surface.boundary import edges_and_faces
+from pipeline.surface.radii import spacing
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import perforated_plane, sphere
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.surface.boundary import boundary_loops
+from pipeline.surface.boundary import boundary_loops, edges_and_faces, loop_measures
 from pipeline.surface.quality import measure_quality
-from pipeline.surface.boundary import edges_and_faces, loop_measures
 from tests.pipeline.surface.shapes import grid_mesh, rectangle
 
 

@@ -5,11 +5,11 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.kernels.rays import triangle_areas_m2
-from pipeline.surface.quality import measure_quality
 from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.fill import fill_holes, least_area, skin_points_m, without_seams
 from pipeline.surface.holes import find_holes
+from pipeline.surface.quality import measure_quality
 from pipeline.types import PointCloud, SurfaceResult
 from tests.pipeline.surface.shapes import grid_mesh, perforated_plane, sphere
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.surface.quality import measure_quality
 from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.holes import beyond_m, find_holes, half_edges, is_closed
+from pipeline.surface.quality import measure_quality
 from tests.pipeline.surface.shapes import grid_mesh, perforated_plane, rectangle
 
 

@@ -6,12 +6,11 @@ import pytest
 from packetmesh.errors import InputError
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.rays import triangle_areas_m2
-from pipeline.surface.boundary import boundary_loops
+from pipeline.surface.boundary import boundary_loops, edges_and_faces
 from pipeline.surface.normals import estimate_normals
+from pipeline.surface.pivoting import Roller, iterate_roll, roll
 from pipeline.surface.radii import spacing
 from pipeline.surface.voxel import voxel_average
-from pipeline.surface.boundary import edges_and_faces
-from pipeline.surface.pivoting import Roller, iterate_roll, roll
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import perforated_plane, rectangle, sphere
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.surface.radii import spacing
 from pipeline.surface.normals import oriented_normals
+from pipeline.surface.radii import spacing
 from pipeline.surface.surrounding import surrounding_distances_m, surrounding_radii
 from pipeline.types import PointCloud
 from tests.pipeline.surface.shapes import lidar_room, perforated_plane, sphere, torus_knot, with_outliers

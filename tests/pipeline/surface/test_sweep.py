@@ -7,9 +7,9 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.kernels.rays import Camera
-from pipeline.surface.truth import compare_with_truth
 from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.sweep import iterate_sweep, sweep_radii_m
+from pipeline.surface.truth import compare_with_truth
 from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RigTruth
 from tests.pipeline.surface.shapes import perforated_plane, rectangle
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from pipeline.kernels.geometry import apply, inverse, look_at, project
 from pipeline.io.meshes import read_mesh, write_mesh
+from pipeline.kernels.geometry import apply, inverse, look_at, project
 from pipeline.kernels.rays import Camera
-from pipeline.surface.texture import photographed
 from pipeline.surface.pictures import MISSED, beside, mesh_picture
+from pipeline.surface.texture import photographed
 from pipeline.types import CameraIntrinsics, Surface
 
 LENS = CameraIntrinsics.pinhole(200.0, 200.0, 159.5, 119.5, 320, 240)

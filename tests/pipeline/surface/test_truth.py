@@ -6,8 +6,7 @@ import pytest
 from packetmesh.errors import InputError
 from pipeline.kernels.geometry import apply, look_at, rigid, rotation_exp
 from pipeline.kernels.rays import Camera, hit_depth
-from pipeline.surface.truth import compare_with_truth
-from pipeline.surface.truth import sample_surface, yardstick_of
+from pipeline.surface.truth import compare_with_truth, sample_surface, yardstick_of
 from pipeline.types import CameraIntrinsics, RigTruth
 from tests.pipeline.surface.shapes import rectangle
 

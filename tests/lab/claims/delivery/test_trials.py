@@ -19,8 +19,8 @@ from lab.claims.delivery.trials import (
 )
 from lab.claims.surface.clouds import single_node
 from network_sim.radio.losses import LossConfig
-from pipeline.kernels.geometry import scaled
 from pipeline.io.demos import load_demo
+from pipeline.kernels.geometry import scaled
 from pipeline.reconstruct import reconstruct
 from pipeline.types import DepthMap, Rig
 

@@ -10,7 +10,7 @@ from packetmesh.files import atomic_path, write_json
 from packetmesh.settings import settings
 from pipeline.deliver import Delivery
 from pipeline.delivery.moments import Moment, NodeArrival
-from pipeline.run_folder import (
+from pipeline.folders.run import (
     METRICS,
     clear_run_folder,
     config_of,

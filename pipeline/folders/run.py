@@ -15,9 +15,9 @@ from packetmesh.settings import settings
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
 from pipeline.merging import MergedClouds
+from pipeline.placement.agreement import Agreement
 from pipeline.placement.outcome import NodeRegistration, NodeVerdict
 from pipeline.reconstruct import Reconstruction
-from pipeline.placement.agreement import Agreement
 from pipeline.spec import Spec
 from pipeline.stages import dressed
 from pipeline.types import PointCloud, PointSource, SurfaceResult

@@ -11,13 +11,11 @@ from operator import add
 import numpy as np
 
 from packetmesh.errors import ReconstructionError
-from pipeline.kernels import geometry
 from pipeline.config import NodePoints, RegistrationConfig
+from pipeline.kernels import geometry
 from pipeline.nodes import NodeClouds
-from pipeline.placement.outcome import NodeAgreement, NodeRegistration, NodeVerdict, Placement
-from pipeline.registration import register
 from pipeline.placement.agreement import NOTHING_SHARED, Agreement, agreement
-from pipeline.registration.anywhere import register_anywhere
+from pipeline.placement.outcome import NodeAgreement, NodeRegistration, NodeVerdict, Placement
 from pipeline.placement.pose_graph import (
     PoseEdge,
     graph_points,
@@ -26,6 +24,8 @@ from pipeline.placement.pose_graph import (
     solve_pose_graph,
     strongest_alike,
 )
+from pipeline.registration import register
+from pipeline.registration.anywhere import register_anywhere
 from pipeline.types import FloatArray, PointCloud, RegistrationResult, RgbdFrame
 
 SHARED_VIEW = 0.25
