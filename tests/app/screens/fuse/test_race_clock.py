@@ -8,7 +8,7 @@ import pytest
 from app.dock.dock import COUNT_NS
 from app.screens.fuse.clock import RaceClock
 from app.screens.fuse.player import error_lane
-from tests.app.test_fuse_numbers import lane
+from tests.app.screens.fuse.test_numbers import lane
 
 MS = 1_000_000
 

@@ -17,7 +17,7 @@ from app.screens.fuse.methods import METHODS, color_of
 from app.screens.fuse.view import SUCCESS_M, Race, Reference
 from pipeline import config
 from pipeline.kernels.geometry import rigid, rotation_exp
-from tests.app.test_fuse_numbers import lane
+from tests.app.screens.fuse.test_numbers import lane
 
 
 def test_every_method_says_what_it_does_in_two_sentences_and_where_it_is_from():

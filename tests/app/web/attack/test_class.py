@@ -14,7 +14,7 @@ from attacker import connected
 
 from app.load.connection import wait_for
 from app.server import build_server
-from tests.app.attack.test_gate import PROPERTIES
+from tests.app.web.attack.test_gate import PROPERTIES
 
 pytestmark = pytest.mark.xdist_group("attack")
 
