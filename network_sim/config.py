@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from network_sim.radio.losses import LossConfig
 from packetmesh.checks import above, at_least, finite, one_each, one_of, several, share
 from packetmesh.errors import InputError
 
@@ -18,6 +17,20 @@ Scenario = Literal["collection", "street-grid"]
 
 MAX_PAYLOAD_BYTES: dict[MacKind, int] = {"ieee802154": 116, "ieee80211b": 2304}
 """Largest payload of a frame: 127 B less 11 B of header and check sum, and IEEE 802.11's largest."""
+
+
+@dataclass(frozen=True, slots=True)
+class LossConfig:
+    """Data frames that get lost on their link besides what the medium does to them (SPEC 6.5)."""
+
+    share: float = 0.0
+    """Share of the data frames that get lost on every link, those that are sent again included."""
+    burst_packets: float = 1.0
+    """Mean length of a run of lost frames (Gilbert-Elliott); 1 loses each frame by itself."""
+
+    def __post_init__(self) -> None:
+        share("loss.share", self.share)
+        at_least("loss.burst_packets", self.burst_packets, 1.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,30 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
-from packetmesh.checks import at_least
-from packetmesh.checks import share as check_share
+from network_sim.config import LossConfig
 
 LOSS_STREAM = 1
 """Keeps what is lost apart from whatever else is drawn from the same seed."""
 _BLOCK = 1024
-
-
-@dataclass(frozen=True, slots=True)
-class LossConfig:
-    """Data frames that get lost on their link besides what the medium does to them (SPEC 6.5)."""
-
-    share: float = 0.0
-    """Share of the data frames that get lost on every link, those that are sent again included."""
-    burst_packets: float = 1.0
-    """Mean length of a run of lost frames (Gilbert-Elliott); 1 loses each frame by itself."""
-
-    def __post_init__(self) -> None:
-        check_share("loss.share", self.share)
-        at_least("loss.burst_packets", self.burst_packets, 1.0)
 
 
 class LinkLosses:

@@ -10,7 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from network_sim.radio.losses import LinkLosses, LossConfig
+from network_sim.config import LossConfig
+from network_sim.radio.losses import LinkLosses
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain
 from pipeline.config import AlignmentMode, DepthConfig, PipelineConfig

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from network_sim.config import NetworkConfig
+from network_sim.config import LossConfig, NetworkConfig
 from network_sim.metrics.metrics import metrics
 from network_sim.presets import PRESETS
-from network_sim.radio.losses import LinkLosses, LossConfig, frames_lost
+from network_sim.radio.losses import LinkLosses, frames_lost
 from network_sim.simulate import simulate
 from network_sim.trace.conservation import balance, image_balance
 from network_sim.trace.log import NetworkTrace

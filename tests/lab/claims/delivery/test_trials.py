@@ -18,7 +18,7 @@ from lab.claims.delivery.trials import (
     rebuilt,
 )
 from lab.claims.surface.clouds import single_node
-from network_sim.radio.losses import LossConfig
+from network_sim.config import LossConfig
 from pipeline.io.demos import load_demo
 from pipeline.kernels.geometry import scaled
 from pipeline.reconstruct import reconstruct
