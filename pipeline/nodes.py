@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.acquisition import Acquired, FilterResult, back_project
 from pipeline.config import DepthConfig, FusionMode, RegistrationConfig
 from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, complete, judge
-from pipeline.kernels.pixels import near
+from pipeline.kernels.masks import near
 from pipeline.registration import fuse, register
 from pipeline.types import DepthMap, PointCloud, PointSource, RegistrationResult, RgbdFrame
 

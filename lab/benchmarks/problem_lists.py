@@ -17,7 +17,7 @@ from lab.claims.registration.cases import CONDITIONS, make_case, random_subset
 from pipeline.io.clouds import read_cloud
 from pipeline.io.poses import read_pose
 from pipeline.kernels.geometry import rigid, rotation_exp
-from pipeline.kernels.points import middle_extent_m
+from pipeline.kernels.point_sets import middle_extent_m
 from pipeline.pairs.register import Pair
 from pipeline.types import FloatArray, PointCloud
 

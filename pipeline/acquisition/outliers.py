@@ -8,7 +8,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.config import AcquisitionConfig
-from pipeline.kernels.points import neighbour_distances_m
+from pipeline.kernels.point_sets import neighbour_distances_m
 from pipeline.types import BoolArray, FloatArray, PointCloud
 
 _MAD_TO_SIGMA = 1.4826

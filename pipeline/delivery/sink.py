@@ -8,7 +8,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.delivery.coding import DepthArray, Images, Received
-from pipeline.kernels.pixels import nearest_colors
+from pipeline.kernels.masks import nearest_colors
 from pipeline.types import DepthMap, RgbdFrame
 
 UNITS_PER_M = (1000.0, 5000.0, 10_000.0, 256.0, 100.0)

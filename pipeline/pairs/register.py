@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
 from pipeline.config import Metric, RegistrationConfig
 from pipeline.kernels.geometry import apply
-from pipeline.kernels.points import distinct_rows, middle_extent_m
+from pipeline.kernels.point_sets import distinct_rows, middle_extent_m
 from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
 from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.registration.methods import METHODS

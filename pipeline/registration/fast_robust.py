@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.config import RegistrationConfig
-from pipeline.kernels.points import neighbour_distances_m
+from pipeline.kernels.point_sets import neighbour_distances_m
 from pipeline.registration.ceicp import SIGMA_MIN_OF_GATE
 from pipeline.registration.matching import Matching
 from pipeline.registration.weighting import PairWeighting, PairWeights

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import apply
-from pipeline.kernels.points import middle_extent_m
+from pipeline.kernels.point_sets import middle_extent_m
 from pipeline.registration.loop import register
 from pipeline.registration.neighbourhood import median_spacing_m, pca_normals
 from pipeline.registration.sample import draw

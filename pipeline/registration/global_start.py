@@ -8,7 +8,7 @@ import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.kernels.open3d_runtime import o3d
-from pipeline.kernels.points import middle_extent_m
+from pipeline.kernels.point_sets import middle_extent_m
 from pipeline.types import FloatArray, PointCloud
 
 VOXELS_ACROSS = 50

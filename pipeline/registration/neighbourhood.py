@@ -8,8 +8,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from pipeline.kernels.kdtree import KdTree, compiled, tree_of
-from pipeline.kernels.patches import patch_normals
-from pipeline.kernels.points import neighbour_distances_m
+from pipeline.kernels.local_planes import patch_normals
+from pipeline.kernels.point_sets import neighbour_distances_m
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 NORMAL_NEIGHBOURS, SPACING_NEIGHBOURS = 20, 4

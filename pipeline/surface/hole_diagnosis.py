@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
-from pipeline.kernels.points import distinct_rows
+from pipeline.kernels.point_sets import distinct_rows
 from pipeline.kernels.rays import first_hits, triangle_scene
 from pipeline.surface.fill import skin_points_m
 from pipeline.surface.findings import Explanation, Reason

@@ -17,7 +17,7 @@ from packetmesh.progress import Progress
 from pipeline.config import SurfaceConfig
 from pipeline.io.clouds import read_cloud
 from pipeline.io.meshes import mesh_suffix, write_mesh
-from pipeline.kernels.points import distinct_rows
+from pipeline.kernels.point_sets import distinct_rows
 from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.boundary import edges_and_faces
 from pipeline.surface.normals import oriented_normals, turned_to_viewpoint

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
 from pipeline.kernels.kdtree import KdTree
-from pipeline.kernels.patches import patch_normals
+from pipeline.kernels.local_planes import patch_normals
 from pipeline.surface.boundary import connected_parts
 from pipeline.types import FloatArray, IntArray, PointCloud
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.config import SurfaceConfig
-from pipeline.kernels.points import neighbour_distances_m
+from pipeline.kernels.point_sets import neighbour_distances_m
 from pipeline.types import FloatArray
 
 SIGMAS = {"thesis": (0.0, 0.25, 0.5, 1.0), "thesis+": (0.0, 1.0, 2.0, 4.0)}

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.kernels.patches import onto_patches
+from pipeline.kernels.local_planes import onto_patches
 from pipeline.types import IntArray, PointCloud
 
 NEIGHBOURS = 20

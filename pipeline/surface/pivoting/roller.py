@@ -9,7 +9,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
-from pipeline.kernels.points import distinct_rows
+from pipeline.kernels.point_sets import distinct_rows
 from pipeline.surface.pivoting.front import FACES, HEAD, SETTLED, TAIL, grown, new_front
 from pipeline.surface.pivoting.grid import build_grid
 from pipeline.surface.pivoting.roll import advance, restart

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.kernels.kdtree import KdTree
-from pipeline.kernels.patches import patch_normals
+from pipeline.kernels.local_planes import patch_normals
 
 
 @pytest.mark.parametrize(

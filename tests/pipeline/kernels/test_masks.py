@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.kernels.pixels import near, nearest_colors
+from pipeline.kernels.masks import near, nearest_colors
 
 
 def test_known_pixels_keep_their_colour_and_others_take_that_of_the_nearest():
