@@ -32,6 +32,16 @@ ROUGH = [
 """Pictures are drawn in half the time, but their edges are not smooth."""
 
 
+UNDRAWN = """
+for (const name of ["drawElements", "drawArrays", "drawElementsInstanced", "drawArraysInstanced"]) {
+  const draw = WebGL2RenderingContext.prototype[name];
+  WebGL2RenderingContext.prototype[name] = function (...given) { if (window.draws) draw.apply(this, given); };
+}
+"""
+"""Pages draw nothing into their 3-D picture before ``window.draws`` is true: without a graphics card that
+takes most of the time, and few tests look at the picture."""
+
+
 def chromium_path() -> str | None:
     """The browser that the environment names, or the first that is installed."""
     named = os.environ.get("PACKETMESH_CHROMIUM")
@@ -41,11 +51,11 @@ def chromium_path() -> str | None:
 
 @pytest.hookimpl(tryfirst=True)  # pytest-xdist looks at the groups, and where a path is named it came first
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark every test here, and keep them on one worker: they share a browser and a server."""
+    """Mark every test here, and keep those of a file on one worker: they share a browser and a server."""
     for item in items:
         if Path(__file__).parent in item.path.parents:
             item.add_marker(pytest.mark.browser)
-            item.add_marker(pytest.mark.xdist_group("browser"))
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -79,6 +89,14 @@ def browser(chromium):
     expect.set_options(timeout=PATIENCE_MS)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=[*ARGUMENTS, *ROUGH])
+        new_context = browser.new_context
+
+        def undrawn(**options):
+            context = new_context(**options)
+            context.add_init_script(UNDRAWN)
+            return context
+
+        browser.new_context = undrawn
         yield browser
         browser.close()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 
 import cv2
@@ -41,14 +42,29 @@ UNCOVERED = ".mantine-Notifications-root, [role=tooltip] { display: none !import
 def canvas(page, still=2):
     """The 3-D picture once `still` looks at it in a row are the same, without what pops up over it."""
     last, same = b"", 1
-    for _ in range(40):
-        page.wait_for_timeout(200)
-        picture = page.locator("canvas").first.screenshot(style=UNCOVERED)
-        same = same + 1 if picture == last else 1
-        if same == still:
-            return picture
-        last = picture
-    return last
+    with drawn(page):
+        for _ in range(40):
+            page.wait_for_timeout(200)
+            picture = page.locator("canvas").first.screenshot(style=UNCOVERED)
+            same = same + 1 if picture == last else 1
+            if same == still:
+                break
+            last = picture
+    return picture
+
+
+@contextlib.contextmanager
+def drawn(page):
+    """The page draws its 3-D picture meanwhile, from the next frame on."""
+    page.evaluate(DRAW)
+    yield
+    page.evaluate("() => { window.draws = false; }")
+
+
+DRAW = """() => {
+  window.draws = true;
+  return new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))));
+}"""
 
 
 def differing(one, other):

@@ -25,6 +25,7 @@ def opened(browser, tmp_path_factory):
     page.on("request", lambda request: asked.append(request.url))
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    page.add_init_script("window.draws = true")
     page.goto(path.as_uri())
     page.locator("html[data-moment='3']").wait_for()
     yield page, asked, wrong

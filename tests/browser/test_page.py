@@ -12,6 +12,7 @@ from tests.browser.hands import DRAG_S, PATIENCE_MS, go, slider
 
 WATCH = """
 (() => {
+  window.draws = true;
   const HELD_MS = 3000; // six seconds after a question, and of these a surface is awaited three at most
   const watched = window.watched = {surfaces: 0, drawn: 0, drawnWhileHeld: 0, answers: 0, covered: []};
   let heldUntil = 0;

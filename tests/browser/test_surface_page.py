@@ -36,6 +36,7 @@ def page(browser, tmp_path_factory):
     page.set_default_timeout(PATIENCE_MS)
     page.wrong = []
     page.on("pageerror", lambda error: page.wrong.append(str(error)))
+    page.add_init_script("window.draws = true")
     page.goto(path.as_uri())
     page.locator("html[data-ready]").wait_for()
     yield page
