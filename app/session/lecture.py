@@ -7,6 +7,7 @@ for votes, until the teacher lets the class steer.
 
 from __future__ import annotations
 
+import base64
 import itertools
 import re
 import uuid
@@ -15,10 +16,10 @@ from dataclasses import dataclass
 from functools import partial
 from urllib.parse import urlsplit
 
+import cv2
 import viser
 
 from app.drawing.cameras import turn
-from app.session.qr import qr_html
 from app.web import viser_private as private
 from app.web.entrance import Token, is_loopback
 from app.web.gate import Gate
@@ -27,6 +28,7 @@ from app.window.gui import Gui
 from app.window.hidden import add_hidden
 from app.window.page import page_call
 from app.window.ui import Count, Ui
+from pipeline.types import ByteArray
 
 SAID = re.compile(r"\d+ (?:(follow)|(roam)|vote ([123]))")
 """What the page of somebody in the class says; a number tells two apart that are alike."""
@@ -264,3 +266,23 @@ def _turn_as(leader: viser.ClientHandle, client: viser.ClientHandle) -> None:
     """Turn a browser's view to what another one's shows."""
     turn(client, leader.camera.look_at, leader.camera.position)
     client.camera.fov = leader.camera.fov
+
+
+SIDE_PX = 360
+PX_PER_MODULE = 8
+
+
+def modules_of(text: str) -> ByteArray:
+    """(N, N) the text as a QR code, 0 for dark, with a quiet zone of four modules."""
+    encoded = cv2.QRCodeEncoder.create().encode(text)  # with two
+    return cv2.copyMakeBorder(encoded, 2, 2, 2, 2, cv2.BORDER_CONSTANT, value=(255,))
+
+
+def qr_html(text: str) -> Markup:
+    """An image of the text as a QR code."""
+    modules = modules_of(text)
+    picture = cv2.resize(modules, None, fx=PX_PER_MODULE, fy=PX_PER_MODULE, interpolation=cv2.INTER_NEAREST)
+    data = base64.b64encode(cv2.imencode(".png", picture)[1].tobytes()).decode()
+    return Markup('<img alt="QR code of {}" width="{}" src="data:image/png;base64,{}">').format(
+        text, SIDE_PX, data
+    )

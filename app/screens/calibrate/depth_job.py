@@ -10,8 +10,7 @@ import numpy as np
 from app.compute.records import Picture
 from app.compute.state import Spec
 from app.compute.store import Store
-from app.screens.calibrate.bias import bias_of, depth_file
-from app.screens.calibrate.cameras import cameras_of, finished
+from app.screens.calibrate.cameras import bias_of, cameras_of, depth_file, finished
 from app.screens.calibrate.maps import off_picture
 from app.screens.calibrate.request import board_of
 from app.screens.calibrate.view import DepthErrorView

@@ -14,7 +14,7 @@ from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import BRAND, NEUTRAL, SOURCE, TARGET
 from app.drawing.poses import place
 from app.screens.calibrate.labels import Around
-from app.screens.calibrate.photograph import decoded, picture_of
+from app.screens.calibrate.photographs import decoded, picture_of
 from app.screens.calibrate.view import CalibrationView, CameraView, RigView
 from pipeline.calibration.board import Board
 from pipeline.kernels.geometry import LEVEL_POSE, inverse

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from app.compute.state import Spec
 from app.compute.store import Store
-from app.screens.calibrate.bias import bias_of
-from app.screens.calibrate.cameras import cameras_of
+from app.screens.calibrate.cameras import bias_of, cameras_of
 from app.screens.calibrate.view import CalibrationView
 from packetmesh.progress import Progress
 

@@ -19,10 +19,8 @@ from app.screens.calibrate.lens_folder import LensFolder
 from app.screens.calibrate.lesson import NUMBERS, SETTINGS, SHIPPED, CalibrateLook, left_out, numbers
 from app.screens.calibrate.noise import NoiseFolder
 from app.screens.calibrate.noise_view import NoiseRequest
-from app.screens.calibrate.numbers import summary_table
-from app.screens.calibrate.parameters import ParameterFolder
-from app.screens.calibrate.photograph import picture_of
-from app.screens.calibrate.photographs import Photographs
+from app.screens.calibrate.numbers import ParameterFolder, summary_table
+from app.screens.calibrate.photographs import Photographs, picture_of
 from app.screens.calibrate.request import calibrate_command, inner, several, views_in, with_boards
 from app.screens.calibrate.rig import RigFolder
 from app.screens.calibrate.trust import TrustFolder, verdict_html

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from functools import partial
 
+import cv2
+import numpy as np
+
 from app.compute.records import Picture
+from app.drawing.colors import BRAND, DELIVERED, LOSS, NEUTRAL, SOURCE, css
 from app.screens.calibrate.answers import Answers
 from app.screens.calibrate.area import PictureArea
-from app.screens.calibrate.bars import Bars, bars_of
-from app.screens.calibrate.photograph import found_picture, picture_of, straightened_picture
-from app.screens.calibrate.view import CameraView
+from app.screens.calibrate.labels import HELD_OUT, RMS
+from app.screens.calibrate.view import CameraView, Photograph
+from app.web.markup import Markup
 from app.window.in_address import tell_unknown
+from app.window.tables import term
 from app.window.ui import Ui
+from pipeline.calibration.estimate import Calibration, FittedView
+from pipeline.types import ByteArray, FloatArray
 
 
 class Photographs:
@@ -87,3 +96,200 @@ class Photographs:
     def _go(self, count: int) -> None:
         if self._names:
             self._on_pick(self._names[(self._names.index(self.chosen) + count) % len(self._names)])
+
+
+SHIFT = 4
+"""Bits behind the comma of what is drawn."""
+LONGEST_PX = 22.0
+"""Length at which the largest error of a view is drawn."""
+FIRST = (250, 220, 0)
+"""The first point, which tells which way is up."""
+
+
+def found_picture(photograph: Photograph, fitted: FittedView | None) -> Picture:
+    """The photograph with rings around the board's points; or around the blobs that were no board."""
+    rgb = decoded(photograph)
+    name = f"View {photograph.name}"
+    if not photograph.found:
+        _rings(rgb, photograph.blobs_px, photograph.zoom, LOSS, 6.0)
+        seen = f" Red: {len(photograph.blobs_px)} blobs." if len(photograph.blobs_px) else ""
+        return Picture(rgb, f"{name}, no board found. {photograph.reason.rstrip('.')}.{seen}")
+    size_px = _ring_px(photograph.points_px, photograph.zoom)
+    _rings(rgb, photograph.points_px, photograph.zoom, DELIVERED, size_px)
+    _rings(rgb, photograph.points_px[:1], photograph.zoom, FIRST, size_px + 1.0)
+    caption = f"{name}, {len(photograph.points_px)} points found (green, the first yellow)"
+    if fitted is None:
+        return Picture(rgb, caption)
+    most_px = float(np.linalg.norm(fitted.residuals_px, axis=1).max())
+    times = round_down(LONGEST_PX / max(most_px * photograph.zoom, 1e-6))
+    ends_px = photograph.points_px - times * fitted.residuals_px  # towards what the lens predicts
+    lines = np.stack([photograph.points_px, ends_px], axis=1) * photograph.zoom
+    fixed = [np.rint(line * (1 << SHIFT)).astype(np.int32) for line in lines]
+    cv2.polylines(rgb, fixed, False, SOURCE, 1, cv2.LINE_AA, shift=SHIFT)
+    return Picture(rgb, f"{caption}; orange: to where the lens puts them, × {times:,.0f}")
+
+
+def decoded(photograph: Photograph) -> ByteArray:
+    """(H, W, 3) RGB."""
+    bgr = cv2.imdecode(np.frombuffer(photograph.jpeg, np.uint8), cv2.IMREAD_COLOR)
+    assert bgr is not None
+    return np.ascontiguousarray(bgr[..., ::-1])
+
+
+def straightened_picture(found: Picture, camera: Calibration, zoom: float) -> Picture:
+    """A photograph, with what is drawn over it, as a lens without distortion would have taken it."""
+    matrix = scaled_matrix(camera.matrix, zoom)
+    if camera.lens == "fisheye":
+        rgb = cv2.fisheye.undistortImage(found.rgb, matrix, camera.distortion, Knew=matrix)
+    else:
+        rgb = cv2.undistort(found.rgb, matrix, camera.distortion)
+    return Picture(rgb, "Straightened: edges that are straight in the world are straight here")
+
+
+def scaled_matrix(matrix: FloatArray, zoom: float) -> FloatArray:
+    """(3, 3) K of a thinned picture, whose pixel centres are at integers, too."""
+    scale = np.array([[zoom, 0.0, 0.5 * (zoom - 1.0)], [0.0, zoom, 0.5 * (zoom - 1.0)], [0.0, 0.0, 1.0]])
+    return scale @ matrix
+
+
+def round_down(times: float) -> float:
+    """1, 2 or 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(max(times, 1.0)))
+    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= max(times, 1.0)))
+
+
+def picture_of(camera: CameraView, name: str) -> Photograph:
+    """The photograph of a view, or the first."""
+    return next((one for one in camera.photographs if one.name == name), camera.photographs[0])
+
+
+def _rings(
+    rgb: ByteArray, points_px: FloatArray, zoom: float, color: tuple[int, int, int], size_px: float
+) -> None:
+    for x, y in np.rint(points_px * zoom * (1 << SHIFT)).astype(int).tolist():
+        cv2.circle(rgb, (x, y), round(size_px * (1 << SHIFT)), color, 1, cv2.LINE_AA, shift=SHIFT)
+
+
+def _ring_px(points_px: FloatArray, zoom: float) -> float:
+    """Radius of rings that do not touch each other."""
+    if len(points_px) < 2:
+        return 6.0
+    apart_px = np.linalg.norm(points_px[1:] - points_px[:-1], axis=1)
+    return float(np.clip(0.35 * zoom * np.median(apart_px), 2.0, 8.0))
+
+
+MARK = "packetmesh-views"
+HEIGHT_PX, LEAST_PX = 84, 3
+"""Of the row, and of a bar."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """One view."""
+
+    name: str
+    rms_px: float | None
+    """None if the board was not found."""
+    unseen_rms_px: float | None
+    """By a lens that has not seen it."""
+    dropped: bool = False
+    suspect: bool = False
+    """Whether it is proposed to drop it."""
+
+
+def bars_of(camera: CameraView, suspects: Collection[str] = ()) -> tuple[Bar, ...]:
+    """A bar for each photograph; ``suspects`` are those that stand out."""
+    bars = []
+    for photograph in camera.photographs:
+        name, fitted = photograph.name, camera.fitted(photograph.name)
+        dropped, rms_px = name in camera.dropped, None if fitted is None else fitted.rms_px
+        bars.append(Bar(name, rms_px, camera.unseen_rms_px(name), dropped, name in suspects))
+    return tuple(bars)
+
+
+class Bars:
+    """The bars of one camera's views; a click on one of them picks it."""
+
+    def __init__(self, ui: Ui, on_pick: Callable[[str], None]) -> None:
+        """Add an empty row; ``on_pick`` is called with the name of a view."""
+        self._on_pick = on_pick
+        self._html = ui.gui.add_html(bars_html((), ""))
+        self._field = ui.when_changed(ui.gui.add_text("View that was clicked", ""), self._picked)
+
+    def show(self, bars: tuple[Bar, ...], chosen: str) -> None:
+        """Show these, one of them chosen."""
+        self._html.content = bars_html(bars, chosen)
+
+    def _picked(self) -> None:
+        name = picked_name(self._field.value)
+        if name:
+            self._on_pick(name)
+
+
+def picked_name(text: str) -> str:
+    """The view that a page names in the hidden field; empty if it is no such message."""
+    try:
+        name, _ = json.loads(text)
+    except (ValueError, TypeError):
+        return ""
+    return name if isinstance(name, str) else ""
+
+
+def bars_html(bars: tuple[Bar, ...], chosen: str) -> Markup:
+    """HTML of the row, its axis and what it means."""
+    errors = [one for bar in bars for one in (bar.rms_px, bar.unseen_rms_px) if one is not None]
+    most = max(errors, default=1.0)
+    columns = Markup("").join(_column(bar, most, bar.name == chosen) for bar in bars)
+    hide = Markup("<style>div:has(> .{}) + div {{ display: none }}</style>").format(MARK)
+    if not bars:
+        return Markup('<div class="{}" data-packetmesh-field>{}</div>').format(MARK, hide)
+    kept = [bar.rms_px for bar in bars if bar.rms_px is not None and not bar.dropped]
+    meaning = Markup(
+        "Error of each of {} views, px ({}): bar by the lens that has seen it, "
+        "line by one that has not ({}). Click one."
+    ).format(len(bars), term("RMS", RMS), term("held out", HELD_OUT))
+    if len(kept) < len(bars):
+        meaning += " ✕ no board found, pale: dropped."
+    return Markup(
+        '<div class="{}" data-packetmesh-field style="padding: 0 0.8em 0.5em; font-size: 12px">{}'
+        '<div style="display: flex; gap: 0.4em"><div style="text-align: right; display: flex; '
+        'flex-direction: column; justify-content: space-between; font-variant-numeric: tabular-nums">'
+        "<span>{:.2g}</span><span>0</span></div>"
+        '<div role="group" aria-label="Views" style="display: flex; flex: 1; gap: 2px; '
+        "height: {}px; "
+        'border-left: 1px solid #bbb; border-bottom: 1px solid #bbb">{}</div></div>'
+        '<div style="margin-top: 0.3em; color: #667">{}</div></div>'
+    ).format(MARK, hide, most, HEIGHT_PX, columns, meaning)
+
+
+def _column(bar: Bar, most: float, chosen: bool) -> Markup:
+    name = bar.name
+    if bar.rms_px is None:
+        told, inside = f"View {name}: no board found", Markup('<b style="color: {}">✕</b>').format(css(LOSS))
+    else:
+        told = f"View {name}: {bar.rms_px:.3f} px"
+        if bar.unseen_rms_px is not None and not bar.dropped:
+            told += f", {bar.unseen_rms_px:.3f} px by a lens that has not seen it"
+        told += ", dropped" if bar.dropped else ", out of line" if bar.suspect else ""
+        color = css(SOURCE) if chosen else css(LOSS) if bar.suspect else css(BRAND)
+        tall = max(LEAST_PX, round(HEIGHT_PX * bar.rms_px / most))
+        faint = "opacity: 0.3;" if bar.dropped else ""
+        inside = Markup(
+            '<i style="display: block; width: 100%; height: {}px; background: {}; {}"></i>'
+        ).format(tall, color, faint)
+        if bar.unseen_rms_px is not None:
+            at = round(HEIGHT_PX * bar.unseen_rms_px / most)
+            inside += Markup(
+                '<i style="position: absolute; left: 0; right: 0; bottom: {}px; height: 2px; '
+                'background: {}"></i>'
+            ).format(at - 1, css(NEUTRAL))
+    around = f"outline: 2px solid {css(SOURCE)};" if chosen else ""
+    look = (
+        "position: relative; flex: 1; min-width: 4px; height: 100%; padding: 0; border: 0; cursor: pointer; "
+        f"background: transparent; display: flex; align-items: flex-end; justify-content: center; {around}"
+    )
+    pressed = "true" if chosen else "false"
+    return Markup(
+        '<button type="button" data-packetmesh-pick="{}" title="{}" aria-label="{}" aria-pressed="{}" '
+        'style="{}">{}</button>'
+    ).format(name, told, told, pressed, look, inside)

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 
 from app.drawing.calibration_plots import distortion_figure, radial_residuals_figure
 from app.drawing.colors import DELIVERED, LOSS, css
-from app.screens.calibrate.terms import HALVES
+from app.screens.calibrate.labels import HALVES
 from app.screens.calibrate.view import TrustRequest, TrustView
 from app.web.markup import Markdown, Markup, escape
 from app.window.tables import number, table, term

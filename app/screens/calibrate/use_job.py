@@ -8,8 +8,7 @@ from pathlib import Path
 
 from app.compute.state import Spec
 from app.compute.store import Store
-from app.screens.calibrate.bias import bias_of
-from app.screens.calibrate.cameras import CamerasFound, cameras_of, finished
+from app.screens.calibrate.cameras import CamerasFound, bias_of, cameras_of, finished
 from app.screens.calibrate.request import inner
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress

@@ -13,7 +13,7 @@ from app.compute.records import Picture
 from app.compute.state import Spec
 from app.compute.store import Store
 from app.drawing.pictures import depth_picture, depth_range_m
-from app.screens.depth.discs import covered, window_around
+from app.screens.depth.brush import covered, window_around
 from app.screens.depth.view import Disc, FillRow, HiddenView, HideRequest
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress

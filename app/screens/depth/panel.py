@@ -18,8 +18,7 @@ from app.screens.depth.hide import HideFolder
 from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PICTURES
 from app.screens.depth.lesson import NUMBERS, SETTINGS, SHIPPED, DepthLook, numbers
 from app.screens.depth.model import ModelFolder
-from app.screens.depth.numbers import confidence_table, depth_table, residual_table
-from app.screens.depth.residuals import residual_figure
+from app.screens.depth.numbers import confidence_table, depth_table, residual_figure, residual_table
 from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_model
 from app.screens.depth.view import HiddenView, HideRequest, ModelChoice, ModelView, SeenSample
 from app.web.markup import Markdown, Markup, shipped_markdown

@@ -10,11 +10,12 @@ import numpy as np
 import viser
 from viser import transforms
 
+from app.compute.records import DepthView
 from app.drawing.cameras import Stage, turn
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import DISTANCE_STOPS, NEUTRAL, ramp
 from app.drawing.poses import move, place
-from app.screens.fuse.view import LensView, RaceStep, RaceView, Start
+from app.screens.fuse.view import FuseView, LensView, RaceStep, RaceView, Start
 from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.types import ByteArray, FloatArray
 
@@ -235,3 +236,61 @@ def pair_lines(step: RaceStep) -> tuple[FloatArray, ByteArray]:
     ends = np.stack([apply(step.T_target_source, step.source_points_m), step.target_points_m], axis=1)
     colors = FAINT + (STRONG - FAINT) * np.clip(step.weights, 0.0, 1.0)[:, None]
     return ends.astype(np.float32), np.repeat(colors[:, None], 2, axis=1).astype(np.uint8)
+
+
+class RaceFraming:
+    """Narrows the view of browsers to a race, and gives them back the angle that they had."""
+
+    def __init__(self) -> None:
+        self._shapes: tuple[tuple[int, float, int], ...] = ()
+        self._fov_rad: float | None = None
+
+    def anew(self) -> None:
+        """Something else is to be framed."""
+        self._shapes = ()
+
+    def frame(self, drawing: RaceDrawing, clients: Iterable[viser.ClientHandle]) -> None:
+        """Have all lanes in the picture, once for each shape of the windows."""
+        clients = list(clients)
+        shapes = tuple(
+            (client.client_id, round(client.camera.aspect, 2), client.camera.image_height)
+            for client in clients
+        )
+        if shapes != self._shapes and clients:
+            if self._fov_rad is None:
+                self._fov_rad = clients[0].camera.fov
+            self._shapes = shapes
+            drawing.look(clients)
+
+    def widen(self, clients: Iterable[viser.ClientHandle]) -> None:
+        """Give the view back the angle that a race narrows."""
+        if self._fov_rad is not None:
+            for client in clients:
+                client.camera.fov = self._fov_rad
+            self._fov_rad, self._shapes = None, ()
+
+
+class NodesDrawing:
+    """The clouds of all nodes below a scene node."""
+
+    def __init__(self, scene: viser.SceneApi, below: str) -> None:
+        self._scene, self._below = scene, below
+        self._view: FuseView | None = None
+        self._clouds: list[viser.PointCloudHandle] = []
+
+    def draw(self, depth: DepthView, view: FuseView) -> None:
+        """Draw the nodes of the chain."""
+        clear(self._scene, self._below)
+        self._view = view
+        self._clouds = [
+            add_cloud(self._scene, f"{self._below}/{node.name}", node.fused, T)
+            for node, T in zip(depth.nodes, view.registered, strict=True)
+        ]
+
+    def place(self, before: bool) -> None:
+        """Move them to where the nodes were believed to stand, or to where registration puts them."""
+        if self._view is None:
+            return
+        poses = self._view.believed if before else self._view.registered
+        for handle, T in zip(self._clouds, poses, strict=True):
+            move(handle, T)

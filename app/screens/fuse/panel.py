@@ -19,9 +19,8 @@ from app.lesson.player import LessonFolder
 from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
-from app.screens.fuse.draw import RaceDrawing, gizmo_pose
+from app.screens.fuse.draw import NodesDrawing, RaceDrawing, RaceFraming, gizmo_pose
 from app.screens.fuse.export import race_offers
-from app.screens.fuse.framing import RaceFraming
 from app.screens.fuse.labels import (
     ADVANCED,
     BEFORE,
@@ -38,7 +37,6 @@ from app.screens.fuse.lesson import NUMBERS, SETTINGS, SHIPPED, RaceLook, number
 from app.screens.fuse.numbers import places_table, race_table, verdict
 from app.screens.fuse.place import moment_of, moment_text, race_of, race_text
 from app.screens.fuse.player import END, RacePlayer
-from app.screens.fuse.result import NodesDrawing
 from app.screens.fuse.setup import RaceSetup
 from app.screens.fuse.view import CaptureView, FuseView, Race, RaceView, Start
 from app.web.markup import Markdown, Markup

@@ -12,9 +12,8 @@ from scipy.spatial import cKDTree
 from app.compute.records import sample
 from app.compute.state import Spec
 from app.compute.store import Store
-from app.screens.fuse.distances import Distances, shades_of
 from app.screens.fuse.job import true_pose
-from app.screens.fuse.lens import Lens, lens_of
+from app.screens.fuse.lens import Distances, Lens, lens_of, shades_of
 from app.screens.fuse.methods import label_of
 from app.screens.fuse.view import (
     PairHistogram,

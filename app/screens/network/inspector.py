@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 from app.screens.network.delivery_draw import DeliveryDrawing
 from app.screens.network.delivery_view import DeliveryView, PacketView
 from app.screens.network.labels import PICK
-from app.screens.network.packets import Frames
-from app.screens.network.packets_told import told
+from app.screens.network.packets import Frames, told
 from app.web.markup import Markdown
 from app.window.ui import Ui
 

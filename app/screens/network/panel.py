@@ -16,8 +16,15 @@ from app.drawing.timeline import Lane
 from app.lesson.files import Numbers, read_lesson
 from app.lesson.player import LessonFolder
 from app.screens.network.delivery_draw import DeliveryDrawing
-from app.screens.network.delivery_legend import legend, most_j
-from app.screens.network.delivery_numbers import changes, difference, moment_table, more_rows, summary
+from app.screens.network.delivery_numbers import (
+    changes,
+    difference,
+    legend,
+    moment_table,
+    more_rows,
+    most_j,
+    summary,
+)
 from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
 from app.screens.network.export import delivery_offers, network_offers
@@ -35,8 +42,7 @@ from app.screens.network.lesson import (
     street_numbers,
 )
 from app.screens.network.numbers import metric_tables, runs_summary, verdict
-from app.screens.network.packets import Frames
-from app.screens.network.packets_told import legend_html
+from app.screens.network.packets import Frames, legend_html
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import NetworkView
 from app.web.markup import Markdown, Markup

@@ -18,8 +18,7 @@ from app.drawing.meshes import VIOLET
 from app.reports.captioned import captioned, gif, on_background, png
 from app.reports.hand_out import viewpoint_of
 from app.reports.surface_page import Side, SurfacePage, surface_page
-from app.screens.surface.labels import NAMES
-from app.screens.surface.legend import legend_of
+from app.screens.surface.labels import NAMES, legend_of
 from app.screens.surface.paint_job import colored_glb, vertex_colors
 from app.screens.surface.view import Coloring
 from packetmesh.errors import InputError

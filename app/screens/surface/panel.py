@@ -11,19 +11,28 @@ from app.drawing.cameras import stage_of, turn
 from app.lesson.files import Numbers, read_lesson
 from app.lesson.player import LessonFolder
 from app.screens.surface.advice import AdviceFolder
-from app.screens.surface.ball import ChosenBall
 from app.screens.surface.baselines import Baselines
 from app.screens.surface.export import surface_offers
 from app.screens.surface.holes import HolesFolder
-from app.screens.surface.labels import AFTER, BASELINES, BOTH, COLORINGS, HINTS, RULES, SHOWN, TEXT
-from app.screens.surface.legend import legend_html
+from app.screens.surface.labels import (
+    AFTER,
+    BASELINES,
+    BOTH,
+    COLORINGS,
+    HINTS,
+    RULES,
+    SHOWN,
+    TEXT,
+    legend_html,
+    picked,
+)
 from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook, numbers, surface_of
 from app.screens.surface.numbers import quality_table, quick_line
-from app.screens.surface.place import picked
 from app.screens.surface.quick import QuickLook
+from app.screens.surface.rolling import Walks
 from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
-from app.screens.surface.spacing_plot import spacing_figure
-from app.screens.surface.stage import SurfaceStage
+from app.screens.surface.stage import ChosenBall, SurfaceStage
+from app.screens.surface.sweep_plot import spacing_figure
 from app.screens.surface.view import (
     BaselineName,
     ExplainView,
@@ -33,7 +42,6 @@ from app.screens.surface.view import (
     SurfaceView,
     Which,
 )
-from app.screens.surface.walks import Walks
 from app.web.markup import Markup
 from app.window.controls import Controls
 from app.window.in_address import STOP

@@ -12,7 +12,7 @@ from app.lesson.files import Choice, Question
 from app.lesson.player import told, with_votes
 from app.load.connection import Connection, wait_for
 from app.server import build_server
-from app.session.qr import modules_of, qr_html
+from app.session.lecture import modules_of, qr_html
 from app.web.entrance import Token, is_loopback
 
 pytestmark = pytest.mark.xdist_group("lecture")  # one worker starts the server once

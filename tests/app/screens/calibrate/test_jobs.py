@@ -9,7 +9,7 @@ import pytest
 from app.cli import main
 from app.compute.state import Spec
 from app.compute.store import Store
-from app.screens.calibrate import bias
+from app.screens.calibrate import cameras as bias
 from app.screens.calibrate.job import calibrate_job
 from app.screens.calibrate.request import calibrate_command, views_in
 from app.screens.calibrate.use_job import use_job

@@ -5,13 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.screens.calibrate import thesis
-from app.screens.calibrate.bars import Bar, bars_html
+from app.screens.calibrate import scatter as thesis
+from app.screens.calibrate.labels import HALVES, HELD_OUT, RMS
 from app.screens.calibrate.noise_view import NoiseRequest, NoiseView
-from app.screens.calibrate.parameters import correlation_html, signed, strongest_sentence
-from app.screens.calibrate.scatter import PAIRS, noise_sheet
-from app.screens.calibrate.terms import HALVES, HELD_OUT, RMS
-from app.screens.calibrate.thesis import nearest_cell
+from app.screens.calibrate.numbers import correlation_html, signed, strongest_sentence
+from app.screens.calibrate.photographs import Bar, bars_html
+from app.screens.calibrate.scatter import PAIRS, nearest_cell, noise_sheet
 from app.screens.calibrate.trust import verdict_html
 from app.window.tables import term
 from lab.claims.calibration.protocol import TRUTH

@@ -15,7 +15,7 @@ from app.drawing.pictures import (
     depth_picture,
     difference_picture,
 )
-from app.screens.depth.residuals import residual_figure
+from app.screens.depth.numbers import residual_figure
 from app.window.compare import CompareArea, captions_html, split
 from pipeline.types import DepthMap
 from tests.app.fakes import ui_of

@@ -7,8 +7,8 @@ import pytest
 
 from app.drawing.colors import css
 from app.screens.fuse.capture import capture_html, capture_sentence, cell_name
+from app.screens.fuse.charts import kernel, weights
 from app.screens.fuse.draw import gizmo_pose, start_of
-from app.screens.fuse.histogram import kernel, weights
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.numbers import places_table, race_table, verdict
 from app.screens.fuse.view import (

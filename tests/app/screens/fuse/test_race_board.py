@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 
 from app.drawing.colors import MOST_DISTANCE_M
 from app.screens.fuse.board import scale, score
-from app.screens.fuse.distances import REACH_M, Distances, shades_of
 from app.screens.fuse.labels import COMPARISONS, RIVALS
+from app.screens.fuse.lens import REACH_M, Distances, shades_of
 from app.screens.fuse.methods import METHODS, color_of
 from app.screens.fuse.view import SUCCESS_M, Race, Reference
 from pipeline import config

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from app.screens.fuse.distances import Distances
-from app.screens.fuse.lens import WINDOW_M, lens_of
+from app.screens.fuse.lens import WINDOW_M, Distances, lens_of
 from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 
 CORNER_M = np.array([0.3, 0.1, 2.0])

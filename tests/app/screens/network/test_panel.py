@@ -16,8 +16,7 @@ from app.dock.dock import time_text
 from app.drawing.colors import COVERAGE_STOPS, linear
 from app.lesson.files import read_lesson
 from app.screens.network.delivery_draw import EMPTY, FULL
-from app.screens.network.delivery_legend import legend
-from app.screens.network.delivery_numbers import moment_table
+from app.screens.network.delivery_numbers import legend, moment_table
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.draw import STREET, ground_of
 from app.screens.network.labels import ANSWER, NETWORKS, ORIGIN, PICK

@@ -7,8 +7,7 @@ import pytest
 
 from app.compute.state import Spec
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET
-from app.screens.surface.labels import COLORINGS
-from app.screens.surface.legend import legend_html
+from app.screens.surface.labels import COLORINGS, legend_html
 from app.screens.surface.paint_job import paint_job, vertex_colors
 from app.screens.surface.view import QUICK_POINTS, PaintRequest
 from packetmesh.progress import drain as end

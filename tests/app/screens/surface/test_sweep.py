@@ -9,9 +9,16 @@ import pytest
 
 from app.compute.state import Spec
 from app.screens.surface.advice import NO_ADVICE, STOPPED, WAITING, AdviceFolder
-from app.screens.surface.spacing_plot import ADVISED, OF_THESIS, USED, spacing_figure
 from app.screens.surface.sweep_job import suggestions_of, sweep_job
-from app.screens.surface.sweep_plot import POINTS, sweep_figure, sweep_sentence
+from app.screens.surface.sweep_plot import (
+    ADVISED,
+    OF_THESIS,
+    POINTS,
+    USED,
+    spacing_figure,
+    sweep_figure,
+    sweep_sentence,
+)
 from app.screens.surface.view import SpacingView, SweepView
 from packetmesh.progress import Progress, drain
 from pipeline.config import PipelineConfig, SurfaceConfig
