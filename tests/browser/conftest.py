@@ -35,7 +35,10 @@ ROUGH = [
 UNDRAWN = """
 for (const name of ["drawElements", "drawArrays", "drawElementsInstanced", "drawArraysInstanced"]) {
   const draw = WebGL2RenderingContext.prototype[name];
-  WebGL2RenderingContext.prototype[name] = function (...given) { if (window.draws) draw.apply(this, given); };
+  WebGL2RenderingContext.prototype[name] = function (...given) {
+    if (window.draws) draw.apply(this, given);
+    window.drew ||= window.draws;
+  };
 }
 """
 """Pages draw nothing into their 3-D picture before ``window.draws`` is true: without a graphics card that

@@ -39,6 +39,19 @@ ALIKE = 0.02
 UNCOVERED = ".mantine-Notifications-root, [role=tooltip] { display: none !important }"
 
 
+DRAW = """() => {
+  [window.drew, window.draws] = [false, true];
+  const end = performance.now() + 5000; // an empty scene has nothing to draw
+  return new Promise(done => {
+    const look = () => {
+      if (!window.drew && performance.now() < end) return void setTimeout(look, 20);
+      requestAnimationFrame(() => requestAnimationFrame(done));
+    };
+    look();
+  });
+}"""
+
+
 def canvas(page, still=2):
     """The 3-D picture once `still` looks at it in a row are the same, without what pops up over it."""
     last, same = b"", 1
@@ -59,12 +72,6 @@ def drawn(page):
     page.evaluate(DRAW)
     yield
     page.evaluate("() => { window.draws = false; }")
-
-
-DRAW = """() => {
-  window.draws = true;
-  return new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))));
-}"""
 
 
 def differing(one, other):
