@@ -66,7 +66,7 @@ INTERVAL = (
     "1.96 standard errors to either side: it holds the truth 95 times in 100, if the lens is of this kind."
 )
 TRUTH = "What the photographs were rendered with."
-HALVES = (
+TWO_HALVES = (
     "The camera is estimated from every other view and from the others. If noise were all that is wrong, "
     "both would agree as well as their standard errors say."
 )

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 
 from app.drawing.calibration_plots import distortion_figure, radial_residuals_figure
 from app.drawing.colors import DELIVERED, LOSS, css
-from app.screens.calibrate.labels import HALVES
+from app.screens.calibrate.labels import TWO_HALVES
 from app.screens.calibrate.view import TrustRequest, TrustView
 from app.web.markup import Markdown, Markup, escape
 from app.window.tables import number, table, term
@@ -92,7 +92,7 @@ def verdict_html(view: TrustView | None) -> Markup:
         return Markup("")
     sign, color = ("✓ PASS", DELIVERED) if view.passed else ("✗ FAIL", LOSS)
     first, *rest = (escape(line) for line in view.lines)
-    rest = [line.replace("Two halves", term("Two halves", HALVES)) for line in rest]
+    rest = [line.replace("Two halves", term("Two halves", TWO_HALVES)) for line in rest]
     more = Markup("").join(Markup("<div style='margin-top: 0.4em'>{}</div>").format(line) for line in rest)
     return Markup(
         "<div style='margin: 0 0.8em 0.6em; padding: 0.5em 0.8em; font-size: 13px; border-radius: 4px; "
@@ -113,7 +113,7 @@ def trust_table(view: TrustView) -> Markup:
             ),
             (
                 "Two halves apart",
-                f"{HALVES} This is how far apart both put a point at the range, root mean square over the "
+                f"{TWO_HALVES} This is how far apart both put a point at the range, root mean square over the "
                 "image. A lens of the wrong kind shows here.",
                 number(view.difference_m, 2, "mm", 1000.0),
             ),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.screens.calibrate import scatter as thesis
-from app.screens.calibrate.labels import HALVES, HELD_OUT, RMS
+from app.screens.calibrate.labels import HELD_OUT, RMS, TWO_HALVES
 from app.screens.calibrate.noise_view import NoiseRequest, NoiseView
 from app.screens.calibrate.numbers import correlation_html, signed, strongest_sentence
 from app.screens.calibrate.photographs import Bar, bars_html
@@ -96,5 +96,5 @@ def test_the_row_of_bars_explains_its_words_and_shows_names_as_text():
 def test_the_verdict_explains_its_halves_and_shows_names_as_text():
     lines = ("Not good enough", "Two halves differ", "Out of line: view <b>")
     shown = verdict_html(SimpleNamespace(passed=False, lines=lines))
-    assert f"{term('Two halves', HALVES)} differ" in shown
+    assert f"{term('Two halves', TWO_HALVES)} differ" in shown
     assert "view &lt;b&gt;" in shown
