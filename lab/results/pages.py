@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from lab.benchmarks.filling import FLAT, NETWORK, OURS, PIXELS
+from lab.benchmarks.filling import FLAT, OURS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
 from lab.results import completion, tables
-from lab.results.markdown import Row, change, listed
+from lab.results.markdown import Row, listed
 from lab.results.record import ROOT, Record, Records, read_records
 from packetmesh.files import atomic_path
 
@@ -44,8 +44,6 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
 }
 """Heading and body by record, in the order of the page; a section without its record is left out."""
 
-NETWORK_FILLERS = (OURS, NETWORK, FLAT, PIXELS)
-"""What fills by the network, or by its alignment."""
 
 INTRODUCTION = """# Results
 
@@ -101,7 +99,7 @@ def marked(page: str, lines: str) -> str:
 
 
 def readme_results(records: Records) -> Iterator[str]:
-    """What the README says of results, a sentence or two for each record it needs."""
+    """Yield the README's limits: one line with one number for each record that it needs."""
     if "reconstruct" in records:
         yield _fusion(records["reconstruct"].numbers)
     if "registration_claims" in records:
@@ -110,8 +108,6 @@ def readme_results(records: Records) -> Iterator[str]:
         yield _depth(records["depth_claims"].numbers["C12"]["ours"])
     if "bench_depth" in records:
         yield _filling(records["bench_depth"].numbers["depth"]["runs"])
-    if "delivery_claims" in records:
-        yield _exchange(records["delivery_claims"].numbers)
     claims = {
         name: claim
         for key, record in records.items()
@@ -124,97 +120,53 @@ def readme_results(records: Records) -> Iterator[str]:
 
 
 def _fusion(numbers: Row) -> str:
-    scene, presets = next(iter(numbers.items()))
-    parts = []
-    for preset, run in presets.items():
-        before, after = run["surface_before"], run["surface_after"]
-        rays = change(before["no_hit_ray_share"], after["no_hit_ray_share"])
-        scores = change(*tables.f_scores(run) or (None, None))
-        parts.append(f"by `{preset}` {rays} and {scores}")
+    scores = [found for presets in numbers.values() if (found := tables.f_scores(presets["packetmesh"]))]
+    falls = sum(after < before for before, after in scores)
     return (
-        "**What fills a hole is a guess.** Rays without a surface, and F-score at 5 cm, before → after "
-        f"fusion in {scene}: {'; '.join(parts)}."
+        "**What fills a hole is a guess.** Fewer rays miss the mesh after fusion, but its F-score falls in "
+        f"{falls} of {len(scores)} scenes ({_link('all scenes', 'what-comes-out')})."
     )
 
 
 def _registration(numbers: Row) -> str:
     medians = tables.point_errors(numbers)
-    biased = [float(cells["bias 3 %"].split()[0]) for cells in medians.values() if "bias 3 %" in cells]
-    lost, gated = (tables.losses(medians, rival) for rival in ("icp", "icp-gated"))
+    lost, conditions = len(tables.losses(medians, "icp")), len(medians["icp"])
     return (
-        f"**CEICP does not always win.** Plain ICP ends nearer to the truth in {len(lost)} of "
-        f"{len(medians['icp'])} conditions: {'; '.join(lost)}. ICP with a gate does in {len(gated)} of "
-        f"{len(medians['icp-gated'])}. No rigid method repairs a depth bias: 3 % leaves {min(biased):.1f} to "
-        f"{max(biased):.1f} cm."
+        f"**CEICP does not always win.** Plain ICP ends nearer to the truth in {lost} of {conditions} "
+        f"conditions ({_link('which', 'registration-the-thesiss-claims')})."
     )
 
 
 def _depth(ours: dict[str, float]) -> str:
-    scaled, raw = (
-        {key.removeprefix(prefix): value for key, value in ours.items() if key.startswith(prefix)}
-        for prefix in ("abs_rel_median-scaled_", "abs_rel_raw_")
-    )
-    held_out = [value for name, value in scaled.items() if name.startswith("Scene ")]
-    real = [name for name in scaled if name.startswith("kinect")]
+    prefix = "abs_rel_median-scaled_kinect"
+    worst = max(value for key, value in ours.items() if key.startswith(prefix))
     return (
-        "**The depth network saw rendered rooms only.** Scaled by the median, its mean relative error is "
-        f"{min(held_out):.3f} to {max(held_out):.3f} in rooms that it never saw; on real frames "
-        + listed([f"{scaled[name]:.3f} (as it comes {raw[name]:.2f}) on {name}" for name in real])
-        + ". A sensor has to align it."
+        "**The depth network learned from rendered rooms.** On real frames its relative error is up to "
+        f"{worst:.3f}, even scaled by the median ({_link('all sets', 'inferred-depth-the-thesiss-claims')})."
     )
 
 
 def _filling(runs: list[Row]) -> str:
-    """Ours beside the flat guess and the best that needs no network, by group of images."""
-    parts = []
-    for group in dict.fromkeys(run["group"] for run in runs if run.get("group", "").endswith(", hidden")):
-        errors = {run["program"]: run for run in runs if run.get("group") == group}
-        peers = [run for name, run in errors.items() if name not in NETWORK_FILLERS]
-        best = min(peers, key=lambda run: run["abs_rel"])
-        shown = (
-            ("completion", errors[OURS]),
-            (NETWORK, errors[NETWORK]),
-            ("a flat guess", errors[FLAT]),
-            (best["program"], best),
-        )
-        cells = ", ".join(f"{name} {tables.error(run)}" for name, run in shown)
-        parts.append(f"{group.removesuffix(', hidden')}: {cells}")
+    """Compare our completion with one depth everywhere, in the first group of images with hidden depth."""
+    group = next(run["group"] for run in runs if run.get("group", "").endswith(", hidden"))
+    errors = {run["program"]: run["abs_rel"] for run in runs if run.get("group") == group}
     return (
-        "**What fills holes.** Relative error over all hidden pixels by completion, by the colour network "
-        "alone, by one depth everywhere through the same alignment, and by the best of the rest: "
-        f"{'; '.join(parts)}."
-    )
-
-
-def _exchange(numbers: Row) -> str:
-    """The headline of the experiment with losses."""
-    rates, aim = numbers["D01"], numbers["D02"]
-
-    def rate(coding: str) -> str:
-        name = f"points_per_percent_{coding}_fused"
-        low, high = rates["ci95"][name]
-        return f"{rates['ours'][name]:.3f} [{low:.3f}, {high:.3f}]"
-
-    kept, ratio = aim["ours"]["kept_layered"], aim["ours"]["bytes_over_jpeg"]
-    sure = "" if rates["verdict"] == "holds" else "; which of them costs least is not certain"
-    return (
-        f"**What a lost packet costs.** One per cent of lost packets costs {rate('raw')} points of F-score "
-        f"at 5 cm with raster, {rate('tiles')} with tiles, {rate('layered')} layered (95 % over seeds and "
-        f"rigs){sure}. At 10 % burst loss the layered coding keeps {100.0 * kept:.1f} % of the lossless "
-        f"F-score at {ratio:.2f} times the bytes of JPEG with RVL."
+        "**Completion hardly beats a flat guess.** Its error in hidden holes of "
+        f"{group.removesuffix(', hidden')} is {errors[OURS] / errors[FLAT]:.2f} times that of one depth "
+        f"everywhere ({_link('all programs', 'filling-holes')})."
     )
 
 
 def _unreproduced(claims: Row) -> str:
-    by_verdict: dict[str, list[str]] = {word: [] for word in VERDICTS}
-    for name in sorted(claims):
-        by_verdict[claims[name]["verdict"]].append(name)
-    reproduced, missing, defined, untested = (by_verdict[word] for word in VERDICTS[:4])
+    missing = [name for name, claim in claims.items() if claim["verdict"] == VERDICTS[1]]
     everyone = {name for name in CLAIMS if not is_beyond(name)}
     waiting = sorted(everyone - set(claims))
     sentence = (
-        f"**The thesis's claims.** Of {len(everyone)}, {len(claims)} are on record: {len(reproduced)} "
-        f"reproduced, {len(defined)} true by definition, {len(untested)} that nothing here can test; not "
-        f"reproduced: {listed(missing)}. [Why](docs/results.md)."
+        f"**Not every claim of the thesis reproduces.** {len(missing)} of {len(everyone)} do not "
+        f"({_link('which, and why', 'registration-the-thesiss-claims')})."
     )
     return sentence + (f" Not measured since the last change: {listed(waiting)}." if waiting else "")
+
+
+def _link(text: str, heading: str) -> str:
+    return f"[{text}](docs/results.md#{heading})"

@@ -25,14 +25,14 @@ DECIMAL = re.compile(r"\d+\.\d+")
 
 
 def changed(value, factor=13.7):
-    """The same numbers, all of them others."""
+    """The same numbers, all of them others, and so are their ratios."""
     if isinstance(value, dict):
         return {key: item if key in {"title", "header"} else changed(item) for key, item in value.items()}
     if isinstance(value, list):
         return [changed(item) for item in value]
     if isinstance(value, str):
         return DECIMAL.sub(lambda found: f"{factor * float(found[0]):.{len(found[0].split('.')[1])}f}", value)
-    return factor * value if isinstance(value, float) else value
+    return factor * value + 1.0 if isinstance(value, float) else value
 
 
 def other(record):

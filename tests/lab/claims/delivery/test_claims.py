@@ -10,7 +10,7 @@ from lab.claims.delivery import cameras, pieces
 from lab.claims.delivery.claims import CLAIMS
 from lab.claims.delivery.setup import loss_tasks, send_tasks
 from lab.claims.delivery.study import Study
-from lab.results.pages import readme_results, results_page
+from lab.results.pages import results_page
 from lab.results.record import Record, rounded
 from packetmesh.files import finite
 
@@ -184,7 +184,7 @@ def test_d07_follows_how_worth_and_sight_go_together():
     assert found["points_per_joule_best_quarter"] > found["points_per_joule_all"]
 
 
-def test_the_page_and_the_readme_state_the_exchange_rate():
+def test_the_page_states_the_exchange_rate():
     verdicts = judged(made_up())
     found = {rig: (choice(SEES_MOST_FIRST), SCORES) for rig in RIG_LEVELS}
     verdicts["D08"] = cameras.D08.judge(found)
@@ -194,10 +194,9 @@ def test_the_page_and_the_readme_state_the_exchange_rate():
         record = finite(verdict.record())
         numbers[name] = record | {"tables": [e for e in record["exhibits"] if "header" in e]}
     record = Record("delivery_claims", "packetmesh", "abc1234", "2026-01-01", {}, "2 cores", rounded(numbers))
-    (sentence,) = (line for line in readme_results({record.name: record}) if "lost packet" in line)
-    assert "0.300 [0.300, 0.300] points of F-score at 5 cm with raster" in sentence
-    assert "0.100 [0.100, 0.100] layered" in sentence
     page = results_page({record.name: record})
+    assert "0.300 [0.300, 0.300] points raw" in page
+    assert "0.100 [0.100, 0.100] points layered" in page
     for title in (
         "One per cent of lost packets",
         "What is left after losses",
