@@ -1,0 +1,1 @@
+"""Small faults planted into modules that hold formulae, to see whether their tests fail."""

@@ -1,0 +1,106 @@
+"""The mutations of a module: one operator, number or condition changed at one place."""
+
+from __future__ import annotations
+
+import ast
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator, operator_names
+
+GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "registration": (("pipeline/registration/*.py",), ("tests/pipeline/registration",)),
+    "pivoting": (
+        ("pipeline/surface/pivoting/*.py",),
+        (
+            "tests/pipeline/surface/test_ball_pivoting.py",
+            "tests/pipeline/surface/test_pivoting_guarantees.py",
+            "tests/pipeline/surface/test_pivoting_shapes.py",
+        ),
+    ),
+    "depth": (("pipeline/depth/*.py",), ("tests/pipeline/depth",)),
+    "calibration": (("pipeline/calibration/*.py",), ("tests/pipeline/calibration",)),
+    "mac": (("network_sim/mac/*.py",), ("tests/network_sim/mac", "tests/network_sim/radio")),
+    "delivery": (("pipeline/delivery/*.py",), ("tests/pipeline/delivery", "tests/pipeline/test_deliver.py")),
+    "web": (
+        ("app/web/entrance.py", "app/web/uploads.py", "app/web/upload_gate.py"),
+        (
+            "tests/app/web/test_entrance.py",
+            "tests/app/web/test_uploads.py",
+            "tests/bad_input/test_uploads.py",
+        ),
+    ),
+}
+"""Modules by group, and the tests that ought to see a fault in them."""
+SKIPPED = (
+    *("Bit", "Shift", "Mod", "Invert"),  # nobody writes these by mistake, and any test sees them
+    *("RemoveDecorator", "ExceptionReplacer"),  # a decorator compiles; no formula names an exception
+)
+"""Parts of the names of operators that are left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mutation:
+    """One fault at one place."""
+
+    group: str
+    path: str
+    """Of the module, relative to the repository."""
+    operator: str
+    occurrence: int
+    line: int
+
+    @property
+    def name(self) -> str:
+        """Short name that stays while the module does."""
+        return f"{self.path} {self.operator.partition('/')[2]} {self.occurrence}"
+
+    def applied(self, code: str) -> str:
+        """Return the module's code with the fault."""
+        mutated: str = mutate_code(code, get_operator(self.operator)(), self.occurrence)
+        return mutated
+
+
+def draw(root: Path, count: int, seed: int) -> list[Mutation]:
+    """Return ``count`` mutations, drawn evenly from those of all groups, in the order of drawing."""
+    everything = [one for group in GROUPS for one in mutations(root, group)]
+    return random.Random(seed).sample(everything, min(count, len(everything)))
+
+
+def mutations(root: Path, group: str) -> Iterator[Mutation]:
+    """Yield all mutations of a group's modules, but those in annotations and checks of types."""
+    for pattern in GROUPS[group][0]:
+        for path in sorted(root.glob(pattern)):
+            code = path.read_text(encoding="utf-8")
+            untested = _annotation_lines(code)
+            nodes = list(ast_nodes(get_ast(code)))
+            for name in operator_names():
+                operator = get_operator(name)
+                if any(one in name for one in SKIPPED) or operator.arguments():
+                    continue
+                places = (place for node in nodes for place in operator().mutation_positions(node))
+                for occurrence, (start, _) in enumerate(places):
+                    if start[0] not in untested:
+                        yield Mutation(group, str(path.relative_to(root)), name, occurrence, start[0])
+
+
+def _annotation_lines(code: str) -> set[int]:
+    """Return the lines of signatures' annotations, of asserts and of blocks for type checkers."""
+    lines = set[int]()
+    for node in ast.walk(ast.parse(code)):
+        spans = list[ast.AST | None]()
+        if isinstance(node, ast.FunctionDef):
+            spans += [arg.annotation for arg in node.args.args + node.args.kwonlyargs]
+            spans.append(node.returns)
+        elif isinstance(node, ast.Assert):
+            spans = [node]
+        elif isinstance(node, ast.If) and isinstance(node.test, ast.Name):
+            spans = [node] if node.test.id == "TYPE_CHECKING" else []
+        for span in spans:
+            if span is not None:
+                lines.update(range(span.lineno, (span.end_lineno or span.lineno) + 1))  # type: ignore[attr-defined]
+    return lines
