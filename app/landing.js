@@ -1,22 +1,22 @@
-// The landing: a click opens a lesson or a scene, as hands would; Escape leaves to the scene behind it.
+// The landing page: a click opens a lesson or a scene; Escape closes the page and shows the scene behind it.
 (() => {
   const landing = document.getElementById("packetmesh-landing");
   if (!landing) return;
 
   const POLL_MS = 50;
-  const POLL_TRIES = 1200; // a slow machine takes its time to begin
-  // Do something with what there is to be, once it is there.
+  const POLL_TRIES = 1200; // slow machines need minutes to start
+  // Call `act` with the result of `find` as soon as there is one.
   function once(find, act, tries = POLL_TRIES) {
     const found = find();
     if (found) act(found);
     else if (tries > 0) setTimeout(once, POLL_MS, find, act, tries - 1);
   }
 
-  const shared = "lecture" in landing.dataset; // a session that has no address of its own
+  const shared = "lecture" in landing.dataset; // a lecture's session has no address of its own
 
   function leave() {
     landing.remove();
-    if (shared) history.replaceState(null, "", location.pathname); // or a reload would lead here again
+    if (shared) history.replaceState(null, "", location.pathname); // or a reload would show the landing again
     window.removeEventListener("keydown", escape, true);
   }
 
@@ -55,6 +55,6 @@
     else leave();
   });
   window.addEventListener("keydown", escape, true);
-  landing.inert = false; // nobody clicks in vain before this
+  landing.inert = false; // earlier clicks would have no effect
   landing.querySelector("[data-explore]").focus();
 })();

@@ -1,8 +1,8 @@
-"""The page that a browser gets: viser's, with the app's scripts and styles, and the landing over it, which
-offers the lessons and the scenes, each with a picture, while the first scene loads.
+"""The page that a browser gets: viser's, with the app's scripts and styles, and over it the landing, which
+offers lessons and scenes with pictures while the first scene loads.
 
-The landing is a part of the page itself, so that it is there before viser is. An address with anything behind
-a question mark goes past it; in a lecture only the teacher's link shows it, without the scenes.
+The landing is part of the page itself, so it is shown before viser starts. An address with a query skips it;
+in a lecture only the teacher's link shows it, without the scenes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from app.web.page import Page
 from pipeline.io.demos import DEMO_SCENES
 
 PICTURES = Path(__file__).resolve().parents[1] / "assets" / "landing"
-"""``NAME.jpg`` of every lesson and scene."""
+"""Folder of ``NAME.jpg`` of every lesson and scene."""
 LESSON_PLACES = {
     "can-a-picture-measure": ("living-room", "depth"),
     "icp-against-ceicp": ("living-room", "fuse"),
@@ -26,7 +26,7 @@ LESSON_PLACES = {
     "what-one-lost-packet-costs": ("living-room", "network"),
     "how-good-is-my-calibration": ("uncalibrated", "calibrate"),
 }
-"""The scene that each lesson speaks of and its screen, in the order in which they are offered."""
+"""Scene and screen of each lesson, in the order in which the lessons are offered."""
 
 _HERE = Path(__file__).parent
 SCRIPTS = tuple(
@@ -36,7 +36,7 @@ SCRIPTS = tuple(
         *("session/address", "lesson/lesson", "session/lecture", "screens/fuse/board", "landing"),
     )
 )
-"""In the order in which they run."""
+"""Scripts in the order in which they run."""
 STYLES = tuple(
     _HERE / f"{name}.css"
     for name in (
@@ -47,16 +47,16 @@ STYLES = tuple(
 
 
 def app_page(lecture: bool) -> Page:
-    """Return the page of the app; in a lecture only the teacher is greeted.
+    """Return the app's page; in a lecture only the teacher sees the landing.
 
     Raises:
-        InputError: the installed viser has another page than those that are known.
+        InputError: the installed viser has an unknown page.
     """
     return Page(SCRIPTS, STYLES, {WELCOME if lecture else "/": landing_html(lecture)})
 
 
 def landing_html(lecture: bool = False) -> Markup:
-    """The screen: what stands over viser's page; its style and script are among the page's (``page.py``)."""
+    """Return the landing's HTML; its style and script are among the page's files."""
     lessons = Markup("").join(
         _card(name, _title(name), f"scene={scene}&screen={screen}", lesson=True)
         for name, (scene, screen) in LESSON_PLACES.items()
@@ -74,13 +74,13 @@ def landing_html(lecture: bool = False) -> Markup:
 
 
 def _title(lesson: str) -> str:
-    """The title that the lesson's file begins with."""
+    """Return the title in the first line of a lesson's file."""
     text = (LESSONS / f"{lesson}.md").read_text(encoding="utf-8")
     return text.partition("\n")[0].removeprefix("# ").strip()
 
 
 def _card(name: str, title: str, place: str, lesson: bool = False) -> Markup:
-    """A button that leads to a place, by its address; and there to the lesson of that title."""
+    """Return a button that opens a place by its address and, for a lesson, the lesson of that title."""
     picture = base64.b64encode((PICTURES / f"{name}.jpg").read_bytes()).decode()
     image = Markup('<img alt="" src="data:image/jpeg;base64,{}">').format(picture)
     data = Markup('data-place="{}"').format(place)

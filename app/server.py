@@ -1,4 +1,4 @@
-"""The web server: one session a browser, loopback by default, nothing left behind when it stops."""
+"""The web server: one session per browser, loopback by default, and no files left after it stops."""
 
 from __future__ import annotations
 
@@ -49,16 +49,16 @@ from pipeline.sources import Demo, RigFolder
 
 PANEL_WIDTH_PX = 440
 ANYWHERE = "0.0.0.0"
-"""As a host: all addresses of this machine."""
+"""Host that stands for all addresses of this machine."""
 FULL = (
     f"There is room for {MOST_SESSIONS} browsers, {MOST_OF_ONE_ADDRESS} of them from one address, each with "
     "a reconstruction of its own, and all places are taken. You come in automatically as soon as one is "
     "free. With `packetmesh serve --lecture` all browsers share one reconstruction."
 )
 TRY_AGAIN = 1013
-"""Code with which a connection is closed, after which a page tries again by itself."""
+"""Websocket close code after which a page tries again to connect."""
 PANELS = (ScenePanel, CalibratePanel, DepthPanel, FusePanel, SurfacePanel, NetworkPanel, ExportPanel)
-"""The steps of the app, in their order."""
+"""The app's steps in order."""
 
 
 @dataclass(slots=True)
@@ -74,27 +74,27 @@ class AppServer:
 
     @property
     def url(self) -> str:
-        """Where a browser of this machine finds it."""
+        """Address for browsers on this machine."""
         return self._at(lambda: "127.0.0.1")
 
     @property
     def link(self) -> str:
-        """By which a browser of this machine comes in."""
+        """Link for browsers on this machine, with the token if one is needed."""
         return self.url + _behind(self.entrance.visitor)
 
     @property
     def class_link(self) -> str:
-        """By which browsers of other machines come in, if it listens to them."""
+        """Link for browsers on other machines, if the server listens to them."""
         return self._at(own_address) + _behind(self.entrance.visitor)
 
     @property
     def teacher_url(self) -> str:
-        """By which the teacher of a lecture comes."""
+        """Link of a lecture's teacher."""
         return self.url + _behind(self.entrance.teacher)
 
     @property
     def owners(self) -> list[object]:
-        """Whose jobs run in the pool: the sessions', and its own before the first of them."""
+        """Owners of the pool's jobs: the sessions, and this server for the jobs before the first session."""
         return [self, *(owner for session in list(self.sessions.values()) for owner in session.owners)]
 
     def _at(self, anywhere: Callable[[], str]) -> str:
@@ -102,7 +102,7 @@ class AppServer:
         return f"http://{anywhere() if host == ANYWHERE else host}:{port}"
 
     def stop(self) -> None:
-        """End all sessions and processes."""
+        """Stop all sessions and processes and delete the server's folder."""
         self.crowd.close()
         for session in list(self.sessions.values()):
             session.close()
@@ -121,23 +121,23 @@ def build_server(
     with_token: bool = True,
     pool: ComputePool | None = None,
 ) -> AppServer:
-    """Start serving and return at once.
+    """Start a server and return at once.
 
     Args:
         scene: name of a demo scene, or a rig folder.
         config: settings to start with; None takes the preset ``packetmesh``.
         host: address to listen on.
         port: port to listen on; 0 lets the system choose one.
-        lecture: share one session among all browsers, steered by those who come by ``teacher_url``.
-        with_token: let only those in who come by ``class_link``, where other machines reach the host.
-        pool: one that was started before; None starts one. It ends with the server.
+        lecture: share one session among all browsers, steered by those that open ``teacher_url``.
+        with_token: admit only browsers that open ``class_link``, if other machines can reach the host.
+        pool: a pool that is already started; None starts one. It stops with the server.
 
     Raises:
-        InputError: the port is taken, the address is not this machine's, or the installed viser is not known.
-        OSError: there is no place for the server's folder.
+        InputError: the port is taken, the address is not this machine's, or the installed viser is unknown.
+        OSError: the server's folder cannot be made.
     """
     _check_address(host, port)
-    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a port scan is no reason for a stack trace
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a port scan needs no stack trace
     share_arenas()
     page = app_page(lecture)
     spec = start_spec(scene, config or PipelineConfig())
@@ -173,7 +173,7 @@ def build_server(
 
 
 def _listening(host: str, port: int, door: Door, entrance: Entrance, page: Page) -> viser.ViserServer:
-    """A server whose answers pass these rules, each before those after it."""
+    """Return a server whose requests pass these checks in this order."""
     with contextlib.ExitStack() as outermost_first:
         for answers in (
             well_formed(),
@@ -189,10 +189,10 @@ def _listening(host: str, port: int, door: Door, entrance: Entrance, page: Page)
 
 
 def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session]) -> None:
-    """Give every browser a session of its own, as long as it is there and there is room."""
+    """Give every browser its own session while it is connected and there is room."""
     server = app.viser_server
     notes = dict[int, Any]()
-    """What those who wait were told."""
+    """Notifications of the waiting browsers."""
 
     def leave(client: viser.ClientHandle) -> None:
         app.crowd.leave(client.client_id)
@@ -211,7 +211,7 @@ def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session])
         except OSError as error:
             client.add_notification("You cannot come in", file_trouble(error), color="red")
             return None
-        if client.client_id not in server.get_clients():  # it left before its session was there
+        if client.client_id not in server.get_clients():  # it left before its session was built
             leave(client)
         return built
 
@@ -219,7 +219,7 @@ def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session])
         title = "You wait for a place"
         notes[client.client_id] = client.add_notification(title, FULL, auto_close_seconds=None)
 
-    async def come(client: viser.ClientHandle) -> None:  # on the connections' own thread: it is quick
+    async def come(client: viser.ClientHandle) -> None:  # quick, so it runs on the connections' thread
         number = client.client_id
         app.crowd.come(
             Visitor(
@@ -243,22 +243,22 @@ def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session])
 
 
 def _behind(token: Token | None) -> str:
-    """What stands behind an address to come in."""
+    """Return the part of an address that admits a browser."""
     return "" if token is None else f"/{token.query}"
 
 
 def start_spec(scene: str, config: PipelineConfig) -> Spec:
-    """What a session wants first: a demo scene by name or a rig folder, with these settings."""
+    """Return the start spec: a demo scene by name or a rig folder, with these settings."""
     preset = next((name for name, known in PRESETS.items() if known == config), "packetmesh")
     source = RigFolder(str(Path(scene).resolve())) if Path(scene).is_dir() else Demo(scene)
     return Spec(source, preset, config)
 
 
 def own_address() -> str:
-    """The address by which other machines of the network reach this one; loopback if it has none."""
+    """Return the address at which the network's other machines reach this one; loopback if it has none."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(("192.0.2.1", 9))  # sends nothing, but is told which way it would go
+            probe.connect(("192.0.2.1", 9))  # sends nothing, but finds the route
             return str(probe.getsockname()[0])
         except OSError:
             return "127.0.0.1"
@@ -286,12 +286,12 @@ def _taken(port: int) -> str:
 
 
 def _dress(server: viser.ViserServer) -> None:
-    """Name, colours and place of the control panel; no tunnel to the outside."""
+    """Set the name, colours and place of the control panel; disable sharing through an outside server."""
     server.gui.configure_theme(
         control_width="large", show_logo=False, show_share_button=False, brand_color=BRAND
     )
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(PANEL_WIDTH_PX)
     server.scene.set_up_direction("+z")
-    server.scene.configure_default_lights(cast_shadow=False)  # costly to draw in software
+    server.scene.configure_default_lights(cast_shadow=False)  # shadows are costly to render in software
     setattr(server, "request_share_url", lambda *_, **__: None)  # noqa: B010

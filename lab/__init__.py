@@ -1,1 +1,1 @@
-"""What makes or judges and is not the product: worlds, data sets, training, claims and benchmarks."""
+"""Everything that makes or evaluates the product: worlds, data sets, training, claims and benchmarks."""

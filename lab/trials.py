@@ -1,7 +1,7 @@
-"""Trials of claims: one store, one digest of what they depend on, one pool.
+"""Run the trials of claims, store their results, and skip those that are already stored.
 
-A trial is a function of a task. Its result is a line of JSON in a file named by the function and the digest
-of its code, so that an interrupted run resumes, and a result never outlives the code that made it.
+A trial is a function of a task. Its result is a line of JSON in a file named by the function and a digest of
+its code: an interrupted run resumes, and changed code starts a new file.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ LIBRARIES = (
     "simpy",
     "small-gicp",
 )
-"""Those whose version can change a result, as far as they are installed."""
+"""Libraries whose version can change a result; those that are not installed are skipped."""
 
 
 def iterate_trials(
@@ -49,16 +49,17 @@ def iterate_trials(
     processes: int | None = None,
     data: Iterable[Path] = (),
 ) -> Generator[Progress, None, list[Any]]:
-    """Compute every task whose result is not in ``folder`` yet, storing each as it comes.
+    """Compute every task whose result is not in ``folder`` yet, and store each result at once.
 
     Args:
-        stage: names the trials in the progress.
-        function: importable by its name, as other processes call it; gives plain values (NaN becomes None).
-        tasks: frozen records or tuples; their ``repr`` says everything that a result depends on beside the
-            code and the data.
-        folder: keeps the results; made when it is missing.
+        stage: name of the trials in the progress reports.
+        function: importable by its name, because other processes call it; returns plain values (NaN becomes
+            None).
+        tasks: frozen records or tuples; their ``repr`` contains everything that a result depends on besides
+            the code and the data.
+        folder: folder of the results; made if it is missing.
         scheduler: address of a Dask scheduler; None takes processes on this machine.
-        processes: on this machine; None takes one for each core.
+        processes: number of processes on this machine; None takes one per core.
         data: files that results depend on, or folders of them.
 
     Returns:
@@ -88,7 +89,7 @@ def iterate_trials(
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Results by task; a half-written last line is cut off, and a line that is no result is left out."""
+    """Return results by task; a half-written last line is cut off, and invalid lines are ignored."""
     if not path.exists():
         return {}
     contents = path.read_bytes()
@@ -108,13 +109,13 @@ def _read(path: Path) -> dict[str, Any]:
 
 @cache
 def trial_digest(module: str, data: tuple[Path, ...] = (), root: Path = ROOT) -> str:
-    """Twelve digits that change with what a trial depends on beside its task.
+    """Return twelve digits that change with everything that a trial depends on besides its task.
 
-    That is the code of its module and of all of ours that it imports, directly or not, but not comments and
-    docstrings; Python and the libraries, by version; and the data.
+    That is the code of its module and of all our modules that it imports, directly or not, without comments
+    and docstrings; the versions of Python and the libraries; and the data.
 
     Args:
-        module: where the trial's function is defined.
+        module: module that defines the trial's function.
         data: files and folders.
         root: folder of our packages.
     """
@@ -129,7 +130,7 @@ def trial_digest(module: str, data: tuple[Path, ...] = (), root: Path = ROOT) ->
 
 
 def _imported(module: str, root: Path) -> dict[str, ast.Module]:
-    """The syntax trees of a module and of every module of ours that it needs, by name."""
+    """Return the syntax trees of a module and of every module of ours that it needs, by name."""
     found: dict[str, ast.Module] = {}
     waiting = [module]
     while waiting:
@@ -149,14 +150,14 @@ def _imported(module: str, root: Path) -> dict[str, ast.Module]:
 
 
 def _source(module: str, root: Path) -> Path | None:
-    """The file of one of our modules; None for another's, or for what is no module."""
+    """Return the file of one of our modules; None for other modules or names."""
     path = root.joinpath(*module.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     return file if module.partition(".")[0] in PACKAGES and file.is_file() else None
 
 
 def library_versions(libraries: Iterable[str] = LIBRARIES) -> dict[str, str]:
-    """Versions of Python and of those of the libraries that are installed."""
+    """Return the versions of Python and of the installed ones of these libraries."""
     versions = {"python": platform.python_version()}
     for library in libraries:
         with suppress(metadata.PackageNotFoundError):

@@ -1,7 +1,7 @@
-"""The command line: one file a command; heavy imports happen inside the command that needs them.
+"""The command line, one file per command; heavy imports are inside the command that needs them.
 
-Exit code 0: done; 1: it could not be done, one sentence says why; 2: wrong use.
-With ``--json`` exactly one JSON object goes to stdout; everything else goes to stderr.
+Exit codes: 0 for success; 1 for a failure, with one sentence on its cause; 2 for wrong use. With ``--json``
+exactly one JSON object goes to stdout; everything else goes to stderr.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 def main(argv: list[str] | None = None) -> None:
     """Run one command and exit with its code.
 
-    Computing processes import this module, as the main one of the program, and no command: hence no other
-    import above.
+    Computing processes import this module as the program's main module and need no command, so nothing else
+    is imported above.
     """
     from app.cli.commands import run
 

@@ -1,4 +1,4 @@
-"""``packetmesh bench``: speed and memory beside peers."""
+"""``packetmesh bench``: speed and memory, compared with other programs."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def bench(
 
 
 def _solve(folder: Path, out: Path) -> dict[str, object]:
-    """The rows of every problem below a folder, and what they come to."""
+    """Solve every problem below a folder. Returns the rows and their summary."""
     from lab.benchmarks.problems import iterate_problems, summary
     from packetmesh.files import write_rows
     from packetmesh.progress import drain
@@ -74,7 +74,7 @@ def _solve(folder: Path, out: Path) -> dict[str, object]:
 
 
 def _browsers(kind: Literal["load", "soak"], seconds: float) -> Benchmark:
-    """Thirty browsers at once; the time is the median from a click to its answer."""
+    """Return a benchmark of thirty browsers at once; its time is the median from a click to its answer."""
     from app.load.load import put_load, soak
     from lab.benchmarks.benchmark import Benchmark
 

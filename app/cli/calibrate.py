@@ -102,7 +102,7 @@ def calibrate(
 
 
 def _camera_lines(report: CameraReport) -> Iterator[str]:
-    """Parameters with their intervals, then the images."""
+    """Yield the parameters with their intervals, then the images."""
     found = report.calibration
     for name, (low, high) in found.intervals.items():
         yield f"{name:>4} {found.parameters[name]:12.5g}   95 %: {low:.5g} to {high:.5g}"
@@ -123,7 +123,7 @@ def _camera_lines(report: CameraReport) -> Iterator[str]:
 
 
 def _trust_lines(trust: Trust) -> Iterator[str]:
-    """What it is worth."""
+    """Yield the coverage, the views to leave out, and the verdict."""
     yield f"Points were seen in {100.0 * trust.coverage.share:.0f} % of the image"
     for one in trust.outliers:
         yield f"Perhaps leave out: {one.reason} (--without {one.name})"

@@ -1,4 +1,4 @@
-"""What ``packetmesh calibrate`` says of a depth sensor."""
+"""The part of ``packetmesh calibrate``'s output about a depth sensor."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def depth_lines(report: CameraReport) -> Iterator[str]:
-    """What the depth sensor is off by, and what is doubtful about its scale."""
+    """Yield the bias of the depth sensor, and doubts about its scale."""
     yield from report.depth_notes
     if report.depth is None:
         if report.depth_reason:

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 
 def several_cameras(images: Sequence[str]) -> tuple[NodeShots, ...]:
-    """The nodes whose folders are named; none where one camera's images are.
+    """Return the nodes whose folders are named; none if the images are of one camera.
 
     Raises:
-        InputError: folders without images, more than a rig has cameras, or only one camera below a folder.
+        InputError: folders without images, more cameras than a rig has, or only one camera below a folder.
     """
     from packetmesh.errors import InputError
     from pipeline.calibration.shots import node_folders, node_shots
@@ -52,20 +52,20 @@ def calibrate_cameras(
     depth_scale: float | None,
     json: bool,
 ) -> None:
-    """Estimate all lenses and poses together, and write a folder that is laid over a rig.
+    """Estimate all lenses and poses together, and write a folder that can be applied to a rig.
 
     Args:
-        nodes: their images.
-        out: Folder for node_00/{intrinsics.json, pose.txt, ...} and so on, and metrics.json.
-        board: What they show.
-        lens: Distortion of all cameras.
-        held_out: In so many turns moments are left out and predicted; 0 leaves out none.
-        range_m: Where the cameras will measure.
-        accuracy_m: Within what a point must be placed there.
-        without: Images to leave out, as node_01/color_03.png.
-        like: A rig in whose world the cameras are placed, by the pose of its first node.
-        depth_scale: Depth units in a metre; None takes whole numbers as millimetres.
-        json: Print everything as one JSON object.
+        nodes: images of the nodes.
+        out: folder for node_00/{intrinsics.json, pose.txt, ...} and so on, and metrics.json.
+        board: the photographed board.
+        lens: distortion model of all cameras.
+        held_out: number of folds in which moments are left out and predicted; 0 leaves out none.
+        range_m: distance at which the cameras will measure.
+        accuracy_m: largest allowed error of a point there.
+        without: images to leave out, as node_01/color_03.png.
+        like: a rig in whose world frame the cameras are placed, by the pose of its first node.
+        depth_scale: depth units per metre; None takes whole numbers as millimetres.
+        json: print everything as one JSON object.
     """
     from app.reports.calibration import write_calibration_report
     from packetmesh.files import writable_folder
@@ -92,7 +92,7 @@ def calibrate_cameras(
 
 
 def _lines(report: RigReport, trust: Mapping[str, Trust]) -> Iterator[str]:
-    """Each camera in a line, then each pair."""
+    """Yield a line per camera, then a line per pair."""
     for name, one in report.cameras.items():
         found = one.calibration
         errors = found.standard_errors

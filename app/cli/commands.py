@@ -1,4 +1,4 @@
-"""All commands by their names, and how a run of one ends."""
+"""All commands by their names, and the exit code of a run."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def run(argv: list[str] | None) -> None:
     except PacketMeshError as error:
         say(f"packetmesh: {error}")
         sys.exit(1)
-    except BrokenPipeError:  # whoever read the output has gone, and wants no more of it
+    except BrokenPipeError:  # the reader of the output has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""``packetmesh deliver``: a rig's images through a network, and the surface of what has arrived."""
+"""``packetmesh deliver``: send a rig's images through a network and rebuild the surface from what arrives."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def deliver(
         network = replace(network, mac=replace(network.mac, kind="replay", trace=str(link_trace)))
     asked = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
     steps = iterate_delivery(asked, processes=min(2, os.cpu_count() or 1))
-    first = next(steps)  # what cannot be sent leaves no folder
+    first = next(steps)  # an error here leaves no folder
     writable_folder(out)
     _say_moment(first)
     delivery = drain(steps, _say_moment)
@@ -80,7 +80,7 @@ def deliver(
 
 
 def _settings(preset: str, chain: str, changes: tuple[str, ...]) -> tuple[NetworkConfig, PipelineConfig]:
-    """The network's and the chain's settings; every change goes to the one that has its key."""
+    """Return the network's and the chain's settings; each change goes to the one that has its key."""
     from network_sim.presets import PRESETS as NETWORKS
     from packetmesh.settings import config_named, settings, with_settings
     from pipeline.config import PRESETS

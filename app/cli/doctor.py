@@ -1,4 +1,4 @@
-"""``packetmesh doctor``: what this machine has, and what to do about what it lacks."""
+"""``packetmesh doctor``: checks of this machine, with advice on what is missing."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LINUX_LIBRARIES = "libgl1 libegl1 libx11-6 libidn2-0 libudev1 libgomp1"
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at."""
+    """The result of one check."""
 
     name: str
     ok: bool
@@ -49,7 +49,7 @@ def doctor(json: bool = False) -> None:
 
 
 def examine() -> list[Finding]:
-    """Look at everything the program leans on; never raises for what it finds."""
+    """Check everything that the program needs; a failed check raises no error."""
     return [
         finding
         for look in (_python, _machine, _packages, _open3d, _network, _scenes, _port, _browser)

@@ -1,4 +1,4 @@
-"""``packetmesh import``: other people's recordings as rigs."""
+"""``packetmesh import``: recordings in other formats as rigs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``packetmesh infer-depth``: photographs to depth images and coloured previews."""
+"""``packetmesh infer-depth``: depth images and coloured previews from photographs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pipeline.types import ByteArray, DepthMap
 
 FARTHEST_M = 65.534
-"""What 16 bits of millimetres hold; 65535 means unknown."""
+"""Largest depth in 16 bits of millimetres; 65535 means unknown."""
 PREVIEW_PERCENTILES = (2.0, 98.0)
 
 
@@ -90,7 +90,7 @@ def _inferred(
     depth_scale: float | None,
     fill: bool,
 ) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """Each photograph with what was made of it."""
+    """Infer each photograph; yield it with a record of the written files."""
     from pipeline.depth import align_depth
     from pipeline.io.images import read_color, read_depth_noted
 
@@ -115,7 +115,7 @@ def _inferred(
 
 
 def _alignment(result: AlignmentResult) -> dict[str, Any]:
-    """How depth was brought to the sensor's metres (SPEC 3.5); disparity has a line of its own."""
+    """Return the alignment of depth to the sensor's metres (SPEC 3.5); disparity has its own line."""
     return {
         "mode": result.mode,
         "coefficients": result.coefficients,
@@ -127,7 +127,7 @@ def _alignment(result: AlignmentResult) -> dict[str, Any]:
 def _filled(
     aligned: AlignmentResult, measured: DepthMap, rgb: ByteArray, network: DepthNetwork
 ) -> tuple[DepthMap, dict[str, Any]]:
-    """Measured depth with its holes filled: by completion, or by a network of one's own (SPEC 3.6)."""
+    """Fill the holes of measured depth: by completion, or by the user's own network (SPEC 3.6)."""
     import numpy as np
 
     from pipeline.config import DepthConfig
@@ -145,7 +145,7 @@ def _filled(
 
 
 def _written(depth: DepthMap, kind: ModelKind, out: Path, stem: str) -> dict[str, Any]:
-    """Writes the depth image and its preview; returns what they hold."""
+    """Write the depth image and its preview; return a record of their content."""
     import numpy as np
 
     from pipeline.io.images import write_color, write_depth_mm
@@ -162,14 +162,14 @@ def _written(depth: DepthMap, kind: ModelKind, out: Path, stem: str) -> dict[str
         values = 1.0 / depth.z_m if kind == "inverse" else depth.z_m
         record["unit"] = f"shares of the largest {'disparity' if kind == 'inverse' else 'depth'}"
         share = values.astype(np.float64) / np.nanmax(values)
-        # The writer's millimetres use all 16 bits; the least is 1 because 0 means unknown.
+        # The millimetres use all 16 bits; the least is 1 because 0 means unknown.
         write_depth_mm(image, DepthMap(np.maximum(FARTHEST_M * share, 0.001)))
     write_color(preview, _colored(depth))
     return record
 
 
 def _colored(depth: DepthMap) -> Any:
-    """(H, W, 3) the nearness 1/z, light where near; magenta where unknown."""
+    """Return (H, W, 3) the nearness 1/z: light where near, magenta where unknown."""
     import numpy as np
 
     from app.drawing.colors import HOLE

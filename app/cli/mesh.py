@@ -1,4 +1,4 @@
-"""``packetmesh mesh``: a ball rolls over a point cloud."""
+"""``packetmesh mesh``: a mesh from a point cloud by a rolling ball."""
 
 from __future__ import annotations
 

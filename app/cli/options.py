@@ -44,14 +44,14 @@ class SourceOptions:
     """A calibration's folder: its node_00/{intrinsics.json, pose.txt, ...} take the place of the own."""
 
     def source(self) -> FileSource:
-        """What they name; exits where they name nothing, or more than one thing."""
+        """Return the source that the options name; exit if they name none or more than one."""
         from pipeline.sources import Calibrated
 
         source = self._images()
         return source if self.calibration is None else Calibrated(source, str(self.calibration))
 
     def nothing_but_scale(self, option: str) -> None:
-        """Exit if they name anything; only the depth scale goes with this option."""
+        """Exit if they name any images; only the depth scale may be given with this option."""
         if replace(self, depth_scale=None) != SourceOptions():
             wrong_use(
                 f"{option} takes no other images: leave out --scene, --rig, --color and what goes with them"

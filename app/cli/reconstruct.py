@@ -1,4 +1,4 @@
-"""``packetmesh reconstruct``: the whole way from images to a surface."""
+"""``packetmesh reconstruct``: the whole chain from images to a surface."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def reconstruct(
 
 
 def imported_notes(report: dict[str, Any] | None) -> list[str]:
-    """What was made of a recording, and what had to be assumed."""
+    """Return sentences on the import of a recording and its assumptions."""
     if report is None:
         return []
     taken = f"imported as {len(report['frames'])} nodes of {report['candidates']} moments"
@@ -89,7 +89,7 @@ def _many(
     set: tuple[str, ...],
     json: bool,
 ) -> None:
-    """Every rig of a folder; exits with 1 if one failed."""
+    """Reconstruct every rig of a folder; exit with 1 if one failed."""
     config = with_settings(config_named(preset, PRESETS), set)
 
     from dataclasses import asdict
@@ -115,7 +115,7 @@ def _many(
 
 
 def say_places(placement: Placement) -> None:
-    """How far the nodes of a rig agree, and which found no place; exits with 1 if no two did."""
+    """Print how far the nodes of a rig agree and which have no pose; exit with 1 if no two agree."""
     from pipeline.placement.outcome import APART
 
     if len(placement.verdicts) < 2:

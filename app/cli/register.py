@@ -76,7 +76,7 @@ def register(
     for answer in run_draws(methods[0], pair, config) if alone else run_methods(methods, pair, config):
         answers.append(answer)
         say(f"{answer.method}: {answer.stop_reason}")
-    chosen_pose(answers)  # a run without a pose leaves no folder
+    chosen_pose(answers)  # raises without a pose, before a folder is made
     writable_folder(out)
     files = {"source": source, "target": target, "init": init, "truth": truth}
     command: dict[str, Any] = {name: None if path is None else str(path) for name, path in files.items()}
@@ -92,7 +92,7 @@ def register(
 
 
 def _parted(answer: Answer) -> str:
-    """That the draws of the points do not agree, and what may help."""
+    """Return a warning that random draws of the points disagree, with advice."""
     ends = f"end up to {100.0 * answer.spread_m:.1f} cm from this answer, not within 0.5 cm"
     if not math.isfinite(answer.spread_m):
         ends = "do not all find a pose"

@@ -1,4 +1,4 @@
-"""``packetmesh reproduce``: the thesis's claims beside ours."""
+"""``packetmesh reproduce``: the thesis's claims compared with our results."""
 
 from __future__ import annotations
 

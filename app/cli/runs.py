@@ -1,4 +1,4 @@
-"""One reconstruction with its folder and report, and many of them, each in a process of its own."""
+"""One reconstruction with its folder and report, and many of them, each in its own process."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ State = Literal["done", "kept", "failed"]
 
 @dataclass(frozen=True, slots=True)
 class RigTask:
-    """One rig or recording of many, and where its run is written."""
+    """One rig or recording of many, and the folder of its run."""
 
     name: str
     path: str
@@ -48,18 +48,18 @@ class RigTask:
     preset: str
     config: PipelineConfig
     depth_scale: float | None
-    """Depth units in a metre; None takes what the images or the kind of recording use."""
+    """Depth units per metre; None takes those of the images or the kind of recording."""
 
 
 @dataclass(frozen=True, slots=True)
 class RigOutcome:
-    """What became of one; shares from 0 to 1, NaN where it failed or does not apply."""
+    """Result of one task; shares from 0 to 1, NaN if it failed or has no such value."""
 
     name: str
     state: State
-    """``kept``: an earlier run with the same settings had done it."""
+    """``kept``: an earlier run with the same settings is complete."""
     sentence: str
-    """Why it failed, or which nodes are left out; empty if there is nothing to say."""
+    """The error, or the nodes that are left out; empty if there is neither."""
     nodes: int = 0
     no_hit_before: float = float("nan")
     no_hit_after: float = float("nan")
@@ -72,13 +72,13 @@ class RigOutcome:
 def iterate_run(
     source: FileSource, preset: str, config: PipelineConfig, out: Path, baseline: Baseline | None = None
 ) -> Generator[Progress, None, tuple[Reconstruction, dict[str, Any]]]:
-    """Reconstruct, and write a run folder with its report; images that cannot be used leave no folder.
+    """Reconstruct and write a run folder with its report; unusable images leave no folder.
 
-    A recording that is named as a rig is imported first, to ``out/imported``. With a baseline, its surface
-    is written, too.
+    A recording that is named as a rig is first imported to ``out/imported``. With a baseline, its surface is
+    written, too.
 
     Returns:
-        The reconstruction and its metrics, with what was imported.
+        The reconstruction and its metrics, with the import report.
 
     Raises:
         PacketMeshError: images, settings or a folder that cannot be used.
@@ -101,8 +101,8 @@ def iterate_run(
 def iterate_imported(
     source: FileSource, out: Path
 ) -> Generator[Progress, None, tuple[FileSource, ImportReport | None]]:
-    """The source itself, or the rig in ``out/imported`` that a recording is imported to, with what was found
-    in it.
+    """Return the source itself, or the rig in ``out/imported`` to which a recording is imported, with the
+    import report.
 
     Raises:
         PacketMeshError: a recording or a folder that cannot be used.
@@ -115,7 +115,7 @@ def iterate_imported(
         return source, None
     rig, new = out / IMPORTED, not out.exists()
     if rig.is_dir():
-        shutil.rmtree(rig)  # of an earlier run
+        shutil.rmtree(rig)  # from an earlier run
     try:
         steps = iterate_import(source.path, rig, depth_scale=source.depth_scale)
         report = yield from part(steps, f"import of {source.path}", 0.0, 0.05, detail=True)
@@ -127,10 +127,10 @@ def iterate_imported(
 
 
 def rigs_in(folder: Path) -> list[Path]:
-    """The rigs and recordings directly in a folder, by name.
+    """Return the rigs and recordings directly in a folder, sorted by name.
 
     Raises:
-        InputError: there is no such folder, or nothing of the kind in it.
+        InputError: there is no such folder, or it holds no rig or recording.
     """
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; give one that holds rigs or recordings")
@@ -146,13 +146,13 @@ def rigs_in(folder: Path) -> list[Path]:
 def iterate_rigs(
     tasks: list[RigTask], out: Path, scheduler: str | None
 ) -> Generator[Progress, None, tuple[RigOutcome, ...]]:
-    """Reconstruct all of them, on every core or on a Dask cluster that sees the same folders.
+    """Reconstruct all tasks, on every core or on a Dask cluster that sees the same folders.
 
-    One that fails leaves its sentence, and the others go on. However it ends, ``out`` gets a table of those
-    that were done.
+    A failed task gives a sentence, and the others continue. In every case ``out`` gets a table of the
+    completed tasks.
 
     Returns:
-        What became of each, in the order of the tasks.
+        The outcomes in the order of the tasks.
     """
     outcomes: dict[int, RigOutcome] = {}
     try:
@@ -172,9 +172,9 @@ def _killed(task: RigTask) -> RigOutcome:
 
 
 def reconstruct_one(task: RigTask) -> RigOutcome:
-    """Do one task, unless an earlier run has, and never raise for what is wrong with its images.
+    """Do one task unless an earlier run is complete; errors in its images are returned, not raised.
 
-    An error of the program itself leaves ``NAME.log`` beside the run's folder.
+    An error of the program itself is written to ``NAME.log`` next to the run's folder.
     """
     out = Path(task.out)
     log = out.with_name(f"{out.name}.log")
@@ -193,7 +193,7 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
         return RigOutcome(task.name, "failed", str(error))
     except OSError as error:
         return RigOutcome(task.name, "failed", f"{error.filename or task.path}: {error.strerror or error}")
-    except Exception as error:  # one rig must not end the others
+    except Exception as error:  # one rig must not stop the others
         with suppress(OSError):
             log.write_text(traceback.format_exc(), encoding="utf-8")
         said = f"An error of the program, {type(error).__name__}: {error}; see {log.name}"
@@ -201,12 +201,12 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
 
 
 def _record(task: RigTask) -> dict[str, Any]:
-    """What a run is of; as a file, written last, it says that all of it is there."""
+    """Return the inputs of a run; written last as a file, they mark the run as complete."""
     return {"path": task.path, "depth_scale": task.depth_scale, "settings": settings(task.config)}
 
 
 def _kept(task: RigTask) -> RigOutcome | None:
-    """What an earlier run of the same gave; None if there is none, or it is not whole."""
+    """Return the outcome of an earlier run with the same inputs; None if there is no complete one."""
     try:
         written = json.loads((Path(task.out) / TASK).read_text(encoding="utf-8"))
         if written != json.loads(json.dumps(_record(task))):
@@ -217,7 +217,7 @@ def _kept(task: RigTask) -> RigOutcome | None:
 
 
 def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome:
-    """The numbers of a run that stand in the table."""
+    """Return the numbers of a run for the table."""
     before, after, measured = metrics["surface_before"], metrics["surface_after"], metrics["measured"]
     numbers = (
         before["no_hit_ray_share"],
@@ -239,7 +239,7 @@ def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome
 
 
 def _write_picture(result: Reconstruction, out: Path) -> None:
-    """The surface as the first camera sees it, small."""
+    """Write a small picture of the surface as the first camera sees it."""
     rgb = mesh_picture(result.after, cameras_of(result.rig, result.placement)[0])
     height_px = round(rgb.shape[0] * PICTURE_WIDTH_PX / rgb.shape[1])
     small = cv2.resize(rgb, (PICTURE_WIDTH_PX, height_px), interpolation=cv2.INTER_AREA)
@@ -248,7 +248,7 @@ def _write_picture(result: Reconstruction, out: Path) -> None:
 
 
 def write_rigs_table(outcomes: tuple[RigOutcome, ...], out: Path) -> None:
-    """``rigs.json``, ``rigs.csv`` and ``rigs.html`` with a picture of each, which links its report."""
+    """Write ``rigs.json``, ``rigs.csv`` and ``rigs.html`` with a picture per rig that links to its report."""
     rows = [asdict(outcome) for outcome in outcomes]
     write_json(out / "rigs.json", finite(rows))
     lines = [",".join(rows[0]), *(",".join(_cell(value) for value in row.values()) for row in rows)]
@@ -258,7 +258,7 @@ def write_rigs_table(outcomes: tuple[RigOutcome, ...], out: Path) -> None:
 
 
 def _cell(value: str | float) -> str:
-    """A value in a CSV file."""
+    """Return a value as a CSV cell."""
     return '"' + value.replace('"', '""') + '"' if isinstance(value, str) else str(value)
 
 
@@ -298,7 +298,7 @@ HEADINGS = (
 
 
 def rigs_row(outcome: RigOutcome) -> tuple[str, ...]:
-    """One line of the table, as text."""
+    """Return one line of the table as text."""
     shares = (
         outcome.no_hit_before,
         outcome.no_hit_after,

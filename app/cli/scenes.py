@@ -1,4 +1,4 @@
-"""``packetmesh scenes``: what can be loaded."""
+"""``packetmesh scenes``: the list of demo scenes."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from packetmesh.settings import config_named
 from pipeline.config import PRESETS
 
 HEED_S = 0.2
-"""Between two looks whether somebody wants it to stop."""
+"""Time between two checks for a signal to stop."""
 ALONE = ", from this machine only; --host 0.0.0.0 lets others in"
 
 
@@ -43,7 +43,7 @@ def serve(
     stops = list[int]()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: stops.append(number))
-    pool = start_pool()  # it imports what it needs while this process does
+    pool = start_pool()  # imports while this process imports
     try:
         from app.server import build_server
         from app.web.entrance import is_loopback
@@ -64,7 +64,7 @@ def serve(
             say("Whoever reaches this address comes in")
         if open:
             webbrowser.open(app.teacher_url if lecture else app.link)
-        while not stops:  # to wait without an end is to sleep through a signal that another thread gets
+        while not stops:  # an endless wait would miss a signal that another thread gets
             time.sleep(HEED_S)
     finally:
         app.stop()

@@ -1,4 +1,4 @@
-"""``packetmesh simulate``: runs of the camera network, their metrics and the trace of the first."""
+"""``packetmesh simulate``: runs of the camera network, with metrics and the trace of the first run."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def _sweep(
 
 
 def _told(steps: Generator[Progress, None, Result]) -> Result:
-    """What a computation gives; every tenth of its progress is printed."""
+    """Run a computation and return its result; print every tenth of its progress."""
     printed = 0
     while True:
         try:

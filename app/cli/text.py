@@ -1,4 +1,4 @@
-"""What the command line says, as text."""
+"""Text output of the command line."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ from packetmesh.progress import Progress
 
 
 def say(text: str) -> None:
-    """A line on stderr, which leaves stdout to JSON and tables."""
+    """Print a line on stderr, so that stdout holds only JSON and tables."""
     sys.stderr.write(f"{text}\n")
     sys.stderr.flush()
 
 
 def say_progress(progress: Progress) -> None:
-    """How far a computation is."""
+    """Print the progress of a computation."""
     say(f"{progress.fraction:4.0%}  {progress.stage}")
 
 
 def wrong_use(sentence: str) -> NoReturn:
-    """Say what is wrong with the options and exit with 2."""
+    """Print the error in the options and exit with 2."""
     say(f"packetmesh: {sentence}")
     sys.exit(2)
 
 
 def print_json(value: Any) -> None:
-    """One strict JSON object on stdout."""
+    """Print one strict JSON object on stdout."""
     from packetmesh.files import finite
 
     sys.stdout.write(f"{json.dumps(finite(value), allow_nan=False)}\n")
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of a table, their columns as wide as what is in them."""
+    """Return the rows of a table as text, each column as wide as its widest cell."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
     return "\n".join(line.rstrip() for line in lines)
 
 
 def answers_table(metrics: dict[str, dict[str, Any]]) -> str:
-    """One line a method; centimetres and seconds."""
+    """Return a table with a line per method, in centimetres and seconds."""
     lengths = ["rmse_m", "average_hausdorff_m", "point_error_m"]
     lengths = [name for name in lengths if all(name in row for row in metrics.values())]
     headings = [f"{name.removesuffix('_m').replace('_', ' ')} cm" for name in lengths]
@@ -55,7 +55,7 @@ def answers_table(metrics: dict[str, dict[str, Any]]) -> str:
 
 
 def mesh_lines(report: dict[str, Any]) -> str:
-    """The quality of a mesh; millimetres and seconds."""
+    """Return the quality of a mesh as text, in millimetres and seconds."""
     from pipeline.surface.boundary import LONGEST_HOLE_M
 
     closed = "" if report["genus"] is None else f", closed, genus {report['genus']}"

@@ -1,3 +1,3 @@
-"""Heavy work in processes next to the server, its results, and what a session has of them. Imports nothing
-else of ``app``.
+"""Computing processes, their job queue, the store of results, and the state of a session's results. Imports
+nothing else of ``app``.
 """

@@ -1,4 +1,4 @@
-"""What the first browser will want, computed while it loads the page."""
+"""Compute the chain of the start settings while the first browser loads the page."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from app.compute.store import Store
 
 
 def compute_ahead(pool: ComputePool, store: Store, shared: SharedViews, spec: Spec, owner: object) -> None:
-    """Begin the chain and return; every view is there for the sessions to come, or is theirs to wait for.
+    """Start computing the chain and return at once. Sessions find each view in ``shared`` or wait for it.
 
-    What fails is left to them: they try again, and say why.
+    A failed step is not reported here: the first session that needs it tries it again and shows the error.
     """
     steps = iter(CHAIN)
 

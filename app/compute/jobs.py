@@ -1,7 +1,7 @@
-"""The door to the computing processes: the serving process names jobs and never imports what they need.
+"""Start jobs by name in the computing processes, so that the server never imports what the jobs need.
 
-A job is a function in a module of a screen whose name ends in ``job``, and its address is what stands
-behind ``app.screens.``: ``fuse.race_job:race_job``. The job of a step is ``STEP.job:STEP_job``.
+A job is a function in a module of a screen whose name ends in ``job``. Its address is the module path after
+``app.screens.`` and the function: ``fuse.race_job:race_job``. A step's job is ``STEP.job:STEP_job``.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ SCREENS = "app.screens"
 
 
 def run(job: str, *arguments: Any) -> Any:
-    """Start a job by its address, in a computing process."""
+    """Run the job with this address; called in a computing process."""
     module, _, function = job.partition(":")
     return getattr(importlib.import_module(f"{SCREENS}.{module}"), function)(*arguments)
 
 
 def run_step(step: str, *arguments: Any) -> Any:
-    """Start the job of a step."""
+    """Run the job of a step."""
     return run(f"{step}.job:{step}_job", *arguments)
 
 
 def start_pool() -> ComputePool:
-    """Computing processes that know every job; the first begins at once."""
+    """Start and return the pool of computing processes; each of them can run every job."""
     return ComputePool(size=max(2, (os.cpu_count() or 1) // 2), warm_up=warm_up)
 
 
 def warm_up() -> Iterator[None]:
-    """Import the first step's job, then all others and what is compiled, a little before each yield."""
+    """Import the first step's job, then all other jobs, then the compiled code, a part before each yield."""
     for step in CHAIN:
         importlib.import_module(f"{SCREENS}.{step}.job")
         yield

@@ -1,4 +1,4 @@
-"""Jobs of which only the newest counts."""
+"""Lanes of jobs in which a newer job replaces the older ones."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from app.compute.pool import ComputePool, Outcome, Ticket
 from app.compute.state import Step
 
 CANCEL_S = 1.0
-"""How long a cancelled job may go on before its process is ended, which costs everybody a new one."""
+"""Time that a cancelled job gets before its process is killed, seconds. A new process then has to start."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Waiting:
-    """A job that begins when the one before it has ended."""
+    """A job that starts when the running job of its lane has ended."""
 
     start: Callable[[], Ticket]
     on_end: Callable[[Outcome], None]
@@ -27,14 +27,14 @@ class _Waiting:
 class LatestWins:
     """A lane of one running and one waiting job; a newer job replaces the waiting one.
 
-    The running job is asked to stop when a newer one arrives. If it ends first its result is still
-    delivered, before the newer one's.
+    The running job is asked to stop when a newer one arrives. If it completes before it stops, its result is
+    still delivered, before the newer job's result.
     """
 
     pool: ComputePool
     owner: object
     urgent: bool = False
-    """Whether its jobs go before those of other lanes."""
+    """Whether the jobs of this lane start before waiting jobs of other lanes."""
     _running: Ticket | None = None
     _waiting: _Waiting | None = None
     _lock: threading.RLock = field(default_factory=threading.RLock)
@@ -51,7 +51,7 @@ class LatestWins:
         on_end: Callable[[Outcome], None],
         key: Hashable = None,
     ) -> None:
-        """Run this job as soon as the one before it is out of the way."""
+        """Start this job, or make it the waiting job and ask the running one to stop."""
         start = partial(
             self.pool.submit,
             self.owner,
@@ -70,11 +70,11 @@ class LatestWins:
         self.pool.stop(running)
 
     def stop(self) -> None:
-        """Forget the waiting job and ask the running one to stop at its next report."""
+        """Drop the waiting job and ask the running one to stop at its next progress report."""
         self._stop(None)
 
     def cancel(self) -> None:
-        """Have the running job ended within ``CANCEL_S``, and tell the waiting one that it does not begin."""
+        """Stop the running job within ``CANCEL_S`` and report the waiting one as stopped."""
         waiting = self._stop(CANCEL_S)
         if waiting is not None:
             waiting.on_end(Outcome("stopped"))
@@ -95,7 +95,7 @@ class LatestWins:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Submission:
-    """One time that a step was handed to its lane; the same step may be again, while this one is stopping."""
+    """A step submitted to its lane. It can be submitted again while its earlier job is stopping."""
 
     step: Step
     key: tuple[Any, ...]
@@ -103,14 +103,14 @@ class Submission:
 
 @dataclass(slots=True, eq=False)
 class Track:
-    """Steps that are computed one after the other, beside those of other tracks."""
+    """Steps that are computed one after the other, in parallel with the steps of other tracks."""
 
     lane: LatestWins
     steps: tuple[Step, ...]
     submitted: Submission | None = None
-    """What is running, or waits for the one before it to stop."""
+    """The submission that runs or waits for the one before it to stop."""
 
     @property
     def running(self) -> Step | None:
-        """The step that is computed now."""
+        """The submitted step; None if there is none."""
         return None if self.submitted is None else self.submitted.step

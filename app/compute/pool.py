@@ -1,8 +1,8 @@
-"""Heavy work in long-lived processes beside the server, so that no browser ever waits for another's.
+"""Run heavy jobs in long-lived processes outside the server, so that no browser waits for another's job.
 
-Open3D holds the interpreter lock, so nothing that computes runs in the serving process. A job is a
-module-level function and its arguments; if it returns a generator, what it yields is reported while
-it runs and the job can be stopped between two yields.
+Open3D holds the interpreter lock, so the server process computes nothing itself. A job is a module-level
+function and its arguments. If the function returns a generator, each value that it yields is sent as a
+progress report, and the job can be stopped between two yields.
 """
 
 from __future__ import annotations
@@ -29,53 +29,53 @@ from packetmesh.files import file_trouble
 logger = logging.getLogger(__name__)
 
 PATIENCE_S = 3.0
-"""How long a superseded job may go on before its process is ended."""
+"""Time that a superseded job gets to stop before its process is killed, seconds."""
 NICENESS = 5
-"""Of the computing processes, so that the serving one answers first."""
+"""Niceness of the computing processes: the server process gets the processor first."""
 RESPAWN_PAUSE_S = 1.0
-"""Before a process is started again that died before it was ready."""
+"""Pause before a process that died during start-up is started again, seconds."""
 MEMORY_LIMIT_BYTES = 2 << 30
-"""A process that holds more than this after a job is replaced by a fresh one."""
+"""Memory limit of a process: one that holds more after a job is replaced by a new process."""
 DIED = "The computing process ended unexpectedly, perhaps out of memory: try fewer points or a smaller ball."
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a job ended."""
+    """The end of a job: its result, its error, or that it was stopped."""
 
     kind: Literal["result", "error", "stopped"]
     value: Any = None
-    """The result, or the sentence that says what went wrong."""
+    """The result, or the error as a sentence."""
 
 
 @dataclass(slots=True, eq=False)
 class Ticket:
-    """One job from its submission to its end."""
+    """A submitted job, until it ends."""
 
     owner: object
-    """Whoever asks; an owner never has two jobs running at once."""
+    """Identifies who submitted the job; the pool never runs two jobs of one owner at once."""
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
     on_progress: Callable[[Any], None]
     on_end: Callable[[Outcome], None]
     key: Hashable = None
-    """What the result depends on, where others may ask for the same."""
+    """What the result depends on: jobs with equal keys are computed once. None: the job is never shared."""
     urgent: bool = False
-    """Whether it goes before those that are not."""
+    """Whether the job starts before waiting jobs that are not urgent."""
     stopping: bool = False
 
 
 @dataclass(slots=True, eq=False)
 class _Slot:
-    """One process of the pool and the job it has."""
+    """One process of the pool and the job that it runs."""
 
     process: BaseProcess | None = None
     connection: Connection | None = None
     ticket: Ticket | None = None
     ready: bool = False
     next_may_start: threading.Event = field(default_factory=threading.Event)
-    """Set once its process has nothing more to prepare, has died, or is not enough for the jobs there are:
-    what the next one imports would slow down the first job."""
+    """Set when the next process may start: this one has warmed up or died, or more jobs wait than there are
+    ready processes. Until then its imports would slow down the first job."""
 
 
 def _nothing() -> Iterator[None]:
@@ -83,9 +83,9 @@ def _nothing() -> Iterator[None]:
 
 
 class ComputePool:
-    """Spawned processes that take jobs in the order of submission, one at a time for each owner.
+    """Spawned processes that run jobs in the order of submission, one job of each owner at once.
 
-    What several ask for is computed once: whoever waits for the key of a job that runs gets what that gives.
+    Jobs with equal keys are computed once: a job whose key is being computed waits and gets that result.
     """
 
     def __init__(
@@ -94,9 +94,9 @@ class ComputePool:
         warm_up: Callable[[], Iterator[None]] = _nothing,
         patience_s: float = PATIENCE_S,
     ) -> None:
-        """``warm_up`` runs in each process: to its first yield before any job, on while none waits.
+        """Start the first process; each other starts when jobs wait or the processes before it are warm.
 
-        The first process starts at once, each other one when there is work for it or those before are warm.
+        Each process runs ``warm_up`` to its first yield before any job, and the later parts between jobs.
         """
         self._context = multiprocessing.get_context("spawn")
         self._warm_up = warm_up
@@ -124,7 +124,7 @@ class ComputePool:
         key: Hashable = None,
         urgent: bool = False,
     ) -> Ticket:
-        """Queue a job; the callbacks run on a thread of the pool and must be brief."""
+        """Queue a job. The callbacks run on a thread of the pool and must return quickly."""
         ticket = Ticket(owner, function, arguments, on_progress, on_end, key, urgent)
         with self._lock:
             if self._closed:
@@ -134,7 +134,7 @@ class ComputePool:
         return ticket
 
     def stop(self, ticket: Ticket, patience_s: float | None = None) -> None:
-        """Ask a job to stop at its next report; end its process if it is deaf for too long."""
+        """Ask a job to stop at its next progress report; kill its process after ``patience_s``."""
         if self._withdraw(ticket):
             return
         with self._lock:
@@ -149,19 +149,19 @@ class ComputePool:
         timer.start()
 
     def _end_process(self, ticket: Ticket) -> None:
-        """End a job with its process, if it still runs."""
+        """Kill the process of a job if the job still runs."""
         with self._lock:
             slot = self._slot_of(ticket)
             if slot is not None and slot.process is not None:
                 slot.process.terminate()
 
     def running(self) -> list[object]:
-        """The owners of the jobs that run now."""
+        """Return the owners of the running jobs."""
         with self._lock:
             return [slot.ticket.owner for slot in self._slots if slot.ticket is not None]
 
     def close(self) -> None:
-        """End all processes; jobs that have not ended are stopped."""
+        """Stop all processes; jobs that have not ended are reported as stopped."""
         with self._lock:
             self._closed = True
             self._closing.set()
@@ -176,7 +176,7 @@ class ComputePool:
             thread.join(timeout=5.0)
 
     def _withdraw(self, ticket: Ticket) -> bool:
-        """Drop a job that has not begun; False if it has."""
+        """Drop a job that has not started. Returns False if it has started."""
         with self._lock:
             if ticket not in self._waiting:
                 return False
@@ -188,7 +188,7 @@ class ComputePool:
         return next((slot for slot in self._slots if slot.ticket is ticket), None)
 
     def _dispatch(self) -> None:
-        """Give waiting jobs to free processes; the lock is held."""
+        """Give waiting jobs to free processes. The caller holds the lock."""
         for slot in self._slots:
             if slot.ticket is not None or not slot.ready:
                 continue
@@ -205,7 +205,7 @@ class ComputePool:
                     slot.next_may_start.set()
 
     def _free(self) -> list[Ticket]:
-        """The waiting jobs that may run now; who waits for what runs already counts as its owner, too."""
+        """Return the jobs that may start now; one that waits for an equal running job occupies its owner."""
         running = [slot.ticket for slot in self._slots if slot.ticket is not None]
         keys = {one.key for one in running} - {None}
         served = [one for one in self._waiting if one.key in keys]
@@ -213,7 +213,7 @@ class ComputePool:
         return [one for one in self._waiting if id(one.owner) not in owners and one not in served]
 
     def _attend(self, slot: _Slot, before: _Slot | None) -> None:
-        """Keep one process alive and hand on what it says, until the pool closes; after the one before."""
+        """Keep one process alive and handle its messages until the pool closes; wait for the slot before."""
         if before is not None:
             before.next_may_start.wait()
         while not self._closed:
@@ -235,7 +235,7 @@ class ComputePool:
             self._bury(slot)
 
     def _start(self, slot: _Slot) -> bool:
-        """Whether there is a new process: the system may have none to give just now."""
+        """Start a process. Returns False if the pool is closed or the system has no process to give."""
         with self._lock:
             if self._closed:
                 return False
@@ -277,11 +277,11 @@ class ComputePool:
                 _tell(one.on_end, Outcome(kind, value))  # type: ignore[arg-type]
 
     def _others(self, ticket: Ticket) -> list[Ticket]:
-        """Those who wait for the same; the lock is held."""
+        """Return the waiting jobs with the same key. The caller holds the lock."""
         return [one for one in self._waiting if one.key is not None and one.key == ticket.key]
 
     def _served(self, ticket: Ticket | None, kind: str) -> list[Ticket]:
-        """Those who wait no more, as a job ended that was theirs, too; the lock is held."""
+        """Remove and return the waiting jobs that this ended job also answers. The caller holds the lock."""
         others = [] if ticket is None or kind == "stopped" else self._others(ticket)
         self._waiting = [one for one in self._waiting if one not in others]
         return others
@@ -302,7 +302,7 @@ class ComputePool:
 
 
 def _send(slot: _Slot, message: tuple[str, Any]) -> None:
-    """Tell a process something; if it has just died, its attendant will notice."""
+    """Send a message to a process. If the process has just died, its attending thread will notice."""
     try:
         assert slot.connection is not None
         slot.connection.send(message)
@@ -311,7 +311,7 @@ def _send(slot: _Slot, message: tuple[str, Any]) -> None:
 
 
 def _tell(callback: Callable[[Any], None], what: Any) -> None:
-    """Hand on what a process says; a callback that fails must not end the thread that attends to it."""
+    """Call a callback; its errors are logged, so that they do not end the attending thread."""
     try:
         callback(what)
     except Exception:
@@ -326,7 +326,7 @@ def _memory_bytes(process: BaseProcess | None) -> int:
 
 
 def _child(connection: Connection, warm_up: Callable[[], Iterator[None]], threads: int) -> None:
-    """Main function of a computing process: take a job, report, repeat until the server is gone."""
+    """Run as the main function of a computing process: take jobs and report, until the server is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_server, daemon=True).start()
     if hasattr(os, "nice"):
@@ -351,19 +351,19 @@ def _child(connection: Connection, warm_up: Callable[[], Iterator[None]], thread
 
 
 def _goes_on(warming: Iterator[None]) -> bool:
-    """Warm up a little; whether there is more to do."""
+    """Run one part of the warm-up. Returns whether there is more."""
     try:
         next(warming)
     except StopIteration:
         return False
-    except Exception:  # it goes wrong again, and is reported, in the first job
+    except Exception:  # the first job fails in the same way and reports it
         traceback.print_exc()
         return False
     return True
 
 
 def _end_with_server() -> None:
-    """However it ends: a job that never reports would not notice."""
+    """End this process when the server ends: a job that never reports would not notice it."""
     server = multiprocessing.parent_process()
     assert server is not None
     server.join()
@@ -373,7 +373,7 @@ def _end_with_server() -> None:
 def _answer(
     connection: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]
 ) -> tuple[str, Any]:
-    """Run one job and say how it ended, in a message for the attendant."""
+    """Run one job. Returns its outcome as a message for the attending thread."""
     try:
         value = function(*arguments)
         while inspect.isgenerator(value):

@@ -1,4 +1,4 @@
-"""What the app shows of each stage: pictures, thinned clouds and numbers, small enough to send."""
+"""Results as the app shows them: pictures, thinned clouds and numbers, small enough to send to a browser."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from pipeline.types import ByteArray, FloatArray, IntArray, SurfaceQuality
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A cloud thinned for the screen."""
+    """A point cloud thinned for display."""
 
     points_m: FloatArray
     """(N, 3) float32."""
     colors: ByteArray | None
     """(N, 3) RGB."""
     total: int
-    """Points of the cloud it was taken from."""
+    """Number of points in the full cloud."""
 
 
 @dataclass(frozen=True, slots=True)
 class ColorBar:
-    """What the colours of a picture mean."""
+    """The colour scale of a picture."""
 
     stops: tuple[tuple[int, int, int], ...]
     """RGB at equal steps from the first label to the last."""
     labels: tuple[str, ...]
-    """With units, at equal steps along the bar."""
+    """Labels with units, at equal steps along the bar."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,18 +40,18 @@ class Picture:
     """(H, W, 3)."""
     caption: str
     bar: ColorBar | None = None
-    """None for a photograph."""
+    """The colour scale; None for a photograph."""
 
 
 @dataclass(frozen=True, slots=True)
 class SceneNode:
-    """What one camera node delivers."""
+    """The images, cloud and camera of one node."""
 
     name: str
     color: Picture
     depth: Picture
     sensor: Sample
-    """Camera frame."""
+    """Sensor points in the camera frame."""
     T_world_camera: FloatArray
     fov_rad: float
     """Vertical field of view."""
@@ -65,13 +65,13 @@ class SceneNode:
 
 @dataclass(frozen=True, slots=True)
 class SceneView:
-    """A rig as it was loaded."""
+    """A loaded rig."""
 
     title: str
     nodes: tuple[SceneNode, ...]
     has_truth: bool
     notes: tuple[str, ...]
-    """What is doubtful about its images, a sentence each."""
+    """Doubts about the images of the rig, one sentence each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,94 +79,94 @@ class ResidualView:
     """Aligned minus sensor depth over the pixels where both are known."""
 
     edges_m: FloatArray
-    """(B + 1,) bins, symmetric about zero."""
+    """(B + 1,) bin edges, symmetric about zero."""
     counts: IntArray
-    """(B,) pixels; the outer bins also hold those beyond them."""
+    """(B,) pixel counts; the outer bins also count the values outside the range."""
     median_m: float
-    """This and the RMS: NaN if no pixel is shared."""
+    """Median residual. It and the RMS are NaN if no pixel is shared."""
     rms_m: float
 
 
 @dataclass(frozen=True, slots=True)
 class JudgedView:
-    """What is believed of the aligned depth; shares of its pixels where the sensor is blind."""
+    """Confidence in the aligned depth: shares of the pixels where the sensor has no depth."""
 
     kept_share: float
-    """This and the two below: NaN if the sensor is blind nowhere."""
+    """Share of pixels that are kept. It and the two shares below are NaN if the sensor has no holes."""
     flying_share: float
     out_of_reach_share: float
 
 
 @dataclass(frozen=True, slots=True)
 class DepthNode:
-    """One node's depth, sensed and inferred."""
+    """Sensor depth and inferred depth of one node."""
 
     name: str
     pictures: dict[str, Picture]
-    """By ``app.screens.depth.view.PictureName``, all of one size."""
+    """Pictures by ``app.screens.depth.view.PictureName``, all of one size."""
     sensor: Sample
     inferred: Sample
     outliers: Sample
     fused: Sample
-    """The sensor's points and those inferred points that fusion lets in."""
+    """The sensor's points and the inferred points that fusion accepts."""
     filled: Sample
-    """Only the inferred points among the fused ones."""
+    """The inferred points among the fused ones."""
     inferred_confidence: ByteArray
-    """(N, 3) RGB of the points of ``inferred`` by their confidence."""
+    """(N, 3) RGB: confidence colours of the points of ``inferred``."""
     filled_confidence: ByteArray
-    """(N, 3) RGB of the points of ``filled`` by theirs."""
+    """(N, 3) RGB: confidence colours of the points of ``filled``."""
     alignment_mode: str
     disparity: bool
-    """Whether the network gives 1/depth."""
+    """Whether the network predicts 1/depth."""
     coefficients: dict[str, float]
     residuals: ResidualView
     inlier_share: float
     judged: JudgedView
     truth_error_m: float | None
-    """Median absolute depth error of the filled pixels, where the truth is known."""
+    """Median absolute depth error of the filled pixels, metres; None without ground truth."""
     network: str
-    """File of the depth network, which sees the colours alone."""
+    """File of the depth network, whose input is the colour image only."""
     completion: str
-    """File of the network that fills the holes from colours and depth; empty where the other one does."""
+    """File of the network that fills holes from colour and depth; empty if the depth network fills them."""
     provider: str
     """The execution provider that ran the depth network."""
     inference_s: float | None
-    """Time of that network on this node's image; None if it had run before."""
+    """Run time of the depth network on this node's image; None if its output was already stored."""
 
 
 @dataclass(frozen=True, slots=True)
 class DepthView:
-    """All nodes after the depth stage."""
+    """The depth stage's result for all nodes."""
 
     nodes: tuple[DepthNode, ...]
 
 
 Shown = Literal["after", "before", "poisson", "alpha"]
-"""A surface that can be drawn: the ball's, or a baseline's."""
+"""A surface that can be drawn: the ball pivoting mesh, or a baseline's."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeshView:
-    """A surface as the browser gets it."""
+    """A surface as it is sent to the browser."""
 
     glb: bytes
     quality: SurfaceQuality
     rims_glb: bytes
-    """All edges with one triangle only, as lines; empty without any."""
+    """All boundary edges (those with one triangle) as lines; empty if there are none."""
     vertices: int
     triangles: int
     truth: dict[str, float] | None
-    """Comparison with the ground truth, where there is one."""
+    """Comparison with the ground truth; None without ground truth."""
 
 
 SCREEN_POINTS = 60_000
-"""Points of all nodes together that are sent to the screen for one kind of cloud."""
+"""Number of points sent to a browser for one kind of cloud, over all nodes."""
 
 
 def sample(
     points_m: FloatArray, colors: ByteArray | None, most: int, rng: np.random.Generator | None = None
 ) -> Sample:
-    """At most ``most`` points of a cloud, drawn evenly without replacement."""
+    """Return at most ``most`` points of a cloud, drawn uniformly without replacement."""
     total = len(points_m)
     if total > most:
         rng = rng or np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""What a session wants and what it has: a step is stale when the two differ."""
+"""A session's spec and its results: a step is stale if its result belongs to another spec."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Step = Literal["scene", "depth", "fuse", "surface", "calibrate", "network"]
 CHAIN: tuple[Step, ...] = ("scene", "depth", "fuse", "surface")
 """The steps of the chain, each computed from the one before it."""
 STEPS: tuple[Step, ...] = (*CHAIN, "calibrate", "network")
-"""All steps that compute; calibration and network wait for nothing of the chain."""
+"""All steps that compute; calibration and network depend on no step of the chain."""
 StepStatus = Literal["fresh", "stale", "running", "failed", "missing"]
 
 STAGE_OF: Mapping[Step, StageName] = {
@@ -28,7 +28,7 @@ STAGE_OF: Mapping[Step, StageName] = {
     "fuse": "placement",
     "surface": "after",
 }
-"""The stage of the chain whose result each step shows."""
+"""The pipeline stage whose result each step shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,49 +44,49 @@ class Sent:
 
 @dataclass(frozen=True, slots=True)
 class BoardViews:
-    """Photographs of a board, and what is to be made of them."""
+    """Photographs of a calibration board and the settings of the calibration."""
 
     folder: str
-    """``node_00/color_00.png`` and so on below it, or the photographs of one camera."""
+    """Folder that holds ``node_00/color_00.png`` and so on, or the photographs of one camera."""
     edition: int = 0
-    """Counts what was added to the folder."""
+    """Counter that increases when photographs are added to the folder."""
     pattern: Pattern = "circles"
     columns: int = 11
     rows: int = 9
     spacing_m: float = 0.035
     lens: Lens = "thesis"
     bent: bool = False
-    """Whether the board's own shape is estimated, too; of one camera's photographs only."""
+    """Whether the board's own shape is estimated too; only for the photographs of one camera."""
     dropped: tuple[tuple[str, str], ...] = ()
-    """Camera and view of those that are left out, in order."""
+    """Camera and view of the photographs that are left out, in order."""
 
 
 @dataclass(frozen=True, slots=True)
 class Spec(spec.Spec):
-    """Everything that a session asks for."""
+    """All settings and sources that a session computes from."""
 
     shown: Shown = "after"
-    """The surface that is drawn, and so exported."""
+    """The surface that is drawn and exported."""
     networks: tuple[NetworkConfig, ...] = ()
-    """Runs of a camera network of its own, beside each other; none until somebody looks."""
+    """Settings of the simulated networks that are compared; empty until the screen is first opened."""
     sent: Sent | None = None
-    """A delivery of the rig's own images; None until somebody looks."""
+    """A delivery of the rig's own images; None until its screen is first opened."""
     views: BoardViews | None = None
-    """Photographs to calibrate from; None until somebody looks, or where there are none."""
+    """Photographs to calibrate from; None until the screen is opened, or if there are none."""
 
     def command(self, out: str = "runs/from-app") -> str:
-        """The command line that computes the same, with the surface that is shown."""
+        """Return the command line that computes the same, including the surface that is shown."""
         line = spec.Spec.command(self, out)
         return f"{line} --baseline {self.shown}" if self.shown in get_args(Baseline) else line
 
     def asks_for(self, step: Step) -> bool:
-        """Whether anybody wants the step: those beside the chain wait until somebody looks."""
+        """Whether the step is to be computed: calibration and network wait until their screen is opened."""
         if step == "calibrate":
             return self.views is not None
         return step != "network" or bool(self.networks) or self.sent is not None
 
     def key(self, step: Step) -> tuple[Hashable, ...]:
-        """What a step's result depends on; equal keys mean equal results."""
+        """Return everything that a step's result depends on; equal keys mean equal results."""
         if step == "calibrate":
             return (step, self.views)
         if step == "network":
@@ -96,7 +96,7 @@ class Spec(spec.Spec):
 
 
 class SharedViews:
-    """The newest views of all sessions: who wants what another has just got gets it at once."""
+    """The newest views of all sessions: a view that one session has computed is reused by the others."""
 
     def __init__(self, capacity: int = 24) -> None:
         self.turns = Turns()
@@ -105,14 +105,14 @@ class SharedViews:
         self._lock = threading.Lock()
 
     def get(self, key: Hashable) -> Any:
-        """The view for this key, or None."""
+        """Return the view with this key, or None."""
         with self._lock:
             if key in self._views:
                 self._views.move_to_end(key)
             return self._views.get(key)
 
     def put(self, key: Hashable, view: Any) -> None:
-        """Keep a view, and forget the one that was wanted longest ago."""
+        """Keep a view and drop the least recently used one if there are too many."""
         with self._lock:
             self._views[key] = view
             self._views.move_to_end(key)
@@ -127,7 +127,7 @@ class Results:
     _views: dict[Step, tuple[Hashable, Any]] = field(default_factory=dict)
     _failures: dict[Step, tuple[Hashable, str]] = field(default_factory=dict)
     _shown: dict[Step, Hashable] = field(default_factory=dict)
-    """The key of what the panels show of a step, all or the beginning of it."""
+    """Key of the result, complete or partial, that the panels show of each step."""
 
     def put(self, step: Step, key: Hashable, view: Any) -> None:
         """Keep a result."""
@@ -136,36 +136,36 @@ class Results:
         self._failures.pop(step, None)
 
     def begin(self, step: Step, key: Hashable) -> None:
-        """The panels show what there is so far of a result."""
+        """Record that the panels show a partial result with this key."""
         self._shown[step] = key
 
     def shows_other(self, step: Step, spec: Spec) -> bool:
-        """Whether the panels show something of a step that is not what ``spec`` asks for."""
+        """Whether the panels show a result of this step that does not belong to ``spec``."""
         return step in self._shown and self._shown[step] != spec.key(step)
 
     def fail(self, step: Step, key: Hashable, sentence: str) -> None:
-        """Remember that this cannot be computed, so that it is not tried again until something changes."""
+        """Record a failure, so that the step is not tried again until its key changes."""
         self._failures[step] = (key, sentence)
 
     def retry_failed(self) -> None:
-        """Try failed steps again."""
+        """Forget all failures, so that the steps are tried again."""
         self._failures.clear()
 
     def view(self, step: Step) -> Any:
-        """The last result of a step, stale or not; None if there is none."""
+        """Return the last result of a step, stale or not; None if there is none."""
         return self._views[step][1] if step in self._views else None
 
     def failure(self, step: Step, spec: Spec) -> str | None:
-        """Why a step cannot be computed as things are."""
+        """Return the error sentence of a step that failed for this spec, or None."""
         key, sentence = self._failures.get(step, (None, None))
         return sentence if key == spec.key(step) else None
 
     def fresh(self, step: Step, spec: Spec) -> bool:
-        """Whether a step's result is what ``spec`` asks for."""
+        """Whether a step's last result belongs to ``spec``."""
         return step in self._views and self._views[step][0] == spec.key(step)
 
     def first_stale(self, spec: Spec, steps: Sequence[Step] = CHAIN) -> Step | None:
-        """The next of ``steps`` to compute; None if all are fresh, one failed, or nobody asks for it."""
+        """Return the first stale one of ``steps``; None if there is none, it failed or it is not needed."""
         for step in steps:
             if not spec.asks_for(step):
                 return None
@@ -174,7 +174,7 @@ class Results:
         return None
 
     def status(self, step: Step, spec: Spec, running: Collection[Step] = ()) -> StepStatus:
-        """What to mark a step with."""
+        """Return the status shown in the stepper."""
         if step in running:
             return "running"
         if self.fresh(step, spec):

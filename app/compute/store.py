@@ -1,4 +1,4 @@
-"""Results by what they depend on, in a folder that the computing processes of one server share."""
+"""Results stored on disk by key, in a folder that the computing processes of one server share."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from pipeline.spec import Spec, StageName
 Step = TypeVar("Step")
 
 CHECKSUM_BYTES = 4
-"""In front of every file: the CRC-32 of the rest."""
+"""Length of the checksum at the start of every file: the CRC-32 of the bytes after it."""
 BLOCK_BYTES = 1 << 20
 
 _newest: dict[tuple[str, str], tuple[Path, Any]] = {}
-"""By folder and stage: the file of the newest result that this process has had, and the result."""
+"""By folder and stage: the file of the last result that this process used, and the result itself."""
 
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """A private folder of pickled results; the ones unused for longest go when it grows over its limit."""
+    """A private folder of pickled results; over its size limit, the least recently used ones are deleted."""
 
     folder: str
     limit_bytes: int = 3 << 30
@@ -39,11 +39,11 @@ class Store:
         key: tuple[Hashable, ...],
         compute: Callable[[], Generator[Step, None, Any]],
     ) -> Generator[Step, None, Any]:
-        """The result for ``key``, computed only if no process has it yet.
+        """Return the result for ``key``; compute it only if no process has stored it yet.
 
         Args:
             key: the name of the stage, and all that its result depends on.
-            compute: yields reports of its progress and returns the result.
+            compute: yields progress reports and returns the result.
         """
         stage = str(key[0])
         path = Path(self.folder, f"{stage}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}")
@@ -58,7 +58,7 @@ class Store:
         return value
 
     def stage(self, spec: Spec, stage: StageName) -> Generator[Any, None, Any]:
-        """The result of a stage of the chain, with whatever has to be computed before it."""
+        """Return the result of a stage of the chain; compute the stages before it if necessary."""
         (value,) = yield from self.stages(spec, stage)
         return value
 
@@ -70,7 +70,7 @@ class Store:
         return tuple(one.value for one in done.values())
 
     def _write(self, path: Path, value: Any) -> None:
-        """Keep a result behind its checksum; a full disk costs only the time to compute it again."""
+        """Write a result after its checksum. If the disk is full, the result is only lost to later calls."""
         with contextlib.suppress(InputError, OSError):
             with atomic_path(path) as temporary, temporary.open("wb") as file:
                 file.write(bytes(CHECKSUM_BYTES))
@@ -81,9 +81,9 @@ class Store:
             self._prune(path)
 
     def _prune(self, newest: Path) -> None:
-        """Delete the files unused for longest until the rest fits the limit; the newest stays.
+        """Delete the least recently used files until the folder fits its limit; keep the newest.
 
-        Those of the future were used before the clock was set back, longer ago than what is of now.
+        Files dated in the future are deleted first: they were used before the clock was set back.
         """
         files, now_ns = [], time.time_ns()
         for path in Path(self.folder).iterdir():
@@ -101,7 +101,7 @@ class Store:
 
 
 class _Summed:
-    """A file to write to, and the checksum of what was written."""
+    """A file that computes the checksum of the bytes written to it."""
 
     def __init__(self, file: BinaryIO) -> None:
         self.checksum = 0
@@ -117,7 +117,7 @@ def _as_bytes(checksum: int) -> bytes:
 
 
 def _read(path: Path) -> Any:
-    """A kept result; None if there is none or it is damaged, so that it is computed again."""
+    """Read a stored result; None if there is none or it is damaged, so that it is computed again."""
     try:
         with path.open("rb") as file:
             said, checksum = file.read(CHECKSUM_BYTES), 0
@@ -129,5 +129,5 @@ def _read(path: Path) -> Any:
             value = pickle.load(file)
         os.utime(path)
         return value
-    except (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError):  # or of other code
+    except (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError):  # of other code
         return None

@@ -1,7 +1,7 @@
-"""Sessions that draw one after the other.
+"""Let sessions draw one after the other.
 
-To build a panel or to draw a view takes a tenth of a second of the interpreter. Thirty sessions that do it
-at once all wait for the same locks, and every click of anybody waits with them.
+Building a panel or drawing a view keeps the interpreter busy for a tenth of a second. If thirty sessions do
+so at once, they all wait for the same locks, and so does every click in every browser.
 """
 
 from __future__ import annotations
@@ -12,24 +12,24 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 
 LONGEST_S = 5.0
-"""A session that draws for longer lets the next one begin."""
+"""Limit after which the next session may draw although this one still does, seconds."""
 
 
 class Turns:
-    """Who draws now; a session that waits for its turn goes on answering clicks."""
+    """A queue of sessions that draw; a session that waits in it still answers clicks."""
 
     def __init__(self) -> None:
         self._drawing = threading.Lock()
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="turns")
 
     def give(self, begin: Callable[[], Future[None] | None]) -> None:
-        """Have something begun when those before it are done; ``begin`` says what to wait for."""
-        with contextlib.suppress(RuntimeError):  # the program ends
+        """Call ``begin`` when the drawings before it are done, and wait for the future that it returns."""
+        with contextlib.suppress(RuntimeError):  # the program is ending
             self._thread.submit(self._wait, begin)
 
     @contextlib.contextmanager
     def taken(self) -> Iterator[None]:
-        """While this thread draws, nobody else does."""
+        """Context in which this thread draws and no other does."""
         with self._drawing:
             yield
 

@@ -1,4 +1,4 @@
-"""``python -m app.compute.warm``: compile what is compiled, so that its first use is not a wait."""
+"""``python -m app.compute.warm``: compile the numba functions ahead of their first use."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RgbdFrame
 
 
 def warm_up() -> Iterator[None]:
-    """Do each once that is compiled, with yields: roll a ball, thin, smooth and register points, acquire and
-    fill a depth image, look at a mesh. What is compiled stays on disk.
+    """Run each compiled function once, with yields between them: roll a ball; thin, smooth and register
+    points; acquire and fill a depth image; cast rays at a mesh. The compiled code stays on disk.
     """
     compile_all()
     yield
@@ -44,7 +44,7 @@ def warm_up() -> Iterator[None]:
 
 
 def _frame() -> RgbdFrame:
-    """A small picture of a step, with a hole."""
+    """Return a small RGB-D frame of a depth step with a hole."""
     z_m = np.ones((12, 16), np.float32)
     z_m[:, 8:] = 2.0
     z_m[4:6, 4:6] = np.nan

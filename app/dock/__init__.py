@@ -1,3 +1,3 @@
 """The clock, the lanes and the plots at the lower edge of the window. Imports of ``app`` only ``window`` and
-what is below it.
+the packages that ``window`` imports.
 """

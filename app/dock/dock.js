@@ -1,9 +1,9 @@
-// The dock: buttons and a timeline in a row of their own below the picture. Its other side is dock.py.
+// The dock: buttons and a timeline in a row of their own below the picture. The server's part is dock.py.
 (() => {
-  const DRAG_PX = 4; // less is a click
-  const REACH_PX = 4; // how far beside an item still means it
-  const AGAIN_MS = 150; // before what was not heard is said again
-  const LATEST = ["look", "point", "seek"]; // of these only the last counts
+  const DRAG_PX = 4; // a shorter movement is a click
+  const REACH_PX = 4; // distance from an item at which it is still hit
+  const AGAIN_MS = 150; // delay before unacknowledged actions are sent again
+  const LATEST = ["look", "point", "seek"]; // actions of which only the last counts
   const PAGE = Math.random().toString(36).slice(2);
   const docks = new Map();
   const {make, write} = window.packetmeshDockRow;
@@ -15,8 +15,8 @@
       this.start = 0;
       this.end = 1;
       this.now = 0;
-      this.window = [0, 1]; // ns, of this page
-      this.shown = [0, 1]; // of the pictures
+      this.window = [0, 1]; // ns, visible in this page
+      this.shown = [0, 1]; // ns, of the pictures
       this.lanes = [];
       this.unheard = [];
       this.said = 0;
@@ -30,7 +30,7 @@
         const [ariaLabel] = title.split(":");
         const one = make("button", "", bar, {textContent: text, title, type: "button", ariaLabel});
         one.addEventListener("click", action);
-        // So that keys go on to mean the same after it.
+        // Keep the keyboard focus on the dock.
         one.addEventListener("pointerdown", () => setTimeout(() => this.row.focus({preventScroll: true})));
         return one;
       };
@@ -61,7 +61,7 @@
       new ResizeObserver(() => this.resized()).observe(this.field);
     }
 
-    // What a hand does.
+    // Pointer, wheel and keys.
 
     listen() {
       const field = this.field;
@@ -107,7 +107,7 @@
         this.tip.hidden = true;
       });
       this.row.addEventListener("keydown", event => this.press(event));
-      // After a hand on the picture nothing has the focus; the arrows then turn the view.
+      // After a click on the picture nothing has the focus; the arrow keys then turn the view.
       document.addEventListener("keydown", event => {
         const idle = event.target === document.body || event.target.matches?.("canvas");
         if (this.visible && idle && [" ", "Home", "End"].includes(event.key)) this.press(event, true);
@@ -116,7 +116,7 @@
 
     press(event, idle = false) {
       if (event.ctrlKey || event.metaKey || event.altKey) return;
-      if (event.key === " " && event.target !== this.row && !idle) return; // a button that has the focus
+      if (event.key === " " && event.target !== this.row && !idle) return; // it presses the focused button
       const action = {
         " ": () => this.say("toggle"),
         ArrowLeft: () => this.say("step", -1),
@@ -140,7 +140,7 @@
       this.look(ns - (ns - from) * factor, ns + (to - ns) * factor);
     }
 
-    // In, about the clock; first to it if it is out of sight.
+    // Zoom in about the clock; first move to the clock if it is out of sight.
     zoomClock() {
       const [from, to] = this.window;
       const span = to - from;
@@ -182,7 +182,7 @@
       this.say("click", ...this.where(event));
     }
 
-    // The cursor follows the hand at once.
+    // Move the clock; the cursor follows the pointer at once.
     scrub(event) {
       this.now = Math.min(Math.max(this.at(this.x(event)), this.start), this.end);
       this.say("seek", this.now);
@@ -195,7 +195,7 @@
       this.sayLook();
     }
 
-    // The way to the server.
+    // Messages to the server.
 
     say(name, ...values) {
       if (LATEST.includes(name)) this.unheard = this.unheard.filter(([, other]) => other !== name);
@@ -211,7 +211,7 @@
       if (write(this.name, text)) this.again = setTimeout(() => this.send(), AGAIN_MS);
     }
 
-    // What the server says.
+    // Messages from the server.
 
     hear(message) {
       this[message.kind](message);
@@ -230,7 +230,7 @@
       if (this.visible) this.came();
     }
 
-    // New pictures take the place of the old ones once they can be drawn at once.
+    // Replace the pictures once the new ones are decoded.
     async picture({window: shown, pictures, words, heard}) {
       const lanes = this.lanes;
       const turn = this.turn = (this.turn ?? 0) + 1;
@@ -239,7 +239,7 @@
       if (turn < (this.drawnTurn ?? 0) || lanes !== this.lanes) return;
       this.drawnTurn = turn;
       this.shown = shown;
-      if (!(this.looked > (heard[PAGE] ?? 0))) this.window = shown; // else the hand is ahead
+      if (!(this.looked > (heard[PAGE] ?? 0))) this.window = shown; // else the user is ahead of the server
       lanes.forEach((lane, index) => {
         images[index].style.cssText = lane.image.style.cssText;
         lane.image.replaceWith(images[index]);
@@ -259,7 +259,7 @@
       if (!this.unheard.length) clearTimeout(this.again);
       const moved = this.now !== now;
       Object.assign(this, {playing, tipSaid: tip, chosen});
-      if (!this.unheard.some(([, name]) => name === "seek")) this.now = now; // else the hand is ahead
+      if (!this.unheard.some(([, name]) => name === "seek")) this.now = now; // else the user is ahead of the server
       this.play.textContent = playing ? "❚❚" : "▶";
       this.loop.ariaPressed = loops;
       this.speed.textContent = speed;
@@ -269,7 +269,7 @@
       this.showTip();
     }
 
-    // Turn the page when the clock leaves it.
+    // Move the window on when the clock leaves it.
     follow() {
       const [from, to] = this.window;
       if (this.now >= from && this.now <= to) return;
@@ -281,11 +281,11 @@
       this.tip.hidden = true;
     }
 
-    // Keys mean the dock from the start, unless a hand is on the keyboard elsewhere.
+    // Give the dock the keyboard focus when it appears, unless the user types elsewhere.
     came() {
       const used = document.activeElement;
       const typing = used?.matches("input, textarea, select, [role=slider], [contenteditable], :focus-visible");
-      const chosen = used?.matches("[aria-haspopup=listbox]:not([data-expanded])"); // from a list that is shut
+      const chosen = used?.matches("[aria-haspopup=listbox]:not([data-expanded])"); // after a choice from a closed list
       if (!typing || chosen) this.row.focus({preventScroll: true});
     }
   }

@@ -1,9 +1,9 @@
-"""The dock at the lower edge of the window: one clock, its buttons, and a timeline of anything in lanes.
+"""The dock at the lower edge of the window: one clock, its buttons, and a timeline with lanes.
 
-The page's side is ``dock.js``, ``dock_view.js`` for what it looks like and ``dock_row.js`` for its place.
-What the page is to know is in three hidden pieces of HTML, each of which says all of its part, so that a page
-that comes later knows as much. What a hand does there comes back through a hidden text field, as the list of
-all that the server has not acknowledged yet: of many changes within 50 ms viser sends only the last.
+The page's part is ``dock.js``, ``dock_view.js`` (drawing) and ``dock_row.js`` (place in the page). The server
+sends three hidden pieces of HTML, each with the whole of its part, so that a page that connects later gets
+everything. The user's actions come back through a hidden text field as the list of all actions that the
+server has not acknowledged: of several changes within 50 ms viser sends only the last.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ from app.window.page import page_call
 from app.window.ui import Ui
 
 PICTURE_S = 0.04
-"""Between two pictures while it plays."""
+"""Time between two pictures during playback, seconds."""
 RUN_S = 30.0
-"""How long a whole run takes at first, about."""
+"""Approximate duration of a whole run at the initial speed, seconds."""
 SPEEDS = tuple(m * 10.0**p for p in range(-4, 4) for m in (1.0, 2.0, 5.0))
-"""Simulated seconds in a second that can be chosen."""
+"""Speeds that can be chosen, simulated seconds per second."""
 WIDTH_PX = (200, 2400)
-"""Of a picture, at least and at most."""
+"""Smallest and largest width of a picture."""
 LEAST_SPAN_NS = 1000
-"""Of a window."""
+"""Shortest time window."""
 COUNT_NS = 1_000_000_000
 """One iteration or step on the axis of a timeline that counts them."""
 PAGES = 50
-"""As many pages are known apart."""
+"""Number of pages whose acknowledged actions are remembered."""
 
 
 class Dock:
-    """Shows lanes of a timeline and moves over it; knows neither networks nor races."""
+    """Shows the lanes of a timeline and moves a clock over it; independent of what the lanes show."""
 
     def __init__(
         self,
@@ -54,13 +54,13 @@ class Dock:
         on_pick: Callable[[int, int], None],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Add the dock, which is empty and hidden until ``load`` and ``show``.
+        """Add the dock; it is empty and hidden until ``load`` and ``show``.
 
         Args:
-            ui: of the browser.
-            on_move: called with the new time in ns whenever the clock moved.
-            on_pick: called with the index of a lane and of an item in it, or -1, that were clicked.
-            clock: seconds of the person who looks.
+            ui: panel of the browser.
+            on_move: called with the new time in ns when the clock has moved.
+            on_pick: called with the indices of the clicked lane and item; the item is -1 if there is none.
+            clock: returns the real time in seconds.
         """
         self._ui, self._on_move, self._on_pick, self._clock = ui, on_move, on_pick, clock
         self._name = uuid.uuid4().hex
@@ -80,7 +80,7 @@ class Dock:
         self._ticker = Ticker(lambda: ui.post(self._tick), PICTURE_S)
         ui.closers.append(self._ticker.close)
 
-    # What screens ask of it.
+    # Called by screens.
 
     @property
     def playing(self) -> bool:
@@ -89,17 +89,17 @@ class Dock:
 
     @property
     def rest_ns(self) -> int:
-        """Where the clock stands, or stood when it began to move."""
+        """Time of the clock, or where it was when it started to move."""
         return self._anchor[1] if self._playing else self.now_ns
 
     @property
     def shown_ns(self) -> int:
-        """Simulated time from one picture to the next while it plays."""
+        """Simulated time between two pictures during playback."""
         return round(self._speed * PICTURE_S * 1e9)
 
     @property
     def speed(self) -> float:
-        """Simulated seconds in a second."""
+        """Simulated seconds per second."""
         return self._speed
 
     def load(
@@ -111,15 +111,15 @@ class Dock:
         counts: str = "",
         run_s: float = RUN_S,
     ) -> None:
-        """Take another timeline, at its start and paused.
+        """Load another timeline, paused at its start.
 
         Args:
-            start_ns: where it begins.
-            end_ns: where it ends; later than the start.
-            stops_ns: (S,) ascending times at which the step buttons halt.
-            lanes: from the top.
+            start_ns: start of the timeline.
+            end_ns: end of the timeline; later than the start.
+            stops_ns: (S,) ascending times at which the step buttons stop.
+            lanes: lanes from top to bottom.
             counts: what the axis counts instead of time, such as "iteration"; each takes ``COUNT_NS``.
-            run_s: how long the whole takes at first, about.
+            run_s: approximate duration of the whole timeline at the initial speed.
         """
         self.pause()
         self._counts = counts
@@ -134,7 +134,7 @@ class Dock:
         self._on_move(start_ns)
 
     def show(self, visible: bool) -> None:
-        """Show or hide it."""
+        """Show or hide the dock."""
         if visible != self._visible:
             self._visible = visible
             if not visible:
@@ -142,7 +142,7 @@ class Dock:
             self._send_setup()
 
     def update(self, lanes: Sequence[Lane]) -> None:
-        """Take other lanes for the same timeline, such as curves that have grown."""
+        """Replace the lanes of the same timeline, for example by curves that have grown."""
         before, self._lanes = self._lanes, tuple(lanes)
         if [_looks(lane) for lane in before] != [_looks(lane) for lane in lanes]:
             self._send_setup()
@@ -150,7 +150,7 @@ class Dock:
         self._send_state()
 
     def play(self) -> None:
-        """Start moving; from the beginning if the end was reached."""
+        """Start the clock; from the start if it is at the end."""
         if self.now_ns >= self._end_ns:
             self._go(self._start_ns)
         self._playing = True
@@ -159,13 +159,13 @@ class Dock:
         self._send_state()
 
     def pause(self) -> None:
-        """Stay."""
+        """Stop the clock."""
         self._playing = False
         self._ticker.run(False)
         self._send_state()
 
     def seek(self, t_ns: int) -> None:
-        """Go to a time, not beyond the ends, and play on from there if playing."""
+        """Move the clock to a time within the ends, and play on from there if playing."""
         self._go(t_ns)
         self._anchor = (self._clock(), self.now_ns)
 
@@ -203,14 +203,14 @@ class Dock:
                 self._on_move(t_ns)
 
     def _pace(self, speed: float) -> None:
-        """Take the speed on the list that is nearest."""
+        """Choose the listed speed nearest to this one."""
         self._speed = min(SPEEDS, key=lambda one: abs(math.log(one / max(speed, 1e-9))))
         self._anchor = (self._clock(), self.now_ns)
 
-    # What a hand does.
+    # Actions of the user.
 
     def _hear(self) -> None:
-        """Do what the page did that was not yet heard of."""
+        """Apply the page's actions that were not applied yet."""
         try:
             message = json.loads(self._field.value)
             page, actions = str(message["page"]), list(message["actions"])
@@ -233,7 +233,7 @@ class Dock:
             self.play()
 
     def _loop(self) -> None:
-        """Begin again at the end, or no longer."""
+        """Turn repeated playback on or off."""
         self._loops = not self._loops
 
     def _faster(self, count: int) -> None:
@@ -241,13 +241,13 @@ class Dock:
         self._pace(SPEEDS[min(max(at, 0), len(SPEEDS) - 1)])
 
     def _look(self, start_ns: float, end_ns: float, width_px: float) -> None:
-        """Show another window, of a page so wide."""
+        """Show another time window, in a page of this width."""
         self._width_px = min(max(round(width_px), WIDTH_PX[0]), WIDTH_PX[1])
         self._window(start_ns, end_ns)
         self._draw()
 
     def look(self, start_ns: float, end_ns: float) -> None:
-        """Show another window, whatever the page shows."""
+        """Show another time window, in place of the one that the page shows."""
         self._window(start_ns, end_ns)
         self._send_setup()
         self._draw()
@@ -258,13 +258,13 @@ class Dock:
         self._window_ns = (start, start + span)
 
     def _point(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> None:
-        """Say what is under the pointer."""
+        """Set the tip for the item under the pointer."""
         there = 0 <= lane < len(self._lanes)
         there = there and (t_ns <= self.now_ns or self._lanes[lane].veil < 1.0)
         self._tip = self._lanes[lane].tell(round(t_ns), int(y_px), round(tolerance_ns)) if there else ""
 
     def _click(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> None:
-        """Go there, and mark what is there."""
+        """Move the clock to a click and mark the item there."""
         there = 0 <= lane < len(self._lanes)
         item = self._lanes[lane].pick(round(t_ns), int(y_px), round(tolerance_ns)) if there else -1
         self._chosen = {"lane": lane, "place": self._lanes[lane].place(item)} if item >= 0 else {}
@@ -272,7 +272,7 @@ class Dock:
         if there:
             self._on_pick(lane, item)
 
-    # What the page is told.
+    # Messages to the page.
 
     def _tell(self, handle: Any, **what: Any) -> None:
         handle.content = page_call("dock", {"dock": self._name, **what})
@@ -306,7 +306,7 @@ class Dock:
         )
 
     def _draw(self) -> None:
-        """Paint all lanes for the window."""
+        """Draw all lanes for the window."""
         pictures, words = [], []
         for lane in self._lanes:
             picture = np.empty((lane.height_px, self._width_px, 3), np.uint8)
@@ -325,7 +325,7 @@ class Dock:
 
 
 def _looks(lane: Lane) -> dict[str, Any]:
-    """What the page knows of a lane from the start."""
+    """Return what the page gets of a lane at the start."""
     legend = list(lane.legend)
     ticks = [(tick.y_px, tick.text) for tick in lane.ticks]
     return {
@@ -347,16 +347,16 @@ ACTIONS: dict[str, Callable[..., None]] = {
     "point": Dock._point,
     "click": Dock._click,
 }
-"""By the name that the page gives them."""
+"""Actions by the names that the page uses."""
 
 
 def speed_text(speed: float) -> str:
-    """Simulated seconds in a second: ×4, ×1/50."""
+    """Return the simulated seconds per second as text: ×4, ×1/50."""
     return f"×{speed:.3g}" if speed >= 1.0 else f"×1/{1.0 / speed:.3g}"
 
 
 def time_text(t_ns: int) -> str:
-    """A length of time in a sentence: 3.21 s, 12.4 ms."""
+    """Return a duration for a sentence: 3.21 s, 12.4 ms."""
     if t_ns == 0:
         return "0 s"
     for unit, ns in (("s", 1e9), ("ms", 1e6), ("µs", 1e3)):

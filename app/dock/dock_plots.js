@@ -1,4 +1,4 @@
-// Plots beside each other in the dock, and a table beside them. Its other side is dock_plots.py.
+// Plots in a row in the dock, with a table next to them. The server's part is plots.py.
 (() => {
   const rows = new Map();
   const {DockRow, make} = window.packetmeshDockRow;
@@ -22,7 +22,7 @@
       new ResizeObserver(() => this.draw()).observe(this.body);
     }
 
-    // What was closed stays so until there is something else.
+    // A row that was closed stays closed until a new run is shown.
     hear({visible, run, title, legend, figures, table}) {
       this.run = run;
       this.wanted = visible && run !== this.closed;

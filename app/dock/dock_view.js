@@ -1,12 +1,12 @@
-// What a dock looks like: lanes, words, clock and axis of a window of time. Style sheet: dock.css.
+// The drawing of a dock: lanes, words, clock and axis of a time window. Style sheet: dock.css.
 window.packetmeshDockView = (() => {
   const {DockRow, make} = window.packetmeshDockRow;
-  const AXIS_PX = 20; // below the lanes; a hand on it moves the clock
+  const AXIS_PX = 20; // height of the axis below the lanes; dragging it moves the clock
   const LANES_GAP_PX = 4;
 
   const css = ([red, green, blue]) => `rgb(${red}, ${green}, ${blue})`;
 
-  // 3.21 s, 12.4 ms; of times a step apart in the unit of the largest, as many digits as tell them apart.
+  // Return 3.21 s, 12.4 ms. With a step: the unit of the largest time, and enough digits to show the step.
   function timeText(ns, step = 0, largest = 0) {
     const size = Math.max(Math.abs(ns), largest);
     const [unit, name] = size >= 1e9 ? [1e9, "s"] : size >= 1e6 ? [1e6, "ms"] : [1e3, "µs"];
@@ -17,10 +17,10 @@ window.packetmeshDockView = (() => {
     return `${value.toFixed(digits)} ${name}`;
   }
 
-  const COUNT_NS = 1e9; // of an iteration or step, on an axis that counts them
+  const COUNT_NS = 1e9; // length of an iteration or step, on an axis that counts them
 
   class DockView extends DockRow {
-    // A place on the axis.
+    // Return the label of a position on the axis.
     text(ns, step = 0, largest = 0) {
       return this.counts ? `${Math.floor(ns / COUNT_NS + 1e-6)}` : timeText(ns, step, largest);
     }
@@ -63,7 +63,7 @@ window.packetmeshDockView = (() => {
         return made;
       });
       this.field.style.height = this.names.style.height = `${top + AXIS_PX}px`;
-      // Lanes of one kind say the same.
+      // Lanes of one kind have the same legend entries: each is shown once.
       const entries = lanes.filter(lane => !lane.veil).flatMap(lane => lane.legend);
       const legend = [...new Map(entries.map(entry => [entry.join(), entry])).values()];
       this.legend.replaceChildren(...legend.map(([text, color]) => {
@@ -101,7 +101,7 @@ window.packetmeshDockView = (() => {
       }
       this.cursor.style.left = `${cursor}px`;
       const step = (this.window[1] - this.window[0]) / width;
-      // As fine as a pixel, and at least three digits of the end, as in tables.
+      // Resolution: one pixel, and at least three digits of the end, as in tables.
       const fine = Math.max(10 ** Math.min(Math.ceil(Math.log10(step)), Math.floor(Math.log10(this.end / 100))), 1);
       const [now, end] = [this.now, this.end].map(ns => this.text(ns, fine, this.end));
       this.time.textContent = `${this.counts} ${now} of ${end}`.trim();
@@ -143,7 +143,7 @@ window.packetmeshDockView = (() => {
         const tick = make("i", "");
         const word = make("span", "", null, {textContent: this.text(index * step, step, this.window[1])});
         tick.style.left = word.style.left = `${x}px`;
-        const back = x < 24 ? 0 : x > width - 24 ? 100 : 50; // so that the first and the last are whole
+        const back = x < 24 ? 0 : x > width - 24 ? 100 : 50; // keeps the first and the last label whole
         word.style.transform = `translateX(-${back}%)`;
         ticks.push(tick, word);
       }

@@ -1,6 +1,6 @@
-"""Plots in the dock at the lower edge of the window, for what a whole class is to read.
+"""Plots in the dock at the lower edge of the window, large enough for a class to read.
 
-The page's side is ``dock_plots.js``. What it is to know is in one hidden piece of HTML, which says all of it.
+The page's part is ``dock_plots.js``. The server sends one hidden piece of HTML with everything.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ NO_TABLE = Markup("")
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """What is shown at a time."""
+    """The plots, legend and table that are shown together."""
 
     title: str
     legend: Markup
-    """HTML: what the signs in all plots mean."""
+    """HTML of the legend of all plots."""
     figures: tuple[go.Figure, ...]
     table: Markup = NO_TABLE
-    """HTML, right of the plots."""
+    """HTML to the right of the plots."""
 
 
 class PlotDock:
-    """Shows plots beside each other; a person may close it, which holds until something else is shown."""
+    """Shows plots side by side; closing it lasts until another run is shown."""
 
     def __init__(self, ui: Ui) -> None:
-        """Add it, empty and hidden."""
+        """Add the dock, empty and hidden."""
         self._name, self._run = uuid.uuid4().hex, 0
         self._sheet: Sheet | None = None
         self._visible = False
@@ -44,17 +44,17 @@ class PlotDock:
             self._message = ui.gui.add_html(Markup(""))
 
     def begin(self) -> None:
-        """What comes is something else, to be seen even if what was there was closed."""
+        """Start a new run, which is shown even if the one before was closed."""
         self._run += 1
 
     def load(self, sheet: Sheet | None) -> None:
-        """Show another sheet; None shows nothing."""
+        """Show another sheet; None hides the dock."""
         if sheet is not None or self._sheet is not None:
             self._sheet = sheet
             self._tell()
 
     def show(self, visible: bool) -> None:
-        """Show it or leave the lower edge to others."""
+        """Show or hide the dock."""
         if visible != self._visible:
             self._visible = visible
             self._tell()

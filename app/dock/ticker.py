@@ -1,4 +1,4 @@
-"""A thread that looks at the clock again and again while something plays."""
+"""A thread that calls a function at regular intervals during playback."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 
 class Ticker:
-    """One thread that calls ``tick`` every ``period_s`` while running, and sleeps otherwise."""
+    """One thread that calls ``tick`` every ``period_s`` while running and sleeps otherwise."""
 
     def __init__(self, tick: Callable[[], None], period_s: float) -> None:
         self._tick = tick
@@ -24,7 +24,7 @@ class Ticker:
             self._running.clear()
 
     def close(self) -> None:
-        """End the thread for good."""
+        """End the thread."""
         self._closed.set()
         self._running.set()
 

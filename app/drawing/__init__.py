@@ -1,3 +1,3 @@
-"""Clouds, meshes, cameras, plots and timelines as they are drawn. Imports of ``app`` only ``compute`` and
+"""Drawings of clouds, meshes, cameras, plots and timelines. Imports of ``app`` only ``compute`` and
 ``web``.
 """

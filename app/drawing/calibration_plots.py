@@ -1,5 +1,5 @@
-"""A camera's calibration in pictures: each says what it shows, in which unit, in colours that everybody tells
-apart. Positions in an image are pixels, from its upper left.
+"""Plots of a camera's calibration, each with its quantity and unit, in colours safe for colour-blind people.
+Positions in an image are in pixels from its upper left corner.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from pipeline.types import FloatArray
 
 RAMP = [(index / 4.0, css(color)) for index, color in enumerate(DISTANCE_STOPS)]
 ARROW_SHARE = 0.03
-"""Of the image's width, about the length of the median residual's arrow."""
+"""Approximate length of the median residual's arrow over the image's width."""
 MOST_ARROWS = 1500
 
 
 def views_figure(
     fitted: Sequence[FittedView], unseen: Sequence[FittedView] = (), outliers: Sequence[str] = ()
 ) -> go.Figure:
-    """Bars of every view's error, in the fit and, beside it, when it is held out; outliers are red."""
+    """Draw each view's error as bars, in the fit and, next to it, held out; outliers are red."""
     figure = titled_figure("Error of each view", "", "RMS, px")
     names = [escape(view.name) for view in fitted]
     colors = [css(LOSS) if view.name in outliers else css(TARGET) for view in fitted]
@@ -46,7 +46,7 @@ def views_figure(
 
 
 def distortion_figure(curve: RadialCurve) -> go.Figure:
-    """How far the lens moves a point, over the distance from the principal point, with its 95 % band."""
+    """Plot the lens's radial distortion over the distance from the principal point, with its 95 % band."""
     figure = titled_figure(
         "Distortion of the lens", "distance from the principal point, px", "moved outward, px"
     )
@@ -82,7 +82,7 @@ def distortion_figure(curve: RadialCurve) -> go.Figure:
 
 
 def residuals_figure(calibration: Calibration) -> go.Figure:
-    """An arrow from where a point is predicted towards where it was seen, drawn longer, for all views."""
+    """Draw the residuals of all views: arrows from predicted towards observed points, lengthened."""
     points_px = np.concatenate([view.points_px for view in calibration.views])
     residuals_px = np.concatenate([view.residuals_px for view in calibration.views])
     median_px = float(np.median(np.linalg.norm(residuals_px, axis=1)))
@@ -114,7 +114,7 @@ def residuals_figure(calibration: Calibration) -> go.Figure:
 
 
 def radial_residuals_figure(told: RadialResiduals) -> go.Figure:
-    """What is left along the radius, with the mean of each band: a wave is a lens of a wrong kind."""
+    """Plot residuals along the radius with the mean of each band; a wave means a wrong lens model."""
     figure = titled_figure(
         "What is left along the radius", "distance from the principal point, px", "outward, px"
     )
@@ -139,7 +139,7 @@ def radial_residuals_figure(told: RadialResiduals) -> go.Figure:
 
 
 def uncertainty_figure(sd: ErrorMap, size_px: tuple[int, int], most_mm: float | None = None) -> go.Figure:
-    """Standard deviation of a point at the range, in millimetres across the ray."""
+    """Draw a map of the standard deviation of a point at ``sd.range_m``, in millimetres across the ray."""
     title = f"Uncertainty at {sd.range_m:g} m, one sd"
     return _map_figure(sd, 1000.0 * sd.error_m, title, size_px, most_mm)
 
@@ -147,14 +147,14 @@ def uncertainty_figure(sd: ErrorMap, size_px: tuple[int, int], most_mm: float | 
 def difference_figure(
     halves: HalfDifference, size_px: tuple[int, int], most_mm: float | None = None
 ) -> go.Figure:
-    """How far apart the two halves of the views place a point at the range."""
+    """Draw a map of the distance between the points that two halves of the views predict at the range."""
     judged = "more than" if halves.beyond_noise else "no more than"
     title = f"Difference of two halves at {halves.map.range_m:g} m: {judged} noise"
     return _map_figure(halves.map, 1000.0 * halves.map.error_m, title, size_px, most_mm)
 
 
 def verdict_figure(judged: Verdict, sd: ErrorMap, size_px: tuple[int, int]) -> go.Figure:
-    """Where in the image a point is placed well enough."""
+    """Draw a map of the 95 % error, with the line inside which a point is accurate enough."""
     title = f"Error at {judged.range_m:g} m (95 %), asked for {1000.0 * judged.accuracy_m:g} mm"
     figure = _map_figure(sd, 1000.0 * judged.error_m, title, size_px, 2000.0 * judged.accuracy_m)
     figure.add_contour(
@@ -170,7 +170,7 @@ def verdict_figure(judged: Verdict, sd: ErrorMap, size_px: tuple[int, int]) -> g
 
 
 def coverage_figure(told: Coverage, size_px: tuple[int, int], views: Sequence[FittedView] = ()) -> go.Figure:
-    """How many points were seen in each cell of the image; cells without any stay white."""
+    """Draw a map of the number of points seen in each cell of the image; empty cells stay white."""
     title = f"Points in {100.0 * told.share:.0f} % of the image"
     figure = image_figure(title, size_px)
     figure.add_heatmap(
@@ -197,7 +197,7 @@ def coverage_figure(told: Coverage, size_px: tuple[int, int], views: Sequence[Fi
 def next_view_figure(
     following: NextView, size_px: tuple[int, int], views: Sequence[FittedView] = ()
 ) -> go.Figure:
-    """Where to hold the board next, over the points that are there already."""
+    """Draw where to hold the board next, over the points seen so far."""
     title = (
         f"Next: {following.distance_m:.2f} m away, tilted by {following.tilt_deg:.0f}°; "
         f"{1000.0 * following.error_before_m:.2g} mm → {1000.0 * following.error_after_m:.2g} mm"
@@ -236,7 +236,7 @@ def _dots(
 def _map_figure(
     told: ErrorMap, values_mm: FloatArray, title: str, size_px: tuple[int, int], most_mm: float | None
 ) -> go.Figure:
-    """Millimetres over the image; pixels come up under the pointer, too."""
+    """Draw a map of millimetres over the image; the pointer shows pixels and value."""
     figure = image_figure(title, size_px)
     known = values_mm[np.isfinite(values_mm)]
     most_mm = most_mm or (float(np.quantile(known, 0.98)) if len(known) else 1.0)
@@ -256,6 +256,6 @@ def _map_figure(
 
 
 def _round_number(value: float) -> float:
-    """The largest of 1, 2, 5, 10, 20, ... that is not above a value."""
+    """Return the largest of 1, 2, 5, 10, 20, ... that is not above a value."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))

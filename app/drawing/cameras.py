@@ -1,4 +1,4 @@
-"""Camera nodes in space, and where to look at them from."""
+"""Camera nodes in the scene, and viewpoints from which to look at them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def add_camera(
     scene: viser.SceneApi, name: str, node: SceneNode, T_world_camera: FloatArray, with_image: bool = True
 ) -> viser.CameraFrustumHandle:
-    """A frustum with the node's picture on it and its name below, which covers neither picture nor scene."""
+    """Draw a frustum with the node's image on it and its name below it, where it covers nothing."""
     frustum = scene.add_camera_frustum(
         name,
         fov=node.fov_rad,
@@ -38,27 +38,27 @@ def add_camera(
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """Where to stand to see a scene, and where to put a second one beside it."""
+    """The viewpoint for a scene, and the place for a second scene next to it."""
 
     viewpoint_m: FloatArray
     middle_m: FloatArray
-    """What to look at."""
+    """The look-at point."""
     right: FloatArray
-    """Unit vector to the right of the picture, horizontal."""
+    """Horizontal unit vector to the right of the picture."""
     width_m: float
-    """Extent of the scene in that direction."""
+    """Extent of the scene along ``right``."""
     top_m: FloatArray
-    """A place for a label above the scene."""
+    """Position of a label above the scene."""
 
 
 def stage_of(nodes: Sequence[SceneNode]) -> Stage:
-    """Behind and above the cameras, looking at the middle of what they see."""
+    """Return a viewpoint behind and above the cameras that looks at the middle of what they see."""
     clouds = [node.sensor.points_m.astype(float) for node in nodes]
     return stage_around(clouds, [node.T_world_camera for node in nodes])
 
 
 def stage_around(clouds_m: Sequence[FloatArray], T_world_camera: Sequence[FloatArray]) -> Stage:
-    """The same for the (N, 3) points that each camera sees, in its own frame."""
+    """Return the viewpoint for the (N, 3) points that each camera sees, in its own frame."""
     seen_m = [apply(pose, points_m) for pose, points_m in zip(T_world_camera, clouds_m, strict=True)]
     middle_m = np.mean([np.median(points_m, axis=0) for points_m in seen_m], axis=0)
     cameras_m = np.mean([pose[:3, 3] for pose in T_world_camera], axis=0)
@@ -74,7 +74,7 @@ def stage_around(clouds_m: Sequence[FloatArray], T_world_camera: Sequence[FloatA
 
 
 def look(clients: Iterable[viser.ClientHandle], stage: Stage, wide: bool = False) -> None:
-    """Turn every browser's view to the scene, from far enough that it, or two side by side, fit in."""
+    """Turn each browser's view to the scene, from far enough that it (wide: two side by side) fits in."""
     back_m = stage.viewpoint_m - stage.middle_m
     width_m = (2.6 if wide else 1.3) * stage.width_m
     for client in clients:
@@ -84,7 +84,7 @@ def look(clients: Iterable[viser.ClientHandle], stage: Stage, wide: bool = False
 
 
 def turn(client: viser.ClientHandle, center_m: FloatArray, stand_m: FloatArray) -> None:
-    """Turn a browser's view to a place, standing at another."""
+    """Turn a browser's view: the camera at ``stand_m`` looks at ``center_m``."""
     with client.atomic():
         client.camera.position = stand_m
         client.camera.look_at = center_m

@@ -1,4 +1,4 @@
-"""Point clouds: sent once, moved by their pose."""
+"""Point clouds in the scene: sent once, then moved by their pose."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def add_cloud(
     size_m: float = POINT_SIZE_M,
     visible: bool = True,
 ) -> viser.PointCloudHandle:
-    """Draw a cloud in its own colours, or in one colour that its own make lighter and darker."""
+    """Draw a cloud in its own colours, or in one colour shaded by its own brightness."""
     handle = scene.add_point_cloud(
         name,
         cloud.points_m,
@@ -47,7 +47,7 @@ def _colors(cloud: Sample, color: tuple[int, int, int] | None) -> ByteArray:
 
 
 def clear(scene: viser.SceneApi, name: str) -> None:
-    """Remove everything below a node; the node itself stays, as visible as it was."""
+    """Remove everything below a node; the node itself stays and keeps its visibility."""
     frame = scene.get_handle_by_name(name)
     visible = True
     if frame is not None:

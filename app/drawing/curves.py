@@ -1,4 +1,4 @@
-"""Charts that are drawn many times a second: curves over a common axis, as far as the player has come."""
+"""Charts that are redrawn many times a second: curves over a common axis, up to the player's time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEADROOM = 1.08
 def add_chart(
     gui: viser.GuiApi, series: Sequence[uplot.Series], labels: tuple[str, str], height_px: int
 ) -> viser.GuiUplotHandle:
-    """An empty chart of these series; ``labels`` are those of the x and the y axis."""
+    """Add an empty chart of these series; ``labels`` are those of the x and the y axis."""
     return gui.add_uplot(
         data=(np.array([0.0, 1.0]), *[np.full(2, np.nan)] * len(series)),
         series=(uplot.Series(label="x"), *series),
@@ -32,17 +32,17 @@ def add_chart(
 
 
 def scales(ends: tuple[float, float], top: float) -> dict[str, uplot.Scale]:
-    """Fixed ranges, because uPlot finds none by itself where a curve has gaps."""
+    """Return fixed ranges: uPlot finds none where a curve has gaps."""
     return {"x": uplot.Scale(time=False, range=ends), "y": uplot.Scale(range=(0.0, HEADROOM * top))}
 
 
 def axes(x: str, y: str) -> tuple[uplot.Axis, ...]:
-    """Both axes with their labels."""
+    """Return both axes with their labels."""
     return (uplot.Axis(label=x, labelSize=20, size=34), uplot.Axis(label=y, labelSize=18, size=50))
 
 
 class Curves:
-    """One quantity of several things that are told apart by their colours."""
+    """A chart of one quantity for several objects, each in its own colour."""
 
     def __init__(
         self,
@@ -55,11 +55,11 @@ class Curves:
         """Add an empty chart.
 
         Args:
-            gui: where to add it.
-            quantity: with its unit, of the vertical axis.
-            most: curves that there can be.
-            least: the smallest height of the vertical axis.
-            height_px: of the whole.
+            gui: panel to add it to.
+            quantity: label of the vertical axis, with the unit.
+            most: largest number of curves.
+            least: smallest height of the vertical axis.
+            height_px: height of the chart.
         """
         self._quantity, self._least, self._most = quantity, least, most
         self._plot = add_chart(gui, _series([css(NEUTRAL)] * most), ("", quantity), height_px)
@@ -76,10 +76,10 @@ class Curves:
         """Show other curves.
 
         Args:
-            curves: (K,) ascending abscissae and (K,) values of each, NaN where there is none.
-            colors: of the curves.
-            ends: of the horizontal axis.
-            label: of the horizontal axis.
+            curves: (K,) ascending abscissae and (K,) values of each curve, NaN without a value.
+            colors: colours of the curves.
+            ends: ends of the horizontal axis.
+            label: label of the horizontal axis.
         """
         self._curves = curves
         highest = max((float(np.nanmax(values, initial=0.0)) for _, values in curves), default=0.0)
@@ -91,8 +91,8 @@ class Curves:
         self.mark(ends[0])
 
     def mark(self, now: float, rows: Sequence[int] = ()) -> None:
-        """Draw the player's place as a line, and each curve up to its value in ``rows`` with a dot there."""
-        # The line is two points above each other, so its place stands twice among the abscissae.
+        """Draw the player's time as a line, and each curve up to its index in ``rows``, with a dot there."""
+        # The vertical line has two points with the same abscissa, so the player's time is in ``x`` twice.
         own = np.concatenate([[now], *(at for at, _ in self._curves)])
         x = np.sort(np.append(np.unique(own), now))
         cursor = np.full(len(x), np.nan)
@@ -107,7 +107,7 @@ class Curves:
 
 
 def _series(colors: Sequence[str]) -> tuple[uplot.Series, ...]:
-    """The player's place, a line for each curve, and a dot for each."""
+    """Return the series: the player's time, a line for each curve, and a dot for each."""
     lines = [uplot.Series(label="curve", stroke=color, width=2) for color in colors]
     dots = [
         uplot.Series(
@@ -119,7 +119,7 @@ def _series(colors: Sequence[str]) -> tuple[uplot.Series, ...]:
 
 
 def polyline(x: FloatArray, at: FloatArray, values: FloatArray) -> FloatArray:
-    """A curve at a chart's abscissae, straight over gaps, nothing beyond its ends."""
+    """Return a curve's values at a chart's abscissae: linear over gaps, NaN beyond its ends."""
     known = np.isfinite(values)
     if not known.any():
         return np.full(len(x), np.nan)

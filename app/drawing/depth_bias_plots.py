@@ -1,4 +1,4 @@
-"""The bias of a depth sensor in pictures: over the distance, over the image, and its noise (SPEC 1.5)."""
+"""Plots of a depth sensor's bias over the distance and over the image, and of its noise (SPEC 1.5)."""
 
 from __future__ import annotations
 
@@ -17,40 +17,40 @@ if TYPE_CHECKING:
 
 STEPS = 80
 MAP_EVERY = 8
-"""Pixels of the image from one of the map's to the next."""
+"""Step between drawn pixels of the map."""
 DIVERGING = [(0.0, "#0072b2"), (0.5, "#f7f7f7"), (1.0, "#d55e00")]
-"""Too near is blue, too far is orange, right is white."""
+"""Measured too near is blue, too far is orange, correct is white."""
 
 
 @dataclass(frozen=True, slots=True)
 class BiasCurve:
-    """What a depth sensor is off by over the distance: numbers to draw, without what they come from."""
+    """A depth sensor's error over the distance, as numbers to draw."""
 
     terms: tuple[str, ...]
     z_m: FloatArray
     """(K,) measured depth."""
     off_m: FloatArray
-    """(K,) measured less true, the map aside."""
+    """(K,) measured minus true depth, without the map term."""
     sd_m: FloatArray
-    """(K,) its standard error."""
+    """(K,) standard error of ``off_m``."""
     noise_m: FloatArray | None
-    """(K,) standard deviation of the depth of a board that faces the sensor; None if it is not known."""
+    """(K,) standard deviation of the depth of a board that faces the sensor; None if unknown."""
     far_m: float
-    """Of the farthest view; beyond, the curve is a guess."""
+    """Distance of the farthest view; beyond it the curve is an extrapolation."""
     view_z_m: FloatArray
     """(V,) mean depth of each view."""
     before_m: FloatArray
-    """(V,) measured less true, in the mean."""
+    """(V,) mean of measured minus true depth of each view."""
     after_m: FloatArray
-    """(V,) the same when corrected."""
+    """(V,) the same mean after the correction."""
 
 
 def bias_curve(fit: DepthFit, to_m: float | None = None) -> BiasCurve:
-    """The numbers of ``bias_figure``.
+    """Return the numbers of ``bias_figure``.
 
     Args:
-        fit: what was found.
-        to_m: how far the curve goes; None is a little beyond the farthest view, where it is a guess.
+        fit: result of the depth calibration.
+        to_m: end of the curve; None extrapolates a little beyond the farthest view.
     """
     near_m, far_m = fit.correction.range_m
     z_m = np.linspace(min(near_m, 0.4), to_m or 1.25 * far_m, STEPS)
@@ -61,8 +61,8 @@ def bias_curve(fit: DepthFit, to_m: float | None = None) -> BiasCurve:
 
 
 def bias_figure(told: BiasCurve) -> go.Figure:
-    """Measured less true depth over the distance: each view before and after, the terms with their band, and
-    within what noise alone leaves a pixel.
+    """Plot measured minus true depth over the distance: each view before and after the correction, the terms
+    with their 95 % band, and the noise of a pixel.
     """
     figure = titled_figure("What the sensor is off by", "measured depth, m", "measured less true, mm")
     z_m, off_m, sd_m = told.z_m, told.off_m, told.sd_m
@@ -111,7 +111,7 @@ def bias_figure(told: BiasCurve) -> go.Figure:
 
 
 def _add_noise(figure: go.Figure, z_m: FloatArray, noise_m: FloatArray) -> None:
-    """Two lines between which noise leaves 95 of 100 pixels of a sensor without bias."""
+    """Add the two lines between which noise leaves 95 of 100 pixels of a sensor without bias."""
     for side in (-BAND95, BAND95):
         figure.add_scatter(
             x=z_m,
@@ -125,7 +125,7 @@ def _add_noise(figure: go.Figure, z_m: FloatArray, noise_m: FloatArray) -> None:
 
 
 def bias_map_figure(fit: DepthFit, at_m: float = 1.5) -> go.Figure:
-    """Measured less true depth over the image, where that much is measured, in millimetres."""
+    """Draw a map of measured minus true depth over the image at ``at_m`` measured depth, in millimetres."""
     width, height = fit.correction.size_px
     figure = image_figure(f"What the sensor is off by at {at_m:g} m", (width, height))
     u, v = np.arange(0, width, MAP_EVERY), np.arange(0, height, MAP_EVERY)
@@ -148,7 +148,7 @@ def bias_map_figure(fit: DepthFit, at_m: float = 1.5) -> go.Figure:
 
 
 def noise_figure(fit: DepthFit) -> go.Figure:
-    """Standard deviation of the depth over the distance: parts of boards by their tilt, and the law."""
+    """Plot the depth's standard deviation over the distance: parts of boards by tilt, and the law."""
     figure = titled_figure("Noise of the depth", "depth, m", "standard deviation, mm")
     points, law = fit.noise_points, fit.correction.noise
     angle_deg = np.degrees(np.arccos(np.clip(points.cosine, 0.0, 1.0)))
@@ -181,6 +181,6 @@ def noise_figure(fit: DepthFit) -> go.Figure:
 
 
 def depth_bias_figures(fit: DepthFit, at_m: float = 1.5) -> dict[str, go.Figure]:
-    """All of them by name, the map only where there is one."""
+    """Return all figures by name; the map only if the fit has one."""
     figures = {"bias": bias_figure(bias_curve(fit)), "noise": noise_figure(fit)}
     return figures | ({"map": bias_map_figure(fit, at_m)} if "map" in fit.terms else {})

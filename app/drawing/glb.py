@@ -1,7 +1,7 @@
 """Meshes and lines as binary glTF that a browser draws quickly, even without a graphics card.
 
-Everything is unlit: the light is put into the vertex colours beforehand. viser's own lighting and its
-ribbon lines are what a software renderer would spend most of a frame on.
+All materials are unlit: the light is computed into the vertex colours beforehand. A software renderer would
+spend most of a frame on viser's lighting and its ribbon lines.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ _UNLIT = "KHR_materials_unlit"
 
 
 def mesh_glb(vertices_m: FloatArray, triangles: IntArray, colors: ByteArray) -> bytes:
-    """(V, 3) vertices with (V, 3) sRGB colours and (F, 3) triangles, seen from their front; empty if none."""
+    """Return a mesh: (V, 3) vertices, (V, 3) sRGB colours, (F, 3) front-facing triangles; empty if none."""
     if not len(triangles):
         return b""
-    rgba = np.full((len(colors), 4), 65535, dtype="<u2")  # linear light, as glTF wants it
+    rgba = np.full((len(colors), 4), 65535, dtype="<u2")  # linear light, as glTF requires
     rgba[:, :3] = _LINEAR[colors]
     return _glb(
         _TRIANGLES,
@@ -37,13 +37,13 @@ def mesh_glb(vertices_m: FloatArray, triangles: IntArray, colors: ByteArray) -> 
 def textured_glb(
     vertices_m: FloatArray, triangles: IntArray, colors: ByteArray, uv: FloatArray, picture: bytes
 ) -> bytes:
-    """A mesh that wears a picture, darkened or tinted by its vertex colours; empty if it has no triangle.
+    """Return a mesh textured with a picture times its vertex colours; empty if it has no triangle.
 
     Args:
-        vertices_m: (V, 3).
-        triangles: (F, 3), seen from their front.
-        colors: (V, 3) sRGB that the picture is multiplied with.
-        uv: (V, 2) in shares of the picture from its upper left corner.
+        vertices_m: (V, 3) vertices.
+        triangles: (F, 3) vertex indices, front-facing.
+        colors: (V, 3) sRGB by which the picture is multiplied.
+        uv: (V, 2) positions in shares of the picture from its upper left corner.
         picture: a JPEG file.
     """
     if not len(triangles):
@@ -60,7 +60,7 @@ def textured_glb(
 
 
 def lines_glb(segments_m: FloatArray, color: tuple[int, int, int]) -> bytes:
-    """(E, 2, 3) segments, one pixel wide, in an sRGB colour; empty if there is none."""
+    """Return (E, 2, 3) segments, one pixel wide, in an sRGB colour; empty if there are none."""
     if not len(segments_m):
         return b""
     red, green, blue = (_LINEAR[list(color)] / 65535.0).tolist()
@@ -74,7 +74,7 @@ def _glb(
     indices: np.ndarray | None = None,
     picture: bytes = b"",
 ) -> bytes:
-    """One primitive of one material, which may wear a JPEG file."""
+    """Return a glTF of one primitive with one material, which may have a JPEG texture."""
     arrays = list(attributes.values()) + ([] if indices is None else [indices])
     parts = [array.tobytes() for array in arrays] + ([picture] if picture else [])
     blocks = [part + bytes(-len(part) % 4) for part in parts]
@@ -130,7 +130,7 @@ def _accessor(row: int, array: np.ndarray) -> dict[str, Any]:
 
 
 def _linear_light() -> np.ndarray:
-    """(256,) uint16 linear light of every sRGB value (IEC 61966-2-1)."""
+    """Return (256,) uint16: the linear light of every sRGB value (IEC 61966-2-1)."""
     srgb = np.arange(256) / 255.0
     linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     return np.rint(65535.0 * linear).astype("<u2")

@@ -1,4 +1,4 @@
-"""What the colours of a picture mean: plain values that HTML, pages and pictures show."""
+"""The legend of a picture as plain values, which HTML, pages and pictures show."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from app.drawing.colors import css
 
 @dataclass(frozen=True, slots=True)
 class Legend:
-    """One of three, or nothing: a sentence, single colours in words, or a bar of colours."""
+    """A legend: a sentence, named single colours, or a colour bar; or empty."""
 
     text: str = ""
     swatches: tuple[tuple[str, tuple[int, int, int]], ...] = ()
-    """What each colour means."""
+    """Names and colours."""
     bar: ColorBar | None = None
 
     def record(self) -> dict[str, Any]:
-        """As a page reads it."""
+        """Return the legend as JSON values for a page."""
         bar = self.bar and {"stops": [css(stop) for stop in self.bar.stops], "labels": self.bar.labels}
         swatches = [{"text": text, "color": css(color)} for text, color in self.swatches]
         return {"text": self.text, "swatches": swatches, "bar": bar}

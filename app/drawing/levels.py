@@ -1,4 +1,4 @@
-"""Frames on the air by row and time, summed up once so that any window at any zoom is counted exactly."""
+"""Radio frames by row and time, with running sums, so that any time window is counted exactly at any zoom."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class Sums:
-    """Moments at which frames begin, or end, in each row, and what comes before each.
+    """Times at which frames start, or end, in each row, with the running sums of the frames before each.
 
-    Sums of times may wrap around, as int64 do; that leaves their differences exact.
+    Sums of times may overflow int64; wrap-around leaves their differences exact.
     """
 
     t_ns: NDArray[np.int64]
-    """(F,) ascending in each row, one row after the other."""
+    """(F,) times, ascending in each row, one row after the other."""
     before: NDArray[np.int64]
-    """(F + 1, 4): of all before each, how many, the sum of their times, and the same of the lost ones."""
+    """(F + 1, 4) running sums: number of frames and sum of their times, then both for the lost frames."""
 
     def until(self, first: int, last: int, t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(T, 4) the same for those of a row, from ``first`` on, that come before each of ascending times."""
-        # Most of the row lies outside a narrow window: it is searched twice, not for every pixel.
+        """Return (T, 4) the sums over a row's frames, from ``first`` on, before each ascending time."""
+        # Most of the row is outside a narrow window: find the window first, then the pixels within it.
         low, high = first + np.searchsorted(self.t_ns[first:last], (t_ns[0], t_ns[-1]))
         at = low + np.searchsorted(self.t_ns[low:high], t_ns)
         return self.before[at] - self.before[first]
@@ -33,27 +33,27 @@ class Levels:
     """Frames by row and time."""
 
     row_at: NDArray[np.int64]
-    """(R + 1,) where each row begins in the other arrays."""
+    """(R + 1,) index at which each row starts in the other arrays."""
     item: NDArray[np.int32]
-    """(F,) index of each frame as it was given; by row, then by start, as what follows."""
+    """(F,) index of each frame in the input; this and the arrays below are sorted by row, then by start."""
     start_ns: NDArray[np.int64]
     end_ns: NDArray[np.int64]
     cause: NDArray[np.int8]
-    """(F,) why it was lost; 0 if it was not."""
+    """(F,) cause of the loss; 0 if the frame was not lost."""
     begun: Sums
     ended: Sums
 
     @property
     def rows(self) -> int:
-        """How many."""
+        """Number of rows."""
         return len(self.row_at) - 1
 
     def row(self, index: int) -> tuple[int, int]:
-        """First frame of a row, and the first behind it."""
+        """Return the index of a row's first frame, and the index after its last."""
         return int(self.row_at[index]), int(self.row_at[index + 1])
 
     def near(self, row: int, start_ns: int, end_ns: int) -> tuple[int, int]:
-        """First frame of a row that begins in a span of time, and the first that begins behind it."""
+        """Return the index of a row's first frame in a time span, and of its first frame after the span."""
         first, last = self.row(row)
         begin, end = np.searchsorted(self.start_ns[first:last], (start_ns, end_ns))
         return first + int(begin), first + int(end)
@@ -66,14 +66,14 @@ def levels_of(
     cause: NDArray[np.integer],
     rows: int,
 ) -> Levels:
-    """The frames (F,) of so many rows, sorted and summed up.
+    """Sort (F,) frames by row and time and compute their running sums.
 
     Args:
-        start_ns: when each frame begins.
-        end_ns: and ends; not before.
-        row: in which row it is. Frames in a row may overlap.
-        cause: why it was lost, up to 127; 0 if it was not.
-        rows: how many; there may be empty ones.
+        start_ns: start of each frame.
+        end_ns: end of each frame; not before its start.
+        row: row of each frame. Frames in a row may overlap.
+        cause: cause of the loss, up to 127; 0 if the frame was not lost.
+        rows: number of rows; rows may be empty.
     """
     order = np.lexsort((start_ns, row))
     by_end = np.lexsort((end_ns, row))
@@ -98,20 +98,20 @@ def _sums(t_ns: NDArray[np.int64], lost: NDArray[np.bool_]) -> Sums:
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """What happens in each of W equal parts of a window, in each of R rows."""
+    """Frames and air time in each of W equal parts of a time window, for each of R rows."""
 
     frames: NDArray[np.int64]
-    """(R, W) that begin there."""
+    """(R, W) frames that start in the part."""
     lost: NDArray[np.int64]
-    """(R, W) of them that are lost."""
+    """(R, W) lost frames that start in the part."""
     taken_ns: NDArray[np.int64]
-    """(R, W) air time in the part, also of frames that began before it."""
+    """(R, W) air time in the part, including that of frames that started earlier."""
     lost_ns: NDArray[np.int64]
-    """(R, W) of it that lost frames took."""
+    """(R, W) air time of lost frames."""
 
 
 def counts_of(levels: Levels, start_ns: int, end_ns: int, parts: int) -> Counts:
-    """Frames and air time in equal parts of a window."""
+    """Return the frames and the air time in equal parts of a time window."""
     edges_ns = start_ns + np.arange(parts + 1, dtype=np.int64) * (end_ns - start_ns) // parts
     begun = np.empty((levels.rows, parts + 1, 4), np.int64)
     ended = np.empty_like(begun)
@@ -120,7 +120,7 @@ def counts_of(levels: Levels, start_ns: int, end_ns: int, parts: int) -> Counts:
         ended[row] = levels.ended.until(*levels.row(row), edges_ns)
     counts = []
     for number, times in ((0, 1), (2, 3)):
-        # A frame has been on the air since its start, but not since its end.
+        # A frame is on the air after its start and before its end.
         on_air = begun[..., number] - ended[..., number]
         taken_ns = on_air * edges_ns - (begun[..., times] - ended[..., times])
         counts += [np.diff(begun[..., number]), np.diff(taken_ns)]

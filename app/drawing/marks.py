@@ -1,4 +1,4 @@
-"""Histograms, and lines that mark a value on them."""
+"""Histograms, and vertical lines that mark a value on them."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from pipeline.types import FloatArray, IntArray
 def mark(
     figure: go.Figure, x: float, label: str, color: str, side: str, dash: str = "solid", log: bool = False
 ) -> None:
-    """A line over the whole height; the labels stand above it, on sides where they do not meet.
+    """Draw a line over the whole height. Labels are above it, on sides where they do not overlap.
 
     Args:
         figure: the chart.
-        x: where, in the unit of its axis.
-        label: HTML.
-        color: CSS.
-        side: of the label that is at ``x``: left, center or right.
-        dash: of the line.
+        x: position in the unit of the axis.
+        label: HTML of the label.
+        color: CSS colour.
+        side: side of the label that is at ``x``: left, center or right.
+        dash: dash style of the line.
         log: whether the axis is logarithmic.
     """
     line = {"color": color, "width": 1.5, "dash": dash}
     figure.add_shape(type="line", x0=x, x1=x, y0=0, y1=1, yref="paper", line=line)
     figure.add_annotation(
-        x=math.log10(x) if log else x,  # unlike shapes, annotations count a logarithmic axis in exponents
+        x=math.log10(x) if log else x,  # on a logarithmic axis, annotations take exponents, unlike shapes
         y=1.0,
         yref="paper",
         yanchor="bottom",
@@ -39,7 +39,7 @@ def mark(
 
 
 def bar_figure(x_title: str, y_title: str) -> go.Figure:
-    """An empty histogram."""
+    """Return an empty histogram."""
     figure = go.Figure()
     figure.update_layout(
         template="plotly_white",
@@ -54,7 +54,7 @@ def bar_figure(x_title: str, y_title: str) -> go.Figure:
 
 
 def add_bars(figure: go.Figure, edges: FloatArray, counts: IntArray, unit: str, what: str) -> None:
-    """Add (B,) counts of ``what`` between (B + 1,) edges in a unit."""
+    """Add bars of (B,) counts of ``what`` between (B + 1,) edges in a unit."""
     figure.add_bar(
         x=0.5 * (edges[1:] + edges[:-1]),
         y=counts,

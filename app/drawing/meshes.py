@@ -1,4 +1,4 @@
-"""Surfaces as the bytes that a browser draws."""
+"""Surfaces as binary glTF for the browser."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from pipeline.io.images import jpeg_of
 from pipeline.types import ByteArray, FloatArray, PointSource, Surface, SurfaceResult, Texture
 
 DARKEST = {True: 0.75, False: 0.45}
-"""How dark a surface gets that turns from the light: the camera's own colours have shadows already."""
+"""Least brightness, by whether the colours are a camera's: photographs already contain shadows."""
 
 VIOLET = (0.72, 0.5, 1.0)
-"""What a photograph is multiplied with where the surface was inferred."""
+"""Factor on a photograph's RGB where the surface was inferred."""
 
 
 def mesh_view(
     surface: SurfaceResult, truth: dict[str, float] | None, texture: Texture | None = None
 ) -> MeshView:
-    """A surface with the rims of its holes, ready to be sent; in photographs if there is a texture."""
+    """Return a surface with the rims of its holes for the browser, with photographs if it has a texture."""
     glb = surface_glb(surface, surface.colors, photographed=True)
     return MeshView(
         glb=glb if texture is None else photographed_glb(surface, texture),
@@ -33,12 +33,12 @@ def mesh_view(
 
 
 def surface_glb(surface: Surface, colors: ByteArray | None, photographed: bool) -> bytes:
-    """The mesh with (V, 3) vertex colours and light on it, as binary glTF; empty if it has no triangle.
+    """Return the mesh with lit (V, 3) vertex colours as binary glTF; empty if it has no triangle.
 
     Args:
-        surface: grey without colours.
-        colors: sRGB.
-        photographed: whether the colours are a camera's, which have light and shadow in them.
+        surface: the surface; grey without colours.
+        colors: sRGB colours.
+        photographed: whether the colours are a camera's, which already contain light and shadow.
     """
     if not len(surface.triangles):
         return b""
@@ -46,12 +46,12 @@ def surface_glb(surface: Surface, colors: ByteArray | None, photographed: bool) 
 
 
 def photographed_glb(surface: Surface, texture: Texture, tinted: bool = False) -> bytes:
-    """The mesh in its cameras' photographs and, where none sees it, in the colours of its points.
+    """Return the mesh with its cameras' photographs, and the points' colours where no camera sees it.
 
     Args:
-        surface: as it was dressed.
-        texture: its photographs.
-        tinted: whether what was inferred is violet.
+        surface: the surface whose texture it is.
+        texture: the photographs.
+        tinted: whether inferred parts are violet.
     """
     if not len(surface.triangles):
         return b""
@@ -68,11 +68,11 @@ def photographed_glb(surface: Surface, texture: Texture, tinted: bool = False) -
 
 
 def _lit(surface: Surface, colors: ByteArray | None, photographed: bool) -> ByteArray:
-    """(V, 3) colours with light on them."""
+    """Return (V, 3) colours with light on them."""
     if colors is None:
         colors, photographed = np.tile(np.array(NEUTRAL, np.uint8), (len(surface.vertices_m), 1)), False
     normals = vertex_normals(surface)
-    light = normals.mean(axis=0)  # from where the cameras stand
+    light = normals.mean(axis=0)  # from where the cameras are
     light[2] += 0.4  # and from above
     light /= max(float(np.linalg.norm(light)), 1e-9)
     darkest = DARKEST[photographed]
@@ -81,7 +81,7 @@ def _lit(surface: Surface, colors: ByteArray | None, photographed: bool) -> Byte
 
 
 def vertex_normals(surface: Surface) -> FloatArray:
-    """(V, 3) those of the points or, where a surface has none, of the triangles around each vertex."""
+    """Return (V, 3) the points' normals or, where a surface has none, means of the triangles' normals."""
     if surface.normals is not None:
         return surface.normals
     a, b, c = surface.vertices_m[surface.triangles].swapaxes(0, 1)
@@ -92,7 +92,7 @@ def vertex_normals(surface: Surface) -> FloatArray:
 
 
 def rim_segments_m(surface: Surface) -> FloatArray:
-    """(E, 2, 3) float32: the edges that have one triangle only."""
+    """Return (E, 2, 3) float32: the edges that belong to one triangle only."""
     edges = np.sort(surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
     keys, triangles = np.unique(edges[:, 0] << 32 | edges[:, 1], return_counts=True)
     rims = keys[triangles == 1]

@@ -1,4 +1,4 @@
-"""Depth as colour, safe for colour-blind eyes, with what cannot be known in magenta."""
+"""Depth images as colour pictures, safe for colour-blind people, with unknown depth in magenta."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 UNKNOWN = (90, 90, 90)
 NEARER, EQUAL, FARTHER = (0, 90, 181), (250, 250, 250), (230, 120, 0)
 FARTHEST_OFF_M = 0.3
-"""Difference from which on the colour does not change."""
+"""Difference at which the colour scale stops."""
 BAR_STOPS = 9
 
 
 def depth_range_m(depth: DepthMap) -> tuple[float, float]:
-    """2nd and 98th percentile of the known depths."""
+    """Return the 2nd and 98th percentile of the known depths."""
     known_m = depth.z_m[depth.valid]
     if not len(known_m):
         return 0.0, 1.0
@@ -26,7 +26,7 @@ def depth_range_m(depth: DepthMap) -> tuple[float, float]:
 
 
 def depth_picture(depth: DepthMap, range_m: tuple[float, float], what: str = "") -> Picture:
-    """Near is dark, far is bright, unknown is magenta; the caption begins with ``what``."""
+    """Draw depth: near is dark, far is bright, unknown is magenta; the caption begins with ``what``."""
     nearest_m, farthest_m = range_m
     level = np.clip((depth.z_m - nearest_m) / (farthest_m - nearest_m), 0.0, 1.0)
     rgb = cividis((np.nan_to_num(level) * 255).astype(np.uint8))
@@ -42,7 +42,7 @@ def depth_picture(depth: DepthMap, range_m: tuple[float, float], what: str = "")
 
 
 def difference_picture(inferred: DepthMap, sensor: DepthMap, most_m: float = FARTHEST_OFF_M) -> Picture:
-    """Inferred minus sensed depth: blue nearer, orange farther, white equal; grey where one is unknown."""
+    """Draw inferred minus sensor depth: blue nearer, orange farther, white equal, grey unknown."""
     difference_m = inferred.z_m - sensor.z_m
     rgb = _diverging(np.clip(difference_m / most_m, -1.0, 1.0))
     rgb[~np.isfinite(difference_m)] = UNKNOWN
@@ -56,7 +56,8 @@ def difference_picture(inferred: DepthMap, sensor: DepthMap, most_m: float = FAR
 
 
 def confidence_picture(confidence: FloatArray, flying: BoolArray, out_of_reach: BoolArray) -> Picture:
-    """The surer, the brighter; magenta what flies, grey what is too far from anything measured or unknown.
+    """Draw confidence: higher is brighter; flying pixels magenta; grey if unknown or too far from
+    measurements.
 
     Args:
         confidence: (H, W) from 0 to 1, NaN where nothing is inferred.
@@ -75,17 +76,17 @@ def confidence_picture(confidence: FloatArray, flying: BoolArray, out_of_reach: 
 
 
 def confidence_colors(confidence: FloatArray) -> ByteArray:
-    """RGB of confidences from 0 to 1, with a last axis of 3; the darkest colour for NaN."""
+    """Return RGB (last axis 3) of confidences from 0 to 1; the darkest colour for NaN."""
     return ramp(np.nan_to_num(confidence), 1.0, CONFIDENCE_STOPS)
 
 
 def cividis(level: ByteArray) -> ByteArray:
-    """(H, W, 3) RGB of (H, W) levels from 0 to 255."""
+    """Return (H, W, 3) RGB of (H, W) levels from 0 to 255."""
     return cv2.cvtColor(cv2.applyColorMap(level, cv2.COLORMAP_CIVIDIS), cv2.COLOR_BGR2RGB)
 
 
 def _diverging(level: FloatArray) -> ByteArray:
-    """(H, W, 3) blue, white, orange for -1, 0, 1."""
+    """Return (H, W, 3) RGB: blue, white, orange for -1, 0, 1."""
     level = np.nan_to_num(level)[..., None]
     blue, white, orange = (np.array(color, float) for color in (NEARER, EQUAL, FARTHER))
     rgb = np.where(level < 0, white + (white - blue) * level, white + (orange - white) * level)

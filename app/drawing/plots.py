@@ -1,4 +1,4 @@
-"""What all plots of a calibration have in common: their look, and axes like an image's."""
+"""The common style of all calibration plots, and the axes of an image."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import plotly.graph_objects as go
 from app.drawing.colors import BRAND, css
 
 BAND95 = 1.96
-"""Standard deviations to either side that hold 95 % of a normal distribution."""
+"""Standard deviations to each side that hold 95 % of a normal distribution."""
 
 
 def titled_figure(title: str, x_title: str, y_title: str) -> go.Figure:
-    """An empty plot; its legend is below it."""
+    """Return an empty plot with its legend below."""
     figure = go.Figure()
     figure.update_layout(
         template="plotly_white",
@@ -26,7 +26,7 @@ def titled_figure(title: str, x_title: str, y_title: str) -> go.Figure:
 
 
 def image_figure(title: str, size_px: tuple[int, int]) -> go.Figure:
-    """Axes of an image: its first row is on top, its pixels are square."""
+    """Return a plot with the axes of an image: the first row on top, square pixels."""
     width, height = size_px
     figure = titled_figure(title, "column, px", "row, px")
     figure.update_layout(
@@ -38,5 +38,5 @@ def image_figure(title: str, size_px: tuple[int, int]) -> go.Figure:
 
 
 def faint(color: tuple[int, int, int]) -> str:
-    """A colour to fill a band with."""
+    """Return a colour that is transparent enough to fill a band."""
     return "rgba({}, {}, {}, 0.25)".format(*color)

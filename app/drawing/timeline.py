@@ -1,4 +1,4 @@
-"""Lanes of a timeline: pictures of a window of simulated time, whose cost hardly grows with the events."""
+"""Lanes of a timeline: pictures of a simulated-time window at a cost nearly independent of its events."""
 
 from __future__ import annotations
 
@@ -19,40 +19,40 @@ Color = tuple[int, int, int]
 PAPER, STRIPE, RULE = (250, 251, 252), (241, 243, 246), (222, 226, 231)
 TEXT = (70, 78, 86)
 FAINTEST = 0.35
-"""Strength of a pixel of whose time hardly anything is taken."""
+"""Strength of a pixel that is nearly free of air time."""
 NEAR_PX = 4.0
-"""Frames at least so far apart on average are shown one by one, others as rates."""
+"""Frames at least this far apart on average are drawn one by one, others as rates."""
 AROUND_PX = 9
-"""Neighbouring pixels over which frames and losses are averaged, so that a rate can be read."""
+"""Number of neighbouring pixels over which frames and losses are averaged, so that a rate is readable."""
 ROWS_PX, ROW_PX = 120, (2, 24)
-"""Height of all rows if they fit, and of the lowest and the highest row."""
+"""Height of all rows if they fit; lowest and highest row."""
 DASH_PX = 12
-"""Half the way from one dash of a curve to the next."""
+"""Half the distance between the dashes of a curve."""
 TICK_PX = 14
-"""Height of a value at the left edge."""
+"""Height of a tick's text at the left edge."""
 NAME_PX = 13
 """Height of a row's name."""
 WORD_PX, WORDS = 56.0, 60
-"""Least width of a frame with a word in it, and how many are written at most."""
+"""Least width of a frame that gets a word, and the largest number of words."""
 FAINT_VEIL = 0.82
-"""Over what lies after the clock and may be guessed at."""
+"""Veil over the time after the clock when its content may be faintly visible."""
 BEFORE = 8
-"""Frames before a time among which one that is still on the air is looked for."""
+"""Number of frames before a time that are searched for one that is still on the air."""
 
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A word beside a lane."""
+    """A text next to a lane."""
 
     y_px: float
-    """Its middle, from the lane's upper edge."""
+    """Middle of the text, from the lane's upper edge."""
     text: str
     color: Color = TEXT
 
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """A word in a lane's picture, in the middle of a span of time."""
+    """A text in a lane's picture, centred in a time span."""
 
     start_ns: int
     end_ns: int
@@ -61,38 +61,38 @@ class Word:
 
 
 class Lane(Protocol):
-    """What a dock shows below its buttons: one picture of any window of time, and what is in it."""
+    """A lane of a dock: it draws a picture of any time window and describes its content."""
 
     title: str
     height_px: int
     veil: float
-    """How much of what lies after the clock is veiled: from 0, not at all, to 1, not to be seen."""
+    """Veil over the time after the clock: 0 leaves it visible, 1 hides it."""
     legend: Sequence[tuple[str, Color]]
-    """What its colours mean."""
+    """Names and colours of the legend."""
     ticks: Sequence[Label]
-    """Values of its height, written at its left edge."""
+    """Texts of values on the vertical axis, written at the left edge."""
 
     def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
-        """Paint (height, width, 3) RGB of the window."""
+        """Draw the window into a (height, width, 3) RGB picture."""
 
     def labels(self, now_ns: int) -> Sequence[Label]:
-        """What stands to the left of the picture while the clock shows ``now_ns``."""
+        """Return the texts to the left of the picture at clock time ``now_ns``."""
 
     def words(self, start_ns: int, end_ns: int, width_px: int) -> Sequence[Word]:
-        """What is written into a picture of that width."""
+        """Return the texts in a picture of this width."""
 
     def pick(self, t_ns: int, y_px: int, tolerance_ns: int) -> int:
-        """The nearest item, or -1."""
+        """Return the index of the nearest item, or -1."""
 
     def tell(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
-        """One line about what is there; empty for nothing."""
+        """Return one line about the items at a place; empty if there are none."""
 
     def place(self, item: int) -> tuple[int, int, int, int]:
-        """Start and end in ns, upper and lower edge in px of an item."""
+        """Return an item's start and end in ns, and its upper and lower edge in px."""
 
 
 class FramesLane:
-    """One row a node: its frames on the air; lost ones are red when near and a rate when far."""
+    """One row per node with its radio frames; losses are red: single frames when near, a rate when far."""
 
     title = "Frames"
     veil = 0.0
@@ -108,10 +108,10 @@ class FramesLane:
         """Show frames.
 
         Args:
-            levels: of the frames.
-            names: of the rows, from the top.
-            about: one line about the frame with an index.
-            causes: why a frame was lost, in a word or two; the first stands for those that were not.
+            levels: the frames, sorted.
+            names: names of the rows from top to bottom.
+            about: returns one line about the frame with an index.
+            causes: causes of losses in a word or two; the first is for frames that were not lost.
         """
         self._levels, self._names, self._about = levels, tuple(names), about
         self._causes = tuple(causes)
@@ -121,7 +121,7 @@ class FramesLane:
         self.height_px = self._row_px * len(names)
 
     def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
-        """Paint the frames of the window."""
+        """Draw the frames of the window."""
         width = picture.shape[1]
         counts = counts_of(self._levels, start_ns, end_ns, width)
         pixel_ns = (end_ns - start_ns) / width
@@ -139,13 +139,13 @@ class FramesLane:
         _paint(body[:, -strip_px:], np.where(many, 0.0, every), np.where(many, np.sqrt(rate), red))
 
     def labels(self, now_ns: int) -> Sequence[Label]:
-        """The nodes' names, as many as there is room for."""
+        """Return the nodes' names, as many as fit."""
         every = -(-NAME_PX // self._row_px)
         rows = range(0, len(self._names), every)
         return [Label((row + 0.5) * self._row_px, self._names[row]) for row in rows]
 
     def words(self, start_ns: int, end_ns: int, width_px: int) -> Sequence[Word]:
-        """Why frames were lost, where there is room for it."""
+        """Return the causes of losses, where they fit."""
         if self._row_px < NAME_PX:
             return []
         levels, least_ns = self._levels, (end_ns - start_ns) * WORD_PX / width_px
@@ -161,7 +161,7 @@ class FramesLane:
         return words[:WORDS]
 
     def pick(self, t_ns: int, y_px: int, tolerance_ns: int) -> int:
-        """The frame at a place, or the nearest in its row."""
+        """Return the frame at a place, or the nearest one in its row."""
         row, levels = y_px // self._row_px, self._levels
         if not 0 <= row < levels.rows:
             return -1
@@ -175,7 +175,7 @@ class FramesLane:
         return int(levels.item[some][latest])
 
     def tell(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
-        """About the one frame at a place, or how many there are and why some of them were lost."""
+        """Return a line about the one frame at a place, or a count of frames and causes of losses."""
         item = self.pick(t_ns, y_px, tolerance_ns)
         if item < 0:
             return ""
@@ -189,7 +189,7 @@ class FramesLane:
         return f"{self._names[row]}: {end - begin:,} frames within a few pixels, {lost}"
 
     def place(self, item: int) -> tuple[int, int, int, int]:
-        """Where a frame is."""
+        """Return a frame's start, end and edges."""
         levels = self._levels
         at = int(np.flatnonzero(levels.item == item)[0])
         row = int(np.searchsorted(levels.row_at, at, side="right")) - 1
@@ -198,12 +198,12 @@ class FramesLane:
 
 
 def _around(counts: NDArray[Any]) -> FloatArray:
-    """(R, W) mean over the pixels around each."""
+    """Return (R, W) means over neighbouring pixels."""
     return cv2.blur(counts.astype(np.float32), (AROUND_PX, 1), borderType=cv2.BORDER_REPLICATE)
 
 
 def _one_by_one(begun: NDArray[np.int64], taken: FloatArray) -> FloatArray:
-    """(R, W) strength of frames, each at least a pixel wide, with a light edge where two touch."""
+    """Return (R, W) strength of frames at least a pixel wide, weaker where two frames touch."""
     strength = np.where((begun > 0) | (taken > 0.0), np.clip(taken, 0.75, 1.0), np.float32(0.0))
     touching = (begun[:, 1:] > 0) & (taken[:, :-1] > 0.5) & (taken[:, 1:] > 0.5)
     strength[:, 1:][touching] = 0.5
@@ -211,7 +211,7 @@ def _one_by_one(begun: NDArray[np.int64], taken: FloatArray) -> FloatArray:
 
 
 def _paint(rows: ByteArray, frames: FloatArray, lost: FloatArray) -> None:
-    """Lay frames, and above them lost ones, in (R, W) strengths over (R, H, W, 3) rows."""
+    """Draw frames, and lost ones over them, in (R, W) strengths onto (R, H, W, 3) rows."""
     for channel, (target, loss) in enumerate(zip(TARGET, LOSS, strict=True)):
         color = rows[:, 0, :, channel].astype(np.float32)
         color += frames * (target - color)
@@ -221,7 +221,7 @@ def _paint(rows: ByteArray, frames: FloatArray, lost: FloatArray) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A quantity that holds from each of its times to the next."""
+    """A quantity whose value holds from each of its times to the next."""
 
     name: str
     unit: str
@@ -229,21 +229,21 @@ class Curve:
     t_ns: NDArray[np.int64]
     """(T,) ascending."""
     values: FloatArray
-    """(T,) NaN where there is none."""
+    """(T,) values, NaN without a value."""
     low: float = 0.0
     high: float = 1.0
-    """Values at the lower and upper edge of the lane."""
+    """Value at the lane's upper edge; ``low`` is at the lower one."""
     digits: int | None = None
-    """Behind the point, so that a number that runs does not jump; None: three in all."""
+    """Fixed decimals, so that a running number does not change its width; None: three digits in all."""
     dashed: bool = False
 
     def at(self, t_ns: NDArray[np.int64]) -> FloatArray:
-        """The value at each time; NaN before the first."""
+        """Return the value at each time; NaN before the first."""
         index = np.searchsorted(self.t_ns, t_ns, side="right")
         return np.concatenate([[np.nan], self.values])[index]
 
     def text(self, now_ns: int) -> str:
-        """Its name and value at a time."""
+        """Return the name and value at a time as text."""
         value = float(self.at(np.array(now_ns)))
         if not np.isfinite(value):
             return f"{self.name} –"
@@ -252,7 +252,7 @@ class Curve:
 
 
 class CurvesLane:
-    """Curves, each on a scale of its own; beside them what they are at the clock."""
+    """Curves, each on its own scale, with their values at the clock next to them."""
 
     def __init__(
         self,
@@ -262,14 +262,14 @@ class CurvesLane:
         veil: float = FAINT_VEIL,
         titled: bool = False,
     ) -> None:
-        """Show curves in so many pixels, veiled so much after the clock; ``titled`` writes the title, too."""
+        """Show curves at this height, with this veil after the clock; ``titled`` also writes the title."""
         self.title, self.height_px, self.veil, self._curves = title, height_px, veil, tuple(curves)
         self._titled = titled
         self.legend: Sequence[tuple[str, Color]] = tuple((curve.name, curve.color) for curve in curves)
         self.ticks: Sequence[Label] = self._scale()
 
     def _scale(self) -> list[Label]:
-        """The values at both edges and in the middle, if they are those of all curves."""
+        """Return ticks at both edges and in the middle, if all curves have the same scale."""
         scales = {(curve.low, curve.high, curve.unit) for curve in self._curves}
         if len(scales) != 1:
             return []
@@ -282,7 +282,7 @@ class CurvesLane:
         return [Label(y_px, f"{value:g} {unit}".rstrip()) for y_px, value in places]
 
     def draw(self, picture: ByteArray, start_ns: int, end_ns: int) -> None:
-        """Paint the curves in the window."""
+        """Draw the curves in the window."""
         picture[:] = PAPER
         picture[[0, self.height_px // 2, -1]] = RULE
         pixels = 2 * np.arange(picture.shape[1], dtype=np.int64) + 1
@@ -294,7 +294,7 @@ class CurvesLane:
             _draw_curve(picture, np.clip(share, 0.0, 1.0), curve.color)
 
     def labels(self, now_ns: int) -> Sequence[Label]:
-        """Name and value of each curve."""
+        """Return the name and value of each curve."""
         title_px = NAME_PX if self._titled else 0
         gap_px = (self.height_px - title_px) / (len(self._curves) + 1)
         curves = [
@@ -304,30 +304,30 @@ class CurvesLane:
         return [Label(0.5 * NAME_PX, self.title), *curves] if self._titled else curves
 
     def words(self, start_ns: int, end_ns: int, width_px: int) -> Sequence[Word]:
-        """None."""
+        """Return no words."""
         return []
 
     def pick(self, t_ns: int, y_px: int, tolerance_ns: int) -> int:
-        """Curves have no items."""
+        """Return -1: curves have no items."""
         return -1
 
     def tell(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
-        """The values at a time."""
+        """Return the values at a time."""
         return ", ".join(curve.text(t_ns) for curve in self._curves)
 
     def place(self, item: int) -> tuple[int, int, int, int]:
-        """Curves have no items."""
+        """Raise an error: curves have no items."""
         raise IndexError(item)
 
 
 def round_up(value: float) -> float:
-    """The next number whose half is round, too: 1, 2, 4, 6, 8 or 10 times a power of ten."""
+    """Return the next of 1, 2, 4, 6, 8 or 10 times a power of ten: half of it is a round number too."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(next(times * power for times in (1.0, 2.0, 4.0, 6.0, 8.0, 10.0) if times * power >= value))
 
 
 def _draw_curve(picture: ByteArray, share: FloatArray, color: Color) -> None:
-    """A line through (W,) shares of the height, with gaps where they are NaN."""
+    """Draw a line through (W,) shares of the height, with gaps at NaN."""
     there = np.flatnonzero(np.isfinite(share))
     for run in np.split(there, np.flatnonzero(np.diff(there) > 1) + 1):
         if len(run):

@@ -1,3 +1,3 @@
-"""Lessons: their files, and the row above the stage that leads through them. Imports of ``app`` only
-``window`` and what is below it.
+"""Lessons: their files, and the row above the picture that leads through them. Imports of ``app`` only
+``window`` and the packages that ``window`` imports.
 """

@@ -1,22 +1,22 @@
-"""Lessons: markdown files whose sections set a screen's controls and say what to look at.
+"""Lessons: markdown files whose sections set a screen's controls and explain what it shows.
 
 A lesson is a ``# title`` and sections. A section is a ``## title``, lines ``set: name = value``, lines
-``open: folder or tab``, lines ``see: control or number`` and its text. What a section does not set is at its
-default, so that every stop can be shown by itself; what it speaks of is opened, framed and in view. A text
-has emphasis, lists and links to the web; tags and images in it are shown as they are written. Numbers
-are not typed: ``{name}`` is computed of what the screen shows. ``{{, and was {3:name}}}`` says what it was at
-the third stop, and nothing to those who were not there.
-Behind the text a section asks::
+``open: folder or tab``, lines ``see: control or number``, and its text. What a section does not set has its
+default, so that each stop can be shown alone. The folders, controls and numbers that it names are opened,
+framed and scrolled into view. A text may have emphasis, lists and web links; tags and images in it are shown
+as plain text. Numbers are computed from the screen, not typed: ``{name}``. ``{{, and was {3:name}}}`` gives
+the number at the third stop, and is left out for users who have not been there.
+After its text a section may ask a question::
 
     ask: What does it cost?
     choices:
-    - [ ] Nothing. | Why somebody may think so, and why it is not so.
+    - [ ] Nothing. | Why somebody may think so, and why it is wrong.
     - [x] Time.
-    - [ ] Energy. | The reason here, too.
-    reveal: What there is to know, which is shown when a person has guessed.
+    - [ ] Energy. | The reason for this choice.
+    reveal: The explanation that is shown after a guess.
 
-Where the right choice depends on the scene, each has a reason and names what must be computed for it to be
-right: ``- [more=plane] The plane. | Why it is wrong where it is.``
+If the right choice depends on the scene, each choice has a reason and names the computed word that makes it
+right: ``- [more=plane] The plane. | Why it is wrong in other scenes.``
 """
 
 from __future__ import annotations
@@ -35,37 +35,37 @@ if TYPE_CHECKING:
 LESSONS = Path(__file__).resolve().parents[2] / "assets" / "lessons"
 NUMBER = r"(\d+(?:\.\d+)?)"
 CHOICES = 3
-"""Of every question; they are the keys 1, 2 and 3."""
+"""Number of choices in every question; the keys are 1, 2 and 3."""
 PARTS = ("ask", "choices", "reveal")
 POINTING = ("open:", "see:")
 FIELD = re.compile(r"\{(?:(\d+):)?([a-z_0-9]+)\}")
 CLAUSE = re.compile(r"\{\{((?:[^{}]|\{[^{}]*\})*)\}\}")
 SCENE = "scene"
-"""The number by which those of another scene are told apart; not for a text."""
+"""Key of ``Numbers`` whose value identifies the scene; texts cannot use it."""
 Numbers: TypeAlias = Mapping[str, str]
-"""What stands for the fields of a text, by their names; empty while it is computed."""
+"""Texts that replace the fields of a lesson's text, by field name; empty while they are computed."""
 Value = TypeVar("Value")
 Look = TypeVar("Look", bound="DataclassInstance")
-"""What a screen is to show: a frozen record of all that a stop may set."""
+"""State of a screen: a frozen record of everything that a stop may set."""
 Setting: TypeAlias = Callable[[Look, str], Look]
-"""Changes a look as the text behind ``set: name =`` says; a ValueError says what to try instead."""
+"""Returns a look with the change of a line ``set: name = text``; a ValueError advises what to try."""
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One of the answers that can be guessed."""
+    """One of the answers to a question."""
 
     text: str
     """Markdown."""
     reason: str = ""
-    """Why it is wrong; empty for the one that is right."""
+    """Why the choice is wrong; empty for the right one."""
     when: tuple[str, str] | None = None
-    """The name of something computed, and what that is where this choice is right; None if it is fixed."""
+    """A number's name and the value that makes this choice right; None if no number decides."""
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What a stop asks before it tells."""
+    """The question of a stop."""
 
     text: str
     """Markdown."""
@@ -75,7 +75,7 @@ class Question:
 
 
 def settled(question: Question, numbers: Numbers) -> Question | None:
-    """The question with the choice that is right in the scene that is shown; None while that is not known."""
+    """Return the question with the right choice for the scene shown; None while it is not known."""
     if all(choice.when is None for choice in question.choices):
         return question
     rights = [choice.when is not None and choice.when in numbers.items() for choice in question.choices]
@@ -97,36 +97,36 @@ class Stop(Generic[Look]):
     """Markdown."""
     look: Look
     opens: tuple[str, ...] = ()
-    """Titles of the folders and tabs that it speaks of."""
+    """Titles of the folders and tabs to open."""
     sees: tuple[str, ...] = ()
-    """Names of the controls and numbers that it speaks of."""
+    """Names of the controls and numbers to point out."""
     question: Question | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Lesson(Generic[Look]):
-    """A way through a screen in stops."""
+    """A lesson: a sequence of stops on one screen."""
 
     title: str
     stops: tuple[Stop[Look], ...]
     default: Look
-    """What is shown where a section sets nothing."""
+    """The state in which a stop has what its section does not set."""
 
 
 def read_lesson(
     path: Path, settings: Mapping[str, Setting[Look]], default: Look, numbers: Collection[str] = ()
 ) -> Lesson[Look]:
-    """The lesson in a markdown file.
+    """Read a lesson from a markdown file.
 
     Args:
         path: the file.
         settings: what a section can set, by the names that it uses.
-        default: what is shown where a section sets nothing.
-        numbers: names of the fields that its texts may have.
+        default: the state for what a section does not set.
+        numbers: names of the fields that the texts may use.
 
     Raises:
-        InputError: the file cannot be read, has no title or no section, sets what it cannot, has a field that
-            nobody computes, or asks without choices or an answer.
+        InputError: the file cannot be read, has no title or section, sets something unknown, uses an unknown
+            field, or asks without choices or an answer.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -184,7 +184,7 @@ def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: 
 
 
 def _question(parts: list[str], where: str) -> Question:
-    """What the parts, each after its name, ask."""
+    """Return the question in the parts of a section; names and texts alternate."""
     asked, choices, reveal = (
         (part.strip() for part in parts[1::2]) if tuple(parts[::2]) == PARTS else ("",) * 3
     )
@@ -215,12 +215,12 @@ def _question(parts: list[str], where: str) -> Question:
 
 
 def sets(key: str, read: Callable[[str], Any]) -> Callable[[Look, str], Look]:
-    """The setting that puts what ``read`` makes of the text into one field of the look."""
+    """Return a setting that stores what ``read`` makes of the text in one field of the look."""
     return lambda look, text: replace(look, **{key: read(text)})
 
 
 def choice(options: Mapping[str, Value]) -> Callable[[str], Value]:
-    """Reads one of the options' names."""
+    """Return a reader that takes the name of one of the options."""
 
     def read(text: str) -> Value:
         if text not in options:
@@ -233,7 +233,7 @@ def choice(options: Mapping[str, Value]) -> Callable[[str], Value]:
 def quantity(
     unit: str, most: float, per_unit: float = 1.0, above_zero: bool = False
 ) -> Callable[[str], float]:
-    """Reads such as '2 cm' with unit cm, up to ``most``; ``per_unit`` units make one of the stored unit."""
+    """Return a reader of texts such as '2 cm' (unit cm) up to ``most``; it divides by ``per_unit``."""
 
     def read(text: str) -> float:
         found = re.fullmatch(rf"{NUMBER} ?{unit}", text)
@@ -245,5 +245,5 @@ def quantity(
 
 
 def short(label: str) -> str:
-    """What stands on the screen, up to its explanation."""
+    """Return a label's text without its explanation."""
     return re.split(r" \(|[,:]", label)[0]

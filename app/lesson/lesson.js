@@ -1,38 +1,38 @@
-// Lessons in the page: the row above the picture in which one stands, and the keys that lead through it.
+// The row above the picture that shows a lesson, and the keys that lead through it.
 (() => {
   const KEYS = {
-    ArrowRight: "Next", PageDown: "Next", " ": "Next", ArrowLeft: "Back", PageUp: "Back", // or a presenter's
+    ArrowRight: "Next", PageDown: "Next", " ": "Next", ArrowLeft: "Back", PageUp: "Back", // the keys of a presenter
     1: "1", 2: "2", 3: "3", s: "Skip", S: "Skip",
   };
   const TYPING = "input:not([type=checkbox]), textarea, select, [role=slider], [role=dialog], [contenteditable=true]";
   const PRESSED_BY_SPACE = "button, input";
-  const FOLDERS_MS = 600; // until the folders of a stop are open
+  const FOLDERS_MS = 600; // time for the folders of a stop to open
 
   const card = Object.assign(document.createElement("div"), {className: "packetmesh-lesson-card"});
-  let mark = null; // of the lesson whose stop was shown last
-  let folder = null; // that it stands in
-  let written = ""; // what the card holds
-  let docked = false; // whether a hand was last on the dock
-  let waiting = false; // for the next frame
+  let mark = null; // mark of the lesson whose stop was shown last
+  let folder = null; // the panel folder of that lesson
+  let written = ""; // the card's HTML
+  let docked = false; // whether the last pointer press was on the dock
+  let waiting = false; // whether a frame is requested
 
   function buttons(around) {
     return [...around.querySelectorAll("button")];
   }
 
-  // The folder of a lesson: the nearest around its mark that has its buttons.
+  // Return the folder of a lesson: the nearest ancestor of its mark that has its buttons.
   function folderOf(mark) {
     let around = mark.parentElement;
     while (around && !buttons(around).some(one => one.textContent === "Next")) around = around.parentElement;
     return around;
   }
 
-  // One of the lesson that is shown. Between two stops there is a new mark before it is told of.
+  // Return a button of the lesson shown. Between two stops the mark is new but not yet announced.
   function button(name) {
     if (!folder?.isConnected || !folder.querySelector(".packetmesh-lesson")) return undefined;
     return buttons(folder).find(one => one.textContent === name);
   }
 
-  // A guess; of somebody in a class it is a vote.
+  // Press a button; for a student in a class a guess is a vote.
   function press(name) {
     if (!window.packetmeshLecture.vote(Number(name))) button(name)?.click();
   }
@@ -62,11 +62,11 @@
   card.addEventListener("click", event => {
     const pressed = event.target.closest("[data-press]");
     if (!pressed) return;
-    pressed.blur(); // or space would press it again
+    pressed.blur(); // or the space bar would press it again
     press(pressed.dataset.press);
   });
 
-  // The control panel holds the text and the buttons, unseen; what is seen is made of them here.
+  // Draw the card. The control panel holds the text and the buttons, hidden; the card is made from them.
   function show() {
     waiting = false;
     if (!mark?.isConnected) frame([], []);
@@ -82,8 +82,10 @@
     if (!card.isConnected) home.append(card);
   }
 
-  // The text, and beside it the question with its choices or the answer. What is large is as low as it can be:
-  // before a guess the title, the question and its choices; then the question, what is right and why.
+  // Return the text, and next to it the question with its choices or the answer. In large type the row is
+  // kept
+  // low: before a guess it has the title, question and choices; after it the question, right answer and
+  // reason.
   function columns(parts, large) {
     const asked = parts.findIndex((one, index) => index > 0 && isQuestion(one));
     if (asked < 0) return `<div>${html(parts)}</div>`;
@@ -95,7 +97,7 @@
     return `<div>${html([question[0], answer])}</div><div>${html(question.slice(1).filter(one => !one.contains(right)))}</div>`;
   }
 
-  // While a guess is waited for, a choice is a button.
+  // Return HTML of these parts; choices are buttons while the question waits for a guess.
   function html(parts) {
     const waits = button("1") !== undefined;
     const choice = (one, index) => {
@@ -114,7 +116,7 @@
       `${skip}${made("Back")}${made("Next")}${end}</div>`;
   }
 
-  // A paragraph that is bold from end to end.
+  // Whether the element is a paragraph that is bold as a whole.
   function isQuestion(one) {
     const bold = one.querySelector(":scope > strong, :scope > b");
     return one.matches("p") && bold !== null && bold.textContent.trim() === one.textContent.trim();
@@ -128,7 +130,7 @@
     return null;
   }
 
-  // What a stop speaks of is framed and in view: folders by their titles, tabs, controls and numbers by their names.
+  // Frame what a stop names and scroll to it: folders and tabs by title, controls and numbers by name.
   function frame(folders, names) {
     document.querySelectorAll(".packetmesh-here").forEach(one => one.classList.remove("packetmesh-here"));
     const called = (selector, titles) => [...document.querySelectorAll(selector)]
@@ -153,8 +155,8 @@
   }).observe(document.body, {childList: true, subtree: true, characterData: true});
 
   window.packetmeshLesson = {
-    // A stop is shown whose mark holds this element: the keys are its own, also after its list was used. A list
-    // that somebody has opened again meanwhile stays open.
+    // Show the stop whose mark holds this element. It gets the keys, even if its drop-down was just used; a
+    // list that the user has opened again meanwhile stays open.
     at(element, folders, names) {
       mark = element.closest(".packetmesh-lesson");
       folder = folderOf(mark);

@@ -1,4 +1,4 @@
-"""A lesson on a screen: it leads from stop to stop, asks before it tells, and counts a class's votes."""
+"""A lesson on a screen: it leads from stop to stop, asks before it explains, and counts a class's votes."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ FIRST = "**Guess before you go on: 1, 2 or 3.** A wrong guess costs nothing. Or 
 VOTING = f"The class votes: 1, 2 or 3. A guess of the teacher's, or **{SKIP}**, shows the answer."
 COMPUTING = "The answer depends on the scene: it comes when the numbers of this stop are computed."
 FIRST_OF_ALL = -1.0
-"""Order of a lesson's folder in the panel of its screen."""
+"""Order of the lesson's folder in its screen's panel: it comes first."""
 BAR = 12
-"""Blocks of a bar that holds all votes."""
+"""Length of the bar for all votes, blocks."""
 KEYS = Markup(
     "<span class='keys'><span><b>→</b> or <b>space</b> next, <b>←</b> back, <b>1 2 3</b> guess, "
     "<b>S</b> skip.<span class='docked'> Click the dock, and the keys are the dock's.</span></span>"
     "<span>The keys are the dock's now; <b>Esc</b> gives them back to the lesson.</span></span>"
 )
-"""What the page says of the keys: while they are the lesson's, and while they are the dock's."""
+"""The page's line about the keys, while they belong to the lesson and while they belong to the dock."""
 TO_COME = "…"
 REPLACED = re.compile(rf"{FIELD.pattern}|!\[|\](?!\(https?://)")
-"""In the markdown of a file: its fields, and what would make an image, or a link to other than the web."""
+"""Parts of a file's markdown to replace: fields, and the start of an image or of a link outside the web."""
 
 
 class LessonFolder(Generic[Look]):
-    """Leads through a lesson stop by stop; every stop sets the screen's controls and asks before it tells."""
+    """Leads through a lesson; each stop sets the screen's controls and asks before it explains."""
 
     def __init__(
         self,
@@ -45,21 +45,21 @@ class LessonFolder(Generic[Look]):
         on_stop: Callable[[Look], None],
         numbers: Callable[[], Numbers] = dict,
     ) -> None:
-        """Add the folder.
+        """Add the folder to the panel.
 
         Args:
-            ui: of the browser.
-            lesson: what it leads through.
-            on_stop: called with what the stop shows.
-            numbers: what stands for the fields of its texts, once the screen shows the stop.
+            ui: panel of the browser.
+            lesson: the lesson.
+            on_stop: called with the state that the stop shows.
+            numbers: returns the texts for the fields, once the screen shows the stop.
         """
         self._lesson, self._on_stop, self._numbers = lesson, on_stop, numbers
         self._known: dict[int, Numbers] = {}
-        """By stop."""
+        """Numbers by stop."""
         self._names = [f"{i}. {stop.title}" for i, stop in enumerate(lesson.stops, 1)]
         self._guesses: dict[int, int] = {}
         self._votes: dict[int, dict[int, int]] = {}
-        """By stop and voter."""
+        """Votes by stop and voter."""
         self._lecture = ui.lecture
         self._waiting = self._asking()
         self._title = f"Lesson: {lesson.title}"
@@ -94,7 +94,7 @@ class LessonFolder(Generic[Look]):
         ui.resets.append(self.reset)
 
     def reset(self) -> None:
-        """Leave the lesson and what its stop has set; nothing of it was guessed."""
+        """Leave the lesson, restore the settings of its stop and forget the guesses."""
         if self._stop.value != OFF:
             self._stop.value = OFF
             self._picked()
@@ -113,15 +113,11 @@ class LessonFolder(Generic[Look]):
         self._picked()
 
     def place(self) -> str:
-        """The number of the stop, for the address; empty without one."""
+        """Return the stop's number for the address; empty without a stop."""
         return "" if self._index() < 0 else str(self._index() + 1)
 
     def take(self, place: str) -> None:
-        """Go to the stop of that number, or to none.
-
-        Raises:
-            InputError: there is no such stop.
-        """
+        """Go to the stop with this number; leave the lesson if it is empty."""
         numbers = ["", *(str(number) for number in range(1, len(self._names) + 1))]
         if place not in numbers:
             raise InputError(f"The address has stop {place[:9]}; this lesson has 1 to {len(self._names)}")
@@ -132,7 +128,7 @@ class LessonFolder(Generic[Look]):
         return -1 if self._stop.value == OFF else self._names.index(self._stop.value)
 
     def _waits(self) -> bool:
-        """Whether the stop has asked and nobody has guessed."""
+        """Whether the stop's question has no guess yet."""
         index = self._index()
         return index >= 0 and self._lesson.stops[index].question is not None and index not in self._guesses
 
@@ -152,12 +148,12 @@ class LessonFolder(Generic[Look]):
         self._point_out()
 
     def refresh(self) -> None:
-        """The screen shows something else: bring the numbers of the stop up to date."""
+        """Update the numbers of the stop, because the screen shows something else."""
         if self._index() >= 0:
             self._write(self._waiting)
 
     def _point_out(self) -> None:
-        """Have the page show the stop, large or not, give it the keys and open what it speaks of."""
+        """Let the page show the stop in its size, give it the keys and open its folders."""
         index = self._index()
         self._marked += 1
         if index < 0:
@@ -172,20 +168,20 @@ class LessonFolder(Generic[Look]):
         )
 
     def _take(self, guess: int) -> None:
-        """Answer a guess; the first one counts."""
+        """Take a guess; only the first one counts."""
         if self._waits():
             self._guesses[self._index()] = guess
             self._write(self._asking())
             self._poll()
 
     def _voted(self, voter: int, vote: int) -> None:
-        """Count a vote of the class; the last one of each counts, until the answer is shown."""
+        """Count a vote of the class; each voter's last vote counts until the answer is shown."""
         if self._waits():
             self._votes.setdefault(self._index(), {})[voter] = vote - 1
             self._write(self._asking())
 
     def _poll(self) -> None:
-        """Have the class vote while the stop waits for an answer."""
+        """Open a vote while the stop waits for an answer, and close it otherwise."""
         if self._lecture is not None:
             self._lecture.poll(self._voted if self._waits() else None)
 
@@ -193,7 +189,7 @@ class LessonFolder(Generic[Look]):
         return GUESS if self._lecture is None else VOTING
 
     def _write(self, waiting: str) -> None:
-        """Show the stop; ``waiting`` stands where the answer will be."""
+        """Show the stop; ``waiting`` is in the place of the answer until there is one."""
         index, self._waiting = self._index(), waiting
         stop = self._lesson.stops[index]
         lines = [f"**{stop.title}** ({index + 1} of {len(self._names)})", stop.text]
@@ -209,8 +205,8 @@ class LessonFolder(Generic[Look]):
         self._guess.visible = self._waits()
 
     def _filled(self, text: str, index: int) -> Markdown:
-        """The text with its numbers: of this stop, or as they were at another in the same scene. What it says
-        of stops where nobody was is left out."""
+        """Return the text with its numbers, of this stop or as they were at another in the same scene.
+        Clauses about stops that the user has not visited are left out."""
         now = self._numbers()
         if now:
             same = {at: known for at, known in self._known.items() if known[SCENE] == now[SCENE]}
@@ -222,7 +218,7 @@ class LessonFolder(Generic[Look]):
 
         def value(found: re.Match[str]) -> str:
             if found[2] is None:
-                return found[0]  # as text
+                return found[0]  # shown as text
             known = self._known[int(found[1]) - 1] if found[1] else now
             return known.get(found[2], TO_COME)
 
@@ -230,11 +226,11 @@ class LessonFolder(Generic[Look]):
 
 
 def with_votes(question: Question, votes: Collection[int]) -> Question:
-    """The question with a bar and a count behind each choice, once anybody has voted.
+    """Return the question with a bar and a count after each choice, if there are votes.
 
     Args:
-        question: what is asked.
-        votes: indices of choices.
+        question: the question.
+        votes: index of the choice in each vote.
     """
     if not votes:
         return question
@@ -248,12 +244,12 @@ def with_votes(question: Question, votes: Collection[int]) -> Question:
 
 
 def told(question: Question, guess: int | None, waiting: str) -> list[str]:
-    """Paragraphs of markdown: the choices, and the answer to a guess, or ``waiting`` before there is one.
+    """Return paragraphs of markdown: the choices, and the answer to a guess, or ``waiting`` before it.
 
     Args:
-        question: what is asked.
-        guess: index of a choice, ``SKIPPED``, or None while nobody has guessed.
-        waiting: what to say until then.
+        question: the question.
+        guess: index of a choice, ``SKIPPED``, or None before a guess.
+        waiting: text shown before a guess.
     """
     if guess is None:
         return [*(f"{i}. {choice.text}" for i, choice in enumerate(question.choices, 1)), waiting]

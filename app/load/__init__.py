@@ -1,1 +1,1 @@
-"""Many browsers at once on a real server, without a page: what ``bench --only load`` and ``soak`` measure."""
+"""Load tests: many browsers at once on a real server, without pages (``bench --only load`` and ``soak``)."""

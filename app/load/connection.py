@@ -1,4 +1,4 @@
-"""Connections to a running app that say and hear what a page does, without a page."""
+"""Connections to a running app that exchange a page's messages without a page."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from app.window.stepper import MARKS
 
 PATIENCE_S = 30.0
 ASKED = "packetmesh.ask("
-"""In the script by which the server asks whether all is drawn."""
+"""Start of the script by which the server asks whether everything is drawn."""
 DRAWN = "Say that all is drawn"
-"""The label of the command that answers it."""
+"""Label of the command that answers it."""
 _CURRENT = re.compile(r"nth-of-type\((\d+)\) {[^}]*color: white;")
 _MARK = re.compile(r"nth-of-type\((\d+)\) .mantine-Button-label::after {[^}]*00a0(.)'")
 
 
 def wait_for(happened: Callable[[], bool], patience_s: float = PATIENCE_S) -> None:
-    """Return once it has.
+    """Wait until ``happened()`` is true.
 
     Raises:
-        TimeoutError: it has not for long.
+        TimeoutError: it is not true in time.
     """
     end_s = time.monotonic() + patience_s
     while not happened():
@@ -39,7 +39,7 @@ def wait_for(happened: Callable[[], bool], patience_s: float = PATIENCE_S) -> No
 
 
 class Connection:
-    """One browser's connection: its controls by their labels, and what it was told of its camera."""
+    """One browser's connection: its controls by their labels, and the state that the server sent."""
 
     def __init__(self, url: str, cookie: str = "") -> None:
         self._socket = connect(
@@ -50,20 +50,20 @@ class Connection:
         )
         self.uuids: dict[str, list[str]] = {}
         self.values: dict[str, object] = {}
-        """By the control's uuid, what the server said last."""
+        """The server's last values by the controls' uuids."""
         self.texts: dict[str, str] = {}
         self.positions: list[tuple[float, ...]] = []
         self.notices: list[str] = []
-        """Titles and sentences of the notifications."""
+        """Titles and texts of the notifications."""
         self.steps: tuple[str, ...] = ()
-        """The steps' labels."""
+        """Labels of the steps."""
         self._marks: dict[str, str] = {}
         self.current = ""
         """The step that is shown."""
         self.heard_s: dict[str, float] = {}
-        """When each step was shown last, and when ``surface`` was last up to date."""
+        """Time when each step was last shown, and when ``surface`` was last up to date."""
         self.lost = False
-        """Whether the server ended the connection."""
+        """Whether the server closed the connection."""
         self._drawn: set[str] = set()
         self._closing = False
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -79,7 +79,7 @@ class Connection:
         self._socket.send(msgspec.msgpack.encode(message.as_serializable_dict()))
 
     def stand(self, position: tuple[float, float, float]) -> None:
-        """Where a hand has turned the view to."""
+        """Report a view turned by the user."""
         up, ahead = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
         self.say(
             messages.ViewerCameraMessage(
@@ -88,7 +88,7 @@ class Connection:
         )
 
     def set(self, label: str, value: object, which: int = 0) -> None:
-        """What a hand does with the control of that label, or with the one ``which`` of many."""
+        """Set the control with this label, or number ``which`` of several."""
         wait_for(lambda: len(self.uuids.get(label, ())) > which)
         self.say(messages.GuiUpdateMessage(self.uuids[label][which], {"value": value}))
 
@@ -96,7 +96,7 @@ class Connection:
         return self.values[self.uuids[label][0]]
 
     def reads(self, text: str) -> bool:
-        """Whether some text in the control panel has it."""
+        """Whether a text in the control panel contains ``text``."""
         return any(text in one for one in list(self.texts.values()))
 
     def go(self, step: str) -> None:
@@ -104,7 +104,7 @@ class Connection:
         self.set("Steps", step)
 
     def mark(self, step: str) -> str:
-        """How the stepper marks a step; empty without a mark."""
+        """Return the stepper's mark of a step; empty without one."""
         return self._marks.get(step, "")
 
     def _read(self) -> None:
@@ -146,7 +146,7 @@ class Connection:
             self.values[uuid] = value
 
     def _take_html(self, content: str) -> None:
-        """See which step is shown; say that all is drawn, when asked."""
+        """Read which step is shown; answer the question whether everything is drawn."""
         if ASKED in content:
             for uuid in self._drawn:
                 self.say(messages.CommandTriggerMessage(uuid))

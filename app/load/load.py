@@ -1,4 +1,4 @@
-"""Thirty browsers on one server: how long they wait, what memory and files it takes, and what is lost."""
+"""Load tests of thirty browsers on one server: waiting times, memory, files and failures."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ from app.load.visitor import Diary, Visitor
 SCENE = "living-room"
 BROWSERS = 30
 LEAVING = 5
-"""Of them, in the middle."""
+"""Number of browsers that leave in the middle."""
 STAY_S = 90.0
-"""That a browser stays when they come and go."""
+"""Time that a browser stays in the soak test, seconds."""
 LOOK_S = 0.5
 LATE_S = 2.0
-"""An answer that needs nothing computed should come sooner, whatever others do."""
+"""Limit for an answer that needs no computation, seconds."""
 SETTLE_S = 2.0 * PATIENCE_S
-"""After the last has left."""
+"""Wait after the last browser has left, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What many browsers saw, and the server's looks while they were there."""
+    """Records of the browsers and of the server's state."""
 
     diaries: tuple[Diary, ...]
     looks: tuple[tuple[float, Look], ...]
-    """With seconds since the first browser came."""
+    """Server states with seconds since the first browser came."""
     before: Look
-    """Before the first."""
+    """State before the first browser."""
     after: Look
-    """A while after the last."""
+    """State some time after the last browser."""
 
     def record(self) -> dict[str, Any]:
-        """The figures; times in seconds."""
+        """Return the figures; times in seconds."""
         looks = [look for _, look in self.looks]
         end_s = self.looks[-1][0]
         return {
@@ -62,7 +62,7 @@ class Load:
         }
 
     def notes(self) -> tuple[str, ...]:
-        """The figures in lines."""
+        """Return the figures as lines of text."""
         record = self.record()
         names = {
             "answers_s": "click to answer",
@@ -92,11 +92,11 @@ class Load:
         )
 
     def longest_stray_s(self) -> float:
-        """How long a job of a browser that had left was seen at most."""
+        """Longest time for which a job of a browser that had left was seen."""
         return max(self._strays_s().values(), default=0.0)
 
     def strays(self, longer_than_s: float) -> int:
-        """How many of them were seen for longer."""
+        """Return the number of such jobs seen for longer."""
         return sum(seconds > longer_than_s for seconds in self._strays_s().values())
 
     def _strays_s(self) -> dict[int, float]:
@@ -107,8 +107,8 @@ class Load:
         return {number: times[-1] - times[0] for number, times in seen.items()}
 
     def _part(self, begin_s: float, end_s: float) -> dict[str, float]:
-        """The most of everything in a part of the time, and the least memory of the server, which goes up and
-        down with every browser that comes.
+        """Return the maximum of each quantity in a time span, and the server's least memory, which rises and
+        falls with every browser.
         """
         looks = [_counts(look) for at_s, look in self.looks if begin_s <= at_s <= end_s]
         if not looks:
@@ -118,7 +118,7 @@ class Load:
 
 
 def put_load(seconds: float) -> Load:
-    """Thirty browsers for so long after all have the room's surface; five of them leave in the middle."""
+    """Keep thirty browsers this long after all have the room's surface; five of them leave in the middle."""
     with serving(SCENE) as server:
         before = server.look()
         started_s = time.monotonic()
@@ -134,7 +134,7 @@ def put_load(seconds: float) -> Load:
 
 
 def soak(seconds: float) -> Load:
-    """Thirty browsers of which every few seconds one leaves and a new one comes."""
+    """Keep thirty browsers, of which one leaves every few seconds and a new one comes."""
     with serving(SCENE) as server:
         before = server.look()
         started_s = time.monotonic()
@@ -152,7 +152,7 @@ def soak(seconds: float) -> Load:
 
 
 def _looks(server: Serving, started_s: float, until_s: float) -> Iterator[tuple[float, Look]]:
-    """A look now and then, until so many seconds after the start."""
+    """Yield the server's state now and then, until this many seconds after the start."""
     while time.monotonic() - started_s < until_s:
         yield time.monotonic() - started_s, server.look()
         time.sleep(LOOK_S)
@@ -170,7 +170,7 @@ def _counts(look: Look) -> dict[str, float]:
 
 
 def _spread(seconds: list[float]) -> dict[str, float]:
-    """Count, median, 95th percentile and the most, of those that came."""
+    """Return count, median, 95th percentile and maximum of the finite times."""
     came = [one for one in seconds if one == one]
     if not came:
         return {"count": 0}

@@ -1,4 +1,4 @@
-"""The server under load, in a process of its own that also tells what is going on in it."""
+"""The server under load, in its own process, which also reports its state."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ READY_S = 120.0
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What there is in the server at one moment."""
+    """The server's state at one moment."""
 
     sessions: int
     threads: int
     files: int
-    """In the store, with those of uploads."""
+    """Number of files in the store, including uploads."""
     bytes: int
     strays: tuple[int, ...]
-    """Running jobs of browsers that have left, each with a number of its own."""
+    """Running jobs of browsers that have left, each with its own number."""
     server_bytes: int = 0
-    """Memory of the serving process."""
+    """Memory of the server process."""
     workers_bytes: int = 0
-    """Memory of the computing processes together."""
+    """Memory of all computing processes together."""
 
 
 class Serving:
-    """A server that can be looked into."""
+    """A server that reports its state."""
 
     def __init__(self, url: str, process_id: int, pipe: Connection) -> None:
         self.url = url
         self._process, self._pipe = psutil.Process(process_id), pipe
 
     def look(self) -> Look:
-        """What there is now."""
+        """Return the present state."""
         self._pipe.send("look")
         inside: tuple[int, int, int, int, tuple[int, ...]] = self._pipe.recv()
         return Look(*inside, _memory_bytes(self._process), sum(map(_memory_bytes, self._workers())))
@@ -61,7 +61,7 @@ def _memory_bytes(process: psutil.Process) -> int:
 
 @contextmanager
 def serving(scene: str) -> Iterator[Serving]:
-    """A server on loopback that starts with a scene; it is stopped at the end.
+    """Context with a server on loopback that starts with a scene.
 
     Raises:
         TimeoutError: it did not start.
@@ -82,12 +82,12 @@ def serving(scene: str) -> Iterator[Serving]:
 
 
 def _serve(pipe: Connection, scene: str) -> None:
-    """Main function of the process: serve, and answer until the other end is closed."""
+    """Run as the main function of the process: serve, and answer until the other end is closed."""
     from app.server import build_server
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     app = build_server(scene, port=0)
-    unused, numbers = itertools.count(), dict[object, int]()  # only of those that run: it keeps them alive
+    unused, numbers = itertools.count(), dict[object, int]()  # running jobs only: it keeps owners alive
     try:
         pipe.send(app.url)
         while pipe.recv() == "look":
@@ -104,7 +104,7 @@ def _serve(pipe: Connection, scene: str) -> None:
 
 
 def _sizes(folder: Path) -> Iterator[int]:
-    """Of all files below it that do not vanish meanwhile."""
+    """Yield the sizes of all files below a folder that still exist."""
     for below, _, names in os.walk(folder):
         for name in names:
             with suppress(OSError):

@@ -1,4 +1,4 @@
-"""One of many browsers: it clicks steps, drags the ball's radius and waits for meshes, as a person does."""
+"""One of many simulated users: clicks steps, drags the ball radius and waits for meshes."""
 
 from __future__ import annotations
 
@@ -14,39 +14,39 @@ from app.load.connection import Connection, wait_for
 from app.window.stepper import MARKS
 
 STEPS = ("Scene", "Depth", "Fuse", "Surface", "Export")
-"""Those that are clicked: none of them has anything computed by being shown."""
+"""Steps to click; showing them starts no computation."""
 RADIUS_MM = (12.0, 40.0)
 MOVES, MOVE_S = 8, 0.08
-"""Of a hand that drags."""
+"""Number of moves of a dragged slider, and the time between them."""
 THINKING_S = 1.5
-"""Mean time between two things that a person does."""
+"""Mean time between two actions of a user."""
 MESH_SHARE = 0.3
-"""Of what is done while no mesh is awaited."""
+"""Share of mesh requests among the actions while no mesh is awaited."""
 FIRST_S = 240.0
-"""Patience with the first surface: all come at once."""
+"""Time limit for the first surface, seconds: all browsers come at once."""
 LONGEST_S = 30.0
-"""An answer that takes longer is none."""
+"""Limit after which an answer counts as missing, seconds."""
 
 
 @dataclass(slots=True)
 class Diary:
-    """What one browser has seen."""
+    """Times measured by one browser."""
 
     opened_s: float = float("nan")
-    """Until the panel was there."""
+    """Time until the panel was there."""
     first_mesh_s: float = float("nan")
-    """Until all steps of the room were computed."""
+    """Time until all steps of the room were computed."""
     answers_s: list[float] = field(default_factory=list)
-    """Of clicks that need nothing computed."""
+    """Answer times of clicks that need no computation."""
     meshes_s: list[float] = field(default_factory=list)
-    """From the last move of the radius until everything of that surface is there."""
+    """Times from the last move of the radius until that surface is complete."""
     lost: str = ""
-    """Why it could not go on; empty if it could."""
+    """Reason why the browser could not continue; empty if it could."""
     notices: list[str] = field(default_factory=list)
 
 
 class Visitor:
-    """A thread that uses the app until it is told to leave."""
+    """A thread that uses the app until it has to leave."""
 
     def __init__(self, url: str, seed: int) -> None:
         self.diary = Diary()
@@ -57,7 +57,7 @@ class Visitor:
         self._thread.start()
 
     def leave(self) -> None:
-        """Close the connection, whatever is being computed."""
+        """Close the connection, even during a computation."""
         self._leaving.set()
         self._thread.join()
 
@@ -101,7 +101,7 @@ class Visitor:
         self._dragged_s = time.monotonic()
 
     def _look_for_mesh(self, page: Connection) -> None:
-        """Note when the surface of the last drag was there."""
+        """Record the time of the last drag's surface if it has come."""
         if self._dragged_s is None or page.mark("Surface") != MARKS["fresh"]:
             return
         if page.heard_s["surface"] > self._dragged_s:

@@ -1,3 +1,3 @@
-"""The HTML pages and pictures that commands write, without a display. Imports of ``app`` only ``drawing``,
+"""HTML pages and pictures that commands write without a display. Imports of ``app`` only ``drawing``,
 ``compute`` and ``web``.
 """

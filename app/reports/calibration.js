@@ -1,4 +1,4 @@
-// Draws the figures that the page holds, each at its place.
+// Draws the page's figures, each at its place.
 
 for (const [row, {data, layout}] of JSON.parse(document.getElementById("figures").textContent).entries())
   Plotly.newPlot(`figure-${row}`, data, layout, {displayModeBar: false, responsive: true});

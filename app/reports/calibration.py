@@ -1,4 +1,4 @@
-"""A camera's calibration as one page: numbers, verdict, and pictures that answer the pointer."""
+"""The report of a camera's calibration on one page: numbers, verdict and interactive figures."""
 
 from __future__ import annotations
 
@@ -86,6 +86,6 @@ def _all(report: CameraReport, trust: Trust) -> list[go.Figure]:
 
 
 def _places(count: int) -> Markup:
-    """Where ``calibration.js`` draws the figures, side by side."""
+    """Return HTML of the places where ``calibration.js`` draws the figures, side by side."""
     place = Markup('<div class="plotly-graph-div" id="figure-{}" style="min-width: 0; height: {}px"></div>')
     return pictures((place.format(row, HEIGHT_PX) for row in range(count)), 2)

@@ -1,4 +1,4 @@
-"""Pictures that say what they show, and moving ones of them."""
+"""Pictures with title and legend, and GIFs of them."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _BAR_PX = 260
 
 
 def captioned(rgb: ByteArray, title: str, note: str, legend: Legend) -> Image.Image:
-    """A picture below its title and above what its colours mean.
+    """Draw a picture between its title and its legend.
 
     Args:
         rgb: (H, W, 3).
-        title: large.
-        note: smaller, after it, where there is room.
-        legend: of its colours; an empty one takes no room.
+        title: title in large letters.
+        note: note in smaller letters after it, if there is room.
+        legend: legend of the colours; an empty one takes no room.
     """
     height, width = rgb.shape[:2]
     size_px = min(max(width // 40, 13), 26)
@@ -45,7 +45,7 @@ def captioned(rgb: ByteArray, title: str, note: str, legend: Legend) -> Image.Im
 
 
 def _draw_legend(pen: ImageDraw.ImageDraw, legend: Legend, middle: int, width: int, size_px: int) -> None:
-    """In one row about a height, in smaller letters where it is long."""
+    """Draw the legend in one row at this height, in smaller letters if it is long."""
     left, half = EDGE_PX, size_px // 2
     if legend.bar is not None:
         first, last = legend.bar.labels[0], legend.bar.labels[-1]
@@ -67,19 +67,19 @@ def _draw_legend(pen: ImageDraw.ImageDraw, legend: Legend, middle: int, width: i
 
 
 def on_background(seen: ByteArray) -> ByteArray:
-    """(H, W, 3) the picture of a mesh with the app's background where no ray met it."""
+    """Return the (H, W, 3) picture of a mesh with the app's background where no ray met it."""
     return np.where((seen == HOLE).all(axis=2, keepdims=True), np.array(BACKGROUND, np.uint8), seen)
 
 
 def png(picture: Image.Image) -> bytes:
-    """As a file."""
+    """Return the picture as a PNG file."""
     file = io.BytesIO()
     picture.save(file, "PNG")
     return file.getvalue()
 
 
 def gif(frames: Sequence[Image.Image], stays_ms: Sequence[int]) -> bytes:
-    """A GIF that repeats without end, in the colours of its last frame, which slides of every make play."""
+    """Return an endless GIF in the colours of its last frame; all slide programs can play it."""
     palette = frames[-1].quantize(_COLORS)
     frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     file = io.BytesIO()
@@ -89,5 +89,5 @@ def gif(frames: Sequence[Image.Image], stays_ms: Sequence[int]) -> bytes:
 
 
 def font(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """The one that comes with Pillow."""
+    """Return the font that comes with Pillow."""
     return ImageFont.load_default(size_px)

@@ -25,9 +25,9 @@ __all__ = [
 ]
 
 MOST_BYTES = 15_000_000
-"""Of the page."""
+"""Most bytes of the page."""
 MOST_FRAMES = 1_000_000
-"""On the timeline; what comes later is left out, and the page says so."""
+"""Most frames on the timeline; later ones are left out, and the page shows a note."""
 _TICK_S = 1e-6
 _BASE64 = 4 / 3
 _PARTS = (
@@ -37,9 +37,9 @@ _PARTS = (
 
 
 def delivery_page(hand_out: HandOut) -> Markup:
-    """A self-contained HTML document of at most ``MOST_BYTES``.
+    """Return a self-contained HTML document of at most ``MOST_BYTES``.
 
-    Meshes that would make it larger are thinned, the last one least; pictures and frames are as given.
+    Meshes that would make it larger are thinned, the last one least; pictures and frames stay as given.
     """
     meshes = [moment.surface or _NOTHING for moment in hand_out.moments]
     box = Box.around(_corners_m(hand_out, meshes))
@@ -58,7 +58,7 @@ _NOTHING = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int32), np.zeros((0, 3)
 
 
 def _corners_m(hand_out: HandOut, meshes: list[Surface]) -> np.ndarray:
-    """(C, 3) points whose box is that of all meshes."""
+    """Return (C, 3) points whose bounding box is that of all meshes."""
     corners = [
         edge(mesh.vertices_m, axis=0) for mesh in meshes if len(mesh.vertices_m) for edge in (np.min, np.max)
     ]
@@ -66,7 +66,7 @@ def _corners_m(hand_out: HandOut, meshes: list[Surface]) -> np.ndarray:
 
 
 def _record(hand_out: HandOut, meshes: list[Surface], box: Box) -> dict[str, Any]:
-    """What the page knows besides pictures, meshes and frames."""
+    """Return the page's data besides pictures, meshes and frames."""
     return {
         "end_s": max(hand_out.end_s, hand_out.moments[-1].t_s),
         "causes": list(hand_out.frames.causes),
@@ -103,11 +103,12 @@ def _finite(value: float | None) -> float | None:
 
 
 def _frames(hand_out: HandOut) -> tuple[bytes, float, float]:
-    """The frames in deflated columns, the tick of their times, and until when they are there, in seconds.
+    """Return the frames in deflated columns, the tick of their times, and the end of the stored frames,
+    seconds.
 
     The columns, by node and start: the ``uint32`` number of frames of every node; then as byte planes
-    (``packed_mesh``) starts, as differences to the same node's frame before, and durations, both in ticks,
-    32 bits; the cause, 8 bits.
+    (``packed_mesh``) starts, as differences to the same node's frame before, and durations, both in ticks, 32
+    bits; the cause, 8 bits.
     """
     frames, until_s = hand_out.frames, hand_out.end_s
     tick_s = max(_TICK_S, float(frames.end_s.max(initial=0.0)) / 2**32)

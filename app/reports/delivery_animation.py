@@ -1,4 +1,4 @@
-"""A delivery as a moving picture for slides, made without a display: mesh, clock and numbers."""
+"""A delivery as a GIF for slides, made without a display: mesh, clock and numbers."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from pipeline.types import ByteArray
 
 SIZE_PX = (960, 540)
 PLAYS_S = 10.0
-"""All moments together, as long after each other as in the network."""
+"""Duration of all moments together; their intervals are proportional to the network's."""
 LAST_S = 3.0
-"""How long the last one stays."""
+"""Duration of the last moment."""
 _SHORTEST_S = 0.06
 _HEAD_PX, _FOOT_PX = 44, 16
 _ROOM_PX = (640, 480)
 
 
 def delivery_animation(hand_out: HandOut) -> bytes:
-    """An animated GIF, which slides of every make play, of ``SIZE_PX``; it repeats without end."""
+    """Return an endless GIF of ``SIZE_PX``; all slide programs can play it."""
     camera = camera_of(viewpoint(hand_out), _ROOM_PX)
     frames = [_frame(hand_out, moment, camera) for moment in hand_out.moments]
     return gif(frames, [round(1000 * stay_s) for stay_s in _stays_s(hand_out)])
 
 
 def _stays_s(hand_out: HandOut) -> Iterator[float]:
-    """How long each moment is shown."""
+    """Yield how long each moment is shown, seconds."""
     t_s = [moment.t_s for moment in hand_out.moments]
     for since_s, until_s in pairwise(t_s):
         yield max(PLAYS_S * (until_s - since_s) / max(hand_out.end_s, 1e-9), _SHORTEST_S)
@@ -58,7 +58,7 @@ def _frame(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> Image.Im
 
 
 def _room(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> ByteArray:
-    """The mesh, and the cameras' frusta over it."""
+    """Draw the mesh, and the cameras' frusta over it."""
     rgb = np.full((_ROOM_PX[1], _ROOM_PX[0], 3), BACKGROUND, np.uint8)
     if moment.surface is not None and len(moment.surface.triangles):
         rgb = on_background(mesh_picture(moment.surface, camera))
@@ -76,7 +76,7 @@ def _room(hand_out: HandOut, moment: HandOutMoment, camera: Camera) -> ByteArray
 
 
 def _numbers(pen: ImageDraw.ImageDraw, hand_out: HandOut, moment: HandOutMoment, left: int, top: int) -> int:
-    """The live numbers below each other; where the column goes on."""
+    """Draw the numbers below each other. Returns the next free height of the column."""
     sent = _megabytes(moment.sent_bytes)
     rows = [
         ("network time", f"{moment.t_s:.3g} s", f"of {hand_out.end_s:.3g} s", INK),
@@ -102,7 +102,7 @@ def _numbers(pen: ImageDraw.ImageDraw, hand_out: HandOut, moment: HandOutMoment,
 
 
 def _thumbnails(picture: Image.Image, moment: HandOutMoment, left: int, top: int) -> None:
-    """The nodes' pictures as received, in one row as wide as the column."""
+    """Draw the nodes' received pictures in one row as wide as the column."""
     room = SIZE_PX[0] - left - EDGE_PX
     width = min(room // len(moment.thumbnails) - 4, 120)
     for row, jpeg in enumerate(moment.thumbnails):

@@ -1,8 +1,8 @@
-"""A whole HTML document in one file. Its policy has a browser run no script but the document's own, and load
-nothing from anywhere.
+"""A whole HTML document in one file. Its content policy lets the browser run only the document's own scripts
+and load nothing.
 
-What stands in scripts and styles is no text that could be escaped; it comes from files of the program, or it
-is JSON or base64.
+Scripts and styles are no text that could be escaped: they come from files of the program, or are JSON or
+base64.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from app.web.markup import Markup
 _POLICY = Markup(
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 )
-"""Styles may stand in the page: pictures of plotly and grids have some of their own."""
+"""Content policy; styles are allowed in the page because plotly's pictures and grids set some."""
 _DOCUMENT = Markup(
     '<!doctype html><html lang="en"><head>'
     '<meta http-equiv="Content-Security-Policy" content="{policy}"><meta charset="utf-8">'
@@ -32,10 +32,10 @@ def document(title: str, body: Markup, style: Markup, scripts: Sequence[Markup] 
     """Return a self-contained document.
 
     Args:
-        title: of the window, as text.
-        body: what it shows.
+        title: title of the window, as text.
+        body: content of the page.
         style: its style sheet.
-        scripts: what runs below the body, in this order; no other script does.
+        scripts: scripts below the body, in their order; no other script can run.
     """
     policy = _POLICY
     if scripts:
@@ -46,21 +46,21 @@ def document(title: str, body: Markup, style: Markup, scripts: Sequence[Markup] 
 
 
 def shipped(path: Path) -> Markup:
-    """Return what a file of the program or of plotly holds, to stand in a page as it is."""
+    """Return the content of a file of the program or of plotly, to be inserted unchanged."""
     return Markup(path.read_text(encoding="utf-8"))  # noqa: S704
 
 
 def json_block(name: str, value: Any) -> Markup:
-    """Return an element of that name with a value that scripts read as JSON."""
-    text = json.dumps(value, allow_nan=False).replace("<", "\\u003c")  # so nothing in it ends the element
+    """Return an element with this name and a value that scripts read as JSON."""
+    text = json.dumps(value, allow_nan=False).replace("<", "\\u003c")  # nothing in it closes the element
     return Markup('<script type="application/json" id="{}">{}</script>').format(name, Markup(text))  # noqa: S704
 
 
 def bytes_block(name: str, data: bytes) -> Markup:
-    """Return an element of that name with bytes that scripts read as base64."""
+    """Return an element with this name and bytes that scripts read as base64."""
     return Markup('<script type="text/plain" id="{}">{}</script>').format(name, b64encode(data).decode())
 
 
 def _hash(script: Markup) -> Markup:
-    """By which the policy knows a script."""
+    """Return the hash by which the policy identifies a script."""
     return Markup("'sha256-{}'").format(b64encode(sha256(script.encode()).digest()).decode())

@@ -38,7 +38,7 @@ _CELL = Markup('<rect x="{}" y="{}" width="{size}" height="{size}" fill="hsl(204
 
 
 def exhibit_html(exhibit: Exhibit) -> Markup:
-    """One table or picture with its title and its note."""
+    """Return one table or picture with its title and its note."""
     if isinstance(exhibit, Table):
         kind, body = "wide", table(exhibit.header, exhibit.rows)
     elif isinstance(exhibit, Chart):
@@ -52,33 +52,33 @@ def exhibit_html(exhibit: Exhibit) -> Markup:
 
 
 def _images(exhibit: Picture) -> Markup:
-    """As PNG, which loses nothing, so that rays without a surface keep their one colour."""
+    """Return the images as lossless PNG, so that rays without a surface keep their one colour."""
     figures = [picture(rgb, caption, "png") for caption, rgb in exhibit.images]
     return pictures(figures, min(PICTURES_IN_A_ROW, len(figures)))
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """From one value to another, evenly or by powers of ten."""
+    """An axis between two values, linear or logarithmic."""
 
     low: float
     high: float
     logarithmic: bool
 
     def share(self, value: float) -> float:
-        """Where a value lies: 0 at the low end, 1 at the high one."""
+        """Return the position of a value: 0 at the low end, 1 at the high one."""
         if self.logarithmic:
             return float(np.log(value / self.low) / np.log(self.high / self.low))
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self) -> list[tuple[float, str]]:
-        """Round values with their texts."""
+        """Return round values with their texts."""
         if self.logarithmic:
             return [(value, f"{value:,g}" if value < 1e6 else f"{value:,.0f}") for value in self._powers()]
         return [(value, f"{value:g}") for value in ticks(self.high)]
 
     def _powers(self) -> list[float]:
-        """Powers of ten, with twos and fives between where they are few."""
+        """Return powers of ten, with twos and fives between them if there are few."""
         decades = range(int(np.floor(np.log10(self.low))), int(np.ceil(np.log10(self.high))) + 1)
         for digits in ((1,), (1, 2, 5)):
             values = [digit * 10.0**decade for decade in decades for digit in digits]
@@ -89,7 +89,7 @@ class Axis:
 
 
 def chart_axes(chart: Chart) -> tuple[Axis, Axis]:
-    """The horizontal and the vertical axis; those that are not logarithmic begin at zero."""
+    """Return the horizontal and the vertical axis; linear ones start at zero."""
     x_high = max((curve.x[-1] for curve in chart.curves), default=1.0)
     y_high = 1.05 * max((max(curve.high) for curve in chart.curves), default=1.0) or 1.0
     x_low = y_low = 0.0
@@ -100,7 +100,7 @@ def chart_axes(chart: Chart) -> tuple[Axis, Axis]:
 
 
 def chart_svg(chart: Chart) -> Markup:
-    """Lines with bands."""
+    """Draw lines with bands."""
     x_axis, y_axis = chart_axes(chart)
     width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
 
@@ -129,7 +129,7 @@ def chart_svg(chart: Chart) -> Markup:
 
 
 def heat_map_svg(heat_map: HeatMap) -> Markup:
-    """Cells from pale (none) to blue (all), each with its share."""
+    """Draw cells from pale (none) to blue (all), each with its share."""
     columns, rows = len(heat_map.x), len(heat_map.y)
     width, height = LEFT + CELL_PX * columns + 10, TOP + CELL_PX * rows + BOTTOM
     parts = []
@@ -160,7 +160,7 @@ def _axes(chart: Chart, x_axis: Axis, y_axis: Axis) -> Markup:
 
 
 def _labels(exhibit: Chart | HeatMap, x: float, below: float, middle: float) -> Markup:
-    """What the axes mean: below at ``x``, and upwards along the left edge."""
+    """Return the axis labels: below the chart at ``x``, and upwards along the left edge."""
     return Markup('{}<g transform="translate(14 {}) rotate(-90)">{}</g>').format(
         _TEXT.format(x, below, "middle", exhibit.x_label),
         middle,
@@ -169,7 +169,7 @@ def _labels(exhibit: Chart | HeatMap, x: float, below: float, middle: float) -> 
 
 
 def ticks(high: float, most: int = 6) -> list[float]:
-    """Round values from zero to at most ``high``."""
+    """Return round values from zero to at most ``high``."""
     power = 10.0 ** np.floor(np.log10(high / most))
     step = next(power * factor for factor in (1, 2, 5, 10) if high / (power * factor) <= most)
     return [round(step * k, 10) for k in range(int(high / step + 1e-9) + 1)]

@@ -1,11 +1,11 @@
-// Plays a delivery: unpacks what the page holds, and moves one clock, the picture, the numbers and the dock.
+// Plays a delivery: unpacks the page's data and moves one clock, the picture, the numbers and the dock.
 
-const PLAY_S = 20; // about so long does a delivery play at the speed of the start
+const PLAY_S = 20; // approximate duration of a delivery at the initial speed
 const SPEEDS = [-3, -2, -1, 0, 1, 2, 3, 4].flatMap(ten => [1, 2, 5].map(each => each * 10 ** ten));
 
-// Unpacking; the forms are those of packed_mesh.py and delivery.py.
+// Unpacking; the formats are those of packed_mesh.py and delivery.py.
 
-// Numbers (unsigned) of a column that lies byte plane by byte plane.
+// Return the unsigned numbers of a column that is stored byte plane by byte plane.
 function column(bytes, offset, count, planes) {
   const numbers = new Uint32Array(count);
   for (let plane = 0; plane < planes; plane++)
@@ -24,7 +24,7 @@ async function meshOf(moment) {
       positions[4 * i + axis] = place += (zigzag >>> 1) ^ -(zigzag & 1);
     });
   }
-  const channels = [1, 0, 2]; // green first, the others as differences to it
+  const channels = [1, 0, 2]; // green first, the others as differences to green
   for (const channel of channels) {
     let value = 0;
     for (let i = 0; i < vertices; i++) {
@@ -41,7 +41,7 @@ async function meshOf(moment) {
   return {positions, colors, triangles};
 }
 
-// Starts and ends in seconds, with running sums of the time on the air and of the losses.
+// Return starts and ends in seconds, with running sums of the air time and of the losses.
 async function framesOf(record) {
   const bytes = await inflate("frames"), nodes = record.nodes.length;
   const counts = new Uint32Array(bytes.slice(0, 4 * nodes).buffer);
@@ -63,7 +63,7 @@ async function framesOf(record) {
   return {first, start, end, cause, air, lost};
 }
 
-// The numbers: a name, what it is now, and what it is measured against.
+// The numbers: a name, the present value, and the value to compare it with.
 
 const TILES = [
   {name: "Network time", now: (record, moment, t) => clock(t, record.end_s), of: record => `of ${clock(record.end_s, record.end_s)}`},
@@ -137,7 +137,7 @@ class Player {
     addEventListener("keydown", event => {
       const action = actions[keys[event.key]];
       if (!action || event.ctrlKey || event.metaKey || event.altKey || event.target.matches("select")) return;
-      event.preventDefault(); // no second click of a button that has the focus
+      event.preventDefault(); // else the focused button would be clicked too
       action();
     });
     addEventListener("keyup", event => event.key === " " && event.preventDefault());
@@ -176,7 +176,7 @@ class Player {
     this.setTime(t);
   }
 
-  // To the next moment or the one before.
+  // Go to the next moment or the one before.
   step(way) {
     const times = [0, ...this.record.moments.map(moment => moment.t_s), this.record.end_s];
     const next = way > 0 ? times.find(t => t > this.t) : times.findLast(t => t < this.t);
@@ -193,7 +193,7 @@ class Player {
     if (row !== this.wanted) this.showMoment(row);
   }
 
-  // The latest that was asked for is shown, as soon as it is unpacked.
+  // Show the moment requested last, as soon as it is unpacked.
   async showMoment(row) {
     this.wanted = row;
     const {mesh, pictures} = await this.unpack(row);

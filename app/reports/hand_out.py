@@ -1,4 +1,4 @@
-"""What a hand-out of a delivery shows: plain values, whoever computed them."""
+"""The data of a delivery's hand-out as plain values, independent of their source."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from pipeline.types import BoolArray, ByteArray, CameraIntrinsics, FloatArray, I
 THUMBNAIL_PX = 192
 """Width of a picture on a frustum."""
 FIELD_RAD = np.radians(45.0)
-"""Angle of view from top to bottom of a picture that is ``ASPECT`` times as wide as high."""
+"""Vertical field of view of a picture with aspect ``ASPECT``."""
 ASPECT = 4 / 3
 TILT_RAD = np.radians(38.0)
-"""How far down one looks."""
+"""Downward tilt of the view."""
 MARGIN = 1.16
 _LIGHT, _DARK, _SQUARE_PX = 150, 105, 6
 
 
 @dataclass(frozen=True, slots=True)
 class HandOutNode:
-    """A camera node where it stands."""
+    """A camera node and its pose."""
 
     name: str
     intrinsics: CameraIntrinsics
     T_world_camera: FloatArray
-    """(4, 4)."""
+    """(4, 4) pose."""
 
 
 @dataclass(frozen=True, slots=True)
 class HandOutMoment:
-    """What the sink has at one moment, and what it could make of that."""
+    """The sink's data at one moment, and the surface computed from it."""
 
     t_s: float
     sent_bytes: int
@@ -42,11 +42,11 @@ class HandOutMoment:
     packets_lost: int
     energy_j: float
     surface: Surface | None
-    """World frame; None where there is none yet."""
+    """World frame; None if there is none yet."""
     thumbnails: tuple[bytes, ...]
-    """For each node its picture as received, as JPEG (``thumbnail``); empty before anything arrived."""
+    """For each node its received picture as JPEG (``thumbnail``); empty before anything has arrived."""
     f_score: float | None = None
-    """At 5 cm against the truth, 0 to 1; None without truth or surface."""
+    """F-score at 5 cm, 0 to 1; None without ground truth or surface."""
     no_hit_share: float | None = None
     """Share of the cameras' rays without surface, 0 to 1."""
 
@@ -56,34 +56,34 @@ class FramesOnAir:
     """Columns (N,) of the frames that the nodes sent."""
 
     node: IntArray
-    """Which of ``HandOut.nodes`` sent it."""
+    """Index in ``HandOut.nodes`` of the sender."""
     start_s: FloatArray
     end_s: FloatArray
     cause: IntArray
-    """Which of ``causes`` kept it from its receiver."""
+    """Index in ``causes`` of the cause of the loss."""
     causes: tuple[str, ...]
-    """In words; the first is that of frames that arrived, and is not shown. At most 256."""
+    """Causes in words; the first stands for frames that arrived and is not shown. At most 256."""
 
 
 @dataclass(frozen=True, slots=True)
 class HandOut:
-    """A delivery, as somebody without PacketMesh is to see it.
+    """A delivery for viewers without PacketMesh.
 
     Raises:
-        InputError: there is no node or no moment, or a moment has not one picture for each node.
+        InputError: there is no node or no moment, or a moment lacks a picture of a node.
     """
 
     title: str
     sentence: str
-    """What one sees."""
+    """Sentence that describes the picture."""
     nodes: tuple[HandOutNode, ...]
     moments: tuple[HandOutMoment, ...]
-    """By time."""
+    """Moments in order of time."""
     frames: FramesOnAir
     end_s: float
-    """Of the network's clock, which starts at 0."""
+    """End of the network's clock, which starts at 0."""
     lossless_f_score: float | None = None
-    """What it would be had everything arrived."""
+    """F-score if everything had arrived."""
 
     def __post_init__(self) -> None:
         if not self.nodes or not self.moments:
@@ -99,29 +99,29 @@ class HandOut:
 
 @dataclass(frozen=True, slots=True)
 class Viewpoint:
-    """From where a hand-out is looked at first."""
+    """The first viewpoint of a hand-out."""
 
     eye_m: FloatArray
     """(3,)."""
     middle_m: FloatArray
-    """(3,) what is looked at."""
+    """(3,) look-at point."""
     up: FloatArray
     """(3,) unit vector."""
 
     def record(self) -> dict[str, list[float]]:
-        """As a page reads it."""
+        """Return the viewpoint as JSON values for a page."""
         return {"eye_m": self.eye_m.tolist(), "middle_m": self.middle_m.tolist(), "up": self.up.tolist()}
 
 
 def thumbnail(rgb: ByteArray, known: BoolArray) -> bytes:
-    """A picture as received, as a small JPEG; what has not arrived is a grey chequered pattern.
+    """Return a received picture as a small JPEG; missing parts are a grey checkerboard.
 
     Args:
         rgb: (H, W, 3).
-        known: (H, W) where the colour has arrived.
+        known: (H, W) whether the colour has arrived.
 
     Returns:
-        No bytes where nothing has arrived.
+        No bytes if nothing has arrived.
     """
     if not known.any():
         return b""
@@ -136,7 +136,7 @@ def thumbnail(rgb: ByteArray, known: BoolArray) -> bytes:
 
 
 def viewpoint(hand_out: HandOut) -> Viewpoint:
-    """Behind and above the first camera, so far away that the last surface and all cameras are in view."""
+    """Return a viewpoint behind and above the first camera that shows the last surface and all cameras."""
     poses = [node.T_world_camera for node in hand_out.nodes]
     surfaces = [moment.surface for moment in hand_out.moments if moment.surface is not None]
     seen_m = [surface.vertices_m for surface in surfaces if len(surface.triangles)]
@@ -146,7 +146,7 @@ def viewpoint(hand_out: HandOut) -> Viewpoint:
 def viewpoint_of(
     poses: Sequence[FloatArray], points_m: FloatArray, cameras_in_sight: bool = True
 ) -> Viewpoint:
-    """The same for cameras' (4, 4) poses, T_world_camera, and (N, 3) points in the world."""
+    """Return the viewpoint for cameras' (4, 4) T_world_camera and (N, 3) points, world frame."""
     up = _up(np.mean([-pose[:3, 1] for pose in poses], axis=0))
     first = poses[0]
     if not len(points_m):
@@ -170,6 +170,6 @@ def viewpoint_of(
 
 
 def _up(direction: FloatArray) -> FloatArray:
-    """The axis of the world next to a direction: cameras look down or up a little."""
+    """Return the world axis nearest to a direction: cameras look down or up a little."""
     axis = int(np.argmax(np.abs(direction)))
     return np.eye(3)[axis] * (1.0 if direction[axis] >= 0.0 else -1.0)

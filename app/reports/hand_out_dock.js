@@ -1,11 +1,11 @@
-// The network's clock: a row of frames for each node, the curves below, one time axis for both.
+// The network's clock: a row of frames for each node and the curves below, on one time axis.
 
 const AXIS_PX = 24, RIGHT_PX = 64;
-const FAR_BARS_PX = 5; // a bar is at least as wide
-const FRAMES_A_BAR = 8; // and stands for about as many frames, so that a share of them says something
-const NEAR_PX = 4; // frames are drawn one by one from so many pixels a frame
+const FAR_BARS_PX = 5; // least width of a bar
+const FRAMES_A_BAR = 8; // approximate number of frames per bar, so that a share of them is meaningful
+const NEAR_PX = 4; // frames are drawn one by one if each has this width
 const ROW_SHARES = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1];
-const SPLIT = 0.36; // part of a row for the losses
+const SPLIT = 0.36; // part of a row's height for the losses
 
 class Dock {
   constructor(canvas, record, frames, seek) {
@@ -27,7 +27,7 @@ class Dock {
     this.draw();
   }
 
-  // What is looked at.
+  // The visible time window.
 
   get left() { return this.canvas.clientWidth < 600 ? 76 : 168; }
   get width() { return Math.max(this.canvas.clientWidth - this.left - RIGHT_PX, 10); }
@@ -55,7 +55,7 @@ class Dock {
     this.window(around - (around - this.from) * clamp(span / this.span, 0, this.record.end_s / this.span), span);
   }
 
-  // A window that holds the time, which moves on with the clock.
+  // Set the clock; a window that contains it moves on with it.
   setNow(t, moved) {
     this.now = t;
     if (moved && (t < this.from || t > this.from + 0.9 * this.span))
@@ -63,7 +63,7 @@ class Dock {
     this.draw();
   }
 
-  // Frames of a node: those that begin in [from, to), their time on the air, and how many of them were lost.
+  // Frames of a node: the number that start in [from, to), their air time, and the number of losses.
 
   first(node, t) {
     const {start, first} = this.frames;
@@ -81,7 +81,7 @@ class Dock {
     return {i, j, count: j - i, air_s: air[j] - air[i], lost: lost[j] - lost[i]};
   }
 
-  // The shares that the height of a row stands for, seen over the whole time.
+  // Return the shares that a row's full height stands for, from the whole run.
   rowShares() {
     const parts = 100, step = this.record.end_s / parts;
     let air = 0, lost = 0;
@@ -164,7 +164,7 @@ class Dock {
   paintRates(index, top) {
     const {pen, row} = this, all = this.between(index, this.from, this.from + this.span);
     const wanted = Math.max(FAR_BARS_PX / this.width, FRAMES_A_BAR / Math.max(all.count, 1)) * this.span;
-    const step = 2 ** Math.ceil(Math.log2(wanted)); // the same bars wherever the window begins
+    const step = 2 ** Math.ceil(Math.log2(wanted)); // the bars do not depend on the start of the window
     const [lane, base] = [SPLIT * (row - 3), top + row - 1];
     for (let t = Math.floor(this.from / step) * step; t < this.from + this.span; t += step) {
       const some = this.between(index, t, t + step);
@@ -204,7 +204,7 @@ class Dock {
     }
   }
 
-  // Red with dark stripes: seen as lost without seeing red.
+  // Return a pattern of red with dark stripes, visible as loss without seeing red.
   hatch() {
     const key = this.color("lost");
     if (this.hatched?.key === key) return this.hatched.pattern;
@@ -256,7 +256,7 @@ class Dock {
     });
   }
 
-  // What the F-score would be had everything arrived.
+  // Draw the F-score that a lossless delivery would have.
   paintLossless(y) {
     this.line("target", [2, 3], 1.5, [[this.left, y], [this.left + this.width, y]]);
     if (this.width < 500) return;
@@ -292,7 +292,7 @@ class Dock {
     }
   }
 
-  // What is still to come is pale.
+  // Draw the time after the clock pale.
   paintNow(base) {
     const {pen} = this, x = clamp(this.x(this.now), this.left, this.left + this.width);
     pen.globalAlpha = 0.55;
@@ -309,7 +309,7 @@ class Dock {
     pen.fill();
   }
 
-  // What is under the pointer, in words.
+  // Return the text for the item under the pointer.
   text(event) {
     const box = this.canvas.getBoundingClientRect(), node = Math.floor((event.clientY - box.top) / this.row);
     const t = this.time(event.clientX), name = this.record.nodes[node]?.name;
@@ -331,7 +331,7 @@ class Dock {
   }
 }
 
-// The curves, which the numbers above share colours and names with.
+// The curves, with the names and colours of the numbers above.
 const CURVES = [
   {name: "F-score at 5 cm", color: "target", dash: [], share: true, of: moment => moment.f_score},
   {name: "Rays without surface", color: "lost", dash: [9, 5], share: true, of: moment => moment.no_hit_share},
@@ -339,14 +339,14 @@ const CURVES = [
 ];
 for (const curve of CURVES) curve.known = record => record.moments.some(moment => curve.of(moment) !== null);
 
-// Numbers in words, with their units.
+// Numbers as text, with their units.
 
 const whole = number => Math.round(number).toLocaleString("en");
 const counted = number => `${whole(number)} frame${number === 1 ? "" : "s"}`;
 const percent = share => `${+(100 * share).toPrecision(share < 0.1 ? 2 : 3)} %`;
 const BYTE_UNITS = [{bytes: 1e9, unit: "GB"}, {bytes: 1e6, unit: "MB"}, {bytes: 1e3, unit: "kB"}, {bytes: 1, unit: "B"}];
 const byteScale = bytes => BYTE_UNITS.find(each => bytes >= each.bytes) ?? BYTE_UNITS[3];
-// With as many digits as the largest of them, so that a number that grows stands still.
+// Return bytes with as many digits as the largest value, so that a growing number keeps its width.
 const bytesText = (bytes, most) => {
   const {bytes: one, unit} = byteScale(most);
   return `${(bytes / one).toFixed(one === 1 ? 0 : clamp(2 - Math.floor(Math.log10(most / one)), 0, 2))} ${unit}`;
@@ -359,5 +359,5 @@ const niceCeiling = value => {
   const ten = 10 ** Math.floor(Math.log10(value));
   return [1, 1.5, 2, 3, 4, 5, 6, 8, 10].map(each => each * ten).find(each => each >= value * 0.999);
 };
-// A time with as many digits as a window of such a length needs.
+// Return a time with as many digits as a window of this length needs.
 const clock = (t, span) => `${t.toFixed(clamp(Math.ceil(2 - Math.log10(span)), 0, 6))} s`;

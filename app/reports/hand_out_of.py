@@ -1,4 +1,4 @@
-"""The hand-out of a delivery from its record."""
+"""The hand-out of a delivery, made from the delivery's record."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PAGE, ANIMATION = "delivery.html", "delivery.gif"
 
 
 def write_hand_out(delivery: Delivery, folder: Path) -> Path:
-    """Write the page that plays a delivery, and a moving picture of it for slides; returns the page.
+    """Write the page that plays a delivery, and a GIF of it for slides; return the page's path.
 
     Raises:
         InputError: the folder cannot be written.
@@ -36,7 +36,7 @@ def write_hand_out(delivery: Delivery, folder: Path) -> Path:
 
 
 def hand_out_of(delivery: Delivery) -> HandOut:
-    """What somebody without PacketMesh is to see of a delivery."""
+    """Return the data of a delivery's hand-out."""
     sending, truth = delivery.sending, delivery.lossless.truth_after
     rig, poses = sending.rig, delivery.lossless.placement.T_world_camera
     return HandOut(
@@ -70,7 +70,7 @@ def _moment(sending: Sending, index: int, moment: Moment) -> HandOutMoment:
 
 
 def _frames(trace: NetworkTrace, nodes: int) -> FramesOnAir:
-    """The frames of the cameras; those of the sink only ask for what is missing."""
+    """Return the frames of the cameras; those of the sink only request missing packets."""
     frames = trace.events.of(EventKind.AIR)
     frames = frames.where(frames.node < nodes)
     words = (RECEIVED, *(cause.name.lower().replace("_", " ") for cause in Cause if cause))

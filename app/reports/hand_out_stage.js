@@ -1,4 +1,4 @@
-// The room in three dimensions: the mesh of a moment, and the nodes' frusta with their pictures as received.
+// The room in 3-D: the mesh of a moment, and the nodes' frusta with their received pictures.
 
 const VERTEX = `#version 300 es
 uniform mat4 view;
@@ -32,7 +32,7 @@ uniform sampler2D picture;
 in vec2 uv;
 out vec4 color;
 void main() { color = texture(picture, uv); }`;
-const FRUSTUM = 0.1; // its depth, of the first distance to the middle
+const FRUSTUM = 0.1; // depth of a frustum over the first distance to the middle
 const LINE_PX = 3;
 
 class Stage extends View {
@@ -57,7 +57,7 @@ class Stage extends View {
     this.empty = this.texture(new ImageData(new Uint8ClampedArray([128, 128, 128, 255]), 1, 1));
   }
 
-  // The vertices, colours and triangles of a moment, kept on the graphics card for the next time.
+  // Show a moment's vertices, colours and triangles; they stay on the graphics card for the next time.
   show(moment, mesh, bitmaps) {
     if (!this.gl) return;
     if (!this.meshes.has(moment)) this.meshes.set(moment, this.upload(mesh));
@@ -101,7 +101,7 @@ class Stage extends View {
     this.record.nodes.forEach((node, row) => this.paintNode(node, row, matrix, at));
   }
 
-  // Lines as thin bands, since WebGL draws none that a class sees, and the picture on the frustum's plane.
+  // Draw a frustum's lines as thin bands (WebGL's own lines are too thin), and the picture on its plane.
   paintNode(node, row, matrix, at) {
     const gl = this.gl, depth = FRUSTUM * this.first;
     const pose = node.T_world_camera, [[fx, , cx], [, fy, cy]] = node.matrix, [width, height] = node.size_px;

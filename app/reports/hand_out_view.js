@@ -1,8 +1,8 @@
-// Something in three dimensions that a hand turns: where one stands, and what WebGL wants to be told.
+// A 3-D view that the user can turn: its camera, and its calls of WebGL.
 
-const HALF_ANGLE = Math.tan(Math.PI / 8); // of the height, or of what 4:3 leaves of it
+const HALF_ANGLE = Math.tan(Math.PI / 8); // tangent of half the field of view: vertical, or vertical of the part that fits 4:3
 
-// Small vectors; matrices are column by column, as WebGL wants them.
+// Small vectors; matrices are in column order, as WebGL takes them.
 const add = (a, b, scale = 1) => a.map((value, i) => value + scale * b[i]);
 const dot = (a, b) => a.reduce((sum, value, i) => sum + value * b[i], 0);
 const cross = (a, b) => [0, 1, 2].map(i => a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
@@ -12,7 +12,7 @@ const times = (a, b) => Array.from({length: 16}, (_, i) =>
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 class View {
-  // From {eye_m, middle_m, up} at first; an own `paint` draws, an own `prepare` what is made once.
+  // Start at {eye_m, middle_m, up}. A subclass draws in `paint` and makes its buffers once in `prepare`.
   constructor(canvas, from) {
     this.canvas = canvas;
     this.from = from;
@@ -26,7 +26,7 @@ class View {
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
-  // Where the view starts: the angles, the distance and the middle that a hand changes.
+  // Set the first view: the angles, the distance and the middle that the user can change.
   look() {
     const {eye_m, middle_m, up} = this.from;
     const back = add(eye_m, middle_m, -1);
@@ -39,7 +39,7 @@ class View {
     this.middle = middle_m;
   }
 
-  // Attributes are numbered in the order of their names.
+  // Compile a program; attributes are numbered in the order of their names.
   program(vertex, fragment, names) {
     const gl = this.gl, made = gl.createProgram();
     for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
@@ -73,7 +73,7 @@ class View {
     return texture;
   }
 
-  // Drawn at most once a frame, whoever asks.
+  // Draw at the next frame, once for all requests.
   draw() {
     this.asked ??= requestAnimationFrame(() => {
       this.asked = null;
@@ -81,7 +81,7 @@ class View {
     });
   }
 
-  // The canvas as sharp as the screen, and empty; false where there is nothing to draw on.
+  // Clear the canvas at the screen's resolution; return false if there is nothing to draw on.
   begin() {
     const gl = this.gl, ratio = Math.min(devicePixelRatio || 1, 2);
     const {clientWidth, clientHeight} = this.canvas;
@@ -94,7 +94,7 @@ class View {
     return true;
   }
 
-  // Of the whole canvas, or of a part of it that is so large.
+  // Return the camera of the whole canvas, or of a part of it with this size.
   camera(width = this.canvas.width, height = this.canvas.height) {
     const ahead = add(this.ahead.map(v => v * Math.cos(this.turn)), this.side, Math.sin(this.turn));
     const back = add(ahead.map(v => v * Math.cos(this.tilt)), this.up, Math.sin(this.tilt));
@@ -114,7 +114,7 @@ class View {
     return {matrix: times(project, view), eye, right, top};
   }
 
-  // What a pixel is wide at a distance of one.
+  // Return the width of a pixel at distance one.
   pixel() { return 2 * HALF_ANGLE / Math.min(this.canvas.clientHeight, 0.75 * this.canvas.clientWidth); }
 
   listen() {
@@ -146,8 +146,8 @@ class View {
   }
 }
 
-// What hands do on a canvas: one pointer drags (moving: with another button), two zoom and pan, a wheel zooms,
-// and one that hardly moved has clicked.
+// Listen to a canvas: one pointer drags (moving: with another button), two zoom and pan, the wheel zooms, and
+// a pointer that hardly moved clicks.
 function gestures(canvas, {drag, zoom, pan, click, hover}) {
   const down = new Map();
   let travelled = 0;

@@ -1,4 +1,4 @@
-"""The few pieces that every written report is made of: one self-contained HTML file."""
+"""Parts of all written reports: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ svg.chart { max-width: 100%; height: auto; }
 
 
 def page(title: str, body: Markup, scripts: Sequence[Markup] = ()) -> Markup:
-    """A whole HTML document."""
+    """Return a whole HTML document."""
     return document(title, body, STYLE, scripts)
 
 
@@ -47,7 +47,7 @@ def write_page(path: Path, title: str, body: Markup, scripts: Sequence[Markup] =
 
 
 def picture(rgb: ByteArray, caption: str, kind: Literal["jpeg", "png"] = "jpeg") -> Markup:
-    """An (H, W, 3) RGB image with what it shows, as an HTML figure holding the image itself."""
+    """Return an (H, W, 3) RGB image with its caption, as an HTML figure that contains the image."""
     options = [cv2.IMWRITE_JPEG_QUALITY, 88] if kind == "jpeg" else []
     _, encoded = cv2.imencode(f".{kind}", rgb[..., ::-1], options)
     data = base64.b64encode(encoded.tobytes()).decode()
@@ -58,14 +58,14 @@ def picture(rgb: ByteArray, caption: str, kind: Literal["jpeg", "png"] = "jpeg")
 
 
 def pictures(figures: Iterable[Markup], columns: int) -> Markup:
-    """Figures side by side, ``columns`` to a row."""
+    """Return figures side by side, ``columns`` to a row."""
     return Markup('<div class="pictures" style="grid-template-columns: repeat({}, 1fr)">{}</div>').format(
         columns, Markup("").join(figures)
     )
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str | float | int | None]]) -> Markup:
-    """A table with a name first in each row; what follows is aligned to the right, a dash for None."""
+    """Return a table with a name first in each row; other cells are aligned right, a dash for None."""
     head = Markup("").join(map(Markup("<th>{}</th>").format, header))
     body = Markup("").join(map(_row, rows))
     return Markup("<table><thead><tr>{}</tr></thead><tbody>{}</tbody></table>").format(head, body)

@@ -1,4 +1,4 @@
-// What the scripts of a page find in it: elements, and bytes as the page holds them.
+// Access to the data in the page: elements, and bytes from base64.
 
 const find = id => document.getElementById(id);
 

@@ -1,4 +1,4 @@
-"""Pages of one file that a browser shows without a network: a body, styles, scripts and what they read."""
+"""Pages of one file that need no network: body, styles, scripts and their data."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ def offline_page(
     record: Mapping[str, Any],
     blocks: Mapping[str, bytes],
 ) -> Markup:
-    """A self-contained HTML document.
+    """Return a self-contained HTML document.
 
     Args:
-        title: of the window.
-        body: name of the file beside this one with the page's body, a template.
-        words: what stands for its names, as plain text.
-        parts: names of the files beside this one with its styles and scripts, in their order.
-        record: what the scripts read as JSON, in the element ``record``.
-        blocks: what they read as bytes, each in an element of that name.
+        title: title of the window.
+        body: file name of the page's body, a template in this folder.
+        words: plain texts that replace the template's names.
+        parts: file names of the styles and scripts in this folder, in their order.
+        record: data that the scripts read as JSON, in the element ``record``.
+        blocks: bytes that they read, each in an element of that name.
     """
     texts = {part: _shipped(part) for part in (_STYLE, *parts)}
     colors = Markup("").join(Markup("--{}: {};").format(name, css(color)) for name, color in _COLORS.items())

@@ -1,7 +1,7 @@
-"""Meshes as few bytes that a browser inflates: 16-bit positions, 8-bit colours, differences, deflate.
+"""Meshes in few bytes for a browser: 16-bit positions, 8-bit colours, differences, deflate.
 
-A packed mesh is a deflated (zlib) run of little-endian ``uint32`` numbers of vertices V and triangles F, then
-byte planes, each holding one byte of every number in a column, the least significant first:
+A packed mesh is a deflated (zlib) sequence of little-endian ``uint32`` numbers of vertices V and triangles F,
+then byte planes, each holding one byte of every number in a column, the least significant first:
 
 1. positions, (3, V) 16 bits: steps of ``Box.step_m`` from ``Box.low_m``, as zig-zag differences to the
    vertex before;
@@ -9,7 +9,7 @@ byte planes, each holding one byte of every number in a column, the least signif
 3. triangles, (3, F) 32 bits: the lowest index ``a``, as difference to the triangle before, ``b - a`` and
    ``c - a``.
 
-Vertices lie along a Morton curve and triangles follow their lowest vertex, so that differences are small.
+Vertices are in the order of a Morton curve, triangles in that of their lowest vertex: differences are small.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import ByteArray, FloatArray, IntArray, Surface
 
 STEPS = 65_535
-"""Of a position along the longest side of the box."""
+"""Steps of a position along the longest side of the box."""
 FEWEST_TRIANGLES = 500
-"""That thinning leaves, however few bytes there are."""
+"""Least number of triangles after thinning, even if there are too few bytes."""
 _MORTON_BITS = 10
 _TRIES = 6
 _LEVEL = 6
-"""Of deflate; 9 takes four times as long for 0.7 % fewer bytes."""
+"""Compression level of deflate; 9 takes four times as long for 0.7 % fewer bytes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """What positions are counted from, and in what steps."""
+    """Origin and step of the positions."""
 
     low_m: FloatArray
     """(3,) the lowest corner."""
@@ -43,14 +43,14 @@ class Box:
 
     @staticmethod
     def around(points_m: FloatArray) -> Box:
-        """The box of (N, 3) points, N at least 1."""
+        """Return the bounding box of (N, 3) points, N at least 1."""
         low_m = points_m.min(axis=0)
         side_m = float((points_m.max(axis=0) - low_m).max())
         return Box(low_m, max(side_m, 1e-6) / STEPS)
 
 
 def pack(mesh: Surface, box: Box) -> bytes:
-    """A coloured mesh inside ``box`` as bytes; vertices that no triangle uses are left out."""
+    """Return a coloured mesh inside ``box`` as bytes; vertices that no triangle uses are left out."""
     used, triangles = np.unique(mesh.triangles, return_inverse=True)
     steps = np.rint((mesh.vertices_m[used] - box.low_m) / box.step_m).astype(np.int64).reshape(-1, 3)
     colors = np.zeros((len(used), 3), np.uint8) if mesh.colors is None else mesh.colors[used]
@@ -70,13 +70,13 @@ def pack(mesh: Surface, box: Box) -> bytes:
 
 
 def pack_within(meshes: Sequence[Surface], box: Box, most_bytes: int, last: float = 4.0) -> list[bytes]:
-    """Every mesh packed, thinned (Garland and Heckbert 1997) where together they take too many bytes.
+    """Pack every mesh; thin them (Garland and Heckbert 1997) if together they take too many bytes.
 
     Args:
-        meshes: of the moments in order.
-        box: around all of them.
-        most_bytes: for all of them together.
-        last: how many times as many bytes the last mesh may take as any other.
+        meshes: meshes of the moments in order.
+        box: bounding box of all of them.
+        most_bytes: most bytes of all of them together.
+        last: factor by which the last mesh may take more bytes than any other.
     """
     packed = [pack(mesh, box) for mesh in meshes]
     weights = np.array([1.0] * (len(meshes) - 1) + [last])
@@ -87,7 +87,7 @@ def pack_within(meshes: Sequence[Surface], box: Box, most_bytes: int, last: floa
 
 
 def _share(needs: FloatArray, weights: FloatArray, most: float) -> float:
-    """The largest share with which the sum of ``weights * min(needs, share)`` stays below ``most``."""
+    """Return the largest share for which ``weights * min(needs, share)`` sums to at most ``most``."""
     order = np.argsort(needs)
     left, weight = most, float(weights.sum())
     for row in order.tolist():
@@ -99,7 +99,7 @@ def _share(needs: FloatArray, weights: FloatArray, most: float) -> float:
 
 
 def _thinned(mesh: Surface, box: Box, packed: bytes, most_bytes: float) -> bytes:
-    """The mesh with as many triangles as fit."""
+    """Return the mesh with as many triangles as fit."""
     count = len(mesh.triangles)
     for _ in range(_TRIES):
         if len(packed) <= most_bytes or count <= FEWEST_TRIANGLES:
@@ -110,7 +110,7 @@ def _thinned(mesh: Surface, box: Box, packed: bytes, most_bytes: float) -> bytes
 
 
 def thinned(mesh: Surface, triangles: int) -> Surface:
-    """The mesh with about so many triangles, its rims kept."""
+    """Return the mesh with about this many triangles, its rims kept."""
     legacy = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(mesh.vertices_m), o3d.utility.Vector3iVector(mesh.triangles)
     )
@@ -124,7 +124,7 @@ def thinned(mesh: Surface, triangles: int) -> Surface:
 
 
 def _morton(steps: IntArray) -> IntArray:
-    """(V,) places along a curve that keeps neighbours together, of (V, 3) positions."""
+    """Return (V,) positions along a Morton curve of (V, 3) points, on which neighbours stay close."""
     coarse = steps >> (16 - _MORTON_BITS)
     code = np.zeros(len(steps), np.int64)
     for bit in range(_MORTON_BITS):
@@ -134,7 +134,7 @@ def _morton(steps: IntArray) -> IntArray:
 
 
 def _lowest_first(triangles: IntArray) -> IntArray:
-    """Each turned, not mirrored, until its lowest index leads; then in the order of these."""
+    """Rotate each triangle so that its smallest index comes first (orientation kept), then sort them."""
     turns = (np.argmin(triangles, axis=1)[:, None] + np.arange(3)) % 3
     turned = np.take_along_axis(triangles, turns, axis=1)
     return turned[np.lexsort(turned.T[::-1])]
@@ -146,19 +146,19 @@ def _decorrelated(rgb: ByteArray) -> ByteArray:
 
 
 def _differences(columns: ByteArray) -> ByteArray:
-    """To the row before, modulo 256."""
+    """Return the differences to the row before, modulo 256."""
     before = np.vstack([np.zeros((1, 3), np.uint8), columns[:-1]])
     return columns - before[: len(columns)]
 
 
 def _zigzag(steps: IntArray) -> IntArray:
-    """Differences to the row before, modulo 65,536, small ones of either sign as small numbers."""
+    """Return zig-zag differences to the row before, modulo 65,536: small ones of either sign are small."""
     delta = np.diff(steps, axis=0, prepend=0).astype(np.int16).astype(np.int64)
     return (delta << 1) ^ (delta >> 63)
 
 
 def _planes(columns: IntArray, kind: str) -> ByteArray:
-    """The bytes of (N, 3) numbers, plane by plane."""
+    """Return the bytes of (N, 3) numbers, plane by plane."""
     numbers = np.ascontiguousarray(columns.T).astype(kind)
     bytes_ = numbers.view(np.uint8).reshape(3, len(columns), numbers.itemsize)
     return np.ascontiguousarray(np.moveaxis(bytes_, 2, 1))

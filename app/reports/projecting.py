@@ -1,4 +1,4 @@
-"""What a camera sees from where a page is looked at first, without a display."""
+"""Projection and drawing of points from a page's first viewpoint, without a display."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
 
 def camera_of(view: Viewpoint, size_px: tuple[int, int]) -> Camera:
-    """The camera of a picture of (width, height), in which all is in sight that a page has in sight."""
+    """Return the camera of a (width, height) picture that shows all that the page shows at first."""
     ahead = view.middle_m - view.eye_m
     ahead /= np.linalg.norm(ahead)
     right = np.cross(ahead, view.up)
@@ -25,14 +25,14 @@ def camera_of(view: Viewpoint, size_px: tuple[int, int]) -> Camera:
 
 
 def project(points_m: FloatArray, camera: Camera) -> tuple[FloatArray, FloatArray]:
-    """(N, 2) pixels and (N,) depths in metres of world points in front of an undistorted camera."""
+    """Return (N, 2) pixels and (N,) depths in metres of world points before an undistorted camera."""
     T = camera.T_world_camera
     seen = (points_m - T[:3, 3]) @ T[:3, :3] @ camera.intrinsics.matrix.T
     return seen[:, :2] / seen[:, 2:], seen[:, 2]
 
 
 def splat(picture: ByteArray, points_m: FloatArray, colors: ByteArray, camera: Camera, size_px: int) -> None:
-    """Paint (N, 3) points in (N, 3) colours as squares into (H, W, 3), the nearest last."""
+    """Draw (N, 3) points in (N, 3) colours as squares into (H, W, 3), the nearest last."""
     at, depth_m = project(points_m, camera)
     order = np.argsort(-depth_m, kind="stable")
     column, row = np.rint(at[order] - 0.5 * (size_px - 1)).astype(int).T

@@ -1,4 +1,4 @@
-"""A race of registrations as somebody without PacketMesh is to see it: plain values, and their page."""
+"""A race of registrations for viewers without PacketMesh: plain values, and their page."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ _PARTS = ("race_page.css", "offline_page.js", "hand_out_view.js", "race_page.js"
 
 @dataclass(frozen=True, slots=True)
 class RaceRun:
-    """One method's way, a step for each iteration and one for its end."""
+    """One method's poses and errors, one step per iteration and one for its end."""
 
     name: str
     color: tuple[int, int, int]
     poses: FloatArray
     """(K, 4, 4) T_world_source."""
     offs_cm: FloatArray
-    """(K,) how far off it is; NaN where that is unknown."""
+    """(K,) error, centimetres; NaN if unknown."""
     notes: tuple[str, ...]
-    """(K,) how it stands."""
+    """(K,) status texts."""
     arrived: bool | None
-    """At its end; None where no truth tells."""
+    """Whether it arrived at the end; None without ground truth."""
     shades: ByteArray
     """(K, N) distance of each point, 0 to 255 along the scale."""
     lens: tuple[ByteArray, ...]
-    """(K,) of (M, 3) column, row and shade of the points in the magnified corner."""
+    """(K,) arrays (M, 3): column, row and shade of the points in the magnified corner."""
 
 
 @dataclass(frozen=True, slots=True)
 class RaceShow:
-    """A race as it was set up."""
+    """A race with its settings."""
 
     title: str
     sentence: str
     source_m: FloatArray
-    """(N, 3) its own frame."""
+    """(N, 3) source frame."""
     target_m: FloatArray
-    """(M, 3) world."""
+    """(M, 3) world frame."""
     view: Viewpoint
     runs: tuple[RaceRun, ...]
     lens_target: ByteArray | None
@@ -53,16 +53,16 @@ class RaceShow:
     lens_cm: float
     """Width of the corner."""
     scale: tuple[str, str, str]
-    """What the colours of the moving cloud mean, and the words at the ends of their scale."""
+    """Meaning of the moving cloud's colours, and the words at the ends of their scale."""
 
     @property
     def steps(self) -> int:
-        """Of the longest run."""
+        """Number of steps of the longest run."""
         return max(len(run.poses) for run in self.runs)
 
 
 def race_page(race: RaceShow) -> Markup:
-    """A self-contained HTML document that plays the race."""
+    """Return a self-contained HTML document that plays the race."""
     record = {
         "view": race.view.record(),
         "steps": race.steps,

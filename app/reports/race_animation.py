@@ -1,4 +1,4 @@
-"""A race as a moving picture for slides, made without a display."""
+"""A race as a GIF for slides, made without a display."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ WIDTH_PX, ROOM_PX, LENS_PX = 960, 300, 190
 _TITLE_PX, _HEAD_PX, _FOOT_PX = 40, 92, 34
 MOST_PICTURES = 40
 PLAYS_S, FIRST_S, LAST_S = 8.0, 1.0, 3.0
-"""How long the race takes, and how long its start and its end are shown."""
+"""Duration of the race, of its start and of its end."""
 _PALETTE = ramp(np.arange(256.0), 255.0, DISTANCE_STOPS)
 
 
 def race_animation(race: RaceShow) -> bytes:
-    """An animated GIF, ``WIDTH_PX`` wide; it repeats without end."""
+    """Return an endless GIF, ``WIDTH_PX`` wide."""
     camera = camera_of(race.view, (WIDTH_PX // len(race.runs), ROOM_PX))
     steps = np.unique(np.linspace(0, race.steps - 1, min(race.steps, MOST_PICTURES)).astype(int)).tolist()
     frames = [_frame(race, step, camera) for step in steps]
@@ -54,7 +54,7 @@ def _frame(race: RaceShow, step: int, camera: Camera) -> Image.Image:
 
 
 def _head(pen: ImageDraw.ImageDraw, run: RaceRun, row: int, left: int, wide: int) -> None:
-    """Name, number and how it stands."""
+    """Draw name, number and status."""
     pen.rectangle((left, _TITLE_PX, left + wide, _TITLE_PX + 5), run.color)
     pen.text((left + EDGE_PX, _TITLE_PX + 18), run.name, INK, font(17), anchor="lm")
     number = off_text(float(run.offs_cm[row]))
@@ -65,7 +65,7 @@ def _head(pen: ImageDraw.ImageDraw, run: RaceRun, row: int, left: int, wide: int
 
 
 def off_text(off_cm: float) -> str:
-    """How far off, in words."""
+    """Return the error as text."""
     return "–" if not np.isfinite(off_cm) else f"{off_cm:.{2 if off_cm < 1.0 else 1}f} cm"
 
 
@@ -80,7 +80,7 @@ def _clouds(race: RaceShow, run: RaceRun, row: int, camera: Camera) -> ByteArray
 
 
 def _lens(race: RaceShow, run: RaceRun, row: int, size_px: tuple[int, int]) -> ByteArray:
-    """The corner, cut so that it fills the picture's width or height, whichever is longer."""
+    """Draw the corner, cut to fill the longer side of the picture."""
     width, height = size_px
     picture = np.full((height, width, 3), PAPER, np.uint8)
     assert race.lens_target is not None
@@ -98,7 +98,7 @@ def _lens(race: RaceShow, run: RaceRun, row: int, size_px: tuple[int, int]) -> B
 
 
 def _scale(pen: ImageDraw.ImageDraw, race: RaceShow, middle: int) -> None:
-    """What the colours mean."""
+    """Draw the colour scale."""
     text, low, high = race.scale
     left = EDGE_PX
     for part in (f"{text}:", low):

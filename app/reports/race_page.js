@@ -1,4 +1,4 @@
-// Plays a race: every lane the same cloud on its way, seen from one place, with how far off it is.
+// Plays a race: every lane shows its cloud's registration from the same viewpoint, with its error.
 
 const CLOUD_VERTEX = `#version 300 es
 uniform mat4 view, pose;
@@ -20,7 +20,7 @@ in vec3 seen;
 out vec4 color;
 void main() { color = vec4(seen, 1.0); }`;
 const POINT_M = 0.012, PLAY_S = 10, MOST_STEP_S = 0.5, DOT_CM = 0.35, RULER_CM = 10;
-const CURVE_PX = [66, 18]; // left and right of the curves
+const CURVE_PX = [66, 18]; // space left and right of the curves
 const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 const rgbOf = css => [1, 3, 5].map(at => parseInt(css.slice(at, at + 2), 16) / 255);
 const offText = cm => cm === null ? "–" : `${cm.toFixed(cm < 1 ? 2 : 1)} cm`;
@@ -187,7 +187,7 @@ class Race {
     return {pen, width, height};
   }
 
-  // The corner cut across: what stays in grey, what moves in the colours of the scale.
+  // Draw the corner, cut across: the target in grey, the source in the scale's colours.
   drawLens(lane, index, row) {
     const {pen, width, height} = this.pen(lane.lens), {lens_cm, scale} = this.record;
     const cm = Math.max(width, height) / lens_cm, size = Math.max(DOT_CM * cm, 2);

@@ -1,4 +1,4 @@
-"""The report of one reconstruction: what came in, what each stage made of it, and how good it is."""
+"""The report of one reconstruction: inputs, results of each stage, and quality."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Marku
 
 
 def _kept(measured: dict[str, float]) -> Markup:
-    """What became of the measurements, in two sentences."""
+    """Return two sentences on the use of the measurements."""
     return Markup(
         " Of the measured pixels, the outlier filter keeps <b>{kept_share:.2%}</b>; the surface lies within "
         "2 % of what was measured at <b>{within_2pct_before:.1%}</b> of them before and at "
@@ -81,7 +81,7 @@ def _kept(measured: dict[str, float]) -> Markup:
 
 
 def _agreeing(measured: dict[str, float]) -> Markup:
-    """How far the cameras of a rig agree, in a sentence; nothing where no two measured the same place."""
+    """Return a sentence on the agreement of a rig's cameras; empty if no two saw the same place."""
     share = measured["agreement_between_nodes"]
     if not math.isfinite(share):
         return Markup("")
@@ -89,7 +89,7 @@ def _agreeing(measured: dict[str, float]) -> Markup:
 
 
 def _must_be_known(metrics: dict[str, Any]) -> Iterator[Markup]:
-    """What is doubtful about the images, and of nodes that found no place, or one that little speaks for."""
+    """Yield doubts about the images, and about nodes with no pose or an uncertain one."""
     for note in metrics.get("import", {"notes": ()})["notes"]:
         yield Markup('<p class="lead">{}.</p>').format(note)
     for node in metrics["nodes"]:
@@ -161,7 +161,7 @@ def _truth_label(key: str) -> str:
 
 
 def _in_units(key: str, *records: dict[str, float] | None) -> tuple[float | None, ...]:
-    """A measure of each surface; None for a surface without a triangle."""
+    """Return a measure of each surface; None for a surface without a triangle."""
     unit = 1000.0 if key.endswith("_m") else 100.0
     return tuple(None if record is None else record[key] * unit for record in records)
 

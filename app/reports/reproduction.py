@@ -1,4 +1,4 @@
-"""The report of the thesis's claims beside our own numbers, and of ours beyond the thesis."""
+"""The report of the thesis's claims compared with our own numbers, and of our further claims."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ MARKS = {
     **dict.fromkeys(("reproduced", "holds"), "reproduced"),
     **dict.fromkeys(("not reproduced", "does not hold"), "not-reproduced"),
 }
-"""Classes of the page's style; the other verdicts are neither good nor bad."""
+"""Classes of the page's style; other verdicts are neutral."""
 
 
 def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
-    """Write one self-contained HTML page with every claim, its verdict and the numbers behind it."""
+    """Write one self-contained HTML page with every claim, its verdict and its numbers."""
     ours = [verdict for verdict in verdicts if verdict.beyond]
     thesis = [verdict for verdict in verdicts if not verdict.beyond]
     body = Markup(
@@ -36,7 +36,7 @@ def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
 
 
 def _counted(verdicts: Sequence[Verdict]) -> str:
-    """How many claims have which verdict."""
+    """Return the number of claims with each verdict."""
     counts = Counter(verdict.verdict for verdict in verdicts)
     parts = (f"{count} {word}" for word in VERDICTS if (count := counts[word]))
     return f"Claims: {', '.join(parts)}."

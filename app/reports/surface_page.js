@@ -1,4 +1,4 @@
-// Two surfaces seen from one place: left of a line the one, right of it the other.
+// Two surfaces from one viewpoint, to the left and to the right of a line.
 
 const MESH_VERTEX = `#version 300 es
 uniform mat4 view;
@@ -19,7 +19,7 @@ vec3 srgb(vec3 c) { return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.05
 void main() { color = vec4(srgb(linear(texture(picture, at).rgb) * tint.rgb), 1.0); }`;
 const ARRAYS = {5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array};
 
-// The one primitive of a binary glTF as app/drawing/glb.py writes it.
+// Read the one primitive of a binary glTF as app/drawing/glb.py writes it.
 function readGlb(bytes) {
   const length = new DataView(bytes.buffer).getUint32(12, true), body = 28 + length;
   const head = JSON.parse(new TextDecoder().decode(bytes.subarray(20, 20 + length)));
@@ -48,7 +48,7 @@ class Split extends View {
   prepare() {
     this.worn = this.program(MESH_VERTEX, MESH_FRAGMENT, ["place", "color", "uv"]);
     this.white = this.texture(new ImageData(new Uint8ClampedArray([255, 255, 255, 255]), 1, 1));
-    this.gl.enable(this.gl.CULL_FACE); // as in the app: from outside one looks into a room
+    this.gl.enable(this.gl.CULL_FACE); // as in the app: the view from outside goes into the room
   }
 
   async load(side, glb) {

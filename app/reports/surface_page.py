@@ -1,4 +1,4 @@
-"""Two surfaces of one scene on a page that needs no network: one beside the other, cut by a line to drag."""
+"""A page of two surfaces of one scene on both sides of a sliding line; it needs no network."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ _PARTS = ("surface_page.css", "offline_page.js", "hand_out_view.js", "surface_pa
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """What is left or right of the line."""
+    """The surface to the left or to the right of the line."""
 
     name: str
     note: str
-    """A sentence with its numbers."""
+    """Sentence with its numbers."""
     glb: bytes
-    """As ``app.drawing.glb`` writes it; empty without a triangle."""
+    """Mesh as ``app.drawing.glb`` writes it; empty without a triangle."""
 
 
 @dataclass(frozen=True, slots=True)
 class SurfacePage:
-    """What somebody without PacketMesh is to see of a reconstruction."""
+    """A reconstruction for viewers without PacketMesh."""
 
     title: str
-    """Of the scene."""
+    """Title of the scene."""
     sentence: str
     left: Side
     right: Side
@@ -37,7 +37,7 @@ class SurfacePage:
 
 
 def surface_page(page: SurfacePage) -> Markup:
-    """A self-contained HTML document."""
+    """Return a self-contained HTML document."""
     sides = (page.left, page.right)
     record = {
         "view": page.view.record(),

@@ -14,11 +14,11 @@ WIDTH_PX = 1600
 _TITLE_PX, _AXIS_PX, _FOOT_PX, _GAP_PX, _RIGHT_PX = 54, 34, 40, 12, 40
 _TICKS = 10
 _SCALE = 2
-"""Lanes are as high as in the app, this many times."""
+"""Scale of the lanes over their height in the app."""
 
 
 def timeline_picture(title: str, lanes: Sequence[Lane], start_ns: int, end_ns: int) -> Image.Image:
-    """All lanes from start to end with names, words and the time in seconds, ``WIDTH_PX`` wide."""
+    """Draw all lanes from start to end with names, words and seconds, ``WIDTH_PX`` wide."""
     heights = [_SCALE * lane.height_px for lane in lanes]
     size = WIDTH_PX, _TITLE_PX + sum(heights) + _GAP_PX * len(lanes) + _AXIS_PX + _FOOT_PX
     picture = Image.new("RGB", size, PAPER)
@@ -50,7 +50,7 @@ def timeline_picture(title: str, lanes: Sequence[Lane], start_ns: int, end_ns: i
 
 
 def _axis(pen: ImageDraw.ImageDraw, left: int, wide: int, top: int, span_ns: tuple[int, int]) -> None:
-    """Ticks at round times."""
+    """Draw ticks at round times."""
     start_s, end_s = (ns / 1e9 for ns in span_ns)
     least_s = max(end_s - start_s, 1e-9) / _TICKS
     ten = 10.0 ** np.floor(np.log10(least_s))

@@ -1,3 +1,3 @@
-"""One browser's session, its address and its view, and the lecture that many share. Imports of ``app`` only
-``window`` and what is below it.
+"""One browser's session with its address and view, and the lecture that many browsers share. Imports of
+``app`` only ``window`` and the packages that ``window`` imports.
 """

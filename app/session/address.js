@@ -1,11 +1,11 @@
-// The address of the page: what stands in it is what the app shows, and the other way round. It is in the
-// query, beside what viser puts there, for viser cannot connect from an address with a # in it.
+// The page's address shows the app's state, and a changed address changes the state. The state is in the
+// query, next to viser's own keys: viser cannot connect from an address that contains a #.
 window.packetmeshAddress = (() => {
-  let name = null; // of the session's hidden field
-  let keys = []; // its own in the query
+  let name = null; // name of the session's hidden field
+  let keys = []; // the app's keys in the query
   let said = 0;
-  let unsaid = null; // what the server has yet to hear
-  let again = 0; // the timer of the next try to say it
+  let unsaid = null; // query that the server has not received yet
+  let again = 0; // timer of the next attempt to send it
 
   function split() {
     const own = new URLSearchParams(), others = new URLSearchParams();
@@ -14,13 +14,13 @@ window.packetmeshAddress = (() => {
     return [own.toString(), others.toString()];
   }
 
-  // To the server, as soon as it hears: what the address asks for.
+  // Send the address's query to the server as soon as it can receive it.
   function say() {
     unsaid = split()[0];
     deliver();
   }
 
-  // A number tells two that are alike apart.
+  // The number makes two equal messages differ, so that viser sends both.
   function deliver() {
     clearTimeout(again);
     if (!window.packetmeshDockRow.write(name, `${said + 1} ${unsaid}`)) return void (again = setTimeout(deliver, 100));
@@ -28,10 +28,10 @@ window.packetmeshAddress = (() => {
     unsaid = null;
   }
 
-  window.addEventListener("popstate", say); // Back and forward
+  window.addEventListener("popstate", say); // the browser's Back and Forward buttons
 
   return {
-    // A session has begun: by a new page, a reload, or after the server was away.
+    // Start a session: after the page loads or reloads, or when the server is back.
     begin(session, own) {
       name = session;
       keys = own;
@@ -44,8 +44,9 @@ window.packetmeshAddress = (() => {
       say();
     },
 
-    // What is shown now; a place of its own among those that Back knows, or a change to the one before. It is
-    // out of date while the server has yet to hear what was asked for meanwhile.
+    // Show this query in the address: as a new entry of the browser's history if `place`, else in place of
+    // the
+    // current entry. It is ignored while a newer query of the page has not reached the server.
     show(text, place) {
       if (unsaid !== null) return;
       const [own, others] = split();

@@ -1,8 +1,8 @@
-"""The address of the page as the state of the app: scene, preset, settings that differ, screen, and what the
-screen adds of its own, such as the stop of a lesson, the moment of a clock or where a person stands.
+"""The page's address as the state of the app: scene, preset, changed settings, screen, and a screen's own
+parts, such as the stop of a lesson, the time of a clock or the camera's pose.
 
-``?scene=office&preset=thesis&set=depth.reach%3D0.2&stop=2&screen=surface``; what is not named is as the
-server started. The page's side is ``address.js``.
+``?scene=office&preset=thesis&set=depth.reach%3D0.2&stop=2&screen=surface``; what the address does not name
+keeps the server's start value. The page's part is ``address.js``.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ from pipeline.io.demos import DEMO_SCENES
 from pipeline.sources import Demo, Source
 
 WAIT_S = 0.3
-"""After a change, before the address follows."""
+"""Delay between a change and the update of the address, seconds."""
 FILES = {"depth.model"}
-"""Settings that name a file, which an address may not."""
+"""Settings that name a file of the server: an address must not set them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """What an address names."""
+    """The state that an address describes."""
 
     spec: Spec
     screen: str
-    """Its title."""
+    """Title of the screen."""
     added: tuple[tuple[str, str], ...] = ()
-    """What the screen adds: keys, and what they say."""
+    """Keys and values of the parts of the screen."""
 
     def text(self) -> str:
-        """The query."""
+        """Return the query of the address."""
         spec = self.spec
         parts = [("scene", name_of(spec.source)), ("preset", spec.preset)]
         changed = differences(spec.config, PRESETS.get(spec.preset, PipelineConfig()))
@@ -51,18 +51,18 @@ class Place:
         return urlencode([*parts, *self.added, ("screen", self.screen.lower())])
 
     def is_beside(self, other: Place) -> bool:
-        """Whether Back is to lead from the one to the other."""
+        """Whether this place and ``other`` get separate entries in the browser's history."""
         places = [(one.screen, one.spec.source, one.stops) for one in (self, other)]
         return places[0] != places[1]
 
     @property
     def stops(self) -> dict[str, str]:
-        """The stops of lessons, by their keys."""
+        """Return the stops of lessons by their keys."""
         return {key: value for key, value in self.added if key.startswith(STOP)}
 
 
 def name_of(source: Source) -> str:
-    """What a source is called in an address: the name of a demo, an upload, a file or a folder."""
+    """Return the name of a source in an address: a demo, an upload, a file or a folder."""
     return name_in(source) or Path(source.title).name
 
 
@@ -73,14 +73,14 @@ def place_of(
     sources: Mapping[str, Source],
     keys: Sequence[str] = (),
 ) -> tuple[Place, list[str]]:
-    """What an address asks for, and a sentence for everything in it that cannot be followed.
+    """Parse an address. Returns the place and one error sentence for each part that cannot be followed.
 
     Args:
         text: the query.
-        start: what holds where it says nothing.
-        screens: titles.
-        sources: by their names.
-        keys: what screens add.
+        start: the place whose values hold where the query gives none.
+        screens: titles of the screens.
+        sources: sources by their names.
+        keys: keys that the screens add.
     """
     named, changes, wrong = dict[str, str](), list[str](), list[str]()
     for key, value in parse_qsl(text, keep_blank_values=True):
@@ -110,7 +110,7 @@ def place_of(
 
 
 class Address:
-    """Hears what the page's address asks for, and has it follow what is shown."""
+    """Receive what the page's address asks for, and keep the address equal to the session's state."""
 
     def __init__(
         self,
@@ -121,15 +121,15 @@ class Address:
         keys: Sequence[str],
         on_ask: Callable[[Place, list[str]], None],
     ) -> None:
-        """Add the hidden parts.
+        """Add the hidden controls to the page.
 
         Args:
-            ui: of the browser.
-            uploads: of the server.
-            start: what is shown where the address says nothing.
-            screens: titles.
-            keys: what screens add.
-            on_ask: called with what an address asks for, and why some of it cannot be followed.
+            ui: panel of the browser.
+            uploads: uploads of the server.
+            start: the place of an empty address.
+            screens: titles of the screens.
+            keys: keys that the screens add.
+            on_ask: called with the place of a new address and the error sentences of its wrong parts.
         """
         self._uploads, self._start, self._on_ask = uploads, start, on_ask
         self._screens, self._keys = screens, keys
@@ -146,7 +146,7 @@ class Address:
         self._timer = ui.debounce(WAIT_S, self._say)
 
     def show(self, place: Place) -> None:
-        """Have the address follow, once the page has said what it asks for itself."""
+        """Update the address to this place; wait until the page has sent its first address."""
         if place == self._place:
             return
         self._place = place
@@ -154,7 +154,7 @@ class Address:
             self._timer.restart()
 
     def close(self) -> None:
-        """Say nothing more: the browser is gone."""
+        """Stop updating the address: the browser is gone."""
         self._timer.cancel()
 
     def _hear(self) -> None:
@@ -163,7 +163,7 @@ class Address:
         try:
             if (text or not begins) and text != self._place.text():
                 self._on_ask(*self._read(text))
-        finally:  # what could not be followed is replaced
+        finally:  # replaces the parts that could not be followed
             self._timer.restart()
 
     def _read(self, text: str) -> tuple[Place, list[str]]:
@@ -173,8 +173,8 @@ class Address:
         return place_of(text, self._start, self._screens, sources, self._keys)
 
     def _say(self) -> None:
-        """Tell the page what its address should be, also if it asked for just that: it may have heard of
-        another place since."""
+        """Send the page its address, even if the page asked for this one: its address may have changed
+        since."""
         place, text = self._place, self._place.text()
         before, wrong = self._read(self._text)
         new = not wrong and place.is_beside(before)

@@ -1,4 +1,4 @@
-"""What a session turns the view to: what its screen draws, or else the scene, fitted to the window."""
+"""Turn a session's view to what its screen draws, or to the scene, and fit it to the window."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from app.window.panel import PanelSession
 
 
 class Framing:
-    """Turns the view of a session when another thing is shown, or the same in another shape of the window."""
+    """Turns a session's view when another object is shown or the window changes its shape."""
 
     def __init__(self, session: PanelSession, views: Views | None) -> None:
-        """Frame for a session; ``views`` are None where many browsers share it."""
+        """Keep the session and its ``views``, which are None in a lecture."""
         self._session, self._views = session, views
         self._wide = False
         self._shape = self._seen_shape = 0.0
@@ -23,7 +23,7 @@ class Framing:
 
         Args:
             anew: whether the scene is another one.
-            keep: whether the view stays where a person has turned it.
+            keep: whether a view that the user has turned stays.
         """
         if self._views is None:
             self._turn(anew)
@@ -31,13 +31,13 @@ class Framing:
             self._views.frame(lambda: self._turn(anew), keep)
 
     def follow_window(self) -> None:
-        """Fit the view anew when the picture has another shape, as when the dock comes or goes."""
+        """Fit the view again if the picture's shape has changed, as when the dock opens or closes."""
         if self._window() != self._seen_shape:
             self._seen_shape = self._window()
             self._session.post(self._session.frame_view, False, True)
 
     def _turn(self, anew: bool) -> str:
-        """Turn it, and name what is looked at."""
+        """Turn the view. Returns the kind of object that it looks at."""
         session = self._session
         below = session.current.drawn_below
         if session.current.look():
@@ -52,6 +52,6 @@ class Framing:
         return "both" if wide else "scene"
 
     def _window(self) -> float:
-        """Width over height of the picture, roughly; that of a shared session is nobody's own."""
+        """Return the picture's width over height to one decimal; 1 for a session that many browsers share."""
         target = self._session.target
         return 1.0 if isinstance(target, viser.ViserServer) else round(target.camera.aspect, 1)

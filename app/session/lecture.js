@@ -1,9 +1,9 @@
-// Somebody of a class: what they are told, their votes, and whether the view is the teacher's or their own.
+// A student's page: messages for the student, votes, and whether the view is the teacher's or the student's.
 window.packetmeshLecture = (() => {
   const REFUSED_MS = 4000;
-  let name = null; // of the seat's hidden field
+  let name = null; // name of the seat's hidden field
   let said = 0;
-  let refused = 0; // the timer until it is forgotten
+  let refused = 0; // timer that removes the refusal message
   const state = {follows: true, steers: false, asks: false, vote: 0};
 
   function make(tag, parent, properties = {}) {
@@ -26,7 +26,7 @@ window.packetmeshLecture = (() => {
     say(follows ? "follow" : "roam");
   }
 
-  // Whether a choice of the lesson's is a vote.
+  // Take a choice in the lesson as a vote. Returns false if no vote is open.
   function cast(vote) {
     if (!state.asks || ![1, 2, 3].includes(vote)) return false;
     state.vote = vote;
@@ -51,7 +51,7 @@ window.packetmeshLecture = (() => {
     if (!chip.isConnected) home.append(chip);
   }
 
-  // A hand on the picture turns the own view.
+  // Dragging or scrolling the picture gives the student an own view.
   const roam = event => event.target.matches?.("canvas[data-engine]") && follow(false);
   window.addEventListener("wheel", roam, {capture: true, passive: true});
   window.addEventListener("pointermove", event => event.buttons && roam(event), true);
@@ -59,7 +59,7 @@ window.packetmeshLecture = (() => {
   return {
     vote: cast,
 
-    // What was voted for, while a question is asked.
+    // The student's vote while a question is open, else 0.
     get voted() {
       return state.asks ? state.vote : 0;
     },
@@ -74,7 +74,7 @@ window.packetmeshLecture = (() => {
       draw();
     },
 
-    // What was touched is not theirs.
+    // Show that the touched control belongs to the teacher.
     refuse() {
       clearTimeout(refused);
       refused = setTimeout(() => { refused = 0; draw(); }, REFUSED_MS);

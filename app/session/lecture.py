@@ -1,8 +1,7 @@
-"""A lecture: one session for all browsers, which a teacher steers and a class follows, votes in, or looks
-around in.
+"""A lecture: one session for all browsers. A teacher steers it; the class follows, votes and may look around.
 
-Whoever came by the teacher's link teaches. What others do with a control that all share is not heard, except
-for votes, until the teacher lets the class steer.
+A browser that opened the teacher's link teaches. The server ignores what other browsers do with shared
+controls, except votes, until the teacher lets the class steer.
 """
 
 from __future__ import annotations
@@ -31,40 +30,40 @@ from app.window.ui import Count, Ui
 from pipeline.types import ByteArray
 
 SAID = re.compile(r"\d+ (?:(follow)|(roam)|vote ([123]))")
-"""What the page of somebody in the class says; a number tells two apart that are alike."""
+"""A message of a student's page: its number, which makes equal messages differ, and its content."""
 UNREACHED = Markup(
     "<b>No other machine reaches this address.</b> Stop the lecture and start it again with "
     "<code>--host 0.0.0.0</code>; then it is one that the class can open."
 )
-"""Of an address of this machine alone."""
+"""Warning for an address that only this machine can reach."""
 
 
 @dataclass(slots=True)
 class _Seat:
-    """A browser of the class."""
+    """One browser in the lecture."""
 
     client: viser.ClientHandle
     teaches: bool
     follows: bool = True
     vote: int = 0
-    """Of 1 to 3; 0 is none."""
+    """The vote, 1 to 3; 0 for none."""
     say: Callable[..., None] = lambda *_: None
-    """Has its page call a function of that name with these arguments."""
+    """Calls a function of the seat's page by name, with these arguments."""
     tell: Callable[[Markdown], None] = lambda _: None
-    """Shows the teacher how many are there, in markdown."""
+    """Shows the teacher the number of students, in markdown."""
     leave: Callable[[], None] = lambda: None
-    """Has the teacher's address no longer follow."""
+    """Stops updating the teacher's address."""
 
 
 class Lecture:
-    """Everybody who is there. All but what the browsers send runs on the session's thread."""
+    """All browsers of a lecture. Methods run on the session's thread, those that judge messages excepted."""
 
     def __init__(self, server: viser.ViserServer, gate: Gate, token: Token, class_url: str) -> None:
-        """Nobody steers but who holds the token, which the gate is told; the class comes by ``class_url``."""
+        """Allow only browsers with the teacher's token to steer; the class opens ``class_url``."""
         self._server, self._token, self._url = server, token, class_url
         self._seats: dict[int, _Seat] = {}
         self._count_vote: Count | None = None
-        """While a question waits for votes."""
+        """Receives the votes while a question is open; else None."""
         self._all_steer = False
         self._leading = False
         gate.may_steer = self._may_steer
@@ -76,28 +75,28 @@ class Lecture:
         frame: Callable[[], None],
         add_address: Callable[[Ui], Callable[[], None]],
     ) -> None:
-        """Let browsers in.
+        """Accept browsers.
 
         Args:
             post: runs a function on the session's thread.
             frame: turns the followers' views to what the screen shows.
-            add_address: has a browser's address follow what is shown, and be followed, until what it returns
-                is called.
+            add_address: connects a browser's address to the session; it returns the function that disconnects
+                it.
         """
         self._post, self._frame, self._add_address = post, frame, add_address
         self._server.on_client_connect(lambda client: post(self._join, client))
         self._server.on_client_disconnect(lambda client: post(self._leave, client.client_id))
 
     def followers(self) -> list[viser.ClientHandle]:
-        """The browsers whose view is turned for them."""
+        """Return the browsers whose view follows the teacher's."""
         return [seat.client for seat in self._present() if seat.follows]
 
     def everybody(self) -> Iterable[viser.ClientHandle]:
-        """All browsers."""
+        """Return all browsers."""
         return self._server.get_clients().values()
 
     def poll(self, count: Count | None) -> None:
-        """Have the class vote, or no longer; what they voted before is dropped."""
+        """Open a vote whose votes ``count`` receives, or close it (None); earlier votes are dropped."""
         self._count_vote = count
         for seat in self._present():
             seat.vote = 0
@@ -105,10 +104,10 @@ class Lecture:
 
     @property
     def class_size(self) -> int:
-        """Browsers that do not teach."""
+        """Number of browsers that do not teach."""
         return sum(not seat.teaches for seat in self._seats.values())
 
-    # Who comes and goes, and what they look at.
+    # Browsers that join and leave, and their views.
 
     def _join(self, client: viser.ClientHandle) -> None:
         seat = _Seat(client, self._teaches(client.client_id))
@@ -132,12 +131,12 @@ class Lecture:
         return next((seat for seat in self._present() if seat.teaches), None)
 
     def _present(self) -> list[_Seat]:
-        """All but those who have just gone, to whom nothing more can be said."""
+        """Return the seats whose browser is still connected."""
         there = self._server.get_clients()
         return [seat for number, seat in self._seats.items() if number in there]
 
     def _catch_up(self, seat: _Seat) -> None:
-        """Turn a browser to what the class sees."""
+        """Turn a browser's view to the one that the class sees."""
         leader = self._leader()
         if leader is None or leader is seat:
             self._frame()
@@ -145,7 +144,7 @@ class Lecture:
             _turn_as(leader.client, seat.client)
 
     def _moved(self, leader: _Seat) -> None:
-        """The teacher's view has changed; of many changes at once the last one is passed on."""
+        """Pass the teacher's changed view on; of several quick changes only the last is passed on."""
         if not self._leading and leader is self._leader():
             self._leading = True
             self._post(self._lead, leader)
@@ -156,10 +155,10 @@ class Lecture:
             if seat is not leader and seat.follows:
                 _turn_as(leader.client, seat.client)
 
-    # What a browser shows of it.
+    # Controls and messages in each browser.
 
     def _add_desk(self, seat: _Seat) -> None:
-        """The teacher's own controls."""
+        """Add the teacher's own controls."""
         client = seat.client
         with client.gui.add_folder("Lecture", order=-1.0):
             told = Gui(client.gui).add_markdown(Markdown(""))
@@ -200,7 +199,7 @@ class Lecture:
             seat.tell(told if size else Markdown("**Nobody is in the class yet.**"))
 
     def _add_chip(self, seat: _Seat) -> None:
-        """What is told somebody in the class."""
+        """Add the bar with a student's messages, and receive what the student's page sends."""
         client, name = seat.client, uuid.uuid4().hex
         ui = self._own_ui(client)
         with add_hidden(ui, name, page_call("beginSeat", name)):
@@ -230,7 +229,7 @@ class Lecture:
         self._show(seat)
 
     def _own_ui(self, client: viser.ClientHandle) -> Ui:
-        """For what one browser has beside what all share."""
+        """Return the controls that only this browser has, next to the shared ones."""
         return Ui(Gui(client.gui), client.scene, self._post, client.atomic, client.flush)
 
     def _show(self, seat: _Seat) -> None:
@@ -247,7 +246,7 @@ class Lecture:
             seat.vote = vote
             self._count_vote(seat.client.client_id, vote)
 
-    # Who may touch what all share, on the thread of the connections.
+    # Who may use shared controls: called on the thread of the connections.
 
     def _may_steer(self, number: int) -> bool:
         return self._all_steer or self._teaches(number)
@@ -256,14 +255,14 @@ class Lecture:
         return self._token.is_in(private.cookies(self._server, number))
 
     def _refuse(self, number: int) -> None:
-        """Tell somebody in the class that what they have touched is not theirs."""
+        """Show a student that the control just used belongs to the teacher."""
         seat = self._seats.get(number)
         if seat is not None:
             seat.say("refuse")
 
 
 def _turn_as(leader: viser.ClientHandle, client: viser.ClientHandle) -> None:
-    """Turn a browser's view to what another one's shows."""
+    """Turn a browser's view to the leader's view."""
     turn(client, leader.camera.look_at, leader.camera.position)
     client.camera.fov = leader.camera.fov
 
@@ -273,13 +272,13 @@ PX_PER_MODULE = 8
 
 
 def modules_of(text: str) -> ByteArray:
-    """(N, N) the text as a QR code, 0 for dark, with a quiet zone of four modules."""
-    encoded = cv2.QRCodeEncoder.create().encode(text)  # with two
+    """Return the text's QR code, (N, N), 0 for dark, with a quiet zone of four modules."""
+    encoded = cv2.QRCodeEncoder.create().encode(text)  # has a quiet zone of two modules
     return cv2.copyMakeBorder(encoded, 2, 2, 2, 2, cv2.BORDER_CONSTANT, value=(255,))
 
 
 def qr_html(text: str) -> Markup:
-    """An image of the text as a QR code."""
+    """Return the text's QR code as an HTML image."""
     modules = modules_of(text)
     picture = cv2.resize(modules, None, fx=PX_PER_MODULE, fy=PX_PER_MODULE, interpolation=cv2.INTER_NEAREST)
     data = base64.b64encode(cv2.imencode(".png", picture)[1].tobytes()).decode()

@@ -1,4 +1,4 @@
-"""What a session's address says, and what is done when one asks for something."""
+"""Keep a session's addresses equal to its state, and apply the addresses that browsers open."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from packetmesh.errors import InputError
 
 CAMERA = "cam"
 REST_S = 0.3
-"""How long the view has to rest before the address follows."""
+"""Time that the view must be still before the address is updated, seconds."""
 
 
 class Places:
-    """The addresses of those who steer a session: of its one browser, or of the teachers in a lecture."""
+    """The addresses of a session: of its one browser, or of the teachers' browsers in a lecture."""
 
     def __init__(self, session: PanelSession, views: Views | None) -> None:
         """Keep the addresses of a session; ``views`` are None where many browsers share it."""
@@ -33,7 +33,7 @@ class Places:
             session.target.camera.on_update(lambda _: rest.restart())
 
     def add(self, ui: Ui) -> Callable[[], None]:
-        """Have a browser's address follow, and be followed, until what is returned is called."""
+        """Connect a browser's address to the session. Returns the function that disconnects it."""
         session = self._session
         titles = [panel.title for panel in session.panels]
         keys = dict.fromkeys(key for panel in session.panels for key in panel.in_address)
@@ -48,7 +48,7 @@ class Places:
         return remove
 
     def follow(self) -> None:
-        """Something may be different now."""
+        """Update the addresses after a possible change."""
         if self._addresses:
             place = self._now()
             for address in self._addresses:
@@ -61,7 +61,7 @@ class Places:
         return Place(session.spec, session.current.title, added)
 
     def _parts(self) -> dict[str, InAddress]:
-        """By key, what is said of what is drawn now."""
+        """Return the parts that appear in the address now, by their keys."""
         session = self._session
         parts = dict[str, InAddress]()
         for panel in session.panels:
@@ -70,7 +70,7 @@ class Places:
         return parts if self._views is None else parts | {CAMERA: self._views}
 
     def _go_to(self, place: Place, wrong: list[str]) -> None:
-        """Show what an address asks for; what it cannot be followed in gets one sentence."""
+        """Show what an address asks for; report its wrong parts in one notification."""
         session = self._session
         session.want(_with(session.spec, place.spec))
         if place.screen != session.current.title:
@@ -81,7 +81,7 @@ class Places:
             session.notify("Not all of the address can be followed", f"{wrong[0].rstrip('.')}{more}.")
 
     def _take(self, asked: Mapping[str, str], spec: Spec) -> list[str]:
-        """A stop first, then what differs from what it sets; the sentences of what is not known."""
+        """Apply lesson stops first, then the parts that differ from them. Returns the error sentences."""
         session, wrong = self._session, list[str]()
         parts = self._parts()
         stops = sorted((key for key in parts if key.startswith(STOP)), key=lambda key: key in asked)
@@ -100,5 +100,5 @@ class Places:
 
 
 def _with(spec: Spec, asked: Spec) -> Spec:
-    """What an address asks for; what it does not name of the spec stays."""
+    """Return ``spec`` with the source, preset and settings of ``asked``."""
     return replace(spec, source=asked.source, preset=asked.preset, config=asked.config)

@@ -1,4 +1,4 @@
-"""One browser's session: what it wants, what it has, and the one thread on which it all happens."""
+"""One browser's session: its spec, its results, and the one thread on which its callbacks run."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ CANCELLED = "Cancelled."
 class Session:
     """Runs the chain for one browser and keeps its panels up to date.
 
-    Whatever happens is posted to one thread: nothing there needs a lock, and nothing slow runs there.
+    All callbacks are posted to one thread: they need no lock, and none of them may be slow.
     """
 
     def __init__(
@@ -75,14 +75,14 @@ class Session:
         self._framing = Framing(self, self.views)
         self.places = Places(self, self.views)
         self.built = self._thread.submit(self._guarded, self._build_in_turn)
-        """Done when its panels are there."""
+        """Done when the panels are built."""
         if isinstance(target, viser.ClientHandle):
             target.camera.on_update(lambda _: self._framing.follow_window())
 
-    # What others ask of it, from any thread.
+    # Called by others, from any thread.
 
     def post(self, function: Callable[..., None], *arguments: Any) -> None:
-        """Have something done on the session's thread; its errors become notifications."""
+        """Run a function on the session's thread; its errors become notifications."""
         self._submit(function, *arguments)
 
     def _submit(self, function: Callable[..., None], *arguments: Any) -> Future[None] | None:
@@ -92,18 +92,18 @@ class Session:
         return None
 
     def _post_in_turn(self, function: Callable[..., None], *arguments: Any) -> None:
-        """The same as ``post`` for what draws much: when no other session does."""
+        """Like ``post``, for a function that draws much: it waits until no other session draws."""
         self._shared.turns.give(lambda: self._submit(function, *arguments))
 
     def close(self) -> None:
-        """Have the session end on its own thread, whoever calls; what was posted to it before is dropped."""
+        """End the session on its own thread; functions posted before that have not run are dropped."""
         self._closed = True
         with contextlib.suppress(RuntimeError):
             self._thread.submit(self._end)
         self._thread.shutdown(wait=False)
 
     def _end(self) -> None:
-        """Stop computing and leave what was uploaded; the browser is gone."""
+        """Stop the jobs and release the uploads; the browser is gone."""
         for lane in self._lanes:
             lane.stop()
         self.ui.close()
@@ -111,7 +111,7 @@ class Session:
 
     @property
     def owners(self) -> list[object]:
-        """Whose its jobs are in the pool."""
+        """The owners of this session's jobs in the pool."""
         return [lane.owner for lane in self._lanes]
 
     @property
@@ -119,21 +119,21 @@ class Session:
         return [self._side, self._quick, *(track.lane for track in self._tracks)]
 
     def clients(self) -> Iterable[viser.ClientHandle]:
-        """The browsers whose view is this session's to turn."""
+        """Return the browsers whose view this session turns."""
         if isinstance(self.target, viser.ViserServer):
             return self.ui.lecture.followers() if self.ui.lecture is not None else ()
         return [self.target]
 
     def notify(self, title: str, sentence: str, color: Any = "red") -> None:
-        """Tell the people who watch."""
+        """Show a notification in all browsers of the session."""
         everybody = self.clients() if self.ui.lecture is None else self.ui.lecture.everybody()
         for client in everybody:
             client.add_notification(title, plain(sentence), color=color, auto_close_seconds=15.0)
 
-    # What panels ask of it, on its thread.
+    # Called by panels, on the session's thread.
 
     def new_folder(self) -> Path:
-        """For an upload, or what is made of one."""
+        """Make a folder for an upload, or for files made from one."""
         return self.uploads.new_folder(self)
 
     def edit(self, change: Callable[[PipelineConfig], PipelineConfig]) -> None:
@@ -141,7 +141,7 @@ class Session:
         self.want(replace(self.spec, config=change(self.spec.config)))
 
     def want(self, spec: Spec) -> None:
-        """Want something else; whatever is still right is kept."""
+        """Change the spec and recompute what depends on the difference."""
         if spec != self.spec:
             self.spec = spec
             self.uploads.keep(spec.source, self)
@@ -156,15 +156,15 @@ class Session:
         on_end: Callable[[Any], None],
         on_partial: Callable[[Any], None] = lambda _: None,
     ) -> None:
-        """Run a job of the store, the spec and these arguments, in place of the one before.
+        """Run a job with the store, the spec and these arguments, in place of the side job before it.
 
-        It waits for the chain's own, also for the step that the session asks for after what it does now. On
-        this thread, ``on_partial`` gets what it has so far, and ``on_end`` its result or None.
+        It waits for the chain's running step and for a step that the current callback submits. On the
+        session's thread, ``on_partial`` gets partial results, and ``on_end`` the result or None on failure.
         """
         self.post(self._run_beside, self._side, job, arguments, on_end, on_partial)
 
     def quick_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
-        """Run a job of a fraction of a second, even beside one of the chain; of many, the latest."""
+        """Run a job of a fraction of a second in parallel with the chain; of several, only the last."""
         self._run_beside(self._quick, job, arguments, on_end, lambda _: None)
 
     def _run_beside(
@@ -202,15 +202,15 @@ class Session:
             self._show_status()
 
     def cancel_side_job(self) -> None:
-        """End the job beside the chain now."""
+        """Stop the side job now."""
         self._side.cancel()
 
     def offers(self) -> tuple[Offers, ...]:
-        """What can be taken along of what all screens show."""
+        """Return the files that all screens offer for download."""
         return tuple(offer for panel in self.panels for offer in panel.offers())
 
     def advance(self) -> None:
-        """Compute the first step of each track that is out of date."""
+        """Compute the first stale step of each track."""
         for track in self._tracks:
             self._advance(track)
         self._show_status()
@@ -239,7 +239,7 @@ class Session:
         )
 
     def _waits(self, step: Step) -> bool:
-        """Whether a step is not computed before somebody looks at it."""
+        """Whether a step is not computed because its screen, which computes only when shown, is hidden."""
         waiting = (panel for panel in self.panels if panel.only_when_shown and panel is not self.current)
         return any(panel.step == step for panel in waiting)
 
@@ -279,7 +279,7 @@ class Session:
                 panel.on_partial(value)
         self.show_staleness()
 
-    # Its own part of the control panel.
+    # The session's own part of the control panel.
 
     def _build_in_turn(self) -> None:
         with self._shared.turns.taken():
@@ -301,11 +301,11 @@ class Session:
                 self.gui.add_html(screen_mark(panel.title))
                 panel.build()
         self.show(self.current.title)
-        if self.views is not None:  # what many share is its teachers' to move
+        if self.views is not None:  # in a lecture the teachers' browsers have the addresses
             self.places.add(self.ui)
 
     def show(self, title: str) -> None:
-        """Make a step the current one."""
+        """Show the step of that title."""
         self.current.on_hide()
         self.current = next(panel for panel in self.panels if panel.title == title)
         with self.target.atomic():
@@ -321,14 +321,14 @@ class Session:
         self.advance()
 
     def _pause_unseen(self) -> None:
-        """Stop what is computed only while somebody looks; it goes on from there when it is shown again."""
+        """Stop the steps that are computed only while their screen is shown; showing it starts them again."""
         for track in self._tracks:
             if track.running is not None and self._waits(track.running):
                 track.submitted = None
                 track.lane.stop()
 
     def frame_view(self, anew: bool = False, keep: bool = False) -> None:
-        """Turn the view to what is shown; ``keep`` leaves it where a person has turned it."""
+        """Turn the view to what is shown; ``keep`` leaves it where the user has turned it."""
         self._framing.frame(anew, keep)
 
     def _act(self, action: str) -> None:
@@ -351,13 +351,13 @@ class Session:
             self.ui.show_command(self.current.command)
 
     def show_staleness(self) -> None:
-        """Dim what belongs to other settings than those that are wanted."""
+        """Dim the numbers and the picture if they belong to other settings than the current ones."""
         ahead = self.current.ahead
         old = self.results.shows_other(self.current.step or CHAIN[-1], self.spec)
         self._header.dim(numbers=old or ahead, picture=old and not ahead)
 
     def _show_status(self) -> None:
-        """Bring the stepper and the status line up to date, and dim the rest."""
+        """Update the stepper, the status line and the dimming."""
         self.show_staleness()
         running = [track.running for track in self._tracks if track.running is not None]
         statuses = {
@@ -383,7 +383,7 @@ class Session:
         except OSError as error:
             self.notify("That did not work", file_trouble(error))
         except Exception as error:
-            if self._closed:  # while it was at work; the pool and the folder may be gone, too
+            if self._closed:  # closed meanwhile: the pool and the folder may be gone
                 return
             logger.exception("a session callback failed")
             self.notify("Something unexpected happened", f"{type(error).__name__}: {error}")

@@ -1,4 +1,4 @@
-"""Where a person stands before what is drawn: the app turns the view to it, and what a hand does stays."""
+"""Camera views of a browser: the app turns the view to what is drawn, and keeps what the user has turned."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from packetmesh.errors import InputError
 from pipeline.types import FloatArray
 
 View: TypeAlias = FloatArray
-"""(2, 3) where to stand and what to look at, world frame, metres."""
+"""(2, 3) camera position and look-at point in the world frame, metres."""
 ALIKE = 1e-3
-"""Over the distance to what is looked at: two views no farther apart are one."""
+"""Tolerance over the distance to the look-at point: two views closer than this are equal."""
 ECHO_S = 0.7
-"""After the app has turned the view, before a browser's answer is taken for a hand's."""
+"""Time after the app turned the view in which a browser's report is not taken for the user's, seconds."""
 FARTHEST_M = 1e5
 
 
 class Views:
-    """The views of one browser, by the kind of thing that is looked at."""
+    """The views of one browser, by the kind of object that is looked at."""
 
     def __init__(self, client: viser.ClientHandle, clock: Callable[[], float] = time.monotonic) -> None:
         self._client, self._clock = client, clock
@@ -31,16 +31,16 @@ class Views:
         self._framed = self._before = self._now()
         self._framed_s = -ECHO_S
         self._turned: dict[str, View] = {}
-        """By kind, where a hand has left it."""
+        """By kind: the view that the user has turned to."""
         self._asked: View | None = None
-        """By the address, until what it is about is there."""
+        """The view that the address asks for, until the results of the address have been computed."""
 
     def frame(self, look: Callable[[], str], keep: bool) -> None:
-        """Have the app turn the view, and turn it back to where a hand has left it.
+        """Let the app turn the view, then restore the view to which the user had turned it.
 
         Args:
-            look: turns the view, or leaves it as it is; the kind of what is shown.
-            keep: whether it is still the same that is looked at, as when another screen was shown meanwhile.
+            look: turns the view or leaves it as it is, and returns the kind of object shown.
+            keep: whether the same object is shown as before, for example after a visit to another screen.
         """
         before = self._now()
         if self._by_hand():
@@ -59,22 +59,22 @@ class Views:
             turn(self._client, wanted[1], wanted[0])
 
     def settle(self) -> None:
-        """All that the address asked for is there; from now on its view is like one of a hand."""
+        """Treat the address's view as one turned by the user, now that all its results have been computed."""
         if self._asked is not None:
             self._turned[self._kind], self._asked = self._asked, None
 
     def place(self) -> str:
-        """Where a hand has turned the view to."""
+        """Return the view that the user has turned to as text; empty for the app's own view."""
         view = self._asked
         if view is None and (self._by_hand() or self._kind in self._turned):
             view = self._now()
         return "" if view is None else ",".join(f"{value:.3f}" for value in view.ravel())
 
     def take(self, place: str) -> None:
-        """Turn the view to where an address says.
+        """Turn the view to the one in an address.
 
         Raises:
-            InputError: it says no two places.
+            InputError: the text is not two positions.
         """
         try:
             view = np.array([float(value) for value in place.split(",")] if place else [])
@@ -95,7 +95,7 @@ class Views:
         return np.array([camera.position, camera.look_at])
 
     def _by_hand(self) -> bool:
-        """Whether it is neither where the app has turned it nor, on its way there, where it was before."""
+        """Whether the view differs from the one the app turned to and from the one before that turn."""
         if self._clock() - self._framed_s < ECHO_S or self._asked is not None:
             return False
         now = self._now()

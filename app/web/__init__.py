@@ -1,2 +1,1 @@
-"""Who may come in, what a browser may send, and how text is made safe to show. Imports nothing else of
-``app``."""
+"""Access to the server, checks of what browsers send, and safe text. Imports nothing else of ``app``."""

@@ -1,4 +1,4 @@
-"""Who gets a session: so many browsers at once, so many of one address, and one begins after the other."""
+"""Limits on the browsers, in all and per address, and a queue whose sessions start one by one."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from typing import Any
 
 MOST_SESSIONS = 64
 MOST_OF_ONE_ADDRESS = 48
-"""Sessions; a class behind one router has one address."""
+"""Most sessions of one network address; a class behind one router has one address."""
 MOST_WAITING, MOST_WAITING_OF_ONE = 64, 32
 BUILD_S = 5.0
-"""Patience with a session that is built, before the next one is."""
+"""Time that a session's building may take before the next session starts, seconds."""
 SILENT_S = 60.0
-"""A browser that has not shown the page by then goes: its page says so at once."""
+"""Time after which a browser that has not shown the page is disconnected, seconds; a page reports at once."""
 LOOK_S = 5.0
 
 logger = logging.getLogger(__name__)
@@ -27,26 +27,26 @@ logger = logging.getLogger(__name__)
 
 @dataclass(slots=True)
 class Visitor:
-    """A browser that has come."""
+    """A connected browser."""
 
     number: int
     address: str
     begin: Callable[[], Future[Any] | None]
-    """Gives it a session, and returns what is done when that is built; None if there is none."""
+    """Starts its session. Returns a future that is done when the session is built; None without one."""
     wait: Callable[[], None]
-    """Tells it that it waits for a place."""
+    """Shows in the browser that it waits for a place."""
     turn_away: Callable[[], None]
-    """Ends its connection."""
+    """Closes its connection."""
     shows_page: Callable[[], bool]
-    """Whether its page has said anything yet."""
+    """Whether its page has sent anything yet."""
     began_s: float = 0.0
-    """When its session was begun, by the clock of this process."""
+    """Start of its session on this process's monotonic clock, seconds."""
     told: bool = False
-    """Whether it knows that it waits."""
+    """Whether the browser shows that it waits."""
 
 
 class Crowd:
-    """All that have come, from any thread. One thread begins sessions and looks for silent ones."""
+    """All connected browsers, usable on any thread. One thread starts sessions and finds silent ones."""
 
     def __init__(self) -> None:
         self._inside: dict[int, Visitor] = {}
@@ -69,14 +69,14 @@ class Crowd:
             visitor.turn_away()
 
     def leave(self, number: int) -> None:
-        """A browser is gone; whoever waits for its place gets it."""
+        """Remove a browser that has gone; its place goes to the next one that waits."""
         with self._lock:
             self._waiting.pop(number, None)
             self._inside.pop(number, None)
         self._soon()
 
     def close(self) -> None:
-        """Begin nothing more."""
+        """Start no more sessions."""
         self._closing.set()
         self._thread.shutdown(wait=False, cancel_futures=True)
 
@@ -85,15 +85,15 @@ class Crowd:
             self._thread.submit(self._fill)
 
     def _fill(self) -> None:
-        """Begin a session for everybody for whom there is room, and tell the others that they wait."""
+        """Start a session for every browser that has room, and tell the others that they wait."""
         while (visitor := self._next()) is not None:
             try:
                 built = visitor.begin()
                 if built is not None:
                     built.result(BUILD_S)
             except TimeoutError:
-                pass  # it goes on by itself
-            except Exception:  # it may be the only one that cannot begin
+                pass  # it continues to build
+            except Exception:  # the failure may concern only this one
                 logger.exception("a session could not begin")
         with self._lock:
             waiting = [one for one in self._waiting.values() if not one.told]
@@ -102,7 +102,7 @@ class Crowd:
             one.wait()
 
     def _next(self) -> Visitor | None:
-        """Take the first of those who wait whose address has room for one more."""
+        """Remove and return the first waiting browser whose address has room."""
         with self._lock:
             counts = Counter(one.address for one in self._inside.values())
             if len(self._inside) >= MOST_SESSIONS:

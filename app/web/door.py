@@ -1,4 +1,4 @@
-"""The door: how fast browsers may connect, and that nobody comes before all is ready behind it."""
+"""A limit on how fast browsers may connect; no connection is accepted before the server is ready."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from typing import Any
 from app.web.origin import Answer, answering
 
 MOST_AT_ONCE, MOST_A_SECOND = 48.0, 4.0
-"""Connections of one address: so many at once, and so many a second from then on. A class behind one router
-comes in one burst."""
+"""Connections of one address: the largest burst, and the rate per second after it. A class behind one router
+connects in one burst."""
 MOST_ADDRESSES = 10_000
 NOT_NOW = "PacketMesh takes no more connections at this moment; the page tries again by itself.\n"
 
 
 @dataclass(slots=True)
 class _Allowance:
-    """What an address may still open."""
+    """The connections that an address may still open."""
 
     left: float
     counted_s: float
 
 
 class Door:
-    """Lets connections in at a bounded rate for each address; shut until it is opened."""
+    """Limits the connection rate of each address; refuses all connections until it is opened."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -35,11 +35,11 @@ class Door:
         self.is_open = False
 
     def guarded(self) -> AbstractContextManager[None]:
-        """Servers that start meanwhile answer 503 to those who come too early or too often."""
+        """Context in which servers start that answer 503 to connections too early or too frequent."""
         return answering(self._answering)
 
     def lets_in(self, address: str) -> bool:
-        """Return whether one more connection of an address may come; it counts if it may."""
+        """Whether one more connection of an address is accepted; an accepted one is counted."""
         now_s = self._clock()
         if len(self._allowances) > MOST_ADDRESSES:
             self._forget(now_s)
@@ -52,7 +52,7 @@ class Door:
         return True
 
     def _forget(self, now_s: float) -> None:
-        """Forget the addresses that may open as many as at the start."""
+        """Forget the addresses whose allowance is full again."""
         whole_s = MOST_AT_ONCE / MOST_A_SECOND
         self._allowances = {
             address: one for address, one in self._allowances.items() if now_s - one.counted_s < whole_s

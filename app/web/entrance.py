@@ -1,6 +1,6 @@
-"""Who may come in, and who teaches: browsers that came by a link with a token, which a cookie remembers.
+"""Access and the teacher's role: a browser opens a link with a token, which a cookie remembers.
 
-The token leaves the address at once, so that nobody reads it from the wall.
+The token is removed from the address at once, so that nobody can read it from a projected screen.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from urllib.parse import parse_qsl, urlencode, urlsplit
 from app.web.origin import Answer, answering
 
 WELCOME = "/?welcome"
-"""Where the teacher's link leads."""
+"""Page to which the teacher's link redirects."""
 NOT_THAT = "This is not a link of this server: open the one that was printed when it started.\n"
 NO_LINK = "PacketMesh lets in who has its link: open the whole address that it printed when it started.\n"
 
 
 class Token:
-    """What a link holds."""
+    """The secret in a link."""
 
     def __init__(self, key: Literal["token", "teacher"]) -> None:
-        """``key`` stands before it in the link."""
+        """Make a token; ``key`` is its name in the link's query."""
         self.key = key
         self.text = secrets.token_urlsafe(16)
         self.cookie = f"packetmesh_{key}_{secrets.token_hex(4)}"
-        """Its name: of this server, as a browser keeps cookies of all ports of a machine together."""
+        """Name of its cookie, unique to this server: browsers share cookies between a machine's ports."""
 
     @property
     def query(self) -> str:
-        """Behind the address, it makes the link."""
+        """The query that makes a server's address a link with this token."""
         return f"?{self.key}={self.text}"
 
     def is_in(self, cookies: str) -> bool:
-        """Whether the header ``Cookie`` of a request holds it."""
+        """Whether a request's ``Cookie`` header holds the token."""
         try:
             held = SimpleCookie(cookies).get(self.cookie)
         except CookieError:
@@ -47,25 +47,25 @@ class Token:
         return held is not None and self.is_text(held.value)
 
     def is_text(self, text: str) -> bool:
-        """Whether it is this one; takes as long for any other of its length."""
+        """Whether ``text`` is the token; the comparison takes constant time."""
         return hmac.compare_digest(text.encode(), self.text.encode())
 
 
 @dataclass(frozen=True, slots=True)
 class Entrance:
-    """The links of a server."""
+    """The tokens of a server."""
 
     visitor: Token | None = None
-    """Without it, or the teacher's, nobody comes in; None lets all in."""
+    """Token that browsers need, unless they have the teacher's; None admits all."""
     teacher: Token | None = None
-    """Of a lecture."""
+    """The teacher's token in a lecture."""
 
     def lets_in(self, cookies: str) -> bool:
-        """Whether a browser with these cookies sees anything."""
+        """Whether a browser with these cookies is admitted."""
         return self.visitor is None or any(token.is_in(cookies) for token in self._tokens)
 
     def guarded(self) -> AbstractContextManager[None]:
-        """Servers that start meanwhile give the cookie to whoever comes by a link, and turn others away."""
+        """Context in which servers start that set the cookie of a valid link and refuse other browsers."""
         return answering(self._answering)
 
     @property
@@ -92,7 +92,7 @@ class Entrance:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches a host that is listened on."""
+    """Whether a listening host is reachable from this machine only."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

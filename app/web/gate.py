@@ -1,8 +1,8 @@
-"""The gate for what browsers send: nothing passes that a hand could not have done on the page.
+"""Checks of all messages from browsers: only what a user could have done on the page passes.
 
-``RULES`` has a rule for each kind of message that passes at all, and ``VALUES`` one for each kind of control:
-which values a hand can give it. What does not pass is dropped and counted. A connection that keeps sending
-what no page sends is closed.
+``RULES`` has a rule for each kind of message that is allowed, and ``VALUES`` one for each kind of control:
+the values that a user can give it. Other messages are dropped and counted. A connection that keeps sending
+messages that no page sends is closed.
 """
 
 from __future__ import annotations
@@ -24,65 +24,65 @@ from app.web import viser_private as private
 from app.web.upload_gate import REFUSED, UploadGate
 
 MOST_TEXT = 4096
-"""Characters that a text field takes."""
+"""Longest text in a text field, characters."""
 MOST_NAME = 1024
-"""Characters of names, such as a file's."""
+"""Longest name, such as a file's, characters."""
 FARTHEST = 1e7
-"""Of places in the scene, metres."""
+"""Largest coordinate in the scene, metres."""
 MOST_PIXELS = 100_000
 MOST_FORGED = 60
-"""Messages that no page sends, before the connection is closed."""
+"""Number of messages that no page sends after which the connection is closed."""
 MOST_AT_ONCE, MOST_A_SECOND = 1000.0, 200.0
-"""Messages other than parts of files: so many in a burst, and so many a second from then on."""
+"""Messages other than parts of files: the largest burst, and the rate per second after it."""
 FLOOD, FORGED_CLOSE = "more than a hand can do", 1008
 
 logger = logging.getLogger(__name__)
 
 
 class Verdict(Enum):
-    """What becomes of a message."""
+    """The result of a check."""
 
     PASSES = "passes"
     LATE = "late"
-    """A page may have sent it, but what it names has changed meanwhile, or is half typed: dropped."""
+    """A page may have sent it, but its target has changed meanwhile or its value is half typed: dropped."""
     FORGED = "forged"
-    """No page sends it: dropped, and the connection is closed if there are many."""
+    """No page sends it: dropped; many of them close the connection."""
     REFUSED = "refused"
-    """A control that all share, and that this browser may not touch."""
+    """It changes a shared control that this browser must not use."""
 
 
 @dataclass(slots=True)
 class _Guest:
-    """A connection, and what it has sent."""
+    """A connection and a record of its messages."""
 
     uploads: UploadGate = field(default_factory=UploadGate)
     shows_page: bool = False
-    """Whether it has done more than turn the view, which its page does at once."""
+    """Whether it has sent more than camera messages, as a shown page does at once."""
     forged: int = 0
     allowance: float = MOST_AT_ONCE
     counted_s: float = field(default_factory=time.monotonic)
 
 
 class Gate:
-    """Judges the messages of all browsers of a server, on the thread of its connections."""
+    """Checks the messages of all browsers of a server, on the thread of its connections."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        """Judge from now on; a server judges before its first browser comes if it is made at once."""
+        """Start checking. Made together with the server, it checks from the first browser on."""
         self._server = server
         self._guests: dict[int, _Guest] = {}
         self.dropped: Counter[str] = Counter()
-        """What did not pass, by verdict and kind of message."""
+        """Number of dropped messages by verdict and kind of message."""
         self.may_steer: Callable[[int], bool] = lambda _: True
-        """Whether a browser, by its number, may touch what all share."""
+        """Whether the browser with this number may use shared controls."""
         self.on_refused: Callable[[int], None] = lambda _: None
-        """Called with a browser that has touched what it may not."""
+        """Called with the number of a browser whose use of a shared control was refused."""
         self.on_too_much: Callable[[int, str], None] = lambda *_: None
-        """Called with the browser and a sentence, if it uploads more than is taken."""
+        """Called with the number of a browser that uploads too much, and a sentence about it."""
         private.listen(server, self._hear)
         server.on_client_disconnect(lambda client: self._guests.pop(client.client_id, None))
 
     def shows_page(self, number: int) -> bool:
-        """Return whether a browser has sent what only a page that is shown sends."""
+        """Whether a browser has sent something that only a shown page sends."""
         return number in self._guests and self._guests[number].shows_page
 
     async def _hear(self, number: int, message: Any, go_on: Callable[[], Awaitable[None]]) -> None:
@@ -104,15 +104,15 @@ class Gate:
                 private.close(self._server, number, FORGED_CLOSE, "not a page of this server")
 
     def _touch(self, number: int, found: tuple[Any, bool] | None) -> Verdict:
-        """Whether a browser may touch what it has named."""
+        """Judge whether a browser may use the found control or node."""
         if found is None:
             return Verdict.FORGED
         return Verdict.PASSES if not found[1] or self.may_steer(number) else Verdict.REFUSED
 
-    # One for every kind of message.
+    # One rule for every kind of message.
 
     def update(self, number: int, message: messages.GuiUpdateMessage) -> Verdict:
-        """A control has another value, or a button is pressed."""
+        """Check a changed control or a pressed button."""
         found = private.find_control(self._server, number, message.uuid) if _is_name(message.uuid) else None
         updates = message.updates
         if found is None or not isinstance(updates, dict) or list(updates) != ["value"]:
@@ -132,14 +132,14 @@ class Gate:
         return verdict
 
     def command(self, number: int, message: messages.CommandTriggerMessage) -> Verdict:
-        """A command of the palette, or its keys."""
+        """Check a command that was chosen in the palette or by its keys."""
         found = private.find_command(self._server, number, message.uuid) if _is_name(message.uuid) else None
         if found is not None and (found[0]._impl.removed or found[0].disabled):
             return Verdict.LATE
         return self._touch(number, found)
 
     def begin_upload(self, number: int, message: messages.FileTransferStartUpload) -> Verdict:
-        """A file is about to come."""
+        """Check the start of an upload."""
         names = (message.source_component_uuid, message.transfer_uuid, message.filename, message.mime_type)
         sizes = (message.part_count, message.size_bytes)
         if not all(map(_is_name, names)) or not all(type(size) is int for size in sizes):
@@ -159,7 +159,7 @@ class Gate:
         return Verdict.PASSES
 
     def part(self, number: int, message: messages.FileTransferPart) -> Verdict:
-        """A part of a file that may come."""
+        """Check a part of an uploaded file."""
         transfer, content = message.transfer_uuid, message.content
         if not _is_name(transfer) or type(message.part_index) is not int or not isinstance(content, bytes):
             return Verdict.FORGED
@@ -167,13 +167,13 @@ class Gate:
         return Verdict.PASSES if known else Verdict.LATE
 
     def acknowledgement(self, number: int, message: messages.FileTransferPartAck) -> Verdict:
-        """A browser has got a part of a file."""
+        """Check a browser's receipt for a part of a file."""
         sizes = (message.transferred_bytes, message.total_bytes)
         whole = _is_name(message.transfer_uuid) and all(type(size) is int for size in sizes)
         return Verdict.PASSES if whole else Verdict.FORGED
 
     def camera(self, number: int, message: messages.ViewerCameraMessage) -> Verdict:
-        """The view was turned, or the window has another size."""
+        """Check a changed view or window size."""
         places = (message.position, message.look_at, message.up_direction)
         lens = (message.fov, message.near, message.far)
         sizes = (message.image_height, message.image_width)
@@ -187,10 +187,10 @@ class Gate:
         )
         if not whole:
             return Verdict.FORGED
-        return Verdict.PASSES if all(sizes) else Verdict.LATE  # a window that has no picture now
+        return Verdict.PASSES if all(sizes) else Verdict.LATE  # the window shows no picture now
 
     def pointer(self, number: int, message: messages.ScenePointerMessage) -> Verdict:
-        """A click into the scene."""
+        """Check a click into the scene."""
         ray = (message.ray_origin, message.ray_direction)
         whole = (
             message.event_type == "click"
@@ -203,7 +203,7 @@ class Gate:
         return self._touch(number, (None, True)) if whole else Verdict.FORGED
 
     def node(self, number: int, message: messages.SceneNodeClickMessage) -> Verdict:
-        """A click on something in the scene."""
+        """Check a click on an object of the scene."""
         ray = (message.ray_origin, message.ray_direction)
         whole = (
             _is_name(message.name)
@@ -217,11 +217,11 @@ class Gate:
             return Verdict.FORGED
         found = private.find_node(self._server, number, message.name, message.owner)
         if found is None or not found[0].visible:
-            return Verdict.LATE  # it comes and goes with what is drawn
+            return Verdict.LATE  # nodes come and go with the drawing
         return self._touch(number, found)
 
     def gizmo(self, number: int, message: Any) -> Verdict:
-        """Arrows in the scene are taken, dragged or let go."""
+        """Check that a transform gizmo in the scene is grabbed, dragged or released."""
         moves = isinstance(message, messages.TransformControlsUpdateMessage)
         if not _is_name(message.name) or not isinstance(message.owner, str):
             return Verdict.FORGED
@@ -229,11 +229,11 @@ class Gate:
             return Verdict.FORGED
         found = private.find_node(self._server, number, message.name, message.owner)
         if found is None or not isinstance(found[0], viser.TransformControlsHandle):
-            return Verdict.LATE  # they come and go with what is drawn
+            return Verdict.LATE  # gizmos come and go with the drawing
         return self._touch(number, found) if found[0].visible else Verdict.LATE
 
     def render(self, number: int, message: messages.GetRenderResponseMessage) -> Verdict:
-        """The picture of the view that the server has asked for."""
+        """Check a picture of the view that the server requested."""
         if not _is_name(message.render_uuid) or not isinstance(message.payload, bytes):
             return Verdict.FORGED
         asked = private.is_asked_for_render(self._server, number)
@@ -258,7 +258,7 @@ RULES: Mapping[type, Callable[[Gate, int, Any], Verdict]] = {
     messages.TransformControlsDragEndMessage: Gate.gizmo,
     messages.GetRenderResponseMessage: Gate.render,
 }
-"""What passes at all. The app has no forms, no held buttons, no nodes to drag, and no links to share."""
+"""All messages that are allowed. The app has no forms, held buttons, draggable nodes or shared links."""
 
 
 def _ticked(handle: Any, value: object) -> Verdict:
@@ -270,14 +270,14 @@ def _pressed(handle: Any, value: object) -> Verdict:
 
 
 def _written(handle: Any, value: object) -> Verdict:
-    """A line of text without control characters."""
+    """Check a line of text: no control characters, not too long."""
     if not isinstance(value, str) or any(category(letter) in ("Cc", "Cs") for letter in value[:MOST_TEXT]):
         return Verdict.FORGED
     return Verdict.PASSES if len(value) <= MOST_TEXT else Verdict.LATE
 
 
 def _chosen(handle: Any, value: object) -> Verdict:
-    """One of the options; a list may have had others when it was opened."""
+    """Check a chosen option; the list may have had other options when it was opened."""
     if not isinstance(value, str) or len(value) > MOST_TEXT:
         return Verdict.FORGED
     if value in handle.options:
@@ -286,12 +286,12 @@ def _chosen(handle: Any, value: object) -> Verdict:
 
 
 def _counted(handle: Any, value: object) -> Verdict:
-    """A number with no more decimals than the control shows, within its bounds."""
+    """Check a number: within the control's bounds, with no more decimals than it shows."""
     return _number(handle, value, handle.value, handle.min, handle.max)
 
 
 def _placed(handle: Any, value: object) -> Verdict:
-    """Numbers of a vector, each as above."""
+    """Check each number of a vector in the same way."""
     count = len(handle.value)
     if not isinstance(value, tuple | list) or len(value) != count:
         return Verdict.FORGED
@@ -307,7 +307,7 @@ def _number(handle: Any, value: Any, now: float, least: float | None, most: floa
     low = -math.inf if least is None else min(least, round(least, digits))
     high = math.inf if most is None else max(most, round(most, digits))
     if not low <= value <= high:
-        return Verdict.LATE  # one that is half typed
+        return Verdict.LATE  # half typed
     shown = abs(value - round(value, digits)) <= 1e-9 * abs(value) or value in (least, most)
     return Verdict.PASSES if shown else Verdict.FORGED
 
@@ -323,11 +323,11 @@ VALUES: Mapping[type, Callable[[Any, object], Verdict]] = {
     viser.GuiVector2Handle: _placed,
     viser.GuiVector3Handle: _placed,
 }
-"""Which values a hand can give a control; other kinds have none that a browser may set."""
+"""Checks of the values that a user can give a control; a browser cannot set other kinds of controls."""
 
 
 def _within_rate(guest: _Guest) -> bool:
-    """Take one from what a connection may still send, which grows with time."""
+    """Use up one message of a connection's allowance, which grows with time. False if it is empty."""
     now_s = time.monotonic()
     more = MOST_A_SECOND * (now_s - guest.counted_s)
     guest.allowance, guest.counted_s = min(guest.allowance + more, MOST_AT_ONCE), now_s
@@ -350,5 +350,5 @@ def _are_numbers(values: object, count: int) -> bool:
 
 
 def _is_turn(wxyz: Any) -> bool:
-    """Whether it is a unit quaternion, as near as a browser's float32."""
+    """Whether the value is a unit quaternion to a browser's float32 precision."""
     return _are_numbers(wxyz, 4) and abs(sum(value * value for value in wxyz) - 1.0) < 1e-2

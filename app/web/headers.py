@@ -1,12 +1,12 @@
-"""What browsers are told to forbid the page: scripts that are not the server's own, code from text, sending
-anything anywhere else, being framed.
+"""The content security policy: the page may run only the server's scripts, send nothing elsewhere, and be in
+no frame.
 
-Scripts are files of this server, or the two of viser's page by their hashes: a script that gets into the
-page by a text, an attribute or an address does not run. Viser's page compiles WebAssembly, works in blobs
-and sets styles as it runs; so styles within the page are allowed. A text that got past the escaping could
-change how the page looks, and call what ``page.js`` offers the server by name; no script of its own runs, and
-the page fetches nothing from another place and sends nothing there. What no policy forbids is to leave: by a
-link, or a ``<meta http-equiv=refresh>``, which needs no click.
+Scripts are files of this server, or viser's two page scripts by their hashes: a script that enters the page
+through a text, an attribute or an address does not run. Viser's page compiles WebAssembly, uses blobs and
+sets styles at run time, so inline styles are allowed. Injected text that got past the escaping could change
+the page's look and call the functions that ``page.js`` offers the server; it could run no script, and fetch
+nothing from and send nothing to another server. A policy cannot forbid leaving the page through a link or a
+``<meta http-equiv=refresh>``, which needs no click.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ POLICY = (
     "style-src 'self' 'unsafe-inline'; font-src 'self' data:; object-src 'none'; frame-src 'none'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""Content-Security-Policy; some browsers do not count a websocket as ``'self'``, so it is named."""
+"""Content-Security-Policy; the websocket is named because some browsers do not count it as ``'self'``."""
 OTHERS = {"X-Content-Type-Options": "nosniff", "X-Frame-Options": "DENY", "Referrer-Policy": "no-referrer"}
 
 
 def strict_headers(hashes: Sequence[str] = ()) -> AbstractContextManager[None]:
-    """Servers that start meanwhile send the policy with every answer.
+    """Context in which servers start that send the policy with every answer.
 
     Args:
-        hashes: of the scripts that may stand in the page, as the policy writes them.
+        hashes: hashes of the scripts allowed in the page, as the policy writes them.
     """
     return answering(partial(_with_headers, " ".join(hashes)))
 

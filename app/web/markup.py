@@ -1,7 +1,7 @@
-"""Text that becomes HTML or markdown: whatever is inserted is escaped, so that a file's text stays text.
+"""Text that becomes HTML or markdown; inserted values are escaped, so that text from a file stays text.
 
-``Markup("<b>{}</b>").format(name)`` escapes the name; joining and adding do, too. A plain ``str`` is never
-markup: where it is shown it is escaped as a whole (``app.window.gui``). Only literals are made into markup;
+``Markup("<b>{}</b>").format(name)`` escapes the name, and so do joining and adding. A plain ``str`` is never
+markup: it is escaped as a whole where it is shown (``app.window.gui``). Only literals are made into markup;
 the linter (S704) reports anything else.
 """
 
@@ -16,27 +16,23 @@ from markupsafe import Markup, escape
 __all__ = ["Markdown", "Markup", "escape", "plain_text", "shipped_markdown"]
 
 _ACTIVE = re.compile(
-    r"(<[^>]*>|&#?\w+;)"  # tags and what is escaped already stay
+    r"(<[^>]*>|&#?\w+;)"  # tags and character references stay
     r"|([\\`*\[\]~|]|(?<![^\W_])_|_(?![^\W_]))"
 )
-"""What markdown would take for emphasis, code, links, tables and escapes."""
+"""Characters that markdown takes for emphasis, code, links, tables and escapes."""
 _LEADING = re.compile(r"^(\d*)([#+\-=.)])(?=[\s#+\-=]|$)")
-"""What makes a heading, a rule or a list at the beginning of a line."""
+"""Characters that make a heading, a rule or a list at the beginning of a line."""
 _NOTHING = re.compile(r"(?!)")
 
 
 class Markdown(Markup):
-    """Markdown in which everything inserted is text: no tag, no link, no emphasis, on one line."""
+    """Markdown in which inserted values are plain text on one line: no tag, link or emphasis."""
 
     __slots__ = ()
 
     @classmethod
     def escape(cls, s: Any, /) -> Markdown:
-        """Return a value as markdown that shows just its text; markup stays markup.
-
-        Args:
-            s: any value; ``Markup`` keeps its tags, ``Markdown`` is returned as it is.
-        """
+        """Return a value as markdown that shows its plain text; markup stays markup."""
         if isinstance(s, Markdown):
             return s
         line = re.sub(r"\s+", " ", escape(s))
@@ -47,17 +43,17 @@ class Markdown(Markup):
 def shipped_markdown(
     text: str, field: re.Pattern[str] = _NOTHING, value: Callable[[re.Match[str]], object] = str
 ) -> Markdown:
-    """Return the markdown of a file that is part of the program; tags in it become text all the same.
+    """Return the markdown of a file of the program; its tags are shown as text.
 
     Args:
-        text: of the file.
-        field: what in it is replaced.
-        value: what stands there instead, as text.
+        text: text of the file.
+        field: pattern of the fields that are replaced.
+        value: gives the plain text that replaces a field.
     """
     plain = text.replace("&", "&amp;").replace("<", "&lt;")
     return Markdown(field.sub(lambda found: plain_text(Markdown.escape(value(found))), plain))  # noqa: S704
 
 
 def plain_text(markup: str) -> str:
-    """Return the same letters as a ``str`` of its own, which is what viser can send."""
+    """Return the markup as a plain ``str``, the type that viser can send."""
     return "".join(markup)

@@ -1,8 +1,8 @@
-"""Only this program's own page may talk to the server.
+"""Access to the server for its own page only.
 
-A web page of any other site can open a websocket to 127.0.0.1, and a site whose name is made to point
-there (DNS rebinding) can even read what comes back. Browsers send the site as ``Origin`` and the name
-that they looked up as ``Host``: the one has to be the other, and that has to be this machine.
+A web page of any other site can open a websocket to 127.0.0.1, and a site whose name is made to point there
+(DNS rebinding) can even read the answers. Browsers send the site as ``Origin`` and the name that they looked
+up as ``Host``: the two must be equal, and must name this machine.
 """
 
 from __future__ import annotations
@@ -20,31 +20,31 @@ from urllib.parse import urlsplit
 from websockets.asyncio import server as websockets_server
 
 Answer: TypeAlias = Callable[[Any, Any], Any]
-"""To a connection and its request: a response, or None to go on to the websocket."""
+"""Takes a connection and its request. Returns a response, or None to continue to the websocket."""
 ONCE = ("Host", "Origin", "Upgrade", "Cookie", "Accept-Encoding")
-"""Headers that a request may have once."""
+"""Headers that a request may have only once."""
 NOT_WELL_FORMED = "This is not a request that PacketMesh understands.\n"
 REFUSED = "PacketMesh answers only its own page: open the address that it printed when it started.\n"
 
 
 def is_own(headers: Mapping[str, str]) -> bool:
-    """Whether a request comes from this server's own page, or from no page at all.
+    """Whether a request comes from this server's own page, or from no page.
 
     Args:
-        headers: of the request, by name in any case.
+        headers: headers of the request; names in any case.
     """
     host = headers.get("Host", "")
     origin = headers.get("Origin")
     try:
         name = urlsplit(f"//{host}").hostname or ""
         page = host if origin is None else urlsplit(origin).netloc
-    except ValueError:  # a bracket of an address that is not closed
+    except ValueError:  # an address with an unclosed bracket
         return False
     return _names_this_machine(name) and page.lower() == host.lower()
 
 
 def _names_this_machine(name: str) -> bool:
-    """Whether a host name cannot be a stranger's: an address, localhost, or what this machine is called."""
+    """Whether a host name is certainly ours: an IP address, localhost, or the name of this machine."""
     with contextlib.suppress(ValueError):
         ipaddress.ip_address(name)
         return True
@@ -53,7 +53,7 @@ def _names_this_machine(name: str) -> bool:
 
 
 def well_formed() -> AbstractContextManager[None]:
-    """Servers that start meanwhile answer 400 to requests that cannot be read, where viser fails with 500."""
+    """Context in which servers start that answer 400 to unreadable requests, where viser fails with 500."""
     return answering(_understood)
 
 
@@ -70,15 +70,15 @@ def _understood(answer: Answer) -> Answer:
 
 
 def only_own_page() -> AbstractContextManager[None]:
-    """Servers that start meanwhile refuse the pages of others."""
+    """Context in which servers start that refuse requests from other sites' pages."""
     return answering(_guard)
 
 
 @contextlib.contextmanager
 def answering(change: Callable[[Answer], Answer]) -> Iterator[None]:
-    """Servers that start meanwhile answer requests with what this makes of their own answer.
+    """Context in which servers start whose answers to requests are changed by ``change``.
 
-    Viser has no option for it.
+    Viser has no option for this.
     """
     serve = websockets_server.serve
 
@@ -94,7 +94,7 @@ def answering(change: Callable[[Answer], Answer]) -> Iterator[None]:
 
 
 def _guard(answer: Answer) -> Answer:
-    """The server's own answer to a request, unless it comes from elsewhere."""
+    """Return the server's answer function, which now refuses requests from other sites."""
 
     def guarded(connection: Any, request: Any) -> Any:
         if not is_own(request.headers):

@@ -1,4 +1,4 @@
-"""The server's own folder: locked while the server lives, so that what a killed one left can be deleted."""
+"""The server's temporary folder, locked while it runs, so that those of killed servers can be deleted."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import IO
 
 try:
     import fcntl
-except ImportError:  # Windows: nothing is locked there, and nothing of others deleted
+except ImportError:  # on Windows nothing is locked, and no folder of another server is deleted
     fcntl = None  # type: ignore[assignment]
 
 PREFIX = "packetmesh-"
@@ -20,22 +20,22 @@ LOCK = "in-use"
 
 @dataclass(frozen=True, slots=True)
 class OwnFolder:
-    """A folder for as long as this process lives."""
+    """A folder that exists as long as this process."""
 
     path: Path
     lock: IO[str]
 
     def delete(self) -> None:
-        """Delete it with all that is in it."""
+        """Delete the folder and its content."""
         self.lock.close()
         shutil.rmtree(self.path, ignore_errors=True)
 
 
 def own_folder() -> OwnFolder:
-    """A new folder; those of servers that were killed are deleted first.
+    """Delete the folders of killed servers and return a new one.
 
     Raises:
-        OSError: there is no place for it.
+        OSError: no folder can be made.
     """
     delete_abandoned()
     path = Path(tempfile.mkdtemp(prefix=PREFIX))
@@ -43,14 +43,14 @@ def own_folder() -> OwnFolder:
     lock = early.open("w")
     if fcntl is not None:
         fcntl.flock(lock, fcntl.LOCK_EX)
-    early.rename(path / LOCK)  # whoever sees it finds it locked
+    early.rename(path / LOCK)  # the lock file appears under this name already locked
     return OwnFolder(path, lock)
 
 
 def delete_abandoned() -> None:
-    """Delete the folders of servers that live no more, as far as they are this user's."""
+    """Delete the folders of servers that no longer run, if they belong to this user."""
     for path in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        with contextlib.suppress(OSError):  # another user's, without a lock, or in use
+        with contextlib.suppress(OSError):  # another user's folder, without a lock, or in use
             if fcntl is not None and not path.is_symlink():
                 with (path / LOCK).open("r+") as lock:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

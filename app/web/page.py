@@ -1,8 +1,8 @@
-"""The page as the server sends it: viser's, with the app's title, scripts and styles from the first byte.
+"""The page as the server sends it: viser's, with the app's title, scripts and styles.
 
 All scripts are files of this server or have their hash in the content policy (``headers.py``): viser's page
-is one script that unpacks another. The names of files hold a hash of their content, so that browsers keep
-them.
+is one script that unpacks another. File names hold a hash of the content, so that browsers can keep the
+files.
 """
 
 from __future__ import annotations
@@ -32,30 +32,30 @@ from packetmesh.errors import InputError
 
 TITLE = "PacketMesh"
 _DIGITS = b"!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
-"""Of the base 88 in which viser's page holds its own script."""
+"""The digits of the base 88 in which viser's page stores its script."""
 _PACKED = re.compile(r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">(.*?)</script>', re.DOTALL)
 _AT_ONCE, _IN_TURN = 'if(document.readyState==="loading")', "if(!window.packetmesh)"
-"""When viser's script waits for the page before it runs the one that it unpacks."""
+"""The condition on which viser's script waits for the page before it runs the unpacked one, and ours."""
 
 
 @dataclass(frozen=True)
 class File:
-    """What a path of the server gives."""
+    """The content that the server sends for one path."""
 
     path: str
     kind: str
     """MIME type."""
     content: bytes
     kept: bool = True
-    """Whether its content is always the same, so that a browser need not ask again."""
+    """Whether the content never changes, so that a browser need not ask again."""
 
     @cached_property
     def packed(self) -> bytes:
-        """Its content as gzip."""
+        """The content, compressed with gzip."""
         return gzip.compress(self.content)
 
     def response(self, accepted: str) -> Response:
-        """Return the answer to a browser that accepts these encodings."""
+        """Return the response to a browser that accepts these encodings."""
         packed = "gzip" in accepted
         body = self.packed if packed else self.content
         headers = Headers()
@@ -68,24 +68,24 @@ class File:
 
 
 class Page:
-    """Viser's page with what the app adds, read once."""
+    """Viser's page with the app's additions, read once."""
 
     def __init__(
         self, scripts: Sequence[Path], styles: Sequence[Path], greetings: Mapping[str, Markup]
     ) -> None:
-        """Read everything.
+        """Read viser's page and the app's files.
 
         Args:
-            scripts: the app's own, in the order in which they run.
-            styles: the app's own.
-            greetings: HTML that stands over the page when it is opened by a path with its query.
+            scripts: the app's scripts, in the order in which they run.
+            styles: the app's style sheets.
+            greetings: HTML shown over the page, by the path and query that show it.
 
         Raises:
-            InputError: the installed viser has another page than those that are known.
+            InputError: the installed viser has an unknown page.
         """
         self._viser = _viser_page()
         self.script_hashes = tuple(map(_hash, _viser_scripts(self._viser)))
-        """What the content policy says of viser's scripts: of the one in the page, and of what it unpacks."""
+        """Hashes of viser's two scripts, the one in the page and the one that it unpacks, for the policy."""
         files = (
             _file("packetmesh", "js", scripts),
             _file("plotly", "js", [Path(plotly.__file__).parent / "package_data" / "plotly.min.js"]),
@@ -101,7 +101,7 @@ class Page:
         self._greetings = {place: self._page(head, greeting) for place, greeting in greetings.items()}
 
     def served(self) -> AbstractContextManager[None]:
-        """Servers that start meanwhile send this page and its files."""
+        """Context in which servers start that send this page and its files."""
         return answering(self._answering)
 
     def _page(self, head: Markup, greeting: Markup) -> File:
@@ -130,10 +130,10 @@ def _file(name: str, suffix: str, parts: Sequence[Path]) -> File:
 
 
 def _viser_page() -> str:
-    """Viser's page, which begins only when the app's scripts have run: they prepare things for it.
+    """Return viser's page, changed to start after the app's scripts, which prepare things for it.
 
     Raises:
-        InputError: it is another page than those that are known.
+        InputError: the page is not a known one.
     """
     path = Path(viser.__file__).parent / "client" / "build" / "index.html"
     page = path.read_text(encoding="utf-8")
@@ -149,24 +149,24 @@ def _unknown() -> InputError:
 
 
 def _viser_scripts(page: str) -> Iterator[str]:
-    """The script in viser's page, and the one that it unpacks and runs.
+    """Yield the script in viser's page, and the one that it unpacks and runs.
 
     Raises:
-        InputError: what is in the page is packed in another way than is known.
+        InputError: the page is packed in an unknown way.
     """
     found = _PACKED.search(page)
     assert found is not None
     packed, style_bytes, code_bytes, script = found.groups()
     try:
         unpacked = zstandard.ZstdDecompressor().decompress(_from_base88(packed))
-    except (ValueError, OverflowError, zstandard.ZstdError):  # packed in another way
+    except (ValueError, OverflowError, zstandard.ZstdError):  # packed in an unknown way
         raise _unknown() from None
     yield script
     yield unpacked[int(style_bytes) :][: int(code_bytes)].decode()
 
 
 def _from_base88(text: str) -> bytes:
-    """Five digits are four bytes; of a rest, one digit more than bytes."""
+    """Decode base 88: five digits are four bytes; the last group has one digit more than bytes."""
     places = np.full(128, -1, dtype=np.int64)
     places[np.frombuffer(_DIGITS, dtype=np.uint8)] = np.arange(88)
     digits = places[np.frombuffer(text.encode("ascii"), dtype=np.uint8)]

@@ -1,4 +1,4 @@
-"""How much a browser may upload, counted before it is kept: viser itself would take any amount."""
+"""Limits on what a browser may upload, counted before the data is kept; viser takes any amount."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import time
 from collections import deque
 
 MOST_BYTES = 256 << 20
-"""Of one file; screens may take less."""
+"""Largest file, bytes; screens may have lower limits."""
 MOST_TOTAL_BYTES = 1 << 30
-"""Of all files of a session."""
+"""Most bytes of all files of a session."""
 MOST_PARTS = 10_000
 MOST_A_MINUTE = 300
 REFUSED = (
@@ -18,16 +18,16 @@ REFUSED = (
 
 
 class UploadGate:
-    """What one browser has sent so far."""
+    """What one browser has uploaded so far."""
 
     def __init__(self) -> None:
         self._left: dict[str, int] = {}
-        """Bytes that are still to come, by transfer."""
+        """Bytes still to come, by transfer."""
         self._total = 0
         self._begun_s: deque[float] = deque(maxlen=MOST_A_MINUTE)
 
     def begins(self, size_bytes: int, parts: int, transfer: str) -> bool:
-        """Whether a file of that size may come; it counts from then on."""
+        """Whether a file of this size may be uploaded; an accepted file is counted at once."""
         now_s = time.monotonic()
         too_often = len(self._begun_s) == MOST_A_MINUTE and now_s - self._begun_s[0] < 60.0
         too_much = not 0 <= size_bytes <= min(MOST_BYTES, MOST_TOTAL_BYTES - self._total)
@@ -39,7 +39,7 @@ class UploadGate:
         return True
 
     def goes_on(self, transfer: str, size_bytes: int) -> bool:
-        """Whether a part belongs to a file that may come, and is not more than it said."""
+        """Whether a part belongs to an accepted file and keeps within the announced size."""
         left = self._left.get(transfer, -1) - size_bytes
         self._left[transfer] = left
         return left >= 0

@@ -1,7 +1,7 @@
-"""What people have uploaded, for all browsers of one server: each upload in a folder with a name of its own.
+"""Uploaded files of all browsers of one server, each upload in a folder with a random name.
 
-The name cannot be guessed. It stands in the address, so that a reload or a second tab opens the same upload;
-files keep their own names in it, so that a command can name them.
+The name cannot be guessed. It is in the page's address, so that a reload or a second tab opens the same
+upload. The files keep their own names, so that a command line can name them.
 """
 
 from __future__ import annotations
@@ -25,32 +25,32 @@ if TYPE_CHECKING:
 
 PREFIX = "upload-"
 KEPT_S = 2 * 3600.0
-"""How long an upload stays when the last browser that has opened it is gone."""
+"""Time that an upload is kept after the last browser that had it open has gone, seconds."""
 LIMIT_BYTES = 4 << 30
-"""Of all uploads that no browser has open; the ones left longest ago go first."""
+"""Limit on all uploads that no browser has open; those closed longest ago are deleted first."""
 GONE = "The address names an upload that this server no longer keeps; upload it again."
 OWN = "own"
-"""Folder of the files of an upload as they came; with a number where there are several."""
+"""Folder for an upload's files as they were sent; with a number if there are several."""
 _NAME = re.compile(rf"/({PREFIX}[\w-]{{20,}})(?=/|$)")
 _FOLDER = re.compile(rf"[^\s'=]*/{PREFIX}[\w-]{{20,}}/(?:{OWN}\d*/)?")
 
 
 def name_in(source: Source) -> str | None:
-    """The name of the upload that a source is, or that is laid over it; None where nothing was uploaded."""
+    """Return the name of the upload that a source is or contains; None if nothing was uploaded."""
     names = _NAME.findall(" ".join(source.arguments()))
     return names[-1] if names else None
 
 
 def plain(command: str) -> str:
-    """A command that names uploaded files as their owner knows them, without the server's own folders."""
+    """Return a command line without the server's folders: uploaded files have only their own names."""
     return _FOLDER.sub("", command)
 
 
 def keep_upload(file: viser.UploadedFile, folder: Path, limit_bytes: int, instead: str) -> Path:
-    """The file where an upload is kept, in ``folder`` by its own name.
+    """Store an uploaded file in ``folder`` under its own name and return its path.
 
     Raises:
-        InputError: it is larger than the limit; ``instead`` says what to do then.
+        InputError: the file is larger than the limit; ``instead`` advises what to do.
     """
     if len(file.content) > limit_bytes:
         raise InputError(
@@ -68,18 +68,18 @@ def keep_upload(file: viser.UploadedFile, folder: Path, limit_bytes: int, instea
 
 @dataclass(slots=True, eq=False)
 class _Upload:
-    """A folder, and who has it open."""
+    """An upload's folder, and the sessions that have it open."""
 
     folder: Path
     source: Source | None = None
-    """What can be opened again; until then the folder belongs to its browser alone."""
+    """The source that can be opened again; None while the folder belongs to one session only."""
     owners: set[int] = field(default_factory=set)
     left_s: float = 0.0
-    """When the last one left."""
+    """Time at which the last session closed it."""
 
 
 class Uploads:
-    """The folders of a server, from any thread; its owner deletes what is below ``root`` at the end."""
+    """The upload folders of a server, usable on any thread; the server deletes ``root`` at its end."""
 
     def __init__(self, root: Path, clock: Callable[[], float] = time.monotonic) -> None:
         self._root, self._clock = root, clock
@@ -87,7 +87,7 @@ class Uploads:
         self._lock = threading.Lock()
 
     def new_folder(self, owner: object) -> Path:
-        """An empty folder that is there as long as its owner, or longer if a source in it is kept."""
+        """Make an empty folder. It is kept while its owner exists, or longer if it holds a kept source."""
         name = PREFIX + secrets.token_urlsafe(16)
         folder = self._root / name
         folder.mkdir(mode=0o700)
@@ -96,7 +96,7 @@ class Uploads:
         return folder
 
     def keep(self, source: Source, owner: object) -> None:
-        """Have a source be found by its name, if any of it was uploaded; the owner has it open."""
+        """Make a source that was uploaded available by its name; ``owner`` has it open."""
         with self._lock:
             names = _NAME.findall(" ".join(source.arguments()))
             for name in names:
@@ -106,14 +106,14 @@ class Uploads:
                 self._uploads[names[-1]].source = source
 
     def find(self, name: str) -> Source | None:
-        """The source of that name; None if there is none, or no longer."""
+        """Return the source of this name; None if it does not exist or was deleted."""
         with self._lock:
             self._prune()
             upload = self._uploads.get(name)
             return None if upload is None else upload.source
 
     def leave(self, owner: object) -> None:
-        """The owner is gone; what nobody could open again goes, too."""
+        """Release an owner's folders; delete those that cannot be opened again."""
         with self._lock:
             for upload in self._uploads.values():
                 if id(owner) in upload.owners:

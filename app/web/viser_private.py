@@ -1,12 +1,13 @@
-"""What the app needs of viser beyond its interface, each with the reason. Viser is pinned for this.
+"""Access to viser's private parts that the app needs, each with its reason. Viser's version is pinned for
+this.
 
-- ``queue_from_any_thread``: viser 1.1 sets an ``asyncio.Event`` from whatever thread queues a message, before
-  it has the event loop set it again. asyncio's events are not made for that: where the loop begins to wait at
-  the same moment, ``set`` fails with "deque mutated during iteration", once in some thousand visits, and
-  leaves a page half built.
-- ``listen``: viser gives every message of every browser to its handlers, without a place to look at it first.
-- ``find_control``, ``find_command``, ``is_live``: what a message names, and whether a hand could reach it.
-- ``address_of``, ``close``, ``cookies``: of a browser's connection.
+- ``queue_from_any_thread``: viser 1.1 sets an ``asyncio.Event`` on whichever thread queues a message, then
+lets the event loop set it again. asyncio's events are not thread-safe: if the loop begins to wait at that
+moment, ``set`` fails with "deque mutated during iteration", once in some thousand visits, and leaves a page
+half built.
+- ``listen``: viser gives every message of a browser to its handlers and has no hook before them.
+- ``find_control``, ``find_command``, ``is_live``: the target of a message, and whether a user could reach it.
+- ``address_of``, ``close``, ``cookies``: parts of a browser's connection.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ import viser
 from viser import _messages as messages
 
 Listener: TypeAlias = Callable[[int, Any, Callable[[], Awaitable[None]]], Awaitable[None]]
-"""Gets the number of a browser, what it sent, and what has viser handle it."""
+"""Takes the browser's number, its message, and a function that lets viser handle the message."""
 
 
 class AnyThreadEvent(asyncio.Event):
-    """An event that other threads set, too; whoever waits is woken by the loop's own call that follows."""
+    """An event that other threads may set too; the loop's own call, which follows, wakes the waiters."""
 
     def set(self) -> None:
-        """Set it; on the event loop, also wake those who wait, even if it is set already."""
+        """Set the event; on the event loop, also wake the waiters, even if it is set already."""
         self._value = True
         if _on_loop():
             for waiter in self._waiters:
@@ -35,7 +36,7 @@ class AnyThreadEvent(asyncio.Event):
 
 
 def queue_from_any_thread(server: viser.ViserServer) -> None:
-    """Have messages to all browsers, and to each that will come, queued safely from all threads."""
+    """Make queueing messages to all present and future browsers safe on all threads."""
 
     def queue_to(connection: Any) -> None:
         connection.get_message_buffer().message_event.__class__ = AnyThreadEvent
@@ -53,10 +54,9 @@ def _on_loop() -> bool:
 
 
 def listen(server: viser.ViserServer, listener: Listener) -> None:
-    """Have all that browsers send go through a listener, once, on the thread of the connections.
+    """Pass every message from browsers once through a listener, on the thread of the connections.
 
-    Viser hands a message to what all browsers share and to what the one has of its own; here the listener
-    decides for both.
+    Viser gives each message to the shared handlers and to the browser's own; the listener decides for both.
     """
     shared = server._websock_server._handle_incoming_message
     own: dict[int, Callable[[int, Any], Awaitable[None]]] = {}
@@ -70,7 +70,7 @@ def listen(server: viser.ViserServer, listener: Listener) -> None:
         await listener(number, message, go_on)
 
     async def heard_already(number: Any, message: Any) -> None:
-        """Heard together with what all share."""
+        """Do nothing: ``heard`` calls this browser's own handler too."""
 
     def connected(connection: Any) -> None:
         own[connection.client_id] = connection._handle_incoming_message
@@ -82,7 +82,7 @@ def listen(server: viser.ViserServer, listener: Listener) -> None:
 
 
 def find_control(server: viser.ViserServer, number: int, uuid: str) -> tuple[Any, bool] | None:
-    """Return the control of that name that a browser has, and whether all share it; None if it has none."""
+    """Return the browser's control with this name and whether it is shared; None if there is none."""
     for gui, shared in _guis(server, number):
         handle = gui._gui_input_handle_from_uuid.get(uuid)
         if handle is not None:
@@ -91,7 +91,7 @@ def find_control(server: viser.ViserServer, number: int, uuid: str) -> tuple[Any
 
 
 def find_command(server: viser.ViserServer, number: int, uuid: str) -> tuple[Any, bool] | None:
-    """Return the command of that name that a browser has, and whether all share it; None if it has none."""
+    """Return the browser's command with this name and whether it is shared; None if there is none."""
     for gui, shared in _guis(server, number):
         handle = gui._command_handle_from_uuid.get(uuid)
         if handle is not None:
@@ -100,13 +100,13 @@ def find_command(server: viser.ViserServer, number: int, uuid: str) -> tuple[Any
 
 
 def find_node(server: viser.ViserServer, number: int, name: str, owner: str) -> tuple[Any, bool] | None:
-    """Return the node of a browser's scene by its name, and whether all share it; None if it has none.
+    """Return the scene node with this name and whether it is shared; None if there is none.
 
     Args:
-        server: of the browser.
-        number: of the browser.
-        name: of the node.
-        owner: as the browser repeats it: empty for what all share.
+        server: the server of the browser.
+        number: number of the browser.
+        name: name of the node.
+        owner: owner as the browser reports it: empty for shared nodes.
     """
     client = server._connected_clients.get(number)
     scene = server.scene if owner == "" else None if client is None else client.scene
@@ -117,34 +117,34 @@ def find_node(server: viser.ViserServer, number: int, name: str, owner: str) -> 
 
 
 def is_live(handle: Any) -> bool:
-    """Return whether a control is there, enabled, and visible with all that it lies in."""
+    """Whether a control exists, is enabled, and is visible with all its containers."""
     if handle._impl.removed or not handle.visible or handle.disabled:
         return False
     gui, container = handle._impl.gui_api, handle._impl.parent_container_id
     while container != "root":
         try:
             within = gui._resolve_container_handle(container)
-        except KeyError:  # a dialog that was closed, or a folder that was removed
+        except KeyError:  # a closed dialog, or a removed folder
             return False
-        if hasattr(within, "_parent"):  # a tab: what holds the tabs counts
+        if hasattr(within, "_parent"):  # for a tab, its tab group counts
             within = within._parent
         if not getattr(within, "visible", True):
             return False
         if not isinstance(within, viser.GuiFolderHandle | viser.GuiTabGroupHandle):
-            return True  # a dialog or a panel of its own lies in nothing
+            return True  # a dialog or a panel has no container
         container = within._impl.parent_container_id
     return True
 
 
 def is_asked_for_render(server: viser.ViserServer, number: int) -> bool:
-    """Return whether the server waits for a picture of a browser."""
+    """Whether the server waits for a picture from a browser."""
     client = server._connected_clients.get(number)
     handlers = {} if client is None else client._websock_connection._incoming_handlers
     return bool(handlers.get(messages.GetRenderResponseMessage))
 
 
 def tell_value(server: viser.ViserServer, number: int, handle: Any) -> None:
-    """Give a browser the value that a control has here."""
+    """Send a browser the control's value on the server."""
     client = server._connected_clients.get(number)
     if client is not None and not handle._impl.is_button:
         back = messages.GuiUpdateMessage(handle._impl.uuid, {"value": handle._impl.value})
@@ -152,7 +152,7 @@ def tell_value(server: viser.ViserServer, number: int, handle: Any) -> None:
 
 
 def cookies(server: viser.ViserServer, number: int) -> str:
-    """Return the cookies with which a browser came; empty if it is gone."""
+    """Return the cookies of a browser's connection request; empty if it is gone."""
     connection = server._websock_server._live_connections.get(number)
     request = None if connection is None else connection.request
     return "" if request is None else ", ".join(request.headers.get_all("Cookie"))
@@ -165,7 +165,7 @@ def address_of(server: viser.ViserServer, number: int) -> str:
 
 
 def close(server: viser.ViserServer, number: int, code: int, reason: str) -> None:
-    """End a browser's connection, from any thread."""
+    """Close a browser's connection; may be called on any thread."""
     connection = server._websock_server._live_connections.get(number)
     loop = server._websock_server._background_event_loop
     if connection is not None and loop is not None and not loop.is_closed():
@@ -173,7 +173,7 @@ def close(server: viser.ViserServer, number: int, code: int, reason: str) -> Non
 
 
 def _guis(server: viser.ViserServer, number: int) -> list[tuple[Any, bool]]:
-    """The panel of a browser's own, and the one that all share."""
+    """Return the browser's own panel and the shared one, each with whether it is shared."""
     client = server._connected_clients.get(number)
     own = [] if client is None else [(client.gui, False)]
     return [*own, (server.gui, True)]

@@ -1,4 +1,4 @@
-"""ZIP files that people upload."""
+"""Reading of uploaded ZIP files."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from packetmesh.files import BROKEN_ZIP
 
 @contextmanager
 def opened_zip(file: Path | BinaryIO, sentence: str) -> Iterator[zipfile.ZipFile]:
-    """A ZIP to read from.
+    """Open a ZIP file for reading.
 
     Raises:
-        InputError: with that sentence, where it or what is in it cannot be read.
+        InputError: with this sentence, if the file or its content cannot be read.
     """
     try:
         with zipfile.ZipFile(file) as archive:

@@ -1,4 +1,4 @@
-"""How the server learns that a browser has drawn what it was sent."""
+"""Ask a browser to report that it has drawn everything it was sent."""
 
 from __future__ import annotations
 
@@ -9,23 +9,22 @@ from app.window.page import page_call
 from app.window.ui import Ui
 
 TIMEOUT_S = 4.0
-"""Without an answer for so long, perhaps as there is no browser, it is taken as given. A page that draws
+"""Time after which a missing answer is taken as given, seconds; there may be no browser. A page that draws
 answers within three seconds (page.js)."""
 
 
 class DrawAcknowledgement:
     """Asks the browser to answer once it has drawn everything sent so far.
 
-    A hand can move a slider faster than a slow browser draws. Without an answer to wait for, what is
-    sent would queue up there and the picture would lag farther and farther behind the hand.
+    A slider can change faster than a slow browser draws. Without waiting for an answer the server would fill
+    the browser's queue, and the picture would lag more and more behind the slider.
 
-    The answer is a command, not a button: of all that is pressed and moved in the panel within 50 ms,
-    viser sends only the last, so that a button would get lost beside a slider, and now and then the
-    slider beside the button.
+    The answer is a command, not a button. Of all input to the panel within 50 ms viser sends only the last,
+    so a button's answer could be lost next to a slider's, and sometimes the slider's next to the button's.
     """
 
     def __init__(self, ui: Ui, on_answer: Callable[[], None]) -> None:
-        """Add the hidden parts; ``on_answer`` is called on the session's thread, once for each question."""
+        """Add the hidden controls. ``on_answer`` is called on the session's thread, once per question."""
         self._on_answer = on_answer
         self._calls = 0
         self.waiting = False
@@ -35,16 +34,16 @@ class DrawAcknowledgement:
         self._timeout = ui.debounce(TIMEOUT_S, self._answered)
 
     def hold(self) -> None:
-        """Have only new meshes drawn, until ``ask`` ends that, a hand turns the view, or 6 s have passed."""
+        """Let the page draw only new meshes until ``ask`` stops this, the user turns the view or 6 s pass."""
         self._call("hold")
 
     def ask(self, vertices: Sequence[int] = (), hold: bool = False) -> None:
-        """Ask now; of two questions, only the last is answered.
+        """Ask now; of two open questions, only the last is answered.
 
         Args:
-            vertices: of each mesh that is to be drawn first. While they are awaited nothing is drawn,
-                so that what they replace may be hidden at once.
-            hold: whether to hold the view from now on.
+            vertices: vertex counts of the meshes that must be drawn first. Until all have arrived nothing is
+                drawn, so that the meshes they replace can be hidden at once.
+            hold: whether the page draws only new meshes from now on.
         """
         self.waiting = True
         self._call("ask", list(vertices), hold)

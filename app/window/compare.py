@@ -1,4 +1,4 @@
-"""One picture area that shows two pictures of the same view, with a slider that divides them."""
+"""A picture area that shows two pictures of the same view on the two sides of a sliding line."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from pipeline.types import ByteArray
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 LINE_PX = 3
 QUALITY = 92
-"""Of JPEG, which takes a tenth of PNG's time and a sixth of its bytes: the slider is dragged."""
+"""JPEG quality. JPEG takes a tenth of PNG's time and a sixth of its bytes, which matters while dragging."""
 
 
 class CompareArea:
-    """Two drop-downs, a split slider, the picture, and what its colours mean."""
+    """Two drop-downs, a split slider, the picture, captions and colour bars."""
 
     def __init__(
         self, ui: Ui, labels: Mapping[Any, str], left: str, right: str, visible: bool = True
@@ -30,11 +30,11 @@ class CompareArea:
         """Add the area to the current container.
 
         Args:
-            ui: where to add it.
-            labels: of the pictures that can be chosen, by their names.
-            left: name of the picture left of the line at first.
-            right: name of the one right of it.
-            visible: whether it is there before the first pictures are.
+            ui: the panel to add it to.
+            labels: labels of the pictures that can be chosen, by their names.
+            left: name of the first picture left of the line.
+            right: name of the first picture right of the line.
+            visible: whether the area is shown before the first pictures are loaded.
         """
         self._labels = labels
         self._names = {label: name for name, label in labels.items()}
@@ -66,7 +66,7 @@ class CompareArea:
         self._start = (left, right, 50.0)
 
     def load(self, pictures: Mapping[Any, Picture] | None) -> None:
-        """Show others of one size, by their names; None shows nothing."""
+        """Show these pictures of one size, by their names; None hides the area."""
         self._pictures, self._drawn = pictures or {}, ()
         for handle in (self._left, self._right, self._split, self._image, self._captions):
             handle.visible = pictures is not None
@@ -80,22 +80,22 @@ class CompareArea:
         self._draw()
 
     def set(self, left: str, right: str, split_share: float) -> None:
-        """Choose for the person, by name."""
+        """Choose both pictures by name, and the place of the line."""
         self._left.value, self._right.value = self._labels[left], self._labels[right]
         self._split.value = round(100.0 * split_share)
         self._draw()
 
     def place(self) -> str:
-        """Both pictures by their names and the line in %, for the address; empty as at the start."""
+        """Return the pictures' names and the line in % for the address; empty for the start values."""
         left, right = (self._names[handle.value] for handle in (self._left, self._right))
         now = (left, right, float(self._split.value))
         return "" if now == self._start else place_text(*now)
 
     def take(self, place: str) -> None:
-        """Show such pictures.
+        """Show the pictures that an address names.
 
         Raises:
-            InputError: there are none like them.
+            InputError: the text names no such pictures.
         """
         left, right, percent = place_of(place, self._start)
         if not {left, right} <= self._labels.keys():
@@ -103,7 +103,7 @@ class CompareArea:
         self.set(left, right, percent / 100.0)
 
     def _draw(self) -> None:
-        """Only what has changed: a dragged slider asks more often than it moves."""
+        """Draw if something has changed: a dragged slider reports more often than its value changes."""
         if not self._pictures:
             return
         left, right = (self._pictures[self._names[handle.value]] for handle in (self._left, self._right))
@@ -117,15 +117,15 @@ class CompareArea:
 
 
 def place_text(left: str, right: str, percent: float) -> str:
-    """What an address says of two pictures, by their names, and the line between them."""
+    """Return the address text of two pictures, by their names, and the line between them."""
     return f"{left},{right},{percent:g}"
 
 
 def place_of(text: str, start: tuple[str, str, float]) -> tuple[str, str, float]:
-    """The pictures and the line of such a text; those of the start if it is empty.
+    """Return the pictures and the line in an address text; ``start`` if it is empty.
 
     Raises:
-        InputError: it is no such text.
+        InputError: the text has another form.
     """
     if not text:
         return start
@@ -136,7 +136,7 @@ def place_of(text: str, start: tuple[str, str, float]) -> tuple[str, str, float]
 
 
 def no_pictures(text: str, start: tuple[str, str, float]) -> InputError:
-    """Says that an address names no two pictures."""
+    """Return the error for an address that does not name two pictures."""
     return InputError(
         f"The address has pictures={text[:40]}; try two pictures and where the line is in %, such as "
         f"{place_text(*start)}"
@@ -144,15 +144,12 @@ def no_pictures(text: str, start: tuple[str, str, float]) -> InputError:
 
 
 def split(left: ByteArray, right: ByteArray, share: float) -> ByteArray:
-    """One picture left of the line, the other right of it.
+    """Return a picture whose left part is ``left`` and whose right part is ``right``.
 
     Args:
         left: (H, W, 3) RGB.
         right: (H, W, 3) RGB.
-        share: of the width that shows ``left``, 0 to 1; at both ends there is no line.
-
-    Returns:
-        (H, W, 3), with a white line edged in black.
+        share: share of the width that shows ``left``, 0 to 1; at 0 and 1 there is no line.
     """
     width = left.shape[1]
     column = round(share * width)
@@ -166,12 +163,12 @@ def split(left: ByteArray, right: ByteArray, share: float) -> ByteArray:
 
 
 def captions_html(left: Picture, right: Picture) -> Markup:
-    """Two columns under the picture: the caption and the colour bar of either side."""
+    """Return HTML of two columns: the caption and colour bar of each picture."""
     return _columns(((Markup("<b>Left:</b> "), left), (Markup("<b>Right:</b> "), right)))
 
 
 def caption_html(picture: Picture) -> Markup:
-    """The caption and the colour bar under a picture that is shown alone."""
+    """Return HTML of the caption and colour bar of a picture that is shown alone."""
     return _columns((("", picture),))
 
 

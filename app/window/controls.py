@@ -1,4 +1,4 @@
-"""Config fields as GUI controls: labels with units, hints from the field's own documentation."""
+"""Controls for config fields: labels with units, and hints from the field's own docstring."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Choice:
     path: str
     """Dotted name of the field, such as ``depth.alignment``."""
     names: Mapping[str, str] = field(default_factory=dict)
-    """What to call a value; values that are missing call themselves."""
+    """Labels of the values; a value that is missing is its own label."""
     hint: str | None = None
-    """None takes the field's docstring."""
+    """Hint of the control; None takes the field's docstring."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +36,13 @@ class Number:
     """A slider over a numeric field."""
 
     label: str
-    """With the unit shown in the app."""
+    """Label with the unit shown in the app."""
     path: str
     least: float
     most: float
     step: float
     per_unit: float = 1.0
-    """Units shown in the app in one unit of the field: 100 for a field in metres shown in cm."""
+    """Shown units per unit of the field: 100 for a field in metres shown in cm."""
     hint: str | None = None
 
 
@@ -59,23 +59,19 @@ Control = Choice | Number | Toggle
 
 
 def get(config: Any, path: str) -> Any:
-    """The value at a dotted path."""
+    """Return the value at a dotted path."""
     return functools.reduce(getattr, path.split("."), config)
 
 
 def put(config: Any, path: str, value: Any) -> Any:
-    """``config`` with the value at a dotted path replaced.
-
-    Raises:
-        InputError: the config refuses the value.
-    """
+    """Return ``config`` with the value at a dotted path replaced."""
     head, _, rest = path.partition(".")
     inner = put(getattr(config, head), rest, value) if rest else value
     return dataclasses.replace(config, **{head: inner})
 
 
 def hint_of(control: Control) -> str:
-    """What the control does, in one or two sentences."""
+    """Return the hint: what the control does, in one or two sentences."""
     if control.hint is not None:
         return control.hint
     owner, name = _owner(control.path)
@@ -83,7 +79,7 @@ def hint_of(control: Control) -> str:
 
 
 def shown(control: Control, config: PipelineConfig) -> Any:
-    """The value as the control shows it."""
+    """Return the field's value as the control shows it."""
     value = get(config, control.path)
     if isinstance(control, Choice):
         return control.names.get(value, value)
@@ -94,7 +90,7 @@ def shown(control: Control, config: PipelineConfig) -> Any:
 
 
 def stored(control: Control, display: Any, config: PipelineConfig) -> PipelineConfig:
-    """``config`` with what the control shows put into the field."""
+    """Return ``config`` with the value that the control shows."""
     if isinstance(control, Choice):
         values = {name: value for value, name in control.names.items()}
         return put(config, control.path, values.get(display, display))
@@ -105,7 +101,7 @@ def stored(control: Control, display: Any, config: PipelineConfig) -> PipelineCo
 
 
 class Controls:
-    """The controls of some fields, kept equal to the session's config."""
+    """The controls of some config fields, kept equal to the session's config."""
 
     def __init__(
         self,
@@ -117,10 +113,10 @@ class Controls:
         """Add the controls to the current container.
 
         Args:
-            ui: where to add them.
-            controls: which fields.
-            config: their first values.
-            on_change: called with the edit that a person made.
+            ui: the panel to add them to.
+            controls: the fields' controls.
+            config: the config whose values they show first.
+            on_change: called with each edit that the user makes.
         """
         self._controls = tuple(controls)
         self._handles = [_add(ui.gui, control, config) for control in controls]
@@ -128,7 +124,7 @@ class Controls:
             ui.when_changed(handle, functools.partial(self._edited, control, handle, on_change))
 
     def write(self, config: PipelineConfig) -> None:
-        """Show another config."""
+        """Show the values of another config."""
         for control, handle in zip(self._controls, self._handles, strict=True):
             value = shown(control, config)
             if handle.value != value:
@@ -156,7 +152,7 @@ def _add(gui: Gui, control: Control, config: PipelineConfig) -> Any:
 
 
 def options_of(path: str) -> tuple[str, ...]:
-    """The values that a ``Literal`` field takes."""
+    """Return the values that a ``Literal`` field takes."""
     owner, name = _owner(path)
     hint = typing.get_type_hints(owner)[name]
     if typing.get_origin(hint) is not Literal:
@@ -165,7 +161,7 @@ def options_of(path: str) -> tuple[str, ...]:
 
 
 def _owner(path: str) -> tuple[type, str]:
-    """The dataclass that has the field at a dotted path, and the field's name."""
+    """Return the dataclass that has the field at a dotted path, and the field's name."""
     parents, _, name = path.rpartition(".")
     owner: type = type(get(PipelineConfig(), parents))
     return owner, name

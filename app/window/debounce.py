@@ -1,4 +1,4 @@
-"""A timer that starts again with every call: its action follows the last one."""
+"""A timer that every call starts again: its action runs after the last one."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ class Debounce:
 
     @property
     def pending(self) -> bool:
-        """Whether the action is still to come."""
+        """Whether the action has yet to run."""
         return self._timer is not None and self._timer.is_alive()
 
     def restart(self) -> None:
-        """Wait from now on."""
+        """Start the waiting time again."""
         self.cancel()
         self._timer = threading.Timer(self._wait_s, self._action)
         self._timer.daemon = True
         self._timer.start()
 
     def cancel(self) -> None:
-        """Drop the action."""
+        """Cancel the action."""
         if self._timer is not None:
             self._timer.cancel()
         self._timer = None

@@ -1,4 +1,4 @@
-// A row of its own below the picture, as wide as the page: what the docks at the lower edge have in common.
+// A row below the picture, as wide as the page: the common part of the docks at the lower edge.
 window.packetmeshDockRow = (() => {
   function make(tag, className, parent, properties = {}) {
     const element = Object.assign(document.createElement(tag), {className, ...properties});
@@ -6,7 +6,7 @@ window.packetmeshDockRow = (() => {
     return element;
   }
 
-  // The page's root is a column with the picture and the control panel in its row.
+  // Return the page's root: a column whose row holds the picture and the control panel.
   function root() {
     let found = null;
     for (let element = document.querySelector("canvas[data-engine]"); element; element = element.parentElement)
@@ -19,7 +19,7 @@ window.packetmeshDockRow = (() => {
       this.name = name;
       this.wanted = this.visible = false;
       this.row = make("div", "packetmesh-dock-row", null, {tabIndex: 0, role: "group", ariaLabel: label});
-      // Without the panel through which it speaks, as when the server is gone, it is not there.
+      // Hide the dock when its hidden panel is missing, for example when the server is gone.
       new MutationObserver(() => this.place()).observe(document.body, {childList: true, subtree: true});
     }
 
@@ -27,7 +27,7 @@ window.packetmeshDockRow = (() => {
       return document.querySelector(`.packetmesh-dock[data-dock="${this.name}"]`);
     }
 
-    // What it is put into, behind all else there.
+    // Return the element to whose end the row is added.
     home() {
       return root();
     }
@@ -39,7 +39,7 @@ window.packetmeshDockRow = (() => {
       if (visible) {
         const used = document.activeElement;
         this.home()?.append(this.row);
-        requestAnimationFrame(() => used?.scrollIntoView({block: "center"})); // the panel is lower now
+        requestAnimationFrame(() => used?.scrollIntoView({block: "center"})); // the panel has moved down
         this.came?.();
       }
       else {
@@ -49,7 +49,7 @@ window.packetmeshDockRow = (() => {
     }
   }
 
-  // The way to the server: the hidden text field beside the anchor of that name; false if it is not there.
+  // Write text for the server into the hidden field of the dock `name`; return false if there is none.
   function write(name, text) {
     const anchor = document.querySelector(`.packetmesh-dock[data-dock="${name}"]`);
     const input = anchor?.parentElement.nextElementSibling?.querySelector("input");

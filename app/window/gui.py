@@ -1,4 +1,4 @@
-"""The control panel as screens use it: viser's, whose HTML and markdown are markup or else escaped."""
+"""The control panel as screens use it: viser's, with HTML and markdown escaped unless they are markup."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Kind = TypeVar("Kind", bound=Markup)
 
 
 class Piece(Generic[Kind]):
-    """A piece of HTML or markdown in the panel. All but its content is viser's handle."""
+    """A piece of HTML or markdown in the panel. Everything but its content is passed to viser's handle."""
 
     _handle: Any
     _kind: type[Kind]
@@ -30,7 +30,7 @@ class Piece(Generic[Kind]):
 
     @property
     def content(self) -> Kind:
-        """What it shows. A ``str`` that is not markup is shown as text."""
+        """The content that is shown. A ``str`` that is not markup is shown as plain text."""
         return self._content
 
     @content.setter
@@ -40,12 +40,12 @@ class Piece(Generic[Kind]):
 
 
 class Gui:
-    """viser's ``GuiApi``, of which nothing puts text into the page as markup by mistake."""
+    """viser's ``GuiApi`` without methods that could put plain text into the page as markup."""
 
     def __init__(self, gui: Any) -> None:
         """Wrap the panel of a browser, or of all browsers."""
         self._gui = gui
-        gui._setup_plotly_js = True  # the page has it (app.web.page); viser would send it, to be run by eval
+        gui._setup_plotly_js = True  # the page has plotly (app.web.page); viser would run it with eval
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._gui, name)

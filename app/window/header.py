@@ -1,4 +1,4 @@
-"""The top of the control panel: the steps, what is being computed, and buttons for all steps."""
+"""The top of the control panel: the stepper, the status line, the progress bar, and buttons for all steps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STARTING = Markdown("**Starting** …")
 
 
 class Header:
-    """Stepper, status line, bar and buttons."""
+    """Stepper, status line, progress bar and buttons."""
 
     def __init__(
         self,
@@ -25,7 +25,7 @@ class Header:
         on_pick: Callable[[str], None],
         on_action: Callable[[str], None],
     ) -> None:
-        """Add them to the current container."""
+        """Add the parts to the current container."""
         self._stepper = Stepper(gui, titles, on_pick)
         self._status = gui.add_markdown(STARTING)
         self._bar = gui.add_progress_bar(0.0)
@@ -39,12 +39,12 @@ class Header:
         actions.on_click(lambda event: on_action(event.target.value))
 
     def progressed(self, report: Progress) -> None:
-        """How far a computation is."""
+        """Show the progress of a computation."""
         self._bar.value = min(100.0, 100.0 * report.fraction)
         self._status.content = Markdown("**Computing** · {}").format(report.stage)
 
     def dim(self, numbers: bool, picture: bool) -> None:
-        """Dim what belongs to other settings than those that are wanted."""
+        """Dim the numbers or the picture, which belong to other settings than the current ones."""
         self._stale.content = stale_html(numbers, picture)
 
     def show(
@@ -55,14 +55,14 @@ class Header:
         failure: str | None,
         busy: bool,
     ) -> None:
-        """Bring everything up to date.
+        """Update all parts.
 
         Args:
             current: title of the step that is shown.
-            statuses: by title.
+            statuses: statuses of the steps by title.
             running: the steps that are computed now.
-            failure: why one cannot be.
-            busy: whether something beside the steps is computed.
+            failure: error sentence of a failed step.
+            busy: whether a side job runs.
         """
         self._stepper.show(current, statuses)
         if running:

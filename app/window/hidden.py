@@ -1,4 +1,4 @@
-"""The place in a page through which a dock at the lower edge speaks with the server."""
+"""A hidden panel in the page, through which a dock at the lower edge exchanges data with the server."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from app.window.ui import Ui
 
 @contextmanager
 def add_hidden(ui: Ui, name: str, call: Markup | None = None) -> Iterator[None]:
-    """A container for controls that nobody sees.
+    """Open a container for hidden controls.
 
     It is a panel of its own so that it stays when the control panel is closed.
 
     Args:
-        ui: of the browser.
-        name: by which the page's side finds it.
-        call: what the page is to do first.
+        ui: the browser's panel.
+        name: name by which the page's script finds it.
+        call: page call that runs when the panel appears.
     """
     panel = ui.gui.add_panel()
     panel.float(x=0, y=0)

@@ -1,15 +1,15 @@
-// What a name means, by a click on it: names in tables and texts, and labels of controls.
+// Explanations that open on a click: for names in tables and texts, and for labels of controls.
 (() => {
   const GAP_PX = 6;
-  const FARTHEST = 40; // parts of the page between a label and its control
+  const FARTHEST = 40; // most page elements between a label and its control
   const note = Object.assign(document.createElement("div"), {className: "packetmesh-hint"});
   note.setAttribute("role", "note");
-  let about = null; // whose meaning is shown
-  let stood = 0; // where that name stood then
-  let passedOn = null; // the box that a click on its label clicks next
+  let about = null; // the element whose explanation is shown
+  let stood = 0; // that element's top edge when the note opened, in px
+  let passedOn = null; // checkbox that the browser clicks next because its label was clicked
   let waiting = false;
 
-  // viser keeps the hint of a control in what its page is made of.
+  // Return a control's hint; viser keeps it only in the React properties of the page.
   function hintOf(label) {
     const key = Object.keys(label).find(one => one.startsWith("__reactFiber$"));
     for (let made = label[key], up = 0; made && up < FARTHEST; made = made.return, up += 1) {
@@ -45,20 +45,20 @@
 
   window.addEventListener("click", event => {
     const one = event.target.closest?.("[data-hint]");
-    if (passedOn && event.target === passedOn) { // the browser's own click on the box of a label
+    if (passedOn && event.target === passedOn) { // the browser's own click on the label's checkbox
       passedOn = null;
       return;
     }
     const again = one === about;
     close();
     const control = one?.matches("label") ? document.getElementById(one.htmlFor) : null;
-    passedOn = control?.matches("[type=checkbox]") ? control : null; // its label ticks it, as everywhere
+    passedOn = control?.matches("[type=checkbox]") ? control : null; // a click on the label also ticks the box, as everywhere
     if (!one || again) return;
-    if (control && !passedOn) event.preventDefault(); // to ask opens no list
+    if (control && !passedOn) event.preventDefault(); // do not open the control's list
     show(one);
   }, true);
   window.addEventListener("keydown", event => event.key === "Escape" && close(), true);
-  // A scroll's event comes a frame late, so after the click that followed it.
+  // Scroll events come a frame late and can follow the click that opened the note: check that it has moved.
   window.addEventListener("scroll", () => about?.getBoundingClientRect().top !== stood && close(), true);
 
   new MutationObserver(() => {

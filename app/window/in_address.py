@@ -1,4 +1,4 @@
-"""States of a screen's parts as they are written in the page's address."""
+"""Parts of a screen whose state is written in the page's address."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ if TYPE_CHECKING:
     import viser
 
 STOP = "stop"
-"""Keys of lessons in the address begin with this; Back goes from stop to stop."""
+"""Prefix of the lessons' keys in the address. The browser's Back button goes from stop to stop."""
 
 
 class InAddress(Protocol):
-    """What the address says of a part of a screen."""
+    """A part of a screen whose state is in the address."""
 
     def place(self) -> str:
-        """Its state; empty where it is as at the start."""
+        """Return the state as text; empty for the start state."""
         ...
 
     def take(self, place: str) -> None:
-        """Go to such a state, at once or when what it is about has come.
+        """Go to a state, at once or when its results have been computed.
 
         Raises:
-            InputError: there is none like it.
+            InputError: there is no such state.
         """
         ...
 
@@ -40,31 +40,31 @@ class CallbackState:
     apply: Callable[[str], object]
 
     def place(self) -> str:
-        """Its state."""
+        """Return the state as text."""
         return self.read()
 
     def take(self, place: str) -> None:
-        """Go to such a state."""
+        """Go to a state."""
         self.apply(place)
 
 
 @dataclass(frozen=True, slots=True)
 class Picked:
-    """A list, of which the address says what was picked."""
+    """A drop-down whose choice is in the address."""
 
     handle: viser.GuiDropdownHandle[str]
     names: Mapping[str, str]
-    """What the address says, and what the list says; the first is the one of the start."""
+    """Labels by the names used in the address; the first is the start value."""
     action: Callable[[], object]
-    """Answers a change."""
+    """Called after a change."""
 
     def place(self) -> str:
-        """The name of what is picked."""
+        """Return the name of the choice; empty for the first."""
         names = list(self.names)[1:]
         return next((name for name in names if self.names[name] == self.handle.value), "")
 
     def take(self, place: str) -> None:
-        """Pick it."""
+        """Choose by name."""
         name = place or next(iter(self.names))
         if name not in self.names or self.names[name] not in self.handle.options:
             raise InputError(f"The address has {name[:40]}; try one of {', '.join(self.names)}")
@@ -74,16 +74,16 @@ class Picked:
 
 
 class Awaited:
-    """A list whose names come with what is computed; an address may ask for one of them before."""
+    """A drop-down whose names come with results; an address may ask for a name before it is there."""
 
     def __init__(self, ui: Ui, handle: viser.GuiDropdownHandle[str], action: Callable[[], object]) -> None:
-        """Take care of a list; ``action`` answers a change."""
+        """Keep the drop-down ``handle``; ``action`` is called after a change."""
         self._ui, self._handle, self._action, self._asked = ui, handle, action, ""
         ui.when_changed(handle, self._picked)
 
     @property
     def value(self) -> str:
-        """The name that is picked."""
+        """The chosen name."""
         return self._handle.value
 
     def _picked(self) -> None:
@@ -91,7 +91,7 @@ class Awaited:
         self._action()
 
     def offer(self, names: tuple[str, ...], all_there: bool = True) -> None:
-        """Have the list hold these names; the one that was picked or asked for is picked if it is there."""
+        """Set the names of the list. A name chosen or asked for before is selected if it is among them."""
         chosen = self._asked or self.value
         if names != self._handle.options:
             self._handle.options = names
@@ -106,11 +106,11 @@ class Awaited:
             self._ui.post(tell_unknown, unknown, names)
 
     def place(self) -> str:
-        """The name that is picked or asked for, unless it is the first."""
+        """Return the name chosen or asked for; empty for the first."""
         return self._asked or ("" if self.value == self._handle.options[0] else self.value)
 
     def take(self, place: str) -> None:
-        """Pick it, at once or when it is there."""
+        """Choose a name, at once or as soon as the list has it."""
         name = place or self._handle.options[0]
         self._asked = "" if name in self._handle.options else name
         if not self._asked and name != self.value:
@@ -119,9 +119,9 @@ class Awaited:
 
 
 def tell_unknown(asked: str, names: Collection[str]) -> None:
-    """Say that an address asks for a name that is not there.
+    """Report that an address names an entry that does not exist.
 
     Raises:
-        InputError: always; a session tells it.
+        InputError: always; the session shows it.
     """
     raise InputError(f"The address has {asked[:40]}, which is not here; try one of {', '.join(names)}")

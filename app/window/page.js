@@ -1,5 +1,5 @@
-// What PacketMesh adds to viser's page, and how the server calls it: an element with the name of one of
-// packetmesh.calls and its arguments, each time it comes into the page (page.py).
+// What PacketMesh adds to viser's page. The server calls a function of packetmesh.calls by adding an element
+// with its name and arguments to the page; every time such an element appears, the function runs (page.py).
 (() => {
   const calls = Object.create(null);
 
@@ -9,35 +9,35 @@
   }
 
   new MutationObserver(changes => {
-    const come = new Set(); // once each, also if it and what it lies in came one after the other
+    const come = new Set(); // a set: an element that was added inside another appears twice
     for (const {addedNodes} of changes)
       for (const node of addedNodes) {
         if (node.nodeType !== Node.ELEMENT_NODE || !node.isConnected) continue;
         if (node.matches("[data-packetmesh-call]")) come.add(node);
         for (const one of node.querySelectorAll("[data-packetmesh-call]")) come.add(one);
       }
-    for (const element of come) queueMicrotask(() => call(element)); // one that fails stops no other
+    for (const element of come) queueMicrotask(() => call(element)); // an error in one call stops no other
   }).observe(document.documentElement, {childList: true, subtree: true});
 
-  // viser makes itself ready for Gaussian splats, which the app never draws, with code made of text, which the
-  // content policy forbids: it waits for that module and never gets it.
+  // viser prepares Gaussian splats, which the app never draws, with code that the content policy forbids. It
+  // waits for that module, which never arrives.
   const {fetch} = window;
   window.fetch = (from, ...options) => String(from).startsWith("data:application/wasm")
     ? new Promise(() => {})
     : fetch(from, ...options);
 
-  // Buttons in HTML, which is told nothing else of a click.
+  // Actions of buttons in HTML, which get no other click handler.
   const PRESSED = {
-    // Copy the text before it.
+    // Copy the text before the button.
     packetmeshCopy(button) {
       navigator.clipboard.writeText(button.previousElementSibling.textContent);
       button.textContent = "Copied";
     },
-    // Press the panel's own button of that name.
+    // Press the panel's own button with this label.
     packetmeshPress(button, name) {
       [...document.querySelectorAll("button")].find(one => one.textContent === name && one !== button)?.click();
     },
-    // Write into the hidden field behind the HTML; with the time, as the same may be picked again.
+    // Write into the hidden field after the HTML. The time makes a repeated choice a new text.
     packetmeshPick(button, name) {
       const html = button.closest("[data-packetmesh-field]");
       const input = html.parentElement.nextElementSibling.querySelector("input");
@@ -52,22 +52,22 @@
       if (button && name in button.dataset) press(button, button.dataset[name]);
   });
 
-  // While anything new arrives, viser draws one frame after another, most of them alike. Without a
-  // graphics card that takes the time in which the next mesh is made. A view that is held draws only frames
-  // in which a mesh is new. And while a mesh is awaited, its place may be empty: then nothing is drawn.
-  const HELD_MS = 6000; // at most, since the last call
-  const AWAITED_MS = 3000; // at most, before the answer is given without
+  // While anything new arrives, viser draws frame after frame, most of them equal. Without a graphics card
+  // that takes the time needed for the next mesh. A held view draws only frames with a new mesh. While a
+  // mesh is awaited its place may be empty, and nothing is drawn.
+  const HELD_MS = 6000; // longest hold after the last call
+  const AWAITED_MS = 3000; // longest wait for meshes before the answer is given without them
   const POLL_MS = 4;
-  const UNFOLD_MS = 200; // before it is seen again whether a folder has come
+  const UNFOLD_MS = 200; // pause before a missing folder is looked for again
   const UNFOLD_TRIES = 10;
   const KEY = {key: "Insert", ctrlKey: true, altKey: true, shiftKey: true};
 
-  let gl = null; // what viser draws with
+  let gl = null; // WebGL context of viser's canvas
   let held = false;
-  let until = 0; // held so long, by the page's clock in ms
-  let awaited = []; // numbers of vertices of the meshes to come
-  let arrived = []; // those that came while the view was held, since the last answer
-  let whole = false; // whether the next frame has all that was awaited
+  let until = 0; // end of the hold by the page's clock, ms
+  let awaited = []; // vertex counts of the awaited meshes
+  let arrived = []; // vertex counts of the meshes that arrived during the hold, since the last answer
+  let whole = false; // whether the next frame has all awaited meshes
   let asked = 0;
   let frame = null;
   let skipped = false;
@@ -75,7 +75,7 @@
   let height = 0;
 
   function answer(question) {
-    if (question !== asked) return; // there is a newer one
+    if (question !== asked) return; // a newer question is open
     asked += 1;
     awaited = [];
     arrived = [];
@@ -85,10 +85,10 @@
 
   function beginFrame() {
     const late = performance.now() > until;
-    const emptied = width !== gl.drawingBufferWidth || height !== gl.drawingBufferHeight; // by a new size
+    const emptied = width !== gl.drawingBufferWidth || height !== gl.drawingBufferHeight; // a new size clears the canvas
     [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
     skipped = !whole && !late && !emptied && (held || awaited.length > 0);
-    if (whole) queueMicrotask(answerWhenDrawn); // after all calls of this frame
+    if (whole) queueMicrotask(answerWhenDrawn); // after all drawing calls of this frame
     whole = false;
   }
 
@@ -104,7 +104,7 @@
     setTimeout(look, POLL_MS);
   }
 
-  // Of a new mesh, three.js uploads the vertices before it clears the frame.
+  // Note a new mesh; three.js uploads its vertices before it clears the frame.
   function uploaded(vertices) {
     if (held) arrived.push(vertices);
     if (!awaited.includes(vertices)) return;
@@ -134,7 +134,8 @@
     before("bufferData", (target, data) => target === gl.ARRAY_BUFFER && uploaded(data?.length / 3));
   }
 
-  // What a hand does now may turn the view; only arrow keys on a slider do not, though viser would turn it.
+  // The user's input may turn the view, so it ends the hold. Arrow keys on a slider do not reach viser's
+  // camera.
   for (const kind of ["pointerdown", "pointerup", "wheel"])
     window.addEventListener(kind, () => { held = false; }, true);
   document.body.onkeydown = event => {
@@ -142,7 +143,7 @@
     else held = false;
   };
 
-  // viser keeps to itself whether a folder is open; its title has an arrow down while it is not. A tab says it.
+  // Open folders and tabs. A closed folder has a downward arrow in its title; a tab has an attribute.
   function unfold(titles, tries = UNFOLD_TRIES) {
     const shut = [...document.querySelectorAll("svg.tabler-icon-chevron-down")].map(arrow => arrow.parentElement);
     const tabs = [...document.querySelectorAll("[role=tab][aria-selected=false]")];
@@ -152,11 +153,10 @@
     if (left.length > 0 && tries > 1) setTimeout(unfold, UNFOLD_MS, left, tries - 1);
   }
 
-  // When another screen is shown viser forgets which folders of the one before were open; the page remembers
-  // it as long as the tab is there.
+  // viser forgets which folders were open when another screen is shown; the page remembers it in this tab.
   const REMEMBERED = "packetmesh-folders";
   const HEADS = "svg[class*=tabler-icon-chevron-]";
-  const folders = JSON.parse(sessionStorage.getItem(REMEMBERED) ?? "{}"); // by screen, title and count of it
+  const folders = JSON.parse(sessionStorage.getItem(REMEMBERED) ?? "{}"); // open or not, by screen, title and the title's count
 
   function heads() {
     const screen = document.querySelector("[data-packetmesh-screen]")?.dataset.packetmeshScreen;
@@ -176,13 +176,13 @@
     sessionStorage.setItem(REMEMBERED, JSON.stringify(folders));
   }, true);
 
-  // A screen is shown: its folders are as they were left.
+  // A screen is shown: open and close its folders as they were left.
   calls.shown = () => {
     for (const {head, key, open} of heads())
       if (folders[key] !== undefined && folders[key] !== open) head.click();
   };
 
-  // Open folders and tabs by their titles; those that are not there yet, when they come within a second or two.
+  // Open folders and tabs by their titles; retry for a second or two those that are not there yet.
   calls.unfold = (_, titles) => unfold(titles);
   calls.hold = () => window.packetmesh.hold();
   calls.ask = (_, vertices, hold) => window.packetmesh.ask(vertices, hold);
@@ -190,15 +190,16 @@
   window.packetmesh = {
     calls,
 
-    // Draw nothing but new meshes for now.
+    // Draw only new meshes from now on.
     hold() {
       watch();
       held = true;
       until = performance.now() + HELD_MS;
     },
 
-    // Press a key once meshes of so many vertices are drawn, and those that are awaited still; without any,
-    // when the next frame is drawn if the view is held, as it goes on to be or not, and else two frames later.
+    // Press a key once meshes with these vertex counts and all meshes still awaited are drawn. Without any,
+    // press
+    // it when the next frame is drawn if the view is or stays held, and else two frames later.
     ask(vertices, hold) {
       watch();
       const question = ++asked;

@@ -1,8 +1,8 @@
-"""What the app adds to viser's page, and how the server has the page do something.
+"""HTML that adds the app's scripts and styles to viser's page and calls the page's functions.
 
-Its scripts and styles are files of the server. The content policy forbids scripts in HTML, so that no text
-from a file can be one: to have the page do something, the server sends HTML with the name of a function and
-its arguments, and ``page.js`` calls it.
+Scripts and styles are files of the server. The content policy forbids scripts in HTML, so that no text from a
+file can run as one. To call a function in the page, the server sends HTML with the function's name and
+arguments, and ``page.js`` calls it.
 """
 
 from __future__ import annotations
@@ -13,25 +13,25 @@ from app.web.markup import Markup
 
 
 def stale_html(numbers: bool, picture: bool) -> Markup:
-    """HTML by which the style sheet dims the numbers of the panel, or the 3-D picture."""
+    """Return HTML that dims the panel's numbers or the 3-D picture, through the style sheet."""
     marks = {"packetmesh-old-numbers": numbers, "packetmesh-old-picture": picture}
     found = (Markup('<i class="{}"></i>').format(mark) for mark, wanted in marks.items() if wanted)
     return Markup("").join(found)
 
 
 def screen_mark(title: str) -> Markup:
-    """HTML that begins a screen, by which the page knows that it is shown."""
+    """Return HTML at the start of a screen that tells the page which screen is shown."""
     mark = Markup('<span data-packetmesh-screen="{}"></span>').format(title)
     return mark + page_call("shown", mark=title)
 
 
 def page_call(function: str, *arguments: object, mark: object = "") -> Markup:
-    """Return HTML that has the page call one of its functions each time it is shown.
+    """Return HTML that calls one of the page's functions each time it is shown.
 
     Args:
         function: its name in ``packetmesh.calls`` (``page.js``).
-        arguments: what JSON can hold; the function gets the element first, then these.
-        mark: tells two calls apart that are otherwise alike, as a page takes the same HTML once only.
+        arguments: JSON values; the function gets the HTML element first, then these.
+        mark: makes otherwise equal calls differ, because a page takes the same HTML only once.
     """
     told = json.dumps(arguments, separators=(",", ":"))
     return Markup('<i hidden data-packetmesh-call="{}" data-arguments="{}" data-mark="{}"></i>').format(

@@ -1,4 +1,4 @@
-"""A step of the app, and the session that runs its jobs."""
+"""A step's panel, and the interface of the session that runs its jobs."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """A file to take along."""
+    """A file that a screen offers for download."""
 
     label: str
     file: str
-    """Its name."""
+    """Name of the file."""
     job: str
-    """That makes its content, as bytes."""
+    """Address of the job that makes the content as bytes."""
     arguments: tuple[Any, ...] = ()
     photographs: bool = False
-    """Whether the job takes the 3-D view as the browser draws it, (H, W, 4), as its last argument."""
+    """Whether the job's last argument is the 3-D view as the browser draws it, (H, W, 4)."""
 
 
 NO_NOTE = Markdown("")
@@ -39,25 +39,25 @@ NO_NOTE = Markdown("")
 
 @dataclass(frozen=True, slots=True)
 class Offers:
-    """Files of one kind, and how a command makes the same."""
+    """Files of one kind, and the command that makes the same files."""
 
     kind: str
     hint: str
     files: tuple[Offer, ...]
     command: str = ""
     note: Markdown = NO_NOTE
-    """On the command, or why there is none."""
+    """Note about the command, or the reason why there is none."""
 
 
 class PanelSession(Protocol):
-    """The session as its panels see it; all but ``post`` is called on the session's thread."""
+    """The session's interface for its panels; all but ``post`` is called on the session's thread."""
 
     target: Target
     ui: Ui
     store: Store
     uploads: Uploads
     folder: Path
-    """Where its uploads are kept."""
+    """Folder of the session's uploads."""
     spec: Spec
     results: Results
     panels: Sequence[Panel]
@@ -130,9 +130,9 @@ class Panel(ABC):
 
     title: ClassVar[str]
     step: ClassVar[Step | None] = None
-    """The step of the chain whose result it shows."""
+    """The step whose result it shows."""
     drawn_below: ClassVar[str]
-    """Scene node under which it draws; only the current step's is visible."""
+    """Scene node under which it draws; only the current panel's node is visible."""
     only_when_shown: ClassVar[bool] = False
     """Whether its step is computed only while it is the current one."""
 
@@ -140,52 +140,52 @@ class Panel(ABC):
         self.session, self.ui = session, session.ui
         self.gui, self.scene = session.ui.gui, session.ui.scene
         self.in_address: dict[str, InAddress] = {}
-        """By key, what the address says while what the screen draws is shown; lessons under ``STOP``."""
+        """By key, the parts whose state is in the address while this is shown; lessons under ``STOP``."""
 
     @abstractmethod
     def build(self) -> None:
         """Add the controls to the current container."""
 
     def on_spec(self, spec: Spec) -> None:
-        """The settings or the source changed."""
+        """Handle a change of the settings or the source."""
 
     def on_view(self, step: Step, view: Any) -> None:
-        """A step of the chain, this or another, has a new view."""
+        """Handle a new view of a step, this panel's or another."""
 
     def on_partial(self, view: Any) -> None:
-        """This panel's step shows what it has so far."""
+        """Show a partial result of this panel's step."""
 
     def on_failure(self, step: Step, sentence: str) -> None:
-        """A step, this or another, could not be computed, or was cancelled."""
+        """Handle a step, this panel's or another, that failed or was cancelled."""
 
     def on_show(self) -> None:
-        """This became the current step."""
+        """Called when this becomes the current panel."""
 
     def on_hide(self) -> None:
-        """Another step becomes the current one."""
+        """Called before another panel becomes the current one."""
 
     def on_action(self, action: str) -> None:
-        """A button for all steps was pressed."""
+        """Handle a press of a button for all steps."""
 
     @property
     def ahead(self) -> bool:
-        """Whether its picture is newer than its numbers, as while a hand drags a slider."""
+        """Whether the picture is newer than the numbers, as while a slider is dragged."""
         return False
 
     def look(self) -> bool:
-        """Turn the view to what it draws; False leaves that to the session, which turns it to the scene."""
+        """Turn the view to what is drawn. False lets the session turn it to the scene."""
         return False
 
     def offers(self) -> tuple[Offers, ...]:
-        """What can be taken along of what it shows."""
+        """Return the files that it offers for download."""
         return ()
 
     @property
     def command(self) -> str:
-        """The command line that computes what it shows."""
+        """Return the command line that computes what it shows."""
         return self.session.spec.command()
 
     @property
     def wide(self) -> bool:
-        """Whether it shows two things side by side."""
+        """Whether it shows two objects side by side."""
         return False

@@ -1,4 +1,4 @@
-"""The row of steps on top of the panel: where you are, what is done, what is out of date."""
+"""The row of step buttons at the top of the panel: the current step, and each step's status."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _MARK = Markup(
     "div:has(> .packetmesh-steps) + div button:nth-of-type({}) .mantine-Button-label::after "
     "{{ content: '\\00a0{}' }}"
 )
-"""The marks are the style's, so that the buttons stay the same while a hand is on one."""
+"""The style sheet draws the status marks, so that a button keeps its element while it is clicked."""
 
 
 class Stepper:
-    """Buttons, one for each step; the current one is filled."""
+    """One button per step; the current one is filled."""
 
     def __init__(self, gui: Gui, titles: Sequence[str], on_pick: Callable[[str], None]) -> None:
         self._titles = tuple(titles)
@@ -35,12 +35,12 @@ class Stepper:
         self._buttons.on_click(lambda event: on_pick(event.target.value))
 
     def show(self, current: str, statuses: Mapping[str, StepStatus]) -> None:
-        """Mark the current step and the state of all."""
+        """Mark the current step and the status of each."""
         self._style.content = _style(self._titles.index(current), [statuses.get(t) for t in self._titles])
 
 
 def _style(current: int, statuses: Sequence[StepStatus | None]) -> Markup:
-    """CSS for the buttons that follow this element: their colours; ``page.css`` has their place."""
+    """Return CSS with the colours of the buttons that follow this element; ``page.css`` sets their place."""
     rules = [Markup("canvas[data-engine] {{ background: {} }}").format(css(BACKGROUND))]
     for number, status in enumerate(statuses, 1):
         color = COLORS[status] if status is not None else css(BRAND)

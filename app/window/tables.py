@@ -1,4 +1,4 @@
-"""Small tables of numbers, each explained by a click on its name."""
+"""HTML of small tables of numbers, in which a click on a name shows its explanation."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _CELL = "padding: 2px 8px 2px 0; vertical-align: top;"
 _VALUE = Markup('<td style="{} text-align: right; font-variant-numeric: tabular-nums">{}</td>')
 
 WAITING, UNKNOWN = "…", "–"
-"""For a value that is to come, and for one that is not."""
+"""Texts for a value that is not computed yet, and for one that is unknown."""
 
 Row: TypeAlias = tuple[str, ...]
-"""One quantity: its name, what it means in a sentence, and its value with the unit for each column."""
+"""One quantity: its name, its explanation in a sentence, and for each column its value with the unit."""
 Head: TypeAlias = str | tuple[str, str]
-"""Of a column; with what it means in a sentence, where that is not plain."""
+"""A column's head, or the head and its explanation in a sentence."""
 
 TRUTH_ROWS = (
     (
@@ -34,12 +34,12 @@ TRUTH_ROWS = (
         "mm",
     ),
 )
-"""Of a surface beside the true one: names, what they mean, where they are in the comparison, and units."""
+"""Comparison with the true surface: name, explanation, key in ``MeshView.truth``, and unit."""
 PER_UNIT = {"%": 100.0, "mm": 1000.0}
 
 
 def term(name: str, hint: str) -> Markup:
-    """HTML of a word that is explained by a click on it, as ``hint.js`` does."""
+    """Return HTML of a word whose explanation opens on a click (``hint.js``)."""
     return Markup('<button type="button" class="packetmesh-term" data-hint="{}">{}</button>').format(
         hint, name
     )
@@ -48,7 +48,7 @@ def term(name: str, hint: str) -> Markup:
 def table(
     rows: Sequence[Row], columns: Sequence[Head] = (), colors: Sequence[tuple[int, int, int]] = ()
 ) -> Markup:
-    """HTML of rows of numbers; ``columns`` head the values when there are several, in ``colors`` if given."""
+    """Return HTML of rows of numbers; ``columns`` are the heads of the values, in ``colors`` if given."""
     lines = []
     if columns:
         names = [one if isinstance(one, str) else term(*one) for one in columns]
@@ -70,7 +70,7 @@ def table(
 
 
 def bar_html(bar: ColorBar) -> Markup:
-    """The colours from left to right over their labels."""
+    """Return HTML of a colour bar over its labels."""
     gradient = ", ".join(css(stop) for stop in bar.stops)
     ends = _joined(Markup("<span>{}</span>").format(label) for label in bar.labels)
     return Markup(
@@ -80,7 +80,7 @@ def bar_html(bar: ColorBar) -> Markup:
 
 
 def command_html(command: str) -> Markup:
-    """A command line to select or copy with one click, which ``page.js`` does."""
+    """Return HTML of a command line that one click selects or copies (``page.js``)."""
     look = (
         "margin: 0; padding: 0.8em; white-space: pre-wrap; overflow-wrap: anywhere; font-size: 12px; "
         "user-select: all; border: 1px solid #bbb; border-radius: 4px"
@@ -96,14 +96,14 @@ def _joined(parts: Iterable[str]) -> Markup:
 
 
 def number(value: float | None, digits: int = 1, unit: str = "", scale: float = 1.0) -> str:
-    """A value with its unit, or a dash where it is unknown."""
+    """Return a value with its unit, or a dash if it is unknown."""
     if value is None or value != value:
         return UNKNOWN
     return f"{value * scale:,.{digits}f}{unit and ' '}{unit}"
 
 
 def truth_rows(meshes: Sequence[MeshView | None], missing: str = WAITING) -> list[Row]:
-    """Surfaces beside the true one, a column for each; ``missing`` stands for one that is not there."""
+    """Return the rows that compare surfaces with the true one; ``missing`` stands for a missing surface."""
 
     def value(mesh: MeshView | None, key: str, unit: str) -> str:
         if mesh is None:

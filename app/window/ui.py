@@ -21,53 +21,53 @@ if TYPE_CHECKING:
 
 Input = TypeVar("Input", bound="viser.GuiInputHandle[Any]")
 Target: TypeAlias = "viser.ClientHandle | viser.ViserServer"
-"""Where a session's controls and drawings go: one browser, or the server for a session that all share."""
+"""Where a session's controls and drawings go: one browser, or the server in a lecture."""
 Count: TypeAlias = Callable[[int, int], None]
-"""Counts the vote of a voter, both by their numbers; choices count from 1."""
+"""Counts a vote: takes the voter's number and the choice, which starts at 1."""
 
 
 class SharedBy(Protocol):
-    """The people who share a session in a lecture."""
+    """The browsers that share a session in a lecture."""
 
     @property
     def class_size(self) -> int:
-        """Browsers that do not teach."""
+        """Number of browsers that do not teach."""
         ...
 
     def followers(self) -> Iterable[viser.ClientHandle]:
-        """Browsers whose view the session turns."""
+        """Return the browsers whose view the session turns."""
         ...
 
     def everybody(self) -> Iterable[viser.ClientHandle]:
-        """All browsers."""
+        """Return all browsers."""
         ...
 
     def poll(self, count: Count | None) -> None:
-        """Open a vote whose votes ``count`` gets, or close it."""
+        """Open a vote whose votes ``count`` receives, or close it (None)."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Ui:
-    """A browser's control panel and scene; what a person does there is answered on the session's thread."""
+    """A browser's control panel and scene; their events are handled on the session's thread."""
 
     gui: Gui
     scene: viser.SceneApi
     post: Callable[..., None]
     """Runs a function on the session's thread."""
     atomic: Callable[[], AbstractContextManager[None]]
-    """Groups what is sent to the browser."""
+    """Groups messages to the browser."""
     flush: Callable[[], None]
-    """Sends it now."""
+    """Sends the messages now."""
     closers: list[Callable[[], None]] = field(default_factory=list)
-    """What ends the timers and threads of the screens."""
+    """Functions that stop the timers and threads of the screens."""
     resets: list[Callable[[], None]] = field(default_factory=list)
-    """What *Reset* takes back beside the settings and the screens."""
+    """Functions that *Reset* calls, besides resetting the settings and the screens."""
     lecture: SharedBy | None = None
     """The lecture whose browsers all show the same; None for a session of one browser."""
 
     def when_changed(self, handle: Input, action: Callable[[], object]) -> Input:
-        """The handle, whose changes by a person, not by the program, cause ``action``."""
+        """Call ``action`` when a user, not the program, changes ``handle``. Returns the handle."""
 
         def changed(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
@@ -79,20 +79,20 @@ class Ui:
     def buttons(
         self, label: str, actions: Mapping[str, Callable[[], object]], hint: str, visible: bool = True
     ) -> viser.GuiButtonGroupHandle[str]:
-        """A row of buttons with what each of them does."""
+        """Add a row of buttons with their actions."""
         group = self.gui.add_button_group(label, tuple(actions), hint=hint, visible=visible)
         group.on_click(lambda event: self.post(actions[event.target.value]))
         return group
 
     def show_command(self, command: str) -> None:
-        """Show a command in a window of its own."""
+        """Show a command line in a modal window."""
         with self.gui.add_modal("The same from the command line") as modal:
             self.gui.add_markdown(Markdown("This computes and writes what the app shows now:"))
             self.gui.add_html(command_html(plain(command)))
             self.gui.add_button("Close").on_click(lambda _: modal.close())
 
     def when_clicked(self, below: str, action: Callable[[FloatArray, FloatArray], object]) -> None:
-        """Answer a click while the node ``below`` is shown: ``action`` gets its ray, origin and direction."""
+        """Handle a click while the node ``below`` is shown: ``action`` gets its ray, origin and direction."""
 
         def clicked(event: Any) -> None:
             if self.shows(below):
@@ -101,17 +101,17 @@ class Ui:
         self.scene.on_click()(lambda event: self.post(clicked, event))
 
     def shows(self, name: str) -> bool:
-        """Whether a scene node is there and visible."""
+        """Whether a scene node exists and is visible."""
         frame = self.scene.get_handle_by_name(name)
         return frame is not None and frame.visible
 
     def debounce(self, wait_s: float, action: Callable[[], object]) -> Debounce:
-        """A timer whose ``action`` runs on the session's thread."""
+        """Return a timer whose ``action`` runs on the session's thread."""
         timer = Debounce(wait_s, lambda: self.post(action))
         self.closers.append(timer.cancel)
         return timer
 
     def close(self) -> None:
-        """End all timers and threads of the screens."""
+        """Stop all timers and threads of the screens."""
         for close in self.closers:
             close()

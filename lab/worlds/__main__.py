@@ -1,4 +1,4 @@
-"""Renders the demo rigs in assets/scenes again: ``python -m lab.worlds [NAME ...]``."""
+"""``python -m lab.worlds [NAME ...]``: render the demo rigs in assets/scenes again."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ JPEG_QUALITY = 92
 
 
 def save_board_views(folder: Path, views: BoardViews) -> None:
-    """Write the images, what the board is, and the truth; no depth image where no depth is known.
+    """Write the images, the board's description and the truth; depth images only where depth is known.
 
     Raises:
         InputError: the folder cannot be written.
@@ -45,7 +45,7 @@ def save_board_views(folder: Path, views: BoardViews) -> None:
 
 
 def load_board_views(folder: Path) -> BoardViews:
-    """The same again; colours as JPEG has left them, depth to the millimetre.
+    """Read board views; colours are those of the JPEG files, depth is rounded to the millimetre.
 
     Raises:
         InputError: a file is missing or cannot be used.

@@ -1,4 +1,4 @@
-"""Where to hold a board so that the cameras of a rig learn the most from it."""
+"""Choice of the board poses from which the cameras of a rig can be calibrated best."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ DISTANCES_M = (0.6, 2.5)
 MOST_TILT_DEG = 45.0
 MARGIN_PX = 8.0
 LEAST_SPACING_PX = 11.0
-"""Between neighbours on the board; smaller circles are not found."""
+"""Least distance between neighbours on the board; smaller circles are not found."""
 TRIES = 60
-"""Random poses for each that is wanted."""
+"""Number of random poses that are tried for each chosen one."""
 CELLS = {(8, 6): 0.25, (4, 3): 4.0}
-"""Parts of an image, across and down, and what a new one is worth; the large ones are those of the depth
+"""Grids of image parts, across and down, and the value of a new part; the large parts are those of the depth
 sensor's map."""
 
 
@@ -34,22 +34,22 @@ def propose_poses(
     free_m: Sequence[FloatArray] | None = None,
     distances_m: tuple[float, float] = DISTANCES_M,
 ) -> tuple[FloatArray, ...]:
-    """T_world_board of ``count`` moments: of many random ones, always the one that shows the most new.
+    """Return T_world_board of ``count`` moments: of many random poses, each time the one that shows most new.
 
     New are parts of an image, a distance or a tilt for a camera, and a pair of cameras that see the board
-    together; the second time counts half of the first.
+    together; a second occurrence counts half of the first.
 
     Args:
-        board: what is held.
-        cameras: who looks; every board proposed is seen whole by one of them at least.
+        board: the board.
+        cameras: the cameras; at least one of them sees the whole board in every pose.
         count: number of moments.
-        seed: of the random poses.
-        free_m: (H, W) depth of what stands before each camera, which must not hide the board; None is
-            nothing.
-        distances_m: nearest and farthest from a camera.
+        seed: seed of the random poses.
+        free_m: (H, W) depth of the objects before each camera, which must not hide the board; None: no
+            objects.
+        distances_m: nearest and farthest distance from a camera.
 
     Raises:
-        InputError: there is no place where a camera sees the whole board.
+        InputError: no place was found at which a camera sees the whole board.
     """
     rng = np.random.default_rng(seed)
     pool: list[tuple[FloatArray, dict[Hashable, float]]] = []
@@ -80,13 +80,13 @@ def propose_poses(
 def sees(
     board: Board, camera: BoardCamera, T_world_board: FloatArray, free_m: FloatArray | None = None
 ) -> bool:
-    """Whether a camera has all of the board in its picture, from its front, large enough and not hidden.
+    """Whether a camera sees the whole board from its front, large enough and not hidden.
 
     Args:
         board: the board.
-        camera: who looks.
+        camera: the camera.
         T_world_board: (4, 4).
-        free_m: (H, W) depth of what stands before the camera.
+        free_m: (H, W) depth of the objects before the camera.
     """
     T = inverse(camera.T_world_camera) @ T_world_board
     points_m = apply(T, board.points_m)
@@ -106,7 +106,8 @@ def sees(
 
 
 def _tilt_rad(T_camera_board: FloatArray) -> float:
-    """Between the board's normal and the way to it; beyond a right angle it is seen from behind."""
+    """Return the angle between the board's normal and the view direction; over 90 degrees it is seen from
+    behind."""
     way = T_camera_board[:3, 3] / np.linalg.norm(T_camera_board[:3, 3])
     return float(np.arccos(np.clip(T_camera_board[:3, 2] @ way, -1.0, 1.0)))
 
@@ -114,7 +115,7 @@ def _tilt_rad(T_camera_board: FloatArray) -> float:
 def _random_pose(
     cameras: Sequence[BoardCamera], rng: np.random.Generator, distances_m: tuple[float, float]
 ) -> FloatArray:
-    """(4, 4) somewhere in the view of one camera, towards that or to the middle of several."""
+    """Return a random (4, 4) pose in the view of one camera, facing it or the middle of several."""
     camera = cameras[int(rng.integers(len(cameras)))]
     size = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
     at_px = rng.uniform(0.1, 0.9, 2) * size
@@ -142,7 +143,7 @@ def _shown(
     T_world_board: FloatArray,
     distances_m: tuple[float, float],
 ) -> Iterator[tuple[Hashable, float]]:
-    """What a moment shows to the cameras that see it, and what that is worth."""
+    """Yield the new views that a moment gives the cameras, with their values."""
     far = {}
     for node in seen:
         camera = cameras[node].intrinsics

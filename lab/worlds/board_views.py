@@ -1,7 +1,7 @@
-"""What the cameras of a rig see of a calibration board: photographs and biased depth (SPEC 1.2, 1.5).
+"""Board views of the cameras of a rig: photographs and biased depth of a board (SPEC 1.2, 1.5).
 
-The sheet is looked at with ``OVER`` x ``OVER`` rays a pixel through the lens as it is, lit by the room's
-lamps, behind what stands before it, and before the room, which is traced once a camera.
+The sheet is sampled with ``OVER`` x ``OVER`` rays per pixel through the true lens, lit by the room's lamps.
+Objects before it hide it; the room behind it is traced once per camera.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from pipeline.kernels.geometry import apply, inverse, pixel_rays, project
 from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, FloatArray
 
 OVER = 4
-"""Rays along either side of a pixel, which is their mean."""
+"""Rays along each side of a pixel, whose value is their mean."""
 INK, PAPER, BACK = 0.05, 0.82, 0.45
-"""Albedo of what is printed, of the sheet, and of the board from behind."""
+"""Albedo of the print, of the sheet, and of the board's back."""
 LIGHT_STEP_PX = 4
-"""The light on the sheet is traced at every fourth pixel either way."""
+"""Step of the pixels at which the light on the sheet is traced, in both directions."""
 LIGHT_BLUR = 2.0
-"""Of the light, in such steps, against the grain of its few rays."""
+"""Standard deviation of the light's blur, in these steps, against the noise of its few rays."""
 AROUND_M = 0.6
-"""The room's walls stand so far beyond all cameras and boards."""
+"""Distance of the room's walls beyond all cameras and boards."""
 
 
 @dataclass(frozen=True, slots=True)
 class BoardCamera:
-    """A node as it truly is; its depth lies on the pixels of its photographs."""
+    """A node with its true parameters; its depth is on the pixels of its photographs."""
 
     intrinsics: CameraIntrinsics
     T_world_camera: FloatArray
@@ -50,7 +50,7 @@ class BoardCamera:
 
 @dataclass(frozen=True, slots=True)
 class BoardImage:
-    """What one camera has of one moment."""
+    """The images of one camera at one moment."""
 
     rgb: ByteArray
     """(H, W, 3)."""
@@ -67,10 +67,10 @@ class BoardViews:
     T_world_board: tuple[FloatArray, ...]
     """(4, 4) of every moment."""
     images: tuple[tuple[BoardImage, ...], ...]
-    """Of every moment, of every camera."""
+    """Images of every moment, of every camera."""
 
     def T_camera_board(self, moment: int, camera: int) -> FloatArray:
-        """(4, 4) where a camera truly has the board."""
+        """Return the (4, 4) true pose of the board in a camera's frame."""
         return inverse(self.cameras[camera].T_world_camera) @ self.T_world_board[moment]
 
 
@@ -83,16 +83,16 @@ def render_board_views(
     quality: Quality = "fast",
     film: Film | None = None,
 ) -> BoardViews:
-    """Photograph and measure a board.
+    """Render photographs and depth of a board.
 
     Args:
-        board: what is printed.
-        cameras: who looks.
-        T_world_board: the board's (4, 4) pose at every moment.
-        seed: of noise, blur and exposure; every image has its own.
+        board: the printed board.
+        cameras: the cameras.
+        T_world_board: (4, 4) pose of the board at every moment.
+        seed: seed of noise, blur and exposure; every image has its own.
         scene: the room around; None builds a plain one that holds all cameras and boards.
-        quality: of the room behind the board.
-        film: how the cameras develop; None is the demo scenes' film.
+        quality: quality of the room behind the board.
+        film: colour film of the cameras; None is the demo scenes' film.
     """
     scene = scene or room_around(board, cameras, T_world_board)
     renderer = Renderer(scene)
@@ -112,7 +112,7 @@ def render_board_views(
 
 
 def with_depth_near_boards(views: BoardViews, margin_px: int) -> BoardViews:
-    """The same, but no depth farther than a margin from the rectangle around the board."""
+    """Return the views without depth farther than a margin from the rectangle around the board."""
     rows = []
     for moment, images in enumerate(views.images):
         row = []
@@ -130,7 +130,7 @@ def with_depth_near_boards(views: BoardViews, margin_px: int) -> BoardViews:
 
 
 def room_around(board: Board, cameras: Sequence[BoardCamera], T_world_board: Sequence[FloatArray]) -> Scene:
-    """A plain room that holds all cameras and boards, along the world's axes."""
+    """Return a plain room, along the world's axes, that holds all cameras and boards."""
     held = [camera.T_world_camera[:3, 3][None] for camera in cameras]
     held += [apply(T, sheet_corners_m(board)) for T in T_world_board]
     low, high = np.concatenate(held).min(axis=0) - AROUND_M, np.concatenate(held).max(axis=0) + AROUND_M
@@ -161,7 +161,7 @@ def _with_board(
     camera: BoardCamera,
     rng: np.random.Generator,
 ) -> Exposure:
-    """The room with the board in it, where it is in the picture and nothing stands before it."""
+    """Return the room with the board in it, where it is in the picture and no object hides it."""
     T_camera_board = inverse(camera.T_world_camera) @ T_world_board
     window = _window(board, T_camera_board, camera.intrinsics)
     if window is None:
@@ -192,7 +192,7 @@ Window = tuple[slice, slice]
 
 
 def _window(board: Board, T_camera_board: FloatArray, intrinsics: CameraIntrinsics) -> Window | None:
-    """The rows and columns that the sheet can cover; None if it is out of the picture."""
+    """Return the rows and columns that the sheet can cover; None if it is out of the picture."""
     corners_m = apply(T_camera_board, sheet_corners_m(board))
     if (corners_m[:, 2] <= 0.05).any():
         if (corners_m[:, 2] > 0.05).any():
@@ -216,12 +216,12 @@ def _window(board: Board, T_camera_board: FloatArray, intrinsics: CameraIntrinsi
 def _looked_at(
     board: Board, T_camera_board: FloatArray, rays: FloatArray, faces: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """(h, w) share of each pixel that the sheet covers, and that share times its albedo."""
+    """Return (h, w) share of each pixel that the sheet covers, and that share times its albedo."""
     h, w = rays.shape[:2]
     plane = np.column_stack([T_camera_board[:3, 0], T_camera_board[:3, 1], T_camera_board[:3, 3]])
     on_board = rays.reshape(-1, 3) @ np.linalg.inv(plane).T
     at_px = sheet_px(board, on_board[:, :2] / on_board[:, 2:]).reshape(h, w, 2).astype(np.float32)
-    # Within a pixel the sheet is straight to a thousandth of a millimetre, so places in it are interpolated.
+    # Within a pixel the sheet is straight to a thousandth of a millimetre, so positions are interpolated.
     x, y = cv2.split(cv2.resize(at_px, (OVER * w, OVER * h), interpolation=cv2.INTER_LINEAR))
     print_ = printed(board)
     inside = (x >= -0.5) & (y >= -0.5) & (x < print_.shape[1] - 0.5) & (y < print_.shape[0] - 0.5)
@@ -239,7 +239,7 @@ def _looked_at(
 def _light(
     renderer: Renderer, places_m: FloatArray, normal: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
-    """(h, w, 3) light on the sheet, smooth but for shadows."""
+    """Return (h, w, 3) light on the sheet, smooth except for shadows."""
     some_m = places_m[LIGHT_STEP_PX // 2 :: LIGHT_STEP_PX, LIGHT_STEP_PX // 2 :: LIGHT_STEP_PX]
     if not some_m.size:
         some_m = places_m[:1, :1]

@@ -1,4 +1,4 @@
-"""A carton of known size on a table in a corner, with a few things around it."""
+"""A box of known size on a table in a corner, with a few objects around it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BOX_YAW_RAD = 0.35
 
 
 def box_on_table() -> Scene:
-    """The scene; the box is its first part."""
+    """Return the scene; the box is its first part."""
     rng = np.random.default_rng(41)
     x, y, top = TABLE_M
     box = board(

@@ -24,7 +24,7 @@ from pipeline.types import DepthMap, FloatArray, RgbdFrame, Rig, RigTruth
 
 POSE_ERROR_RAD = np.radians(3.0)
 POSE_ERROR_M = 0.06
-"""How wrong every node but the first is about its pose."""
+"""Error of the believed position of every node but the first, metres."""
 
 UNCALIBRATED = "uncalibrated"
 
@@ -39,7 +39,7 @@ DEMOS: dict[str, Callable[[], Scene]] = {
 
 
 def build_demo(name: str) -> Scene:
-    """The procedural scene behind a demo.
+    """Return the procedural scene behind a demo.
 
     Raises:
         InputError: there is no demo of that name.
@@ -50,7 +50,7 @@ def build_demo(name: str) -> Scene:
 
 
 def render_demo(name: str) -> Rig:
-    """The rig of a demo as it ships; the same bits every time."""
+    """Return the rig of a demo as it ships; every call gives the same bits."""
     scene = build_demo(name)
     renderer = Renderer(scene)
     frames, depth = [], []
@@ -68,7 +68,7 @@ def render_demo(name: str) -> Rig:
 
 
 def nodes_of(name: str) -> tuple[BoardCamera, ...]:
-    """The nodes of a demo as they truly are.
+    """Return the nodes of a demo with their true parameters.
 
     Raises:
         InputError: there is no demo of that name.
@@ -80,12 +80,13 @@ def nodes_of(name: str) -> tuple[BoardCamera, ...]:
 
 
 def render_demo_boards(name: str) -> BoardViews | None:
-    """The board views beside a demo whose nodes need calibration; None beside the others."""
+    """Return the board views of a demo whose nodes need calibration; None for other demos."""
     return render_boards(DEMO_SCENES[name].seed) if name == UNCALIBRATED else None
 
 
 def disturbed(T_world_camera: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """The (4, 4) pose turned by ``POSE_ERROR_RAD`` and shifted by ``POSE_ERROR_M``, in random directions."""
+    """Return the (4, 4) pose turned by ``POSE_ERROR_RAD`` and shifted by ``POSE_ERROR_M``, in random
+    directions."""
     axis, way = (v / np.linalg.norm(v) for v in rng.standard_normal((2, 3)))
     T = T_world_camera.copy()
     T[:3, :3] = T[:3, :3] @ rotation_exp(POSE_ERROR_RAD * axis)

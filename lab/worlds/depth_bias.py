@@ -1,4 +1,4 @@
-"""How a depth sensor is wrong in a way that does not average out (SPEC 1.5)."""
+"""A model of a depth sensor's systematic errors, which averaging does not remove (SPEC 1.5)."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from pipeline.types import DepthMap, FloatArray
 
 @dataclass(frozen=True, slots=True)
 class DepthBias:
-    """The true depth of what is measured at z in pixel (u, v): a + b z + c z^2 + z s(u, v)."""
+    """The true depth of a measured z in pixel (u, v): a + b z + c z^2 + z s(u, v)."""
 
     a_m: float = 0.0
     b: float = 1.0
     c_per_m: float = 0.0
     waves: FloatArray = field(default_factory=lambda: np.zeros((1, 1)))
-    """(K, L) of s, a share of the depth: how much of cos(k pi v') cos(l pi u') it holds, u' and v' from 0 to
-    1 across the image. Without the first, s has no mean; it is no spline, which a calibration may fit."""
+    """(K, L) cosine coefficients of s, a share of the depth: s = sum of w_kl cos(k pi v') cos(l pi u'), u'
+    and v' from 0 to 1 across the image. With w_00 = 0, s has mean zero; s is not a spline, so a calibration
+    has to fit it."""
 
     def share(self, shape: tuple[int, int]) -> FloatArray:
         """(H, W) s at every pixel."""
@@ -30,7 +31,7 @@ class DepthBias:
         return down @ self.waves @ across.T
 
     def measured(self, true: DepthMap) -> DepthMap:
-        """What a sensor with this bias reports where one without it reports ``true``."""
+        """Return the depth that a sensor with this bias reports for the depth ``true``."""
         above_m = true.z_m.astype(np.float64) - self.a_m
         slope = self.b + self.share(true.z_m.shape)
         root = np.sqrt(np.maximum(slope**2 + 4.0 * self.c_per_m * above_m, 0.0))

@@ -1,4 +1,4 @@
-"""From light to a photograph: exposure, white balance, filmic curve, vignette, blur and sensor noise."""
+"""Conversion of light to a photograph: exposure, white balance, filmic curve, vignette, blur and noise."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.types import ByteArray, FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """How a cheap colour camera develops a scene; each photograph has random values within these ranges."""
+    """A cheap colour camera's film; each photograph has random values within these ranges."""
 
     exposure_stops: float = 0.15
     """Auto exposure is wrong by up to this many stops either way."""

@@ -16,7 +16,7 @@ WINDOW = (0.15, 0.85, 1.8, 1.45)
 
 
 def living_room() -> Scene:
-    """The scene; every choice is seeded."""
+    """Return the scene; all random choices are seeded."""
     rng = np.random.default_rng(11)
     return Scene(
         "living-room",

@@ -1,7 +1,7 @@
-"""A room on moving day before three nodes as they come from the shop, and the boards to calibrate them by.
+"""A room on moving day with three uncalibrated nodes, and board views to calibrate them.
 
-Their files say 525 pixels of focal length, a lens without distortion, poses by a tape measure, and depth as
-the sensor has it.
+The nodes' files have a focal length of 525 pixels, a lens without distortion, poses by a tape measure, and
+depth as the sensor gives it.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from pipeline.types import CameraIntrinsics
 SIZE_M = (3.9, 3.7, 2.5)
 WINDOW = (0.35, 0.9, 1.3, 1.3)
 CORNER_M = (SIZE_M[0] - 0.4, SIZE_M[1] - 0.36)
-"""Of the stacked boxes."""
+"""Place of the stacked boxes."""
 BOARD = Board("circles", 11, 9, 0.05)
 MOMENTS = 14
 AROUND_PX = 16
-"""The depth images end so far beyond the board, which keeps the files small."""
+"""Margin of the depth images around the board, which keeps the files small."""
 
 
 def _lens(fx_px: float, fy_px: float, cx_px: float, cy_px: float, k1: float, k2: float) -> CameraIntrinsics:
@@ -42,17 +42,17 @@ LENSES = (
     _lens(508.3, 509.9, 313.1, 246.8, -0.08, 0.09),
     _lens(537.2, 536.1, 321.7, 251.2, 0.14, -0.31),
 )
-"""As they truly are: focal lengths 2 to 3 % off what the files say."""
+"""True lenses: focal lengths are 2 to 3 % off those in the files."""
 BIASES = (
     DepthBias(0.0, 0.99, 0.0, np.array([[0.0, 0.002, -0.002], [0.001, 0.0, 0.001], [-0.002, 0.0, 0.0]])),
     DepthBias(0.03, 1.0, 0.0, np.array([[0.0, -0.002, -0.003], [0.002, 0.001, 0.0], [-0.001, 0.0, 0.0]])),
     DepthBias(-0.03, 1.01, 0.0, np.array([[0.0, 0.001, -0.002], [-0.002, 0.0, 0.001], [-0.003, 0.0, 0.0]])),
 )
-"""Of the depth sensors: 1 % too far; 3 cm too near; 3 cm too far and 1 % too near."""
+"""Biases of the depth sensors: 1 % too far; 3 cm too near; 3 cm too far and 1 % too near."""
 
 
 def moving_day() -> Scene:
-    """The scene; every choice is seeded. Its intrinsics are what the nodes' files say."""
+    """Return the scene; all random choices are seeded. Its intrinsics are those in the nodes' files."""
     rng = np.random.default_rng(53)
     return Scene(
         "uncalibrated",
@@ -70,13 +70,13 @@ def moving_day() -> Scene:
 
 
 def true_nodes() -> tuple[BoardCamera, ...]:
-    """The nodes as they are."""
+    """Return the nodes with their true parameters."""
     cameras = moving_day().cameras
     return tuple(BoardCamera(*node) for node in zip(LENSES, cameras, BIASES, strict=True))
 
 
 def render_boards(seed: int) -> BoardViews:
-    """The circle grid held in the room before all nodes, at ``MOMENTS`` moments."""
+    """Return views of the circle grid in the room before all nodes, at ``MOMENTS`` moments."""
     scene, nodes = moving_day(), true_nodes()
     renderer = Renderer(scene)
     free_m = [renderer.depth(node.intrinsics, node.T_world_camera) for node in nodes]
@@ -98,7 +98,7 @@ def _room(rng: Rng) -> list[Part]:
 
 
 def _corner(rng: Rng) -> list[Part]:
-    """Cartons in stacks."""
+    """Add stacks of cartons."""
     x, y = CORNER_M
     return [
         *storage.cardboard_box(rng, place(x, y, 0.04), (0.62, 0.5, 0.48)),
@@ -111,7 +111,7 @@ def _corner(rng: Rng) -> list[Part]:
 
 
 def _sideboard(rng: Rng) -> list[Part]:
-    """Emptied, with what does not fit into a carton on it."""
+    """Add an emptied sideboard with objects on it that fit into no carton."""
     x, y, top = 2.3, SIZE_M[1] - 0.24, 0.8
     return [
         *storage.cabinet(rng, place(x, y, NORTH), (1.35, 0.44, top), "#8a5a33"),

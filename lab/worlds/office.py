@@ -17,7 +17,7 @@ DESK_M = (1.72, SIZE_M[1] - 0.43)
 
 
 def office() -> Scene:
-    """The scene; every choice is seeded."""
+    """Return the scene; all random choices are seeded."""
     rng = np.random.default_rng(23)
     return Scene(
         "office",

@@ -1,4 +1,4 @@
-"""Rays through pixels, and the random numbers that neighbouring pixels share out among themselves."""
+"""Rays through pixels, and random numbers that are stratified over neighbouring pixels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pipeline.types import CameraIntrinsics, FloatArray, IntArray
 def camera_rays(
     intrinsics: CameraIntrinsics, T_world_camera: FloatArray, offset_px: tuple[float, float] = (0.0, 0.0)
 ) -> FloatArray:
-    """(H * W, 6) float32 world rays whose parameter t is the depth z."""
+    """Return (H * W, 6) float32 world rays whose parameter t is the depth z."""
     matrix = intrinsics.matrix.copy()
     matrix[:2, 2] -= offset_px
     directions = pixel_rays(replace(intrinsics, matrix=matrix)).reshape(-1, 3)
@@ -25,7 +25,7 @@ def camera_rays(
 
 
 def dither(shape: tuple[int, int], rng: np.random.Generator) -> FloatArray:
-    """(H * W, 2) random numbers, 0 to 1, that differ as much as can be between neighbouring pixels."""
+    """Return (H * W, 2) random numbers, 0 to 1, stratified over each tile of 4 x 4 pixels."""
     shifted = rng.random((shape[0] * shape[1], 2), dtype=np.float32)
     shifted *= np.float32(1.0 / 16.0)
     shifted += _strata(shape)
@@ -34,14 +34,14 @@ def dither(shape: tuple[int, int], rng: np.random.Generator) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def lit_pixels(shape: tuple[int, int], every: bool) -> IntArray:
-    """Row numbers of the pixels whose light is traced: all, or the white fields of a chess board."""
+    """Return the row numbers of the pixels whose light is traced: all, or every other one (checkerboard)."""
     y, x = np.mgrid[: shape[0], : shape[1]]
     return np.flatnonzero((x + y) % 2 == 0) if not every else np.arange(x.size)
 
 
 @lru_cache(maxsize=4)
 def _strata(shape: tuple[int, int]) -> FloatArray:
-    """(H * W, 2) lower ends of the sixteenths that the pixels of a 4 x 4 tile draw from."""
+    """Return (H * W, 2) lower ends of the sixteenths from which the pixels of a 4 x 4 tile draw."""
     first = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]])
     second = np.array([[0, 5, 10, 15], [11, 14, 1, 4], [6, 3, 12, 9], [13, 8, 7, 2]])
     repeats = (-(-shape[0] // 4), -(-shape[1] // 4))

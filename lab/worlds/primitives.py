@@ -55,11 +55,11 @@ def lathe(profile_m: FloatArray | Sequence, segments: int = 32, bevel_m: float =
     """A profile turned about the z axis: vases, cups, shades, bottles.
 
     Args:
-        profile_m: (K, 2) radius and height. An open profile runs from bottom to top along the outside and
-            is closed along the axis; a profile that ends where it starts is a ring, counter-clockwise
-            in the (radius, height) plane.
+        profile_m: (K, 2) radius and height. An open profile runs from bottom to top along the outside and is
+            closed along the axis; a profile that returns to its start is a ring, counter-clockwise in the
+            (radius, height) plane.
         segments: facets around the axis.
-        bevel_m: cuts the profile's corners, so that smooth shading keeps them crisp.
+        bevel_m: cuts the profile's corners, so that they stay sharp in smooth shading.
     """
     profile = np.asarray(profile_m, float)
     ring = np.array_equal(profile[0], profile[-1])
@@ -178,42 +178,42 @@ def tube(path_m: FloatArray | Sequence, radius_m: float | Vector, segments: int 
 
 
 def transformed(mesh: Mesh, T: FloatArray) -> Mesh:
-    """The mesh after a (4, 4) rigid or scaling transform that keeps its handedness."""
+    """Return the mesh after a (4, 4) rigid or scaling transform that keeps its handedness."""
     return geometry.apply(T, mesh[0]), mesh[1]
 
 
 def moved(mesh: Mesh, x_m: float = 0.0, y_m: float = 0.0, z_m: float = 0.0) -> Mesh:
-    """The mesh shifted."""
+    """Return the mesh shifted."""
     return mesh[0] + np.array([x_m, y_m, z_m]), mesh[1]
 
 
 def merged(meshes: Sequence[Mesh]) -> Mesh:
-    """Several solids as one mesh."""
+    """Return several solids as one mesh."""
     first = np.cumsum([0] + [len(vertices) for vertices, _ in meshes])
     triangles = [triangles + start for (_, triangles), start in zip(meshes, first, strict=False)]
     return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(triangles)
 
 
 def quads_of(index: IntArray) -> IntArray:
-    """(Q, 4) cells of a (rows, columns) grid of vertex numbers, counter-clockwise when rows go up."""
+    """Return (Q, 4) cells of a (rows, columns) grid of vertex numbers, counter-clockwise if rows go up."""
     corners = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     return np.stack(corners, axis=-1).reshape(-1, 4)
 
 
 def _split(quads: IntArray) -> IntArray:
-    """Two triangles for each quad."""
+    """Return two triangles for each quad."""
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def _cube_surface(axes: list[FloatArray]) -> Mesh:
-    """The outside of a grid over a box, whose planes lie at three lists of coordinates."""
+    """Return the outside of a grid over a box, whose planes are at three lists of coordinates."""
     used, triangles = _cube_triangles(tuple(len(axis) for axis in axes))
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)[used], triangles
 
 
 @lru_cache(maxsize=64)
 def _cube_triangles(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
-    """Which points of a grid lie on its outside, and (F, 3) triangles over those."""
+    """Return the points of a grid that are on its outside, and (F, 3) triangles over them."""
     number = np.arange(np.prod(shape)).reshape(shape)
     # For each axis, the other two in the order that makes the high side's faces counter-clockwise.
     quads = []
@@ -225,7 +225,8 @@ def _cube_triangles(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
 
 
 def _bevelled(profile: FloatArray, bevel_m: float, ring: bool) -> FloatArray:
-    """The profile with two points for each corner, a bevel's length (or a third of the edge) away from it."""
+    """Return the profile with each corner replaced by two points, a bevel (or a third of an edge) away from
+    it."""
     corners = profile if ring else profile[1:-1]
     before = np.roll(profile, 1, axis=0) if ring else profile[:-2]
     after = np.roll(profile, -1, axis=0) if ring else profile[2:]
@@ -239,7 +240,7 @@ def _bevelled(profile: FloatArray, bevel_m: float, ring: bool) -> FloatArray:
 
 
 def _ear_clip(outline: FloatArray) -> IntArray:
-    """(K - 2, 3) triangles of a simple counter-clockwise polygon."""
+    """Return (K - 2, 3) triangles of a simple counter-clockwise polygon."""
     rest, triangles = list(range(len(outline))), []
     while len(rest) > 3:
         for k in range(len(rest)):

@@ -1,4 +1,4 @@
-"""A scene as Embree sees it: which part a ray meets, where, and whether something is in its way."""
+"""Ray casting with Embree: the part that a ray meets, the place, and shadow tests."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from pipeline.types import BoolArray, FloatArray, IntArray
 
 @dataclass(frozen=True, slots=True)
 class Hits:
-    """Where N rays meet the scene."""
+    """The first intersections of N rays with the scene."""
 
     t: FloatArray
-    """(N,) in units of the ray's direction; infinite for a miss."""
+    """(N,) ray parameter, in units of the direction; infinite for a miss."""
     positions: FloatArray
     """(N, 3)."""
     normals: FloatArray
@@ -32,7 +32,7 @@ class Hits:
     """(N,) index of the part, -1 for a miss."""
 
     def select(self, rows: IntArray) -> Hits:
-        """The hits of some rays."""
+        """Return the hits of some rays."""
         return Hits(self.t[rows], self.positions[rows], self.normals[rows], self.view[rows], self.part[rows])
 
 
@@ -55,12 +55,12 @@ class RayCaster:
 
     @cached_property
     def _opaque(self) -> o3d.t.geometry.RaycastingScene:
-        """What casts shadows."""
+        """The parts that cast shadows."""
         pairs = zip(self._meshes, self._parts, strict=True)
         return _embree([mesh for mesh, part in pairs if part.material.emission <= 0.0])
 
     def cast(self, rays: FloatArray) -> Hits:
-        """The first thing each ray meets."""
+        """Return the first intersection of each ray."""
         answer = self._all.cast_rays(tensor(rays, np.float32), nthreads=self._threads)
         t, triangle = answer["t_hit"].numpy(), answer["primitive_ids"].numpy()
         positions, normals, view = np.zeros((3, len(t), 3), np.float32)
@@ -73,13 +73,13 @@ class RayCaster:
         return Hits(t, positions, normals, view, part)
 
     def occluded(self, rays: FloatArray, t_far: float) -> BoolArray:
-        """(N,) True where something opaque is nearer than ``t_far`` times the ray's direction."""
+        """Return (N,) True where an opaque part is nearer than ``t_far`` times the ray's direction."""
         cast = tensor(rays, np.float32)
         return self._opaque.test_occlusions(cast, 0.0, t_far, nthreads=self._threads).numpy()
 
 
 def world_mesh(scene: Scene) -> tuple[FloatArray, IntArray]:
-    """(V, 3) vertices in the world frame and (F, 3) triangles of all parts."""
+    """Return (V, 3) vertices in the world frame and (F, 3) triangles of all parts."""
     return merged([(apply(part.T_world_part, part.vertices_m), part.triangles) for part in scene.parts])
 
 
@@ -87,7 +87,7 @@ _ShadedMesh = tuple[FloatArray, IntArray, FloatArray]
 
 
 def _world_mesh(part: Part) -> _ShadedMesh:
-    """World vertices, triangles, and (F, 3, 3) shading normals of each triangle's corners."""
+    """Return world vertices, triangles, and (F, 3, 3) shading normals of each triangle's corners."""
     vertices = apply(part.T_world_part, part.vertices_m)
     triangles = np.ascontiguousarray(part.triangles)
     return vertices, triangles, shading.corner_normals(vertices, triangles, part.smooth)

@@ -20,12 +20,12 @@ Quality = Literal["fast", "photo"]
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One rendered image and what is really there, all on the same pixel grid."""
+    """One rendered image and the true geometry, all on the same pixel grid."""
 
     rgb: ByteArray
     """(H, W, 3)."""
     z_m: FloatArray
-    """(H, W) float32 depth along the optical axis at the pixel centres; NaN where nothing is."""
+    """(H, W) float32 depth along the optical axis at the pixel centres; NaN if the ray meets nothing."""
     normals: FloatArray
     """(H, W, 3) unit surface normals in the world frame, towards the camera."""
     infrared: FloatArray
@@ -38,7 +38,7 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """A view before the film is developed."""
+    """A view before it becomes a photograph."""
 
     radiance: FloatArray
     """(H, W, 3) float32 linear light."""
@@ -47,25 +47,25 @@ class Exposure:
     infrared: FloatArray
     gloss: FloatArray
     T_world_camera: FloatArray
-    """These as in ``View``."""
+    """This and the fields before it are as in ``View``."""
 
     def developed(self, film: Film, rng: np.random.Generator) -> View:
-        """The photograph, and what is really there."""
+        """Return the photograph with the true geometry."""
         rgb = develop(self.radiance, film, rng)
         return View(rgb, self.z_m, self.normals, self.infrared, self.gloss, self.T_world_camera)
 
 
 @dataclass(frozen=True, slots=True)
 class _Sampling:
-    """How many rays a quality spends."""
+    """The number of rays of a render quality."""
 
     offsets_px: tuple[tuple[float, float], ...]
-    """Where in a pixel the passes look."""
+    """Positions in a pixel that the passes sample."""
     rays: int
-    """Shadow rays a light, pass and pixel, and sky rays over the hemisphere a pass and pixel."""
+    """Shadow rays per light, pass and pixel, and sky rays over the hemisphere per pass and pixel."""
     thorough: bool
-    """Trace light at all pixels, not at the white fields of a chess board, and gather the light of what sky
-    rays hit, instead of only counting it as occluded."""
+    """Trace light at all pixels, not only at every other one (checkerboard), and collect the light of the
+    surfaces that sky rays hit, instead of counting them as occluders only."""
     film: Film
 
 
@@ -76,9 +76,9 @@ _SAMPLING = {
     "photo": _Sampling(_ROTATED_GRID_PX, rays=4, thorough=True, film=Film()),
 }
 _DULL = 0.05
-"""Parts with less gloss reflect nothing."""
+"""Gloss below which parts reflect nothing."""
 _REACH_M = 1.2
-"""Things nearer than this occlude the ambient light."""
+"""Distance within which objects occlude the ambient light."""
 
 
 class Renderer:
@@ -96,12 +96,14 @@ class Renderer:
         self._gloss = np.array([m.gloss for m in materials] + [0.0], np.float32)
         self._infrared = np.array([m.infrared for m in materials] + [0.0], np.float32)
         self._emission = np.array([m.emission for m in materials] + [0.0], np.float32)
-        self._mirror = np.where(self._emission > 0.0, np.float32(0.0), self._gloss)  # own light outshines it
+        self._mirror = np.where(
+            self._emission > 0.0, np.float32(0.0), self._gloss
+        )  # the part's own light outshines it
         self._ambient = np.asarray(scene.ambient, np.float32)
 
     @cached_property
     def _mean_albedo(self) -> FloatArray:
-        """(parts + 1, 3) mean albedo of each part, black for a miss."""
+        """Return (parts + 1, 3) mean albedo of each part, black for a miss."""
         return np.stack([*(_mean_albedo(part) for part in self.scene.parts), np.zeros(3, np.float32)])
 
     def view(
@@ -111,7 +113,7 @@ class Renderer:
         quality: Quality,
         rng: np.random.Generator,
     ) -> View:
-        """Renders one view (H, W of ``intrinsics``)."""
+        """Render one view (H, W of ``intrinsics``)."""
         return self.exposure(intrinsics, T_world_camera, quality, rng).developed(_SAMPLING[quality].film, rng)
 
     def exposure(
@@ -121,7 +123,7 @@ class Renderer:
         quality: Quality,
         rng: np.random.Generator,
     ) -> Exposure:
-        """The light of one view (H, W of ``intrinsics``)."""
+        """Return the light of one view (H, W of ``intrinsics``)."""
         sampling = _SAMPLING[quality]
         shape = (intrinsics.height_px, intrinsics.width_px)
         center = self._caster.cast(camera_rays(intrinsics, T_world_camera))
@@ -144,13 +146,14 @@ class Renderer:
         )
 
     def depth(self, intrinsics: CameraIntrinsics, T_world_camera: FloatArray) -> FloatArray:
-        """(H, W) float32 true depth at the pixel centres; NaN where nothing is."""
+        """Return (H, W) float32 true depth at the pixel centres; NaN if the ray meets nothing."""
         return self.parts_seen(intrinsics, T_world_camera)[0]
 
     def parts_seen(
         self, intrinsics: CameraIntrinsics, T_world_camera: FloatArray
     ) -> tuple[FloatArray, IntArray]:
-        """(H, W) depth like ``depth``, and the (H, W) index of the part at each pixel, -1 for none."""
+        """Return (H, W) depth as in ``depth``, and the (H, W) index of the part at each pixel, -1 for
+        none."""
         hits = self._caster.cast(camera_rays(intrinsics, T_world_camera))
         shape = (intrinsics.height_px, intrinsics.width_px)
         z_m = np.where(hits.part >= 0, hits.t, np.float32(np.nan))
@@ -159,13 +162,13 @@ class Renderer:
     def irradiance(
         self, positions_m: FloatArray, normals: FloatArray, rng: np.random.Generator, rays: int = 4
     ) -> FloatArray:
-        """(H, W, 3) light that falls on places (H, W, 3) of something that is not in the scene.
+        """Return (H, W, 3) light on positions (H, W, 3) of an object that is not in the scene.
 
         Args:
-            positions_m: world frame.
-            normals: (H, W, 3) unit, towards the side that is lit.
+            positions_m: (H, W, 3) world frame.
+            normals: (H, W, 3) unit, towards the lit side.
             rng: draws the rays.
-            rays: shadow rays a light and place, and sky rays a place.
+            rays: shadow rays per light and position, and sky rays per position.
         """
         shape = positions_m.shape[:2]
         places, up = (array.reshape(-1, 3).astype(np.float32) for array in (positions_m, normals))
@@ -178,7 +181,7 @@ class Renderer:
         return (light / rays).reshape(*shape, 3)
 
     def _albedo(self, hits: Hits) -> FloatArray:
-        """(N, 3) albedo from the parts' textures, black for misses."""
+        """Return (N, 3) albedo from the parts' textures, black for misses."""
         albedo = np.zeros((len(hits.part), 3), np.float32)
         order = np.argsort(hits.part, kind="stable")
         bounds = np.searchsorted(hits.part[order], np.arange(len(self.scene.parts) + 1))
@@ -196,7 +199,7 @@ class Renderer:
         sampling: _Sampling,
         rng: np.random.Generator,
     ) -> FloatArray:
-        """(H, W, 3) light towards the camera: traced at some pixels, spread within surfaces to all."""
+        """Return (H, W, 3) light towards the camera: traced at some pixels, spread within surfaces to all."""
         lit = lit_pixels(shape, sampling.thorough)
         some = hits.select(lit)
         direct, shine, sky = (np.zeros((len(lit), 3), np.float32) for _ in range(3))
@@ -225,9 +228,9 @@ class Renderer:
         shine: FloatArray,
         shadows: bool = True,
     ) -> None:
-        """Adds each light to (N, 3) irradiance, by one shadow ray or as if nothing were in its way.
+        """Add each light to (N, 3) irradiance, by one shadow ray or as if unoccluded.
 
-        Its blurred image in (N,) glossy surfaces goes to (N, 3) shine.
+        Its blurred image in (N,) glossy surfaces is added to (N, 3) shine.
         """
         count = len(hits.t)
         rays, weight = np.empty((count, 6), np.float32), np.empty(count, np.float32)
@@ -242,7 +245,8 @@ class Renderer:
             shading.add_light(*lamp, hits.view, hits.normals, gloss, irradiance, shine)
 
     def _sky(self, hits: Hits, random: FloatArray, bounce: bool) -> FloatArray:
-        """(N, 3) ambient irradiance by one ray over the hemisphere, with what it meets on the way."""
+        """Return (N, 3) ambient irradiance by one ray over the hemisphere, with the surfaces that it
+        meets."""
         rays = np.empty((len(hits.t), 6), np.float32)
         shading.hemisphere_rays(hits.positions, hits.normals, random, rays)
         if bounce:
@@ -251,7 +255,8 @@ class Renderer:
         return np.where(blocked[:, None], 0.35 * self._ambient, self._ambient).astype(np.float32)
 
     def _met(self, rays: FloatArray, random: FloatArray, shadows: bool) -> FloatArray:
-        """(N, 3) light from what rays meet: its mean colour, lit by lamps and ambient light."""
+        """Return (N, 3) light of the surfaces that rays meet: their mean colour, lit by lamps and ambient
+        light."""
         hits = self._caster.cast(rays)
         light = np.zeros((len(rays), 3), np.float32)
         self._add_lights(hits, np.zeros(len(rays), np.float32), random, light, light, shadows)
@@ -264,7 +269,7 @@ class Renderer:
     def _add_mirrored(
         self, hits: Hits, albedo: FloatArray, random: FloatArray, shadows: bool, shine: FloatArray
     ) -> None:
-        """Adds what shiny parts reflect to (N, 3) shine, blurred by their roughness and tinted by metals."""
+        """Add reflections of shiny parts to (N, 3) shine, blurred by roughness and tinted by metals."""
         rows = np.flatnonzero(self._mirror[hits.part] > _DULL)
         if not len(rows):
             return
@@ -285,18 +290,18 @@ def render(
     quality: Quality,
     rng: np.random.Generator,
 ) -> View:
-    """One view of a scene; use ``Renderer`` for several."""
+    """Render one view of a scene; use ``Renderer`` for several."""
     return Renderer(scene).view(intrinsics, T_world_camera, quality, rng)
 
 
 def _evaluate(part: Part, positions_m: FloatArray, normals: FloatArray) -> FloatArray:
-    """(N, 3) albedo at world positions of a part."""
+    """Return (N, 3) albedo at world positions of a part."""
     T = part.T_world_part.astype(np.float32)
     return part.material.texture((positions_m - T[:3, 3]) @ T[:3, :3], normals @ T[:3, :3])
 
 
 def _mean_albedo(part: Part) -> FloatArray:
-    """(3,) mean of the texture over places on some twenty triangles."""
+    """Return the (3,) mean of the texture over positions on about twenty triangles."""
     triangles = np.ascontiguousarray(part.triangles[:: max(1, len(part.triangles) // 20)])
     weights = np.array([[3, 3, 4], [7, 2, 1], [1, 7, 2]], np.float32) / 10.0
     corners = part.vertices_m[triangles].astype(np.float32)
@@ -306,13 +311,13 @@ def _mean_albedo(part: Part) -> FloatArray:
 
 
 def _mirror_share(hits: Hits, gloss: FloatArray) -> FloatArray:
-    """(N,) share of the light that is mirrored, more at grazing angles (after Schlick)."""
+    """Return (N,) share of the light that is mirrored, more at grazing angles (after Schlick)."""
     grazing = (1.0 - np.clip(-np.einsum("nk,nk->n", hits.view, hits.normals), 0.0, 1.0)) ** 4
     return np.where(gloss > _DULL, gloss * (gloss + (1.0 - gloss) * grazing), np.float32(0.0))
 
 
 def _smoothed(image: FloatArray, hits: Hits, shape: tuple[int, int]) -> FloatArray:
-    """(H * W, 3) light averaged, and filled where it is NaN, within surfaces."""
+    """Return (H * W, 3) light averaged, and filled where it is NaN, within surfaces."""
     surface = (hits.positions.reshape(*shape, 3), hits.normals.reshape(*shape, 3), hits.t.reshape(shape))
     return shading.smooth_within_surfaces(image.reshape(*shape, 3), *surface, 2).reshape(-1, 3)
 

@@ -1,4 +1,4 @@
-"""Random materials for floors, walls and things, wide enough that a network cannot learn a style by heart."""
+"""Random materials of floors, walls and objects, varied enough that a network cannot memorise a style."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def random_wall(rng: Rng) -> Material:
 
 
 def random_material(rng: Rng) -> Material:
-    """Anything a thing may be made of."""
+    """A random material of an object."""
     color, second, third = textures.random_palette(rng, 3)
     light, dark = random_timber(rng)
     seed, gloss = draw_seed(rng), float(rng.choice([0.0, 0.0, 0.1, 0.3, 0.5]))
@@ -85,7 +85,7 @@ def random_material(rng: Rng) -> Material:
 
 
 def recolored(parts: list[Part], rng: Rng) -> list[Part]:
-    """A piece in other colours: its own ones times a random tint, so that textures and contrasts stay."""
+    """Return a piece in other colours: its own times a random tint, so that textures and contrasts stay."""
     gain = np.clip(rng.uniform(0.45, 1.7) * rng.uniform(0.6, 1.4, 3), 0.2, 2.0).astype(np.float32)
     return [
         part if part.material.emission > 0.0 else replace(part, material=_tinted(part.material, gain))
@@ -94,7 +94,7 @@ def recolored(parts: list[Part], rng: Rng) -> list[Part]:
 
 
 def random_timber(rng: Rng) -> tuple[FloatArray, FloatArray]:
-    """Light and dark colour of a wood: from maple over oak and cherry to wenge, or limed grey."""
+    """Return light and dark colour of a wood: from maple over oak and cherry to wenge, or limed grey."""
     light = np.array([0.55, 0.36, 0.19]) * rng.uniform([0.9, 0.75, 0.6], [1.1, 1.15, 1.5])
     light *= rng.uniform(0.15, 1.3)
     light = light + rng.uniform(0.0, 0.5) ** 2 * (light.mean() - light)
@@ -102,14 +102,14 @@ def random_timber(rng: Rng) -> tuple[FloatArray, FloatArray]:
 
 
 def muted(rng: Rng, count: int, low: float, high: float, chroma: float = 0.4) -> FloatArray:
-    """(count, 3) colours of low to middling saturation with a luminance near low to high."""
+    """Return (count, 3) colours of low to medium saturation with a luminance from about low to high."""
     value = rng.uniform(low, high, (count, 1))
     tint = rng.uniform(0.0, chroma, (count, 1)) * rng.uniform(-1.0, 1.0, (count, 3))
     return np.clip(value * (1.0 + tint), 0.01, 0.9)
 
 
 def draw_seed(rng: Rng) -> int:
-    """A seed for a texture."""
+    """Return a seed for a texture."""
     return int(rng.integers(2**31))
 
 
@@ -119,10 +119,10 @@ def _tinted(material: Material, gain: FloatArray) -> Material:
 
 
 def covered(parts: list[Part], material: Material) -> list[Part]:
-    """The parts all of one material, but for those that shine."""
+    """Return the parts in one material, except those that emit light."""
     return [part if part.material.emission > 0.0 else replace(part, material=material) for part in parts]
 
 
 def lamp_white(rng: Rng) -> FloatArray:
-    """(3,) white of a colour temperature from about 2700 to 8000 K."""
+    """Return (3,) white of a colour temperature from about 2700 to 8000 K."""
     return np.array([1.0, 0.78, 0.52]) + rng.random() ** 0.7 * np.array([-0.12, 0.14, 0.55])

@@ -20,17 +20,17 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 @dataclass(slots=True)
 class _Plan:
-    """A room while it is being furnished."""
+    """A room that is being furnished."""
 
     seed: int
     size_m: FloatArray
     """(3,) inner width (x), depth (y) and height."""
     parts: list[Part]
     taken: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
-    """Low and high (x, y) corners of what stands on the floor."""
+    """Low and high (x, y) corners of the pieces on the floor."""
 
     def add_free(self, piece: list[Part], T: FloatArray, gap_m: float = 0.04) -> bool:
-        """Puts a piece at ``T`` if it lies inside the room and meets nothing else on the floor."""
+        """Put a piece at ``T`` if it is inside the room and overlaps no other piece on the floor."""
         moved = pieces.moved(piece, T)
         low, high = pieces.bounds(moved)
         half = 0.5 * self.size_m[:2] - 0.01
@@ -59,7 +59,7 @@ def random_room(seed: int) -> Scene:
 
 
 def _dress_walls(plan: _Plan, rng: Rng) -> list[FloatArray]:
-    """Skirting, windows, doors, pictures and shelves; returns where daylight comes in."""
+    """Add skirting, windows, doors, pictures and shelves; return the places where daylight comes in."""
     windows = []
     skirting = Material(paint(muted(rng, 1, 0.1, 0.8)[0], 2)) if rng.random() < 0.6 else None
     for wall in range(4):
@@ -82,7 +82,7 @@ def _dress_walls(plan: _Plan, rng: Rng) -> list[FloatArray]:
 
 
 def _furnish_walls(plan: _Plan, rng: Rng) -> None:
-    """Sofas, shelves, cabinets, desks and clutter with their backs to the walls."""
+    """Add sofas, shelves, cabinets, desks and clutter with their backs to the walls."""
     for _ in range(int(rng.integers(4, 10))):
         piece = _varied(pieces.from_stock(pieces.random_wall_furniture, plan.seed, rng), rng)
         low, high = pieces.bounds(piece)
@@ -97,7 +97,7 @@ def _furnish_walls(plan: _Plan, rng: Rng) -> None:
 
 
 def _furnish_middle(plan: _Plan, rng: Rng) -> None:
-    """Tables with chairs, rugs, boxes and things that stand about."""
+    """Add tables with chairs, rugs, boxes and single objects."""
     if rng.random() < 0.35:
         rug = pieces.random_rug(rng)
         x, y = rng.uniform(-0.2, 0.2, 2) * plan.size_m[:2]
@@ -114,7 +114,7 @@ def _furnish_middle(plan: _Plan, rng: Rng) -> None:
 
 
 def _varied(piece: list[Part], rng: Rng) -> list[Part]:
-    """A piece as made, in other colours, or all of a random material."""
+    """Return a piece unchanged, in other colours, or all of a random material."""
     kind = rng.random()
     if kind < 0.3:
         return piece
@@ -124,7 +124,7 @@ def _varied(piece: list[Part], rng: Rng) -> list[Part]:
 
 
 def _lights(rng: Rng, size_m: FloatArray, windows: list[FloatArray]) -> tuple[tuple[Light, ...], FloatArray]:
-    """One to three area lights and the ambient light, from a warm evening to a grey day."""
+    """Return one to three area lights and the ambient light, from a warm evening to a grey day."""
     lights = []
     for place in windows[:2]:
         if rng.random() < 0.75:
@@ -140,7 +140,7 @@ def _lights(rng: Rng, size_m: FloatArray, windows: list[FloatArray]) -> tuple[tu
 
 
 def _intrinsics(rng: Rng) -> CameraIntrinsics:
-    """A Kinect v1's colour camera, from sample to sample: 525 px +- 5 % at 640 x 480."""
+    """Return random intrinsics of a Kinect v1's colour camera: 525 px +- 5 % at 640 x 480."""
     focal_px = 525.0 * rng.uniform(0.95, 1.05)
     cx_px, cy_px = 319.5 + rng.normal(0.0, 4.0), 239.5 + rng.normal(0.0, 4.0)
     return CameraIntrinsics.pinhole(focal_px, focal_px, cx_px, cy_px, 640, 480)

@@ -1,4 +1,4 @@
-"""A procedural place: solid parts with materials, lights, and the cameras that look at it."""
+"""A procedural scene: solid parts with materials, lights, and the cameras that see it."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ Texture = Callable[[FloatArray, FloatArray], FloatArray]
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """What a surface does to light, visible and infrared."""
+    """The reflection of visible and infrared light by a surface."""
 
     texture: Texture
     """Albedo as a function of the place on the part; a solid texture needs no unwrapping."""
     gloss: float = 0.0
-    """Strength of the mirror-like reflection, 0 (chalk) to 1 (polished metal); loses depth when high."""
+    """Strength of the mirror-like reflection, 0 (chalk) to 1 (polished metal); high gloss loses depth."""
     infrared: float = 1.0
     """Infrared albedo relative to the visible luminance; black plastic and screens are near 0."""
     emission: float = 0.0
-    """Own light, in units of albedo (lamps, windows, screens)."""
+    """Emitted light in units of albedo (lamps, windows, screens)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Scene:
     parts: tuple[Part, ...]
     lights: tuple[Light, ...]
     ambient: FloatArray
-    """(3,) linear RGB of the light that comes from everywhere, dimmed by ambient occlusion."""
+    """(3,) linear RGB of the light from all directions, dimmed by ambient occlusion."""
     cameras: tuple[FloatArray, ...]
     """True T_world_camera of every node."""
     intrinsics: CameraIntrinsics

@@ -1,4 +1,4 @@
-"""A structured-light depth sensor of the first Kinect's kind: its noise, its steps and its holes."""
+"""A structured-light depth sensor like the first Kinect: its noise, quantisation and holes."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, FloatArray
 
 @dataclass(frozen=True, slots=True)
 class SensorConfig:
-    """What a first-generation Kinect does; pixels are those of its 640-wide image.
+    """Parameters of a first-generation Kinect; pixels are those of its 640-wide image.
 
     Sources: Nguyen, Izadi, Lovell 2012 (axial noise, steep angles); Khoshelham, Elberink 2012 (baseline,
-    disparity steps, range); Barron, Malik 2013 and Handa et al. 2014 (jitter at edges). The holes'
-    thresholds were set by eye beside two real frames, for 10 to 25 % of holes.
+    disparity steps, range); Barron, Malik 2013 and Handa et al. 2014 (jitter at edges). The holes' thresholds
+    were set by eye from two real frames, for 10 to 25 % of holes.
     """
 
     baseline_m: float = 0.075
-    """The projector stands this far to the right of the camera, so shadows fall to the left of things."""
+    """Distance of the projector to the right of the camera; shadows fall to the left of objects."""
     disparity_step_px: float = 0.125
     near_m: float = 0.4
     far_m: float = 4.5
     fade_m: float = 0.6
-    """Returns get rare over this distance before the far end."""
+    """Distance before the far end over which returns become rare."""
     noise_m: tuple[float, float] = (0.0012, 0.0019)
     """Standard deviation a + b (z - 0.4)^2 along the axis."""
     grazing_deg: tuple[float, float] = (70.0, 86.0)
@@ -37,25 +37,25 @@ class SensorConfig:
     dark: tuple[float, float] = (0.0012, 0.006)
     """Infrared return (albedo x cosine / z^2) below which every pixel is lost, and above which none is."""
     mirror_deg: float = 9.0
-    """A shiny surface blinds the camera within about this angle of looking straight back."""
+    """Angle to the view direction within which a shiny surface's reflection blinds the camera."""
     edge_px: tuple[float, float] = (0.0, 1.7)
-    """Width of the band without depth along depth edges, from least to most."""
+    """Smallest and largest width of the band without depth along depth edges."""
     edge_jump_px: float = 1.0
-    """A step of disparity between neighbours that makes an edge."""
+    """Disparity step between neighbours that makes an edge."""
     flying_share: float = 0.06
     """Share of the pixels near edges that report a depth between front and back."""
     blob_share: float = 0.002
-    """Share lost for no visible reason, in blobs."""
+    """Share of pixels lost in blobs without a visible cause."""
     blob_px: tuple[float, float] = (2.0, 9.0)
     """Sizes of the blobs, fine and coarse, in which returns are lost."""
     border_px: tuple[float, float, float, float] = (8.0, 6.0, 16.0, 6.0)
-    """Left, top, right and bottom margins that the depth camera does not see."""
+    """Left, top, right and bottom margins outside the depth camera's view."""
 
 
 def sense_depth(
     view: View, intrinsics: CameraIntrinsics, rng: np.random.Generator, config: SensorConfig | None = None
 ) -> DepthMap:
-    """What the sensor reports of a rendered view: metric depth with noise, steps and holes (NaN)."""
+    """Return the sensor's depth of a rendered view: metric, with noise, quantisation and holes (NaN)."""
     config = config or SensorConfig()
     per_px = 640.0 / intrinsics.width_px
     focal_px = intrinsics.fx_px * per_px
@@ -78,17 +78,17 @@ def sense_depth(
 
 
 def axial_sigma_m(z_m: FloatArray, config: SensorConfig | None = None) -> FloatArray:
-    """Standard deviation of the depth noise, Nguyen et al. 2012."""
+    """Return the standard deviation of the depth noise, Nguyen et al. 2012."""
     a, b = (config or SensorConfig()).noise_m
     return a + b * (z_m - 0.4) ** 2
 
 
 def projector_shadow(z_m: FloatArray, focal_baseline: float, jump_px: float) -> BoolArray:
-    """(H, W) True where the projector's light is blocked by something nearer in the same row.
+    """Return (H, W) True where a nearer point in the same row blocks the projector's light.
 
     Args:
         z_m: (H, W) true depth.
-        focal_baseline: focal length (pixels) times baseline (metres); the projector stands at +x.
+        focal_baseline: focal length (pixels) times baseline (metres); the projector is at +x.
         jump_px: neighbours whose disparities differ by less are one surface.
     """
     shadow = np.zeros(z_m.shape, np.bool_)
@@ -98,7 +98,8 @@ def projector_shadow(z_m: FloatArray, focal_baseline: float, jump_px: float) -> 
 
 @numba.njit(cache=True, nogil=True)
 def _cast_shadow(disparity, jump_px, shadow):  # type: ignore[no-untyped-def]
-    """Z-buffer of each row as the projector sees it, two bins a pixel: column u appears at u - disparity."""
+    """Fill the z-buffer of each row as the projector sees it, two bins a pixel: column u appears at u -
+    disparity."""
     height, width = disparity.shape
     for y in range(height):
         margin = int(np.max(disparity[y])) + 2
@@ -116,7 +117,7 @@ def _cast_shadow(disparity, jump_px, shadow):  # type: ignore[no-untyped-def]
 
 
 def _distance_to_edges(disparity_px: FloatArray, jump_px: float) -> FloatArray:
-    """(H, W) pixels to the nearest depth edge, at most the image's size."""
+    """Return (H, W) distance to the nearest depth edge in pixels, at most the image's size."""
     smooth = np.ones(disparity_px.shape, np.uint8)
     across = np.abs(np.diff(disparity_px, axis=1)) > jump_px
     down = np.abs(np.diff(disparity_px, axis=0)) > jump_px
@@ -128,7 +129,8 @@ def _distance_to_edges(disparity_px: FloatArray, jump_px: float) -> FloatArray:
 def _jittered(
     true_m: FloatArray, edge_distance_px: FloatArray, rng: np.random.Generator, config: SensorConfig
 ) -> FloatArray:
-    """Depth whose edges are ragged by about a pixel, with a few flying pixels between front and back."""
+    """Return depth whose edges are ragged by about a pixel, with a few flying pixels between front and
+    back."""
     height, width = true_m.shape
     y, x = np.mgrid[:height, :width]
     dy, dx = np.rint(rng.normal(0.0, 0.7, (2, height, width))).astype(int)
@@ -141,7 +143,7 @@ def _jittered(
 
 
 def _quantised(z_m: FloatArray, focal_baseline: float, step_px: float) -> FloatArray:
-    """Depth whose disparity is a whole number of steps."""
+    """Return depth whose disparity is a whole number of steps."""
     steps = np.maximum(np.rint(focal_baseline / np.maximum(z_m, 0.05) / step_px), 1.0)
     return focal_baseline / (steps * step_px)
 
@@ -149,7 +151,7 @@ def _quantised(z_m: FloatArray, focal_baseline: float, step_px: float) -> FloatA
 def _loss_probability(
     view: View, intrinsics: CameraIntrinsics, true_m: FloatArray, config: SensorConfig
 ) -> FloatArray:
-    """(H, W) probability that a pixel returns nothing: steep, dark, shiny, far, or by chance."""
+    """Return (H, W) probability that a pixel returns nothing: steep, dark, shiny, far, or by chance."""
     rays = pixel_rays(intrinsics) @ view.T_world_camera[:3, :3].T
     cosine = np.abs(np.einsum("hwk,hwk->hw", rays, view.normals)) / np.linalg.norm(rays, axis=-1)
     angle_deg = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
@@ -162,7 +164,8 @@ def _loss_probability(
 
 
 def _field(shape: tuple[int, int], sizes_px: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """(H, W) uniform random numbers, 0 to 1, alike within about the (K,) sizes, which weigh equally."""
+    """Return (H, W) uniform random numbers, 0 to 1, correlated over about the (K,) sizes, weighted
+    equally."""
     total = np.zeros(shape)
     for size_px in sizes_px:
         blurred = cv2.GaussianBlur(rng.standard_normal(shape), (0, 0), size_px, borderType=cv2.BORDER_REFLECT)
@@ -178,6 +181,6 @@ def _outside(shape: tuple[int, int], border_px: FloatArray) -> BoolArray:
 
 
 def _ramp(x: FloatArray, low: float, high: float) -> FloatArray:
-    """Smooth step from 0 at low to 1 at high."""
+    """Return a smooth step from 0 at low to 1 at high."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)

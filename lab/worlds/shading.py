@@ -6,14 +6,15 @@ import numba
 import numpy as np
 
 _SKIN_M = 0.003
-"""Rays leave a surface from this far above it, so that facets do not shadow themselves."""
+"""Distance from a surface at which rays start, so that facets do not shadow themselves."""
 
 
 @numba.njit(cache=True, nogil=True)
 def corner_normals(vertices, triangles, smooth):  # type: ignore[no-untyped-def]
-    """(F, 3, 3) float32 shading normals at the corners of triangles: the faces' own, or blended if smooth.
+    """Return (F, 3, 3) float32 shading normals at the corners of triangles: the faces' own, or blended if
+    smooth.
 
-    A corner where the blend leans more than 60 degrees from its face keeps the face's: caps stay crisp.
+    A corner whose blend is over 60 degrees from its face's normal keeps the face's: caps keep sharp edges.
     """
     faces = np.zeros((len(triangles), 3))
     total = np.zeros((len(vertices), 3))
@@ -41,7 +42,7 @@ def corner_normals(vertices, triangles, smooth):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def interpolate_hits(rays, t_hit, primitive, uv, corner_normals, positions, normals, view):  # type: ignore[no-untyped-def]
-    """Fills (N, 3) unit directions of (N, 6) rays, and positions and normals (towards the origin) of hits."""
+    """Fill (N, 3) unit directions of (N, 6) rays, and positions and normals (towards the origin) of hits."""
     for n in range(len(t_hit)):
         dx, dy, dz = rays[n, 3], rays[n, 4], rays[n, 5]
         length = np.sqrt(dx * dx + dy * dy + dz * dz)
@@ -63,7 +64,7 @@ def interpolate_hits(rays, t_hit, primitive, uv, corner_normals, positions, norm
 
 @numba.njit(cache=True, nogil=True)
 def rotate(directions, T, rays):  # type: ignore[no-untyped-def]
-    """Fills (N, 6) rays from the origin of a (4, 4) pose, along (N, 3) directions in its frame."""
+    """Fill (N, 6) rays from the origin of a (4, 4) pose, along (N, 3) directions in its frame."""
     for n in range(len(directions)):
         x, y, z = directions[n, 0], directions[n, 1], directions[n, 2]
         for k in range(3):
@@ -73,7 +74,7 @@ def rotate(directions, T, rays):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def light_rays(positions, normals, center, size_m, dither, rays, cosine_over_d2, index):  # type: ignore[no-untyped-def]
-    """Shadow rays (t = 1 at the light) from the lit side of surfaces to random points of a ball.
+    """Fill shadow rays (t = 1 at the light) from the lit side of surfaces to random points of a ball.
 
     Fills the first M rows of rays (N, 6), cosine_over_d2 (N,) and index (N,), and returns M.
     """
@@ -100,7 +101,7 @@ def light_rays(positions, normals, center, size_m, dither, rays, cosine_over_d2,
 
 @numba.njit(cache=True, nogil=True)
 def add_light(occluded, cosine_over_d2, index, rays, color, view, normals, gloss, irradiance, shine):  # type: ignore[no-untyped-def]
-    """Adds unoccluded light to (N, 3) irradiance, and its blurred image (Blinn-Phong) to (N, 3) shine."""
+    """Add unoccluded light to (N, 3) irradiance, and its blurred image (Blinn-Phong) to (N, 3) shine."""
     for m in range(len(occluded)):
         if occluded[m]:
             continue
@@ -123,7 +124,7 @@ def add_light(occluded, cosine_over_d2, index, rays, color, view, normals, gloss
 
 @numba.njit(cache=True, nogil=True)
 def hemisphere_rays(positions, normals, dither, rays):  # type: ignore[no-untyped-def]
-    """Fills (N, 6) cosine-distributed unit rays above each surface."""
+    """Fill (N, 6) cosine-distributed unit rays above each surface."""
     for n in range(len(positions)):
         nx, ny, nz = normals[n, 0], normals[n, 1], normals[n, 2]
         sign = np.float32(1.0) if nz >= 0.0 else np.float32(-1.0)
@@ -141,7 +142,7 @@ def hemisphere_rays(positions, normals, dither, rays):  # type: ignore[no-untype
 
 @numba.njit(cache=True, nogil=True)
 def mirror_rays(positions, normals, view, roughness, dither, rays):  # type: ignore[no-untyped-def]
-    """Fills (N, 6) mirrored rays, spread by an (N,) roughness."""
+    """Fill (N, 6) mirrored rays, spread by an (N,) roughness."""
     for n in range(len(positions)):
         along = view[n, 0] * normals[n, 0] + view[n, 1] * normals[n, 1] + view[n, 2] * normals[n, 2]
         z = np.float32(2.0) * dither[n, 0] - np.float32(1.0)
@@ -159,7 +160,7 @@ def mirror_rays(positions, normals, view, roughness, dither, rays):  # type: ign
 
 @numba.njit(cache=True, nogil=True)
 def smooth_within_surfaces(image, positions, normals, z_m, radius):  # type: ignore[no-untyped-def]
-    """(H, W, 3) mean of each pixel's known (not NaN) neighbours on the same plane: noise goes, edges stay.
+    """Return (H, W, 3) means of each pixel's known (not NaN) neighbours on the same plane; edges stay sharp.
 
     The outermost neighbours count half, so that patterns with a period of twice the radius vanish.
     """

@@ -22,7 +22,8 @@ def shell(
     wall: Finish = random_wall,
     floor: Finish = random_floor,
 ) -> list[Part]:
-    """Floor, ceiling and four walls as slabs outside of ``size_m``; one wall in five has its own finish."""
+    """Return floor, ceiling and four walls as slabs outside ``size_m``; one wall in five has another
+    finish."""
     x, y, z = size_m
     white = muted(rng, 1, darkest_ceiling, 0.85)[0]
     ceiling = Material(paint(white, 1, 0.04)) if rng.random() < 0.85 else random_wall(rng)
@@ -44,11 +45,11 @@ def shell(
 def wall_pose(
     size_m: FloatArray, wall: int, along_m: float, inset_m: float = 0.0, z_m: float = 0.0
 ) -> FloatArray:
-    """Pose against one of four walls, front (-y) to the room, ``along_m`` from the wall's middle."""
+    """Return a pose against one of four walls, front (-y) to the room, ``along_m`` from the wall's middle."""
     reach_m = 0.5 * (size_m[1] if wall % 2 == 0 else size_m[0]) - inset_m
     return place(0.0, 0.0, wall * np.pi / 2.0) @ place(along_m, reach_m, 0.0, z_m)
 
 
 def wall_length(size_m: FloatArray, wall: int) -> float:
-    """How long one of the four walls is, metres."""
+    """Return the length of one of the four walls, metres."""
     return float(size_m[0] if wall % 2 == 0 else size_m[1])

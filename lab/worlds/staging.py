@@ -1,4 +1,4 @@
-"""What the demo scenes share: a closed room, sunlight, and nodes on an arc that look at one place."""
+"""Common parts of the demo scenes: a closed room, sunlight, and nodes on an arc that look at one place."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ WEST, EAST, SOUTH, NORTH = np.pi / 2.0, -np.pi / 2.0, np.pi, 0.0
 WALL_M = 0.22
 
 Opening = tuple[float, float, float, float]
-"""A window's hole: place along the wall from its middle (to the right), lower edge, width, height; metres."""
+"""A window's hole: position along the wall from its middle (to the right), lower edge, width, height;
+metres."""
 
 
 def shell(
@@ -32,14 +33,14 @@ def shell(
     openings: Mapping[float, Opening],
     skirting: str = "#efece4",
 ) -> list[Part]:
-    """Floor, ceiling, walls and skirting boards around the room (0, 0, 0) to ``size_m``.
+    """Return floor, ceiling, walls and skirting boards around the room (0, 0, 0) to ``size_m``.
 
     Args:
-        rng: seeds the paint.
+        rng: random generator of the paint.
         size_m: inner size.
-        floor: its material.
+        floor: material of the floor.
         walls: materials of the west, east, south and north wall.
-        ceiling: its material.
+        ceiling: material of the ceiling.
         openings: the windows' holes by wall, ``WEST`` to ``NORTH``.
         skirting: colour of the skirting boards.
     """
@@ -59,7 +60,7 @@ def shell(
 
 
 def _wall(length_m: float, height_m: float, opening: Opening | None) -> Mesh:
-    """A wall behind y = 0, about x = 0, with or without a hole; it covers the corners as well."""
+    """Return a wall behind y = 0, about x = 0, with or without a hole; it covers the corners too."""
     total = length_m + 2.0 * WALL_M
     if opening is None:
         return moved(box((total, WALL_M, height_m)), 0.0, WALL_M / 2, height_m / 2)
@@ -75,7 +76,7 @@ def _wall(length_m: float, height_m: float, opening: Opening | None) -> Mesh:
 
 
 def sun(through_m: Sequence[float], onto_m: Sequence[float], irradiance: float) -> Light:
-    """Sunlight that comes through one place (in a window) and falls on another."""
+    """Return sunlight that passes one place (in a window) and falls on another."""
     through, onto = np.asarray(through_m, float), np.asarray(onto_m, float)
     way = (through - onto) / np.linalg.norm(through - onto)
     distance_m = 15.0
@@ -86,7 +87,8 @@ def sun(through_m: Sequence[float], onto_m: Sequence[float], irradiance: float) 
 def arc(
     target_m: Sequence[float], distance_m: float, height_m: float, azimuths_deg: Sequence[float]
 ) -> tuple[FloatArray, ...]:
-    """T_world_camera of nodes around a place, at a horizontal distance and a height above the floor."""
+    """Return T_world_camera of nodes around a place, at a horizontal distance and a height above the
+    floor."""
     poses = []
     for azimuth in np.radians(azimuths_deg):
         x = target_m[0] + distance_m * np.cos(azimuth)

@@ -1,4 +1,4 @@
-"""Where a person with a depth camera would stand in a room, and where a camera hangs below the ceiling.
+"""Random viewpoints in a room: of handheld depth cameras, and of cameras below the ceiling.
 
 Rooms are closed; parts[0] is the floor slab, parts[1] the ceiling slab, parts[:6] the shell.
 """
@@ -18,27 +18,27 @@ from pipeline.kernels.geometry import look_at, rigid, rotation_exp
 from pipeline.types import CameraIntrinsics, FloatArray, IntArray
 
 NEAREST_M = 0.3
-"""No pixel of a varied view is nearer."""
+"""Least depth of a pixel in a varied view."""
 _MARGIN_M = 0.25
-"""Cameras keep this far from walls."""
+"""Distance of cameras from walls."""
 _CLOSE_UP_SHARE = 0.3
 _CEILING_SHARE = 0.25
 _CLEARANCE_M = 0.45
-"""From the box around any thing: at 75 degrees the corner of the image is 44 degrees off the axis, so that
-what is 0.42 m away may be 0.3 m deep."""
+"""Distance from the box around any object: at 75 degrees the corner of the image is 44 degrees off the axis,
+so an object 0.42 m away can have a depth of 0.3 m."""
 _PREVIEW = CameraIntrinsics.pinhole(26.25, 26.25, 15.5, 11.5, 32, 24)
 
 _View = TypeVar("_View")
 
 
 def random_views(scene: Scene, rng: Rng, count: int, renderer: Renderer | None = None) -> list[FloatArray]:
-    """T_world_camera of ``count`` plausible cameras: room views, and close-ups from above.
+    """Return T_world_camera of ``count`` plausible cameras: room views, and close-ups from above.
 
     Args:
         scene: a closed room.
         rng: source of all randomness.
         count: number of cameras.
-        renderer: the scene's renderer, where there is one already.
+        renderer: the scene's renderer, if there is one already.
 
     Raises:
         InputError: the room is so full that no camera sees anything.
@@ -61,17 +61,17 @@ def random_views(scene: Scene, rng: Rng, count: int, renderer: Renderer | None =
 def varied_views(
     seed: int, scene: Scene, count: int = 5, renderer: Renderer | None = None, width_px: int = 320
 ) -> Iterator[tuple[FloatArray, CameraIntrinsics]]:
-    """T_world_camera and intrinsics (4:3) of cameras that see something and stand in nothing.
+    """Yield T_world_camera and intrinsics (4:3) of cameras with a usable view that are inside no object.
 
     Three in four are held by people, at 1.0 to 1.8 m; the others hang at 2.2 to 3 m and look down. Their
     horizontal fields of view are 45 to 75 degrees.
 
     Args:
-        seed: of the views.
+        seed: seed of the views.
         scene: a closed room.
         count: number of views.
-        renderer: the scene's renderer, where there is one already.
-        width_px: of the images.
+        renderer: the scene's renderer, if there is one already.
+        width_px: width of the images.
 
     Raises:
         InputError: the room is so full that no camera sees anything.
@@ -95,7 +95,7 @@ def varied_views(
 
 
 def _found(scene: Scene, count: int, tries: int, candidate: Callable[[], _View | None]) -> Iterator[_View]:
-    """The first ``count`` candidates that are something, of ``tries`` for each."""
+    """Yield the first ``count`` valid candidates, of ``tries`` for each."""
     found = 0
     for _ in range(tries * count):
         if found == count:
@@ -109,7 +109,8 @@ def _found(scene: Scene, count: int, tries: int, candidate: Callable[[], _View |
 
 
 def _inside(scene: Scene, face: Callable[[FloatArray], float]) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest corner of the air in a room, up to the upper or lower face of the ceiling slab."""
+    """Return the lowest and highest corner of a room's air, up to the ceiling slab's face that ``face``
+    selects."""
     floor, ceiling = scene.parts[:2]
     places = floor.vertices_m + floor.T_world_part[:3, 3]
     top = float(face(ceiling.vertices_m[:, 2] + ceiling.T_world_part[2, 3]))
@@ -117,20 +118,20 @@ def _inside(scene: Scene, face: Callable[[FloatArray], float]) -> tuple[FloatArr
 
 
 def _things(scene: Scene, low: FloatArray, high: FloatArray) -> FloatArray:
-    """(K, 3) centres of the parts that stand in the lower half of the room."""
+    """Return (K, 3) centres of the parts in the lower half of the room."""
     centers = np.array([part.T_world_part[:3, 3] for part in scene.parts[6:]]).reshape(-1, 3)
     inside = np.all((centers > low) & (centers < high), axis=1) & (centers[:, 2] < 1.3)
     return centers[inside]
 
 
 def _boxes(scene: Scene) -> tuple[FloatArray, FloatArray]:
-    """(K, 3) low and high corners of the boxes around everything but the shell."""
+    """Return (K, 3) low and high corners of the boxes around everything but the shell."""
     corners = np.array([bounds([part]) for part in scene.parts[6:]]).reshape(-1, 2, 3)
     return corners[:, 0], corners[:, 1]
 
 
 def _room_view(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
-    """A camera at 0.5 to 2 m, pitched -38 to +10 degrees, that rather looks across the room."""
+    """Return a camera at 0.5 to 2 m, pitched -38 to +10 degrees, that mostly looks across the room."""
     x, y = rng.uniform(low[:2] + _MARGIN_M, high[:2] - _MARGIN_M)
     eye = np.array([x, y, low[2] + rng.uniform(0.5, min(2.0, high[2] - low[2] - 0.2))])
     yaw = _yaw_to_middle(eye, low, high) + rng.normal(0.0, 0.9)
@@ -139,7 +140,7 @@ def _room_view(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def _close_up(rng: Rng, things: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray | None:
-    """A camera 0.6 to 1.6 m from a thing, looking down at it by 20 to 65 degrees."""
+    """Return a camera 0.6 to 1.6 m from an object, looking down at it by 20 to 65 degrees."""
     target = things[rng.integers(len(things))] + rng.normal(0.0, 0.1, 3)
     distance, yaw = rng.uniform(0.6, 1.6), rng.uniform(0.0, 2.0 * np.pi)
     pitch = np.radians(rng.uniform(20.0, 65.0))
@@ -150,7 +151,7 @@ def _close_up(rng: Rng, things: FloatArray, low: FloatArray, high: FloatArray) -
 
 
 def _handheld(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
-    """A camera held at 1.0 to 1.8 m, tilted -45 to +10 degrees, rather towards the middle of the room."""
+    """Return a camera at 1.0 to 1.8 m, tilted -45 to +10 degrees, mostly towards the middle of the room."""
     eye = _somewhere(rng, low, high, rng.uniform(1.0, 1.8), 0.35)
     pitch = np.radians(np.clip(rng.normal(-15.0, 13.0), -45.0, 10.0))
     yaw = _yaw_to_middle(eye, low, high) + rng.normal(0.0, 0.9)
@@ -158,7 +159,7 @@ def _handheld(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def _overhead(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
-    """A camera mounted at 2.2 to 3 m that looks down by 20 to 80 degrees, often from a corner."""
+    """Return a camera at 2.2 to 3 m that looks down by 20 to 80 degrees, often from a corner."""
     height = rng.uniform(2.2, max(2.2, min(3.0, high[2] - low[2] - 0.1)))
     eye = _somewhere(rng, low, high, height, 0.15)
     if rng.random() < 0.5:
@@ -179,19 +180,19 @@ def _yaw_to_middle(eye: FloatArray, low: FloatArray, high: FloatArray) -> float:
 
 
 def _direction(yaw_rad: float, pitch_rad: float) -> FloatArray:
-    """(3,) unit vector; upwards for a positive pitch."""
+    """Return a (3,) unit vector; upwards for a positive pitch."""
     level = np.cos(pitch_rad)
     return np.array([level * np.cos(yaw_rad), level * np.sin(yaw_rad), np.sin(pitch_rad)])
 
 
 def _rolled(T_world_camera: FloatArray, rng: Rng, sigma_rad: float) -> FloatArray:
-    """The camera turned a little about its axis, as nobody holds one level."""
+    """Return the camera turned a little about its axis, because a held camera is never level."""
     roll = np.array([0.0, 0.0, rng.normal(0.0, sigma_rad)])
     return np.asarray(T_world_camera @ rigid(rotation_exp(roll), np.zeros(3)))
 
 
 def _camera(fov_rad: float, width_px: int) -> CameraIntrinsics:
-    """A pinhole camera with square pixels and 4:3 images."""
+    """Return a pinhole camera with square pixels and 4:3 images."""
     height_px = width_px * 3 // 4
     focal_px = 0.5 * width_px / np.tan(0.5 * fov_rad)
     return CameraIntrinsics.pinhole(
@@ -205,7 +206,7 @@ def _is_bare(part: IntArray, most: float) -> bool:
 
 
 def _sees_enough(z_m: FloatArray, part: IntArray, close: bool) -> bool:
-    """Whether nothing sits before the lens and the picture is not just walls and ceiling."""
+    """Whether no object is close before the lens and the picture is not only walls and ceiling."""
     if _is_bare(part, 0.45 if close else 0.65):
         return False
     nearest, middle, far = np.percentile(z_m, [2.0, 50.0, 95.0])

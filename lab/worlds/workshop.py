@@ -17,7 +17,7 @@ BENCH_M = (2.55, SIZE_M[1] - 0.36)
 
 
 def workshop() -> Scene:
-    """The scene; every choice is seeded."""
+    """Return the scene; all random choices are seeded."""
     rng = np.random.default_rng(37)
     return Scene(
         "workshop",
@@ -102,7 +102,7 @@ def _floor(rng: Rng) -> list[Part]:
 
 
 def _offcuts(rng: Rng, T_world: np.ndarray) -> list[Part]:
-    """Short ends of planks that stand in a crate."""
+    """Short ends of planks in a crate."""
     parts = []
     for k in range(7):
         length, tone = rng.uniform(0.3, 0.55), ("#d2b083", "#c29a63", "#b98a58")[k % 3]

@@ -1,1 +1,1 @@
-"""Calibrate: the cameras from photographs of a board, and how far to believe them."""
+"""The Calibrate screen: cameras calibrated from photographs of a board, and their uncertainty."""

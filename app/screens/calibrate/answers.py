@@ -1,4 +1,4 @@
-"""What is asked about the camera and the view that are shown: first the verdict, then depth."""
+"""Requests for the shown camera's verdict and then for the depth of the shown view."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Answers:
-    """The newest verdict and the newest depth pictures; of two questions, the later waits for the earlier."""
+    """The newest verdict and depth pictures; the depth job waits for the verdict."""
 
     def __init__(
         self,
@@ -21,11 +21,11 @@ class Answers:
         on_trust: Callable[[TrustView | None], None],
         on_depth: Callable[[], None],
     ) -> None:
-        """Ask nothing yet.
+        """Start without requests.
 
         Args:
-            session: whose jobs answer.
-            on_trust: called with a new verdict, or None if there could be none.
+            session: the session whose jobs answer.
+            on_trust: called with a new verdict, or None if there is none.
             on_depth: called when there are new depth pictures.
         """
         self._session, self._on_trust, self._on_depth = session, on_trust, on_depth
@@ -36,11 +36,11 @@ class Answers:
         self._judging = False
 
     def trust_in(self, camera: CameraView) -> TrustView | None:
-        """The newest verdict, if it is about this camera."""
+        """Return the newest verdict if it is about this camera."""
         return self._trust if self._trust is not None and self._trust.request.camera == camera.name else None
 
     def pictures_of(self, camera: CameraView, view: str) -> dict[str, Picture]:
-        """What there is for a view."""
+        """Return the pictures of a view that have been computed."""
         trust, off = self.trust_in(camera), self._off
         pictures = {} if trust is None else dict(trust.pictures)
         if off is not None and (off.camera, off.view) == (camera.name, view):
@@ -48,12 +48,12 @@ class Answers:
         return pictures
 
     def ask(self, request: TrustRequest, view: str, depth: bool) -> None:
-        """Ask what is not known yet.
+        """Request what is not known yet.
 
         Args:
-            request: the verdict that is wanted.
-            view: the one that is shown.
-            depth: whether its depth is wanted.
+            request: the verdict to compute.
+            view: the view that is shown.
+            depth: whether its depth is needed.
         """
         if self._judging:
             return

@@ -1,4 +1,4 @@
-"""Two pictures of what one camera sees, with a line between them."""
+"""A picture area with two pictures of a camera's view, divided by a line."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ EMPTY = np.full((480, 640, 3), 235, np.uint8)
 QUALITY = 92
 MISSING = "not there for this view"
 START = (PAIRS[STRAIGHTENED].left, PAIRS[STRAIGHTENED].right, 50.0)
-"""Two pictures and the line between them in %."""
+"""The first two pictures, and the line between them in %."""
 
 
 class PictureArea:
-    """Which two pictures are shown, where the line is, the pictures, and what their colours mean."""
+    """The choice of two pictures, the line, the pictures, and their colour bars."""
 
     def __init__(self, ui: Ui, on_pair: Callable[[], None]) -> None:
-        """Add the area to the current container; ``on_pair`` is called when others are wanted."""
+        """Add the area to the current container; ``on_pair`` is called after another choice."""
         self._pictures: Mapping[str, Picture] = {}
         self._on_pair = on_pair
         self._drawn: tuple[object, ...] = ()
@@ -40,32 +40,32 @@ class PictureArea:
 
     @property
     def wanted(self) -> str:
-        """The pair that is to be shown, one of ``PAIRS``."""
+        """The chosen pair, one of ``PAIRS``."""
         return self._pair.value
 
     def load(self, pictures: Mapping[str, Picture]) -> None:
-        """Show what there is; without the photograph nothing."""
+        """Show the available pictures; without the photograph nothing."""
         self._pictures, self._drawn = pictures, ()
         for handle in (self._pair, self._split, self._image, self._captions):
             handle.visible = bool(pictures)
         self._draw()
 
     def set(self, pair: str = STRAIGHTENED, split_share: float = 0.5) -> None:
-        """Choose for the person."""
+        """Choose a pair and the line."""
         self._pair.value, self._split.value = pair, round(100.0 * split_share)
         self._draw()
 
     def place(self) -> str:
-        """The pair by its pictures' names and the line in %, for the address; empty as at the start."""
+        """Return the pair by its pictures' names and the line in % for the address; empty for the start."""
         pair = PAIRS[self.wanted]
         now = (pair.left, pair.right, float(self._split.value))
         return "" if now == START else place_text(*now)
 
     def take(self, place: str) -> None:
-        """Show such a pair.
+        """Show the pair in an address.
 
         Raises:
-            InputError: there is none like it.
+            InputError: there is no such pair.
         """
         left, right, percent = place_of(place, START)
         names = [name for name, pair in PAIRS.items() if (pair.left, pair.right) == (left, right)]
@@ -75,7 +75,7 @@ class PictureArea:
         self._on_pair()
 
     def _draw(self) -> None:
-        """Only what has changed: a dragged slider asks more often than it moves."""
+        """Draw if something has changed: a dragged slider reports more often than its value changes."""
         if not self._pictures:
             return
         photo = self._pictures["photo"]

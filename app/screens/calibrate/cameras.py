@@ -1,4 +1,4 @@
-"""Every camera of a session with a board, by itself and then all together."""
+"""Calibration of every camera of a board session, first alone and then all together."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ from pipeline.io.images import read_color
 from pipeline.types import ByteArray
 
 PICTURE_WIDTH_PX, QUALITY = 640, 85
-"""Of the photographs in the panel."""
+"""Width and JPEG quality of the photographs in the panel."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraFound:
-    """A camera by itself."""
+    """A camera calibrated alone."""
 
     view: CameraView
     report: CameraReport | None
@@ -52,19 +52,19 @@ class CameraFound:
 
 @dataclass(frozen=True, slots=True)
 class CamerasFound:
-    """All cameras, as the panel shows them and as ``packetmesh calibrate`` has them."""
+    """All cameras, as the panel shows them and as ``packetmesh calibrate`` reports them."""
 
     view: CalibrationView
     reports: Mapping[str, CameraReport]
-    """By name, of those that their views determine: as all together have them, or each by itself."""
+    """Reports by name of the cameras that their views determine: from all cameras together, or alone."""
     rig: RigReport | None = None
-    """None of one camera, and where they cannot be placed."""
+    """None for one camera, or if the cameras cannot be placed."""
 
 
 def cameras_of(
     store: Store, views: BoardViews, share: float = 1.0
 ) -> Generator[Progress | CalibrationView, None, CamerasFound]:
-    """All cameras, without their depth; yields what there is so far, in the first ``share`` of the work.
+    """Calibrate all cameras without their depth; yield partial results in the first ``share`` of progress.
 
     Raises:
         InputError: there are no photographs.
@@ -92,7 +92,7 @@ def cameras_of(
 def finished(
     steps: Generator[Progress | CalibrationView, None, CamerasFound],
 ) -> Generator[Progress, None, CamerasFound]:
-    """Only the progress on the way to all cameras."""
+    """Yield only the progress, and return the cameras."""
     while True:
         try:
             step = next(steps)
@@ -103,19 +103,19 @@ def finished(
 
 
 def own_views(views: BoardViews, *cameras: str) -> BoardViews:
-    """All that some cameras depend on as long as each is by itself: what others leave out is not there."""
+    """Return all that these cameras depend on while calibrated alone, without others' dropped views."""
     return replace(views, dropped=tuple(one for one in views.dropped if one[0] in cameras))
 
 
 def stage_name(kind: str, camera: str) -> str:
-    """What the store calls a result about a camera, which may be one of a node's two."""
+    """Return the store's name of a result about a camera, which may be one of a node's two."""
     return f"{kind}-{camera.replace('/', '-')}"
 
 
 def _camera_of(
     store: Store, views: BoardViews, name: str, moments: Mapping[Path, str], begin: float, end: float
 ) -> Generator[Progress, None, CameraFound]:
-    """One camera, which nothing but its own views changes."""
+    """Calibrate one camera alone, from its own views."""
     own = own_views(views, name)
 
     def compute() -> Generator[Progress, None, CameraFound]:
@@ -151,7 +151,7 @@ def _camera_of(
 
 
 def _warp(found: BoardWarp, board: Board) -> WarpView:
-    """What the panel shows of a board's shape."""
+    """Return the board's shape for the panel."""
     off_plane_m = found.off_plane_m.reshape(board.rows, board.columns)
     return WarpView(off_plane_m, found.helps, found.rms_px, found.flat_rms_px)
 
@@ -165,7 +165,7 @@ def _photograph(moment: str, image: ByteArray, found: Detection) -> Photograph:
 
 
 def _with_lens(camera: CameraView, report: CameraReport, moments: Mapping[Path, str]) -> CameraView:
-    """The camera with its lens, by which dropped views are placed, too; all are called by their moments."""
+    """Return the camera with its lens, which also places dropped views; views are named by moments."""
     names = {path.name: moment for path, moment in moments.items()}
     lens = replace(report.calibration, views=_named(report.calibration.views, names))
     placed = [*_named(report.held_out, names)]
@@ -181,12 +181,12 @@ def _with_lens(camera: CameraView, report: CameraReport, moments: Mapping[Path, 
 
 
 def _named(fitted: Sequence[FittedView], moments: Mapping[str, str]) -> tuple[FittedView, ...]:
-    """Views by their moments instead of the names of files."""
+    """Return views named by their moments instead of files."""
     return tuple(replace(view, name=moments[view.name]) for view in fitted)
 
 
 def _together(views: BoardViews, view: CalibrationView, reports: Mapping[str, CameraReport]) -> CamerasFound:
-    """All lenses and poses together; where that cannot be, every camera as it is by itself."""
+    """Calibrate all lenses and poses together; if that fails, keep every camera alone."""
     nodes = shots_of(views)
     try:
         rig = cameras_together(nodes, reports, view.board, FOLDS)
@@ -225,12 +225,12 @@ UNITS = {
     "scale": ("Scale", 100.0, "%"),
     "curvature_per_m": ("Curvature", 1000.0, "mm at 1 m"),
 }
-"""What the terms are called, and units shown in one of the field's."""
+"""Names of the terms, shown units per unit of the field, and units."""
 
 
 @dataclass(frozen=True, slots=True)
 class DepthFound:
-    """A correction, and what the panel shows of it."""
+    """A depth correction, and its view for the panel."""
 
     correction: DepthCorrection
     view: BiasView
@@ -239,14 +239,14 @@ class DepthFound:
 def bias_of(
     store: Store, views: BoardViews, cameras: CamerasFound, camera: str, done: float = 0.5
 ) -> Generator[Progress, None, DepthFound | str]:
-    """The bias of the depth of a camera's node, or why it is not known.
+    """Return the depth bias of a camera's node, or a sentence why it is unknown.
 
     Args:
-        store: what is known already: a camera by itself keeps its bias while only others change.
+        store: keeps the bias of a camera that is calibrated alone while only others change.
         views: the photographs.
-        cameras: that took them.
+        cameras: the calibrated cameras.
         camera: one of them.
-        done: share of the work before this.
+        done: share of the progress before this.
     """
     name = camera.removesuffix(INFRARED)
 
@@ -260,7 +260,7 @@ def bias_of(
 
 
 def depth_file(views: BoardViews, camera: str, moment: str) -> Path | None:
-    """The depth image of a view, on the pixels of its photograph; None without one."""
+    """Return the depth image of a view, on the pixels of its photograph; None without one."""
     apart = camera.endswith(INFRARED)
     shots = _node(views, camera.removesuffix(INFRARED)).shots
     found = (one.depth for one in shots if one.moment == moment and (one.infrared is not None) == apart)
@@ -288,7 +288,7 @@ def _bias(node: NodeShots, cameras: CamerasFound) -> DepthFound | str:
 
 
 def _view(fit: DepthFit, note: str) -> BiasView:
-    """What the panel shows of it."""
+    """Return the fit for the panel."""
     rows = _rows(fit.correction)
     return BiasView(fit.terms, rows, fit.rms_before_m, fit.rms_after_m, bias_curve(fit), note)
 

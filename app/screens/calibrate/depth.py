@@ -1,4 +1,4 @@
-"""The folder of the depth sensor's own bias: its terms, and the curve before and after."""
+"""The folder of the depth sensor's bias: its terms, and the curve before and after the correction."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ each of its pixels truly is, so the photographs that calibrate the lens calibrat
 
 
 class DepthFolder:
-    """Numbers and a curve of one camera's depth."""
+    """Numbers and a curve of one camera's depth bias."""
 
     def __init__(self, ui: Ui) -> None:
         """Add the folder."""
@@ -32,7 +32,7 @@ class DepthFolder:
             self._note = gui.add_markdown(Markdown(""))
 
     def load(self, told: BiasView | str | None) -> None:
-        """Show another camera's; None is still to come, a sentence says why there is none."""
+        """Show a camera's bias; None is not computed yet, a text is the reason why there is none."""
         found = told if isinstance(told, BiasView) else None
         self._plot.visible = found is not None
         self._table.content = Markup("") if found is None else bias_table(found)
@@ -44,7 +44,7 @@ class DepthFolder:
 
 
 def bias_table(view: BiasView) -> Markup:
-    """HTML: the terms that held-out views justify, and what they do."""
+    """Return a table in HTML of the terms that held-out views justify, and their effect."""
     meaning = {
         "Offset": "Added to every depth; with its 95 % interval.",
         "Scale": "How much longer depth truly is than measured; with its 95 % interval.",

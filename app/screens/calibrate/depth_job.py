@@ -1,4 +1,4 @@
-"""The depth of one view beside the board's plane, as measured and corrected."""
+"""The job that compares one view's depth, measured and corrected, with the board's plane."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LEAST_SCALE_M = 0.01
 
 
 def depth_job(store: Store, spec: Spec, name: str, view: str) -> Generator[Progress, None, DepthErrorView]:
-    """What a view's depth is off by on the board; no picture where there is no depth or no board."""
+    """Return pictures of a view's depth error on the board; none without depth or board."""
     views = spec.views
     assert views is not None
     known = yield from finished(cameras_of(store, views))
@@ -52,7 +52,7 @@ def depth_job(store: Store, spec: Spec, name: str, view: str) -> Generator[Progr
 
 
 def board_depth_m(lens: Calibration, T_camera_board: FloatArray, board: Board) -> FloatArray:
-    """(H, W) depth of the board's plane between its outermost points; NaN elsewhere."""
+    """Return (H, W) depth of the board's plane between its outermost points; NaN elsewhere."""
     width_px, height_px = lens.size_px
     low_m, high_m = board.points_m[:, :2].min(axis=0), board.points_m[:, :2].max(axis=0)
     along = np.linspace(0.0, 1.0, 16, endpoint=False)[:, None]

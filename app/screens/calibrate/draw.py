@@ -1,4 +1,4 @@
-"""Boards and cameras in space: as a camera sees them, as the board does, or all cameras of a rig."""
+"""Drawing of boards and cameras: relative to a camera, to the board, or all cameras of a rig."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from pipeline.types import FloatArray
 BELOW = "/calibrate"
 FACES = np.array([[0, 1, 2], [0, 2, 3]])
 RIM = 0.9
-"""Of the board beyond its outer points, in its spacing."""
+"""Width of the board beyond its outer points, in its spacing."""
 ASPECT = 1.2
-"""In a picture that is narrower than so many heights one stands farther away."""
+"""Aspect below which the viewpoint is farther away."""
 FAR = 0.95
-"""How far away one stands, over the size of what is seen."""
+"""Distance of the viewpoint over the size of the drawing."""
 
 
 class BoardsDrawing:
-    """The boards of one camera, the cameras around one board, or those of a rig; one view is chosen."""
+    """The boards of one camera, the cameras around one board, or a rig's; one view is highlighted."""
 
     def __init__(self, scene: viser.SceneApi, on_pick: Callable[[str], None]) -> None:
-        """Draw nothing yet; ``on_pick`` is called, on any thread, with a view that was clicked."""
+        """Start empty; ``on_pick`` is called, on any thread, with a clicked view."""
         self._scene, self._on_pick = scene, on_pick
         self._handles: dict[str, Any] = {}
         self._dropped: frozenset[str] = frozenset()
 
     def draw_scene(self, scene: SceneView | None) -> None:
-        """Draw what the cameras see, as nothing is known of a board."""
+        """Draw what the cameras see, if there are no views of a board."""
         clear(self._scene, BELOW)
         self._handles = {}
         for node in () if scene is None else scene.nodes:
@@ -70,14 +70,14 @@ class BoardsDrawing:
         came: SceneView | None,
         chosen: str,
     ) -> None:
-        """Draw all cameras where the board puts them, beside where the scene had them.
+        """Draw all cameras at their calibrated poses, next to the scene's.
 
         Args:
             view: the cameras.
-            rig: where they stand.
-            scene: what they see, as the chain has it.
-            came: the scene as it came.
-            chosen: the view that is chosen.
+            rig: their poses.
+            scene: the scene in the chain.
+            came: the scene as it was loaded.
+            chosen: the chosen view.
         """
         clear(self._scene, BELOW)
         self._handles, self._dropped = {}, frozenset()
@@ -102,14 +102,14 @@ class BoardsDrawing:
         self.choose(chosen)
 
     def choose(self, chosen: str) -> None:
-        """Show one of the views as the chosen one."""
+        """Highlight one of the views."""
         for name, handle in self._handles.items():
             color = SOURCE if name == chosen else NEUTRAL if name in self._dropped else TARGET
             if tuple(handle.color) != color:
                 handle.color = color
 
     def _add_board(self, board: Board, name: str, pose: FloatArray, opacity: float = 0.35) -> None:
-        """A sheet with its points; one without a name is the board of all views."""
+        """Add a sheet with the board's points; without a name it is the board of all views."""
         (left, upper, _), (right, lower, _) = board.points_m.min(axis=0), board.points_m.max(axis=0)
         rim = RIM * board.spacing_m
         corners = np.array(
@@ -148,10 +148,10 @@ class BoardsDrawing:
         color: tuple[int, int, int],
         picture: str | None = None,
     ) -> None:
-        """A camera; one that is named like a view can be clicked."""
+        """Add a camera; one that is named like a view can be clicked."""
         assert camera.calibration is not None
         width_px, height_px = camera.size_px
-        path = f"{BELOW}/frustum-{name.replace('/', '-')}"  # below no other camera, though one node has two
+        path = f"{BELOW}/frustum-{name.replace('/', '-')}"  # never below another camera of the node
         frustum = self._scene.add_camera_frustum(
             path,
             fov=2.0 * float(np.arctan2(0.5 * height_px, camera.calibration.matrix[1, 1])),
@@ -172,13 +172,13 @@ class BoardsDrawing:
 
 
 def poses_of(camera: CameraView) -> dict[str, FloatArray]:
-    """(4, 4) T_camera_board by view."""
+    """Return (4, 4) T_camera_board by view."""
     fitted = (camera.fitted(photograph.name) for photograph in camera.photographs)
     return {view.name: view.T_camera_board for view in fitted if view is not None}
 
 
 def place_of(camera: CameraView, around: Around) -> Stage:
-    """Where to stand to see all views of a camera."""
+    """Return the viewpoint that shows all views of a camera."""
     poses = poses_of(camera).values()
     spread = [LEVEL_POSE @ (pose if around == "camera" else inverse(pose)) for pose in poses]
     every_m = np.array([np.zeros(3), *(pose[:3, 3] for pose in spread)])
@@ -191,6 +191,6 @@ def place_of(camera: CameraView, around: Around) -> Stage:
 
 
 def stand_before(client: viser.ClientHandle, stage: Stage) -> None:
-    """Turn a browser's view there, from far enough that all is seen in a narrow picture, too."""
+    """Turn a browser's view there, far enough that all is visible in a narrow picture, too."""
     away = max(1.0, ASPECT / max(client.camera.aspect, 0.1))
     turn(client, stage.middle_m, stage.middle_m + away * (stage.viewpoint_m - stage.middle_m))

@@ -1,4 +1,4 @@
-"""The job of the Calibrate screen: the cameras of a session with a board, and the bias of their depth."""
+"""The job of the Calibrate screen: the cameras of a board session, and the bias of their depth."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from app.screens.calibrate.view import CalibrationView
 from packetmesh.progress import Progress
 
 CAMERAS_SHARE = 0.6
-"""Of the work is for the cameras, the rest for their depth."""
+"""Share of the progress for the cameras; their depth has the other part."""
 
 
 def calibrate_job(store: Store, spec: Spec) -> Generator[Progress | CalibrationView, None, CalibrationView]:
-    """Find the board in all photographs, estimate every camera, all of them together, then the bias of their
-    depth; yields what there is so far.
+    """Find the board in all photographs and estimate every camera, all together, and the bias of their depth;
+    yield partial results.
     """
     views = spec.views
     assert views is not None

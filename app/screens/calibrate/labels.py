@@ -1,4 +1,4 @@
-"""What the Calibrate screen says of itself, and what its choices are called."""
+"""Texts of the Calibrate screen, and labels of its choices."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ PictureName = Literal[
     "photo", "straightened", "uncertainty", "halves", "coverage", "next", "off-before", "off-after"
 ]
 Around = Literal["camera", "board", "rig"]
-"""What stays in its place in space."""
+"""The object that is fixed in the drawing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two pictures with a line between them."""
+    """Two pictures divided by a line."""
 
     left: PictureName
     right: PictureName

@@ -1,4 +1,4 @@
-"""What the camera and the board may be: the kind of lens, and whether the board may be bent."""
+"""The folder with the lens model, and the choice whether the board may be bent."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ EMPTY = np.full((48, 64, 3), 235, np.uint8)
 
 
 class LensFolder:
-    """A drop-down, a checkbox, and the board's shape where it was asked for."""
+    """A drop-down, a checkbox, and the board's shape if it was estimated."""
 
     def __init__(self, ui: Ui, on_change: Callable[[], None]) -> None:
-        """Add the folder; ``on_change`` is called when somebody wants another camera."""
+        """Add the folder; ``on_change`` is called after a change."""
         gui = ui.gui
         with gui.add_folder("Advanced", expand_by_default=False):
             self._lens = gui.add_dropdown("Lens", list(get_args(Lens)), hint=ABOUT_LENS)
@@ -46,29 +46,29 @@ class LensFolder:
 
     @property
     def lens(self) -> Lens:
-        """The kind that is wanted."""
+        """The chosen lens model."""
         return self._lens.value
 
     @property
     def bent(self) -> bool:
-        """Whether the board's shape is wanted, too."""
+        """Whether the board's shape is estimated too."""
         return bool(self._bent.value) and not self._bent.disabled
 
     def one_camera(self, alone: bool) -> None:
-        """Whether there is only one, so that the board may be bent."""
+        """Allow a bent board only if there is one camera."""
         self._bent.disabled = not alone
         self._why_not.content = Markdown("") if alone else NOT_BENT
         if not alone:
             self._bent.value = False
 
     def set(self, lens: Lens) -> bool:
-        """Choose for the person, with a flat board; whether that is another choice."""
+        """Choose a lens and a flat board. Returns whether that is a change."""
         changed = (self._lens.value, self._bent.value) != (lens, False)
         self._lens.value, self._bent.value = lens, False
         return changed
 
     def load(self, camera: CameraView | None) -> None:
-        """Show the shape of the board of a camera's views."""
+        """Show the board's shape in a camera's views."""
         warp = None if camera is None else camera.warp
         self._image.visible = self._caption.visible = warp is not None
         if warp is not None:

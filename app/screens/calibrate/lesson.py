@@ -1,4 +1,4 @@
-"""The lesson of the Calibrate screen: what a stop can set, and the file that ships."""
+"""The lesson of the Calibrate screen: the settings of its stops, the numbers of its texts, its file."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from pipeline.config import Lens
 
 SHIPPED = LESSONS / "how-good-is-my-calibration.md"
 Keep = Literal["all", "three alike"]
-"""The views that a calibration is made of."""
+"""The views used for a calibration."""
 LEAST_DEG = 8.0
-"""Between the normals of the three: boards ever alike determine no lens."""
+"""Least angle between the normals of the three boards: equal ones determine no lens."""
 _ON_OFF = {"on": True, "off": False}
 _KEEP: dict[str, Keep] = {"all": "all", "three alike": "three alike"}
 _LENSES: dict[str, Lens] = {"thesis": "thesis", "brown": "brown", "rational": "rational"}
@@ -28,7 +28,7 @@ _LENSES: dict[str, Lens] = {"thesis": "thesis", "brown": "brown", "rational": "r
 
 @dataclass(frozen=True, slots=True)
 class CalibrateLook:
-    """What a stop shows; by default what the screen shows at first."""
+    """State of the screen at a stop; the default is the screen's first state."""
 
     pair: str = STRAIGHTENED
     """One of ``app.screens.calibrate.labels.PAIRS``."""
@@ -37,13 +37,13 @@ class CalibrateLook:
     keep: Keep = "all"
     lens: Lens = "thesis"
     range_m: float | None = None
-    """Where the camera is judged; None leaves that to the scene."""
+    """Range at which the camera is judged; None takes the scene's own."""
     noise_px: float | None = None
-    """Replays the noise experiment."""
+    """Noise of the replayed experiment; None replays nothing."""
     other_lens: bool = False
-    """Whether that is seen through a lens of another kind."""
+    """Whether the experiment's views are seen through another lens."""
     used: bool = False
-    """Whether the chain computes with the calibration."""
+    """Whether the chain uses the calibration."""
 
 
 def _noise(look: CalibrateLook, text: str) -> CalibrateLook:
@@ -63,14 +63,13 @@ SETTINGS: dict[str, Setting[CalibrateLook]] = {
     "noise": _noise,
     "calibration in use": sets("used", choice(_ON_OFF)),
 }
-"""What a stop can set, by its name in the file."""
+"""The settings of a stop, by their names in the file."""
 
 
 def left_out(camera: CameraView, keep: Keep) -> Iterator[tuple[str, str]]:
-    """Camera and moment of the views that are left out to keep those.
+    """Yield camera and moment of the views to leave out.
 
-    Three alike are those whose boards point most nearly the same way, but not so nearly that they determine
-    no lens.
+    "three alike" keeps the three whose boards have the most similar directions that still determine a lens.
     """
     lens = camera.calibration
     if keep == "all" or lens is None:
@@ -84,7 +83,7 @@ def left_out(camera: CameraView, keep: Keep) -> Iterator[tuple[str, str]]:
 
 
 def _spread_deg(normals: list[np.ndarray]) -> float:
-    """The largest angle between two of them."""
+    """Return the largest angle between two of them."""
     cosines = np.clip(np.array(normals) @ np.array(normals).T, -1.0, 1.0)
     return float(np.degrees(np.arccos(cosines.min())))
 
@@ -94,7 +93,7 @@ NUMBERS = ("circles", "measurements", "views", "rms", "held_out", "fx")
 
 
 def numbers(scene: str, circles: int, camera: CameraView) -> Numbers:
-    """Their values for a camera in a scene, and a board of so many circles."""
+    """Return the fields' values for a camera in a scene, and a board with this number of circles."""
     found = camera.calibration
     return {
         SCENE: f"{scene}, {camera.name}",

@@ -1,4 +1,4 @@
-"""What is known of each pixel of a camera, as pictures of the size of its photographs."""
+"""Maps over a camera's image, as pictures of the size of its photographs."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from pipeline.types import ByteArray, FloatArray
 PAPER = 245
 NO_POINTS = (228, 228, 228)
 WARP_WIDTH_PX, LEAST_WARP_M = 400, 5e-4
-"""Of the picture of a bent board, and from where on its colours are full."""
+"""Width of the picture of a bent board, and deviation at which its colours are full."""
 SHIFT = 4
-"""Bits behind the comma of what is drawn."""
+"""Fraction bits of drawing coordinates."""
 
 
 def map_picture(error_m: FloatArray, most_m: float, size_px: tuple[int, int], what: str) -> Picture:
-    """Errors in mm over the image, dark for none; grey where the lens has no ray.
+    """Draw errors in mm over the image, dark for zero; grey where the lens has no ray.
 
     Args:
-        error_m: (R, C) of cells.
-        most_m: from which on the colour does not change.
+        error_m: (R, C) errors of the cells.
+        most_m: error at which the colour scale ends.
         size_px: width and height of the picture.
-        what: begins the caption.
+        what: start of the caption.
     """
     known = np.isfinite(error_m)
     filled = np.where(known, error_m, most_m).astype(np.float32)
@@ -48,7 +48,7 @@ def map_picture(error_m: FloatArray, most_m: float, size_px: tuple[int, int], wh
 def coverage_picture(
     told: Coverage, views: Sequence[FittedView], zoom: float, size_px: tuple[int, int]
 ) -> Picture:
-    """How many points were seen where; light grey where there was none."""
+    """Draw the number of points seen per cell; light grey for none."""
     most = max(int(told.counts.max()), 1)
     cells = ramp(told.counts.astype(float), float(most), DISTANCE_STOPS)
     cells[told.counts == 0] = NO_POINTS
@@ -63,7 +63,7 @@ def coverage_picture(
 
 
 def next_picture(following: NextView, lens: Calibration, zoom: float, size_px: tuple[int, int]) -> Picture:
-    """Where to hold the board next, over the points that are there already."""
+    """Draw where to hold the board next, over the points seen so far."""
     rgb = np.full((size_px[1], size_px[0], 3), PAPER, np.uint8)
     for view in lens.views:
         _dots(rgb, view.points_px * zoom, NEUTRAL, 1)
@@ -80,7 +80,7 @@ def next_picture(following: NextView, lens: Calibration, zoom: float, size_px: t
 
 
 def off_picture(off_m: FloatArray, most_m: float, zoom: float, what: str) -> Picture:
-    """(H, W) depth that is off: blue too near, white right, orange too far, grey unknown."""
+    """Draw (H, W) depth errors: blue too near, white correct, orange too far, grey unknown."""
     rgb = ramp(
         np.clip(np.nan_to_num(off_m), -most_m, most_m) + most_m, 2.0 * most_m, (NEARER, EQUAL, FARTHER)
     )
@@ -95,7 +95,7 @@ def off_picture(off_m: FloatArray, most_m: float, zoom: float, what: str) -> Pic
 
 
 def warp_picture(warp: WarpView) -> Picture:
-    """How the board is bent, as one looks at it: blue towards the camera, orange away from it."""
+    """Draw the shape of the board as the camera sees it: blue towards it, orange away from it."""
     most_m = max(float(np.abs(warp.off_plane_m).max()), LEAST_WARP_M)
     rows, columns = warp.off_plane_m.shape
     size_px = (WARP_WIDTH_PX, round(WARP_WIDTH_PX * rows / columns))

@@ -21,24 +21,24 @@ THIS, OTHER = "this lens", "one of another kind"
 READY = Markdown("Drag the slider to begin.")
 STOPPED = Markdown("Stopped. Drag the slider to begin anew.")
 REST_S = 0.25
-"""How long the slider has to rest before the experiment begins."""
+"""Time that the slider must be still before the experiment starts, seconds."""
 
 
 class NoiseFolder:
-    """A slider and a sentence; the scatter of the trials, as they come, is in the dock."""
+    """A slider and a sentence; the growing scatter of the trials is in the dock."""
 
     def __init__(self, ui: Ui, on_replay: Callable[[float, bool], None], on_stop: Callable[[], None]) -> None:
         """Add the folder.
 
         Args:
-            ui: where to add it.
-            on_replay: called with the noise in px, and whether the lens is of another kind.
-            on_stop: called when what runs is to end.
+            ui: panel to add it to.
+            on_replay: called with the noise in px, and whether the lens is another model.
+            on_stop: called to stop the running replay.
         """
         self._on_replay, self._on_stop = on_replay, on_stop
         self._view: NoiseView | None = None
         self._wanted: tuple[float, bool] | None = None
-        """What is being replayed."""
+        """Noise and lens of the running replay."""
         gui = ui.gui
         self._resting = ui.debounce(REST_S, self._rested)
         self._folder = gui.add_folder("What if the points were noisier?", expand_by_default=False)
@@ -69,16 +69,16 @@ class NoiseFolder:
         self._dock = PlotDock(ui)
 
     def show(self, visible: bool) -> None:
-        """Show the scatter, or leave the lower edge to others."""
+        """Show or hide the scatter."""
         self._dock.show(visible)
 
     def set(self, sigma_px: float, other_lens: bool) -> None:
-        """Choose for the person, and begin."""
+        """Set the noise and start."""
         self._sigma.value, self._through.value = sigma_px, OTHER if other_lens else THIS
         self._rested()
 
     def forget(self) -> None:
-        """What was replayed is of another camera, or of other views."""
+        """Remove the replay, which belongs to another camera or other views."""
         if self._wanted is not None:
             self._on_stop()
         self._view = self._wanted = None
@@ -86,11 +86,11 @@ class NoiseFolder:
         self._status.content = READY
 
     def stop(self) -> None:
-        """Keep what there is."""
+        """Stop the replay and keep its trials."""
         self._on_stop()
 
     def load(self, view: NoiseView) -> None:
-        """Show what there is so far of the noise that is wanted; what comes late is of another one."""
+        """Show the trials so far; late ones of another replay are ignored."""
         if not isinstance(view, NoiseView) or asked(view.request) != self._wanted or not view.trials:
             return
         self._view = view
@@ -98,7 +98,7 @@ class NoiseFolder:
         self._status.content = noise_line(view)
 
     def ended(self, view: NoiseView | None, request: NoiseRequest) -> None:
-        """The last trial, or none: it was stopped or could not be."""
+        """Handle the end of a replay; None if it was stopped or failed."""
         if asked(request) != self._wanted:
             return
         if view is not None:
@@ -108,7 +108,7 @@ class NoiseFolder:
         self._wanted = None
 
     def _moved(self) -> None:
-        """Stop at once what runs with another noise; begin when the hand rests."""
+        """Stop the running replay at once; start when the slider is at rest."""
         if self._wanted is not None:
             self._on_stop()
         self._resting.restart()
@@ -121,12 +121,12 @@ class NoiseFolder:
 
 
 def asked(request: NoiseRequest) -> tuple[float, bool]:
-    """The part of a request that the controls set."""
+    """Return the part of a request that the controls set."""
     return request.sigma_px, request.other_lens
 
 
 def noise_line(view: NoiseView) -> Markdown:
-    """The experiment in some sentences."""
+    """Return the experiment's result in some sentences."""
     whole = view.trials >= view.request.trials
     told = Markdown(
         "**{}.** fx, fy, cx and cy are all within {:g} % of the truth in **{:.0f} %** of them. "

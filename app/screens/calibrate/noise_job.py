@@ -1,4 +1,4 @@
-"""The thesis's robustness experiment, live: noise on the points of the views that are shown (SPEC 1.4)."""
+"""The job of the thesis's robustness experiment: noise on the points of the shown views (SPEC 1.4)."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from pipeline.calibration.trust import half_difference_px
 from pipeline.types import FloatArray
 
 SHOW_S = 0.25
-"""Between two pictures of what there is so far."""
+"""Time between two partial results, seconds."""
 HALVED = 8
-"""In every eighth trial two halves of the views are compared, which takes three calibrations more."""
+"""In every eighth trial two halves of the views are compared, which takes three more calibrations."""
 AT_M = 2.0
-"""Range at which they are."""
+"""Range of that comparison."""
 OTHER = np.array([0.0, 0.0, 0.003, -0.002, 0.3])
-"""What a lens of another kind has more of k1, k2, p1, p2 and k3: as a cheap one has that is mounted askew."""
+"""Extra k1, k2, p1, p2 and k3 of another lens, as of a cheap lens that is mounted askew."""
 
 
 @dataclass(slots=True)
 class _Trials:
-    """Those that are done."""
+    """The completed trials."""
 
     found: list[list[float]] = field(default_factory=list)
     covariances: list[FloatArray] = field(default_factory=list)
@@ -39,7 +39,7 @@ class _Trials:
     beyond_noise: list[bool] = field(default_factory=list)
 
     def view(self, empty: NoiseView) -> NoiseView:
-        """What there is so far."""
+        """Return the result so far."""
         if not self.found:
             return empty
         return replace(
@@ -55,10 +55,10 @@ class _Trials:
 def noise_job(
     store: Store, spec: Spec, request: NoiseRequest
 ) -> Generator[Progress | NoiseView, None, NoiseView]:
-    """Take the calibration that was found as the truth, and see where noise on its points leads.
+    """Take the found calibration as the truth, and recalibrate from its points with noise.
 
     Yields:
-        What there is so far; the job stops at any of these.
+        Partial results; the job can be stopped at each of them.
 
     Raises:
         InputError: the camera has no calibration.
@@ -83,7 +83,7 @@ def noise_job(
 
 
 def _seen(true: Calibration, other_lens: bool) -> list[View]:
-    """The views without noise, through the lens itself or through one that has more to it."""
+    """Return the views without noise, through the lens itself or one with more distortion terms."""
     optics = true.optics
     if other_lens and true.lens != "fisheye":
         more = np.zeros(max(len(OTHER), true.distortion.size))

@@ -1,4 +1,4 @@
-"""What the replay of the noise experiment asks for, and its answer."""
+"""Request and result of the replayed noise experiment."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pipeline.types import BoolArray, FloatArray
 
 TRIALS = 200
 CLOSE = 0.005
-"""The thesis's claim: all four of fx, fy, cx, cy within this share."""
+"""The thesis's claim: fx, fy, cx and cy are all within this share of the truth."""
 INSIDE_95 = 5.991
-"""Squared Mahalanobis distance that 95 % of a normal distribution in the plane do not exceed."""
+"""Squared Mahalanobis distance that 95 % of a 2-D normal distribution do not exceed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,61 +21,61 @@ class NoiseRequest:
 
     camera: str
     sigma_px: float
-    """Standard deviation, of either coordinate."""
+    """Standard deviation of each coordinate."""
     other_lens: bool = False
-    """Whether the views are taken through a lens of another kind than the one that is estimated."""
+    """Whether the views are taken through a lens of another model than the estimated one."""
     trials: int = TRIALS
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseView:
-    """The trials that are done."""
+    """The completed trials."""
 
     request: NoiseRequest
     names: tuple[str, ...]
-    """Of the P parameters."""
+    """Names of the P parameters."""
     truth: FloatArray
-    """(P,)"""
+    """(P,) true parameters."""
     found: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    """(T, P)"""
+    """(T, P) estimated parameters."""
     covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    """(P, P) that the trials predict of themselves, their mean."""
+    """(P, P) mean of the covariances that the trials predict."""
     rms_px: float = 0.0
-    """Of the trials' points, their mean."""
+    """Mean RMS of the trials' points."""
     halved: int = 0
-    """In so many trials two halves of the views were compared."""
+    """Number of trials in which two halves of the views were compared."""
     beyond_noise: int = 0
-    """In so many of these they differed by more than noise explains."""
+    """Number of these in which the halves differed by more than noise explains."""
 
     @property
     def trials(self) -> int:
-        """How many are done."""
+        """Number of completed trials."""
         return len(self.found)
 
     def column(self, name: str) -> FloatArray:
-        """(T,) what the trials found of a parameter."""
+        """Return (T,) a parameter's estimates."""
         return self.found[:, self.names.index(name)]
 
     def true(self, name: str) -> float:
-        """Of a parameter."""
+        """Return a parameter's true value."""
         return float(self.truth[self.names.index(name)])
 
     def rmse(self, name: str) -> float:
-        """Root mean square error of the trials."""
+        """Return the root mean square error of the trials."""
         return float(np.sqrt(np.mean((self.column(name) - self.true(name)) ** 2)))
 
     def predicted(self, name: str) -> float:
-        """Standard error that the trials predict."""
+        """Return the standard error that the trials predict."""
         at = self.names.index(name)
         return float(np.sqrt(self.covariance[at, at]))
 
     def pair_covariance(self, x: str, y: str) -> FloatArray:
-        """(2, 2) of two parameters."""
+        """Return the (2, 2) covariance of two parameters."""
         at = [self.names.index(x), self.names.index(y)]
         return self.covariance[np.ix_(at, at)]
 
     def inside(self, x: str, y: str) -> BoolArray:
-        """(T,) which trials lie in the ellipse that should hold 95 % of them."""
+        """Return (T,) whether a trial is in the ellipse that should hold 95 % of them."""
         apart = np.column_stack([self.column(x) - self.true(x), self.column(y) - self.true(y)])
         far = np.einsum("ti,ij,tj->t", apart, np.linalg.pinv(self.pair_covariance(x, y)), apart)
         return far <= INSIDE_95

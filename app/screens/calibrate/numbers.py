@@ -1,4 +1,4 @@
-"""The numbers of one camera's calibration, each with its definition."""
+"""Tables of one camera's calibration; every number has a definition."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ MEANING = {
 
 
 def unseen_rms_px(camera: CameraView) -> float | None:
-    """Over all points of the views that were held out in turn."""
+    """Return the RMS over all points of the views that were held out in turn; None without any."""
     apart = [view.residuals_px for view in camera.unseen if view.name not in camera.dropped]
     return rms_px(np.concatenate(apart)) if apart else None
 
 
 def summary_table(cameras: Sequence[CameraView], names: Sequence[str] = ()) -> Markup:
-    """HTML: errors and the focal length, a column for each: now, and before views were dropped."""
+    """Return a table in HTML of errors and focal length, now and before views were dropped."""
     found = [camera.calibration for camera in cameras]
 
     def row(name: str, meaning: str, values: Sequence[str]) -> tuple[str, ...]:
@@ -66,19 +66,19 @@ def summary_table(cameras: Sequence[CameraView], names: Sequence[str] = ()) -> M
 
 
 def views_used(camera: CameraView) -> str:
-    """How many of how many."""
+    """Return the numbers of used and of all views as text."""
     used = len(camera.calibration.views) if camera.calibration else 0
     return f"{used} of {len(camera.photographs)}"
 
 
 def bend(camera: CameraView) -> str:
-    """By how much the board is bent, and whether that is used."""
+    """Return the board's bend as text, and whether it is used."""
     warp = camera.warp
     return "–" if warp is None else f"{1000.0 * warp.bend_m:.2g} mm, {'' if warp.used else 'not '}used"
 
 
 def within(found: Calibration | None, name: str) -> str:
-    """A parameter with the half of its 95 % interval."""
+    """Return a parameter with half its 95 % interval as text."""
     if found is None:
         return "–"
     value, (low, high) = found.parameters[name], found.intervals[name]
@@ -87,7 +87,7 @@ def within(found: Calibration | None, name: str) -> str:
 
 
 def parameter_table(camera: CameraView) -> Markup:
-    """HTML: every parameter, its standard error, its 95 % interval, and the truth where it is known."""
+    """Return a table in HTML of every parameter, standard error, 95 % interval and known true value."""
     found = camera.calibration
     if found is None:
         return Markup("")
@@ -106,15 +106,15 @@ def parameter_table(camera: CameraView) -> Markup:
 
 
 WEAK = 0.8
-"""Below it a pair is no reason for anything."""
+"""Least correlation for which the sentence gives a reason."""
 DARK = -0.6
-"""On the blue of a correlation below this, white is read better than black."""
+"""Correlation below which its blue is dark enough for white text."""
 SHORT, AWAY = "dist.", "The board's distance from the camera, the mean over the views."
 FOCAL, CENTER, LEANING = ("fx", "fy"), ("cx", "cy"), ("p1", "p2")
 
 
 class ParameterFolder:
-    """A table, and a square of how every number goes together with every other."""
+    """A table of the parameters, and a matrix of their correlations."""
 
     def __init__(self, ui: Ui) -> None:
         """Add the folder."""
@@ -123,18 +123,18 @@ class ParameterFolder:
             self._together = ui.gui.add_html(Markup(""))
 
     def load(self, camera: CameraView | None) -> None:
-        """Show another camera; None shows none."""
+        """Show another camera; None shows nothing."""
         self._table.content = Markup("") if camera is None else parameter_table(camera)
         if camera is None:
             self.relate(None)
 
     def relate(self, together: Correlations | None) -> None:
-        """Show how its parameters go together, once that is known."""
+        """Show the correlations of its parameters, once they are known."""
         self._together.content = Markup("") if together is None else correlation_html(together)
 
 
 def correlation_html(together: Correlations) -> Markup:
-    """The strongest pair in a sentence over the lower half of the square, colours and numbers."""
+    """Return HTML: a sentence on the strongest pair, over the lower half of the coloured matrix."""
     names = [short(name) for name in together.names]
     heads = [term(name, AWAY) if name == SHORT else name for name in names]
     rows = [
@@ -171,18 +171,18 @@ def _cell(one: str, other: str, value: float) -> Markup:
 
 
 def signed(value: float) -> str:
-    """A correlation in two digits: .97, −.30, 1.00."""
+    """Return a correlation with two decimals: .97, −.30, 1.00."""
     digits = f"{abs(value):.2f}"
     return ("−" if value < -0.005 else "") + (digits[1:] if digits[0] == "0" else digits)
 
 
 def short(name: str) -> str:
-    """What heads a row."""
+    """Return the head of a row."""
     return SHORT if name == DISTANCE else name
 
 
 def strongest_sentence(pair: Pair) -> str:
-    """Which two go together most, and what parts them."""
+    """Return a sentence on the most correlated pair and the views that separate it."""
     one, other = ("the board's distance" if name == DISTANCE else name for name in (pair.first, pair.second))
     size = signed(abs(pair.correlation))
     if abs(pair.correlation) < WEAK:
@@ -194,7 +194,7 @@ def strongest_sentence(pair: Pair) -> str:
 
 
 def parted_by(pair: Pair) -> str:
-    """What kind of views tells the two apart."""
+    """Return the kind of views that separates a pair of parameters."""
     names = (pair.first, pair.second)
     if all(name in (*FOCAL, DISTANCE) for name in names):
         return "a longer lens on a board farther away looks nearly the same; more tilted views part them"

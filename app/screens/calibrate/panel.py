@@ -1,4 +1,4 @@
-"""Calibrate: the cameras from photographs of a board, and how far to believe them."""
+"""The Calibrate screen's panel: views of a board, the cameras estimated from them, their uncertainty."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from pipeline.sources import Calibrated, Demo
 
 
 class CalibratePanel(Panel):
-    """Views of a board, the cameras they tell, and whether to trust them."""
+    """Views of a board, the cameras estimated from them, and the verdict on each."""
 
     title = "Calibrate"
     step: ClassVar[Step | None] = "calibrate"
@@ -44,7 +44,7 @@ class CalibratePanel(Panel):
     only_when_shown: ClassVar[bool] = True
 
     def build(self) -> None:
-        """Verdict, camera, bars, views, the split picture, the stage; numbers; the rest in folders."""
+        """Add verdict, camera, bars, views, pictures and drawing; the other numbers are in folders."""
         gui, ui = self.gui, self.ui
         self._source = inner(self.session.spec.source)
         self._here = self._had_views = False
@@ -56,7 +56,7 @@ class CalibratePanel(Panel):
         self._framed: tuple[Hashable, ...] = ()
         self._look: CalibrateLook | None = None
         self._came: SceneView | None = None
-        """The scene as it came."""
+        """The scene as it was loaded."""
         gui.add_markdown(TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, CalibrateLook(), NUMBERS)
         self._lesson = LessonFolder(ui, lesson, self._take_look, self._lesson_numbers)
@@ -95,7 +95,7 @@ class CalibratePanel(Panel):
         self._uploads = UploadFolder(ui, session.folder, self._use_own)
         self._lens = LensFolder(ui, self._picked_lens)
 
-    # What there is to calibrate from.
+    # The photographs.
 
     def on_show(self) -> None:
         """Look for the board at the first visit."""
@@ -105,12 +105,12 @@ class CalibratePanel(Panel):
             self._use_own(None)
 
     def on_hide(self) -> None:
-        """Another step is shown, and the lower edge is left to it."""
+        """Hide the scatter in the dock."""
         self._here = False
         self._noise.show(False)
 
     def _use_own(self, views: BoardViews | None) -> None:
-        """Take the photographs of the person, or those of the scene, once somebody looks."""
+        """Use the uploaded photographs, or those of the scene once the screen is shown."""
         if views is None and self._here and isinstance(self._source, Demo):
             folder = board_views_of(self._source.name)
             views = None if folder is None else views_in(folder)
@@ -128,7 +128,7 @@ class CalibratePanel(Panel):
         self._show_camera()
 
     def on_spec(self, spec: Spec) -> None:
-        """Another scene has other cameras; what is replayed belongs to the views before."""
+        """Take another scene, which has other cameras; stop a replay of earlier views."""
         moved, taken = inner(spec.source) != self._source, self._had_views and spec.views is None
         self._had_views = spec.views is not None
         if moved or taken:
@@ -142,12 +142,12 @@ class CalibratePanel(Panel):
             self._noise.forget()
 
     def on_partial(self, view: Any) -> None:
-        """Show the cameras as they come."""
+        """Show the cameras computed so far."""
         if isinstance(view, CalibrationView):
             self._take(view, all_there=False)
 
     def on_view(self, step: Step, view: Any) -> None:
-        """Show all cameras; and what becomes of the surface."""
+        """Show all cameras, or the new surface's numbers."""
         if step == "scene":
             self._uploads.cameras([node.name for node in view.nodes])
             self._judge.at_range([0.5 * (node.nearest_m + node.farthest_m) for node in view.nodes])
@@ -162,7 +162,7 @@ class CalibratePanel(Panel):
             self._show_look()
 
     def on_failure(self, step: Step, sentence: str) -> None:
-        """Say why there is no camera."""
+        """Show why there is no camera."""
         if step == "calibrate":
             self._view = None
             self._show_camera()
@@ -181,7 +181,7 @@ class CalibratePanel(Panel):
         return None if self._view is None else self._view.camera(self._camera.value)
 
     def _picked_camera(self) -> None:
-        """Show another camera; what was replayed is not its own."""
+        """Show another camera and remove the replay of the last one."""
         self._noise.forget()
         self._show_camera()
 
@@ -217,7 +217,7 @@ class CalibratePanel(Panel):
         self._rig.load(self._view.rig)
 
     def _show_view(self) -> None:
-        """Show the chosen view, and what is known of its pixels."""
+        """Show the chosen view, and the maps of its pixels."""
         camera = self._shown()
         self._photographs.load(camera)
         if camera is not None:
@@ -233,7 +233,7 @@ class CalibratePanel(Panel):
             self._drawing.choose(name)
 
     def _drop(self) -> None:
-        """Leave the chosen view out, or take it in again."""
+        """Leave the chosen view out, or use it again."""
         camera, views, chosen = self._shown(), self.session.spec.views, self._photographs.chosen
         if camera is None or views is None:
             return
@@ -249,10 +249,10 @@ class CalibratePanel(Panel):
         self._whole = {}
         self._want(self.session.spec.views)
 
-    # What is asked beside the chain.
+    # Requests besides the chain.
 
     def _ask(self) -> None:
-        """Ask for the verdict, and for the depth of the chosen view where it is wanted."""
+        """Request the verdict, and the depth of the chosen view if it is shown."""
         camera = self._shown()
         if camera is not None and camera.calibration is not None:
             request = self._judge.request(camera.name)
@@ -279,7 +279,7 @@ class CalibratePanel(Panel):
     # The chain.
 
     def _use_it(self) -> None:
-        """Write what is shown, and have the chain compute with it."""
+        """Write the calibration that is shown, and let the chain use it."""
         self._uses += 1
         self._use.say(WRITING)
         folder = str(self.session.new_folder() / f"calibration_{self._uses:02d}")
@@ -299,14 +299,14 @@ class CalibratePanel(Panel):
 
     @property
     def command(self) -> str:
-        """The command line that finds the cameras that are shown."""
+        """Return the command line that finds the cameras that are shown."""
         views = self.session.spec.views
         return super().command if views is None else calibrate_command(views, self._source)
 
     # The lesson.
 
     def _take_look(self, look: CalibrateLook) -> None:
-        """Set the controls as a stop says; what needs the cameras waits for them."""
+        """Set the controls for a stop; settings that need the cameras wait for them."""
         with self.ui.atomic():
             self._photographs.area.set(look.pair, look.split_share)
             self._around.value = next(name for name, key in AROUND.items() if key == look.around)
@@ -324,7 +324,7 @@ class CalibratePanel(Panel):
             self._show_look()
 
     def _show_look(self) -> None:
-        """What the stop wants of the cameras, now that all of them are there."""
+        """Apply the stop's settings that needed all cameras."""
         look, views = self._look, self.session.spec.views
         if look is None or views is None or not self.session.results.fresh("calibrate", self.session.spec):
             return
@@ -339,7 +339,7 @@ class CalibratePanel(Panel):
             self._use_it()
 
     def _lesson_numbers(self) -> Numbers:
-        """Of the camera that is shown; empty while it is computed."""
+        """Return the numbers of the camera that is shown; empty while it is computed."""
         session, view, camera = self.session, self._view, self._shown()
         scene: SceneView | None = session.results.view("scene")
         fresh = session.results.fresh("calibrate", session.spec) and self._look is None
@@ -348,7 +348,7 @@ class CalibratePanel(Panel):
         columns, rows = view.board.size
         return numbers(scene.title, columns * rows, camera)
 
-    # What is drawn.
+    # Drawing.
 
     def _draw(self) -> None:
         camera, view, around = self._shown(), self._view, AROUND[self._around.value]
@@ -364,7 +364,7 @@ class CalibratePanel(Panel):
             self.session.frame_view()
 
     def look(self) -> bool:
-        """Turn the view to the boards when there are others; the cameras of a rig stand in the scene."""
+        """Turn the view to new boards; the cameras of a rig are seen with the scene."""
         camera, around = self._shown(), AROUND[self._around.value]
         if camera is None or camera.calibration is None or around == "rig":
             self._framed = ()

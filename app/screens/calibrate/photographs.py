@@ -1,4 +1,4 @@
-"""The photographs of one camera: a bar for the error of each, and the chosen one as a picture."""
+"""The photographs of one camera: an error bar per view, and the chosen view as a picture."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pipeline.types import ByteArray, FloatArray
 
 
 class Photographs:
-    """Bars that can be clicked, buttons that go from view to view, and the picture area."""
+    """Bars that can be clicked, buttons to the next view, and the picture area."""
 
     def __init__(
         self,
@@ -36,20 +36,20 @@ class Photographs:
         on_drop: Callable[[], None],
         on_all: Callable[[], None],
     ) -> None:
-        """Add them to the current container.
+        """Add the parts to the current container.
 
         Args:
-            ui: where to add them.
-            answers: what is known of the pixels of a view.
-            on_pick: called with the name of the view that a person wants to see.
-            on_pair: called when other pictures of it are wanted.
-            on_drop: leaves the chosen view out, or takes it in again.
-            on_all: leaves none out.
+            ui: panel to add them to.
+            answers: results about the pixels of a view.
+            on_pick: called with the name of the view to show.
+            on_pair: called when other pictures of it are chosen.
+            on_drop: leaves the chosen view out, or uses it again.
+            on_all: uses all views again.
         """
         self._ui, self._answers, self._on_pick = ui, answers, on_pick
         self._names: tuple[str, ...] = ()
         self.chosen = ""
-        """Name of the view that is shown, or is to be shown once it is there."""
+        """Name of the view that is shown, or will be shown once it exists."""
         self._asked = ""
         self._bars = Bars(ui, on_pick)
         self._row = ui.buttons(
@@ -62,7 +62,7 @@ class Photographs:
         self.area = PictureArea(ui, on_pair)
 
     def load(self, camera: CameraView | None) -> None:
-        """Show the views of a camera, and what is known of the pixels of the chosen one; None: nothing."""
+        """Show the views of a camera, and the maps of the chosen one; None shows nothing."""
         self._row.visible = camera is not None
         if camera is None:
             self.area.load({})
@@ -85,11 +85,11 @@ class Photographs:
         self.area.load(pictures | self._answers.pictures_of(camera, self.chosen))
 
     def place(self) -> str:
-        """The name of the view that is shown, for the address; empty for the first."""
+        """Return the name of the shown view for the address; empty for the first."""
         return "" if self.chosen in self._names[:1] else self.chosen
 
     def take(self, place: str) -> None:
-        """Show the view of that name, at once or when it is there."""
+        """Show the view of this name, at once or as soon as it exists."""
         self._asked = place
         self._on_pick(place or next(iter(self._names), ""))
 
@@ -99,15 +99,15 @@ class Photographs:
 
 
 SHIFT = 4
-"""Bits behind the comma of what is drawn."""
+"""Fraction bits of drawing coordinates."""
 LONGEST_PX = 22.0
 """Length at which the largest error of a view is drawn."""
 FIRST = (250, 220, 0)
-"""The first point, which tells which way is up."""
+"""Colour of the first point, which shows the board's orientation."""
 
 
 def found_picture(photograph: Photograph, fitted: FittedView | None) -> Picture:
-    """The photograph with rings around the board's points; or around the blobs that were no board."""
+    """Draw rings around the board's points, or around the blobs if no board was found."""
     rgb = decoded(photograph)
     name = f"View {photograph.name}"
     if not photograph.found:
@@ -122,7 +122,7 @@ def found_picture(photograph: Photograph, fitted: FittedView | None) -> Picture:
         return Picture(rgb, caption)
     most_px = float(np.linalg.norm(fitted.residuals_px, axis=1).max())
     times = round_down(LONGEST_PX / max(most_px * photograph.zoom, 1e-6))
-    ends_px = photograph.points_px - times * fitted.residuals_px  # towards what the lens predicts
+    ends_px = photograph.points_px - times * fitted.residuals_px  # towards the lens's prediction
     lines = np.stack([photograph.points_px, ends_px], axis=1) * photograph.zoom
     fixed = [np.rint(line * (1 << SHIFT)).astype(np.int32) for line in lines]
     cv2.polylines(rgb, fixed, False, SOURCE, 1, cv2.LINE_AA, shift=SHIFT)
@@ -130,14 +130,14 @@ def found_picture(photograph: Photograph, fitted: FittedView | None) -> Picture:
 
 
 def decoded(photograph: Photograph) -> ByteArray:
-    """(H, W, 3) RGB."""
+    """Return (H, W, 3) RGB."""
     bgr = cv2.imdecode(np.frombuffer(photograph.jpeg, np.uint8), cv2.IMREAD_COLOR)
     assert bgr is not None
     return np.ascontiguousarray(bgr[..., ::-1])
 
 
 def straightened_picture(found: Picture, camera: Calibration, zoom: float) -> Picture:
-    """A photograph, with what is drawn over it, as a lens without distortion would have taken it."""
+    """Return a photograph with its rings as a lens without distortion would have taken it."""
     matrix = scaled_matrix(camera.matrix, zoom)
     if camera.lens == "fisheye":
         rgb = cv2.fisheye.undistortImage(found.rgb, matrix, camera.distortion, Knew=matrix)
@@ -147,19 +147,19 @@ def straightened_picture(found: Picture, camera: Calibration, zoom: float) -> Pi
 
 
 def scaled_matrix(matrix: FloatArray, zoom: float) -> FloatArray:
-    """(3, 3) K of a thinned picture, whose pixel centres are at integers, too."""
+    """Return (3, 3) K of a scaled picture, whose pixel centres are at integers, too."""
     scale = np.array([[zoom, 0.0, 0.5 * (zoom - 1.0)], [0.0, zoom, 0.5 * (zoom - 1.0)], [0.0, 0.0, 1.0]])
     return scale @ matrix
 
 
 def round_down(times: float) -> float:
-    """1, 2 or 5 times a power of ten."""
+    """Round down to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(max(times, 1.0)))
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= max(times, 1.0)))
 
 
 def picture_of(camera: CameraView, name: str) -> Photograph:
-    """The photograph of a view, or the first."""
+    """Return the photograph of a view, or the first one."""
     return next((one for one in camera.photographs if one.name == name), camera.photographs[0])
 
 
@@ -171,7 +171,7 @@ def _rings(
 
 
 def _ring_px(points_px: FloatArray, zoom: float) -> float:
-    """Radius of rings that do not touch each other."""
+    """Return a radius of rings that do not touch each other."""
     if len(points_px) < 2:
         return 6.0
     apart_px = np.linalg.norm(points_px[1:] - points_px[:-1], axis=1)
@@ -180,25 +180,25 @@ def _ring_px(points_px: FloatArray, zoom: float) -> float:
 
 MARK = "packetmesh-views"
 HEIGHT_PX, LEAST_PX = 84, 3
-"""Of the row, and of a bar."""
+"""Height of the row, and least height of a bar."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """One view."""
+    """The bar of one view."""
 
     name: str
     rms_px: float | None
-    """None if the board was not found."""
+    """Error in the fit; None if the board was not found."""
     unseen_rms_px: float | None
-    """By a lens that has not seen it."""
+    """Error by a lens that was estimated without the view."""
     dropped: bool = False
     suspect: bool = False
-    """Whether it is proposed to drop it."""
+    """Whether dropping it is proposed."""
 
 
 def bars_of(camera: CameraView, suspects: Collection[str] = ()) -> tuple[Bar, ...]:
-    """A bar for each photograph; ``suspects`` are those that stand out."""
+    """Return a bar for each photograph; ``suspects`` are views that stand out."""
     bars = []
     for photograph in camera.photographs:
         name, fitted = photograph.name, camera.fitted(photograph.name)
@@ -217,7 +217,7 @@ class Bars:
         self._field = ui.when_changed(ui.gui.add_text("View that was clicked", ""), self._picked)
 
     def show(self, bars: tuple[Bar, ...], chosen: str) -> None:
-        """Show these, one of them chosen."""
+        """Show these bars, one of them chosen."""
         self._html.content = bars_html(bars, chosen)
 
     def _picked(self) -> None:
@@ -227,7 +227,7 @@ class Bars:
 
 
 def picked_name(text: str) -> str:
-    """The view that a page names in the hidden field; empty if it is no such message."""
+    """Return the view that a page names in the hidden field; empty if the message is invalid."""
     try:
         name, _ = json.loads(text)
     except (ValueError, TypeError):
@@ -236,7 +236,7 @@ def picked_name(text: str) -> str:
 
 
 def bars_html(bars: tuple[Bar, ...], chosen: str) -> Markup:
-    """HTML of the row, its axis and what it means."""
+    """Return HTML of the row with its axis and legend."""
     errors = [one for bar in bars for one in (bar.rms_px, bar.unseen_rms_px) if one is not None]
     most = max(errors, default=1.0)
     columns = Markup("").join(_column(bar, most, bar.name == chosen) for bar in bars)

@@ -1,4 +1,4 @@
-"""What is asked of the photographs of a board, in the terms of the pipeline."""
+"""Board photographs as inputs of the pipeline, and the command line for them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from pipeline.sources import Calibrated, Demo, RigFolder, Source
 
 TRUTH = "truth.json"
 FOLDS = 4
-"""In so many turns views, or moments of several cameras, are held out."""
+"""Number of folds in which views, or moments of several cameras, are held out."""
 
 
 def views_in(folder: Path) -> BoardViews:
-    """The photographs in a folder, of the board that its board.json says, or else of the thesis's.
+    """Return the photographs in a folder, with the board in its board.json or else the thesis's.
 
     Raises:
-        InputError: the file says something else.
+        InputError: the file has other content.
     """
     path = folder / BOARD_FILE
     board = read_board(path) if path.exists() else Board()
@@ -29,12 +29,12 @@ def views_in(folder: Path) -> BoardViews:
 
 
 def board_of(views: BoardViews) -> Board:
-    """What is photographed."""
+    """Return the photographed board."""
     return Board(views.pattern, views.columns, views.rows, views.spacing_m)
 
 
 def shots_of(views: BoardViews) -> tuple[NodeShots, ...]:
-    """The images of every camera.
+    """Return the images of every camera.
 
     Raises:
         InputError: there are none.
@@ -43,12 +43,12 @@ def shots_of(views: BoardViews) -> tuple[NodeShots, ...]:
 
 
 def several(views: BoardViews) -> bool:
-    """Whether more than one camera took them."""
+    """Whether the photographs are from more than one camera."""
     return len(camera_images(shots_of(views))) > 1
 
 
 def true_parameters(views: BoardViews, camera: str) -> dict[str, float]:
-    """fx, fy, cx, cy, k1 and so on of a camera whose photographs were rendered; empty for real ones."""
+    """Return fx, fy, cx, cy, k1 and so on of a rendered camera; empty for real ones."""
     try:
         told = json.loads(Path(views.folder, TRUTH).read_text(encoding="utf-8"))
         true = told["cameras"][camera]
@@ -60,7 +60,7 @@ def true_parameters(views: BoardViews, camera: str) -> dict[str, float]:
 
 
 def calibrate_command(views: BoardViews, source: Source) -> str:
-    """The command line that finds the same cameras, several of them in the world of the scene's rig."""
+    """Return the command line that finds the same cameras, several of them in the rig's world frame."""
     board, nodes = board_of(views), shots_of(views)
     folder = views.folder if len(nodes) > 1 else str(nodes[0].folder)
     words = ["packetmesh", "calibrate", folder, "--pattern", board.pattern]
@@ -82,17 +82,17 @@ def calibrate_command(views: BoardViews, source: Source) -> str:
 
 
 def _folder(source: Source) -> Path | None:
-    """Where the rig of a scene lies; None of one that is no rig on disk."""
+    """Return the folder of a scene's rig; None if it is no rig on disk."""
     if isinstance(source, Demo):
         return SCENES / source.name
     return Path(source.path) if isinstance(source, RigFolder) else None
 
 
 def inner(source: Source) -> Source:
-    """A source without the calibration that is laid over it."""
+    """Return a source without the calibration laid over it."""
     return source.source if isinstance(source, Calibrated) else source
 
 
 def with_boards() -> list[str]:
-    """The demo scenes that have views of a board."""
+    """Return the demo scenes that have views of a board."""
     return [name for name in DEMO_SCENES if board_views_of(name) is not None]

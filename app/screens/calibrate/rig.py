@@ -1,4 +1,4 @@
-"""The folder of all cameras together: where each stands, and how sure that is."""
+"""The folder of all cameras together: their poses and uncertainties."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MEANING = (
 
 
 class RigFolder:
-    """Where the cameras stand."""
+    """The poses of the cameras."""
 
     def __init__(self, ui: Ui) -> None:
         """Add the folder."""
@@ -31,14 +31,14 @@ class RigFolder:
             self._text = ui.gui.add_markdown(Markdown(""))
 
     def load(self, rig: RigView | str | None) -> None:
-        """Show another rig; a sentence says why there is none, None hides it."""
+        """Show another rig; a text is the reason why there is none, None hides the folder."""
         self._folder.visible = rig is not None
         self._table.content = rig_table(rig) if isinstance(rig, RigView) else Markup("")
         self._text.content = rig_line(rig) if isinstance(rig, RigView) else Markdown.escape(rig or "")
 
 
 def rig_table(rig: RigView) -> Markup:
-    """HTML: a line for each camera but the first."""
+    """Return a table in HTML with a line for each camera but the first."""
     rows = []
     for one in rig.cameras[1:]:
         away_m = float(np.linalg.norm(one.T_first_camera[:3, 3]))
@@ -56,7 +56,7 @@ def rig_table(rig: RigView) -> Markup:
 
 
 def rig_line(rig: RigView) -> Markdown:
-    """How well all of it fits, and moments that had no part in it."""
+    """Return a sentence on the fit of the whole rig and on held-out moments."""
     told = f"RMS over all cameras {rig.rms_px:.3f} px"
     if rig.held_out_rms_px is None:
         return Markdown("{}; there are too few shared moments to hold some out.").format(told)

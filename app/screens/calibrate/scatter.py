@@ -1,4 +1,4 @@
-"""The trials of the noise experiment as the dock shows them: large, around the truth, beside the thesis's."""
+"""The noise experiment's trials in the dock: scatter plots around the truth, with the thesis's errors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pipeline.types import FloatArray
 PAIRS = (("fx", "fy"), ("cx", "cy"), ("k1", "k2"))
 TEXT_PX, TICK_PX, DOT_PX = 17, 15, 8
 REACH = 3.5
-"""Standard errors on either side of the truth that are shown at least."""
+"""Least extent of the plot to each side of the truth, in standard errors."""
 INK = "#111"
 ERROR = "Root mean square of the trials' difference from the truth."
 PREDICTED = (
@@ -33,7 +33,7 @@ THESIS = (
 
 
 def noise_sheet(view: NoiseView) -> Sheet:
-    """Everything that the dock shows of the trials so far."""
+    """Return the dock's sheet of the trials so far."""
     cell = nearest_cell(view.request.sigma_px, view.names)
     request = view.request
     lens = ", through a lens of another kind" if request.other_lens else ""
@@ -47,7 +47,7 @@ def noise_sheet(view: NoiseView) -> Sheet:
 
 
 def legend_html(cell: Cell | None) -> Markup:
-    """What the signs mean."""
+    """Return HTML of the legend."""
     signs = [
         (Markup('<i style="background: {}"></i>').format(css(BRAND)), "trial"),
         (Markup('<i style="background: {}"></i>').format(css(LOSS)), "trial outside"),
@@ -67,7 +67,7 @@ def legend_html(cell: Cell | None) -> Markup:
 
 
 def errors_html(view: NoiseView, cell: Cell | None) -> Markup:
-    """A table: how far the trials are off, how far they think they are, and the thesis's."""
+    """Return a table: the trials' errors, their predicted standard errors, and the thesis's errors."""
     pad = "padding: 3px 0 3px 14px; text-align: right; font-variant-numeric: tabular-nums"
     heads = [term("error", ERROR), term("predicted", PREDICTED)]
     heads += [] if cell is None else [term("thesis", THESIS)]
@@ -91,7 +91,7 @@ def errors_html(view: NoiseView, cell: Cell | None) -> Markup:
 
 
 def scatter_figure(view: NoiseView, x: str, y: str, cell: Cell | None) -> go.Figure:
-    """The trials, the truth as a cross, and the ellipse that should hold 95 % of them."""
+    """Plot the trials, the truth as a cross, and the ellipse that should hold 95 % of them."""
     figure = go.Figure()
     figure.update_layout(
         template="plotly_white",
@@ -121,7 +121,7 @@ def scatter_figure(view: NoiseView, x: str, y: str, cell: Cell | None) -> go.Fig
 
 
 def _axis(view: NoiseView, name: str, cell: Cell | None) -> dict[str, object]:
-    """From the truth to either side as far as the trials and the thesis go."""
+    """Return an axis around the truth that holds the trials and the thesis's errors."""
     true, found = view.true(name), view.column(name)
     off = None if cell is None else cell.error(name, true)
     reach = max(REACH * view.predicted(name), 1.1 * float(np.abs(found - true).max()), 1.2 * abs(off or 0.0))
@@ -137,7 +137,7 @@ def _axis(view: NoiseView, name: str, cell: Cell | None) -> dict[str, object]:
 
 
 def _add_claim(figure: go.Figure, view: NoiseView, x: str, y: str) -> None:
-    """The frame in which the thesis says that its estimates are."""
+    """Add the frame within which the thesis claims its estimates to be."""
     if x not in UNITS:
         return
     (left, right), (low, high) = (
@@ -160,7 +160,7 @@ def _add_dots(
 
 
 def ellipse_points(center: FloatArray, covariance: FloatArray, count: int = 73) -> FloatArray:
-    """(count, 2) a closed line around 95 % of a normal distribution."""
+    """Return (count, 2) a closed line around 95 % of a normal distribution."""
     values, vectors = np.linalg.eigh(covariance)
     angle = np.linspace(0.0, 2.0 * np.pi, count)
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -169,29 +169,29 @@ def ellipse_points(center: FloatArray, covariance: FloatArray, count: int = 73) 
 
 NAMES = ("fx", "fy", "cx", "cy", "k1", "k2")
 TRUE = (500.0, 500.0, 300.0, 250.0, 0.05, 0.1)
-"""Of its camera."""
+"""True parameters of the thesis's camera."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What the thesis found at the noise that is nearest to another."""
+    """The thesis's result at the noise nearest to a given one."""
 
     sigma_px: float
     errors: dict[str, float]
-    """By parameter: of k1 and k2 what it is off by, of the others as a share of the truth."""
+    """Errors by parameter: absolute for k1 and k2, for the others as a share of the truth."""
 
     def error(self, name: str, true: float) -> float | None:
-        """Of a camera like another; None of what the thesis does not estimate."""
+        """Return the error for a parameter with this true value; None if the thesis does not estimate it."""
         off = self.errors.get(name)
         return None if off is None else off if name.startswith("k") else off * true
 
 
 def nearest_cell(sigma_px: float, parameters: Sequence[str]) -> Cell | None:
-    """Of the noise that is nearest; None without noise, where the thesis finds the truth.
+    """Return the thesis's result at the nearest noise; None without noise, where it finds the truth.
 
     Args:
         sigma_px: the noise.
-        parameters: of the lens: beside a k4, its k1 and k2 are not what they are in the thesis's.
+        parameters: names of the lens's parameters; with a k4, k1 and k2 differ from the thesis's.
     """
     sigma = min(TABLE_4_1, key=lambda one: abs(one - sigma_px))
     if sigma_px < 0.5 * min(TABLE_4_1):

@@ -1,4 +1,4 @@
-"""Whether a camera is good enough: for what range and accuracy, the verdict, and how the lens bends."""
+"""The folder that judges a camera for a range and an accuracy, with two curves of its lens."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from app.window.ui import Ui
 
 REST_S = 0.3
 OWN_M = 2.0
-"""Range until a scene says another."""
+"""Range until a scene sets another."""
 CURVES = {"distortion": "How far the lens moves a point", "left": "What it leaves along the radius"}
 
 
 class TrustFolder:
-    """Range and accuracy, what they ask of the camera, and two curves of its lens."""
+    """Range and accuracy, the camera's errors there, and two curves of its lens."""
 
     def __init__(self, ui: Ui, on_ask: Callable[[], None]) -> None:
-        """Add the folder; ``on_ask`` is called when the camera is to be judged anew."""
+        """Add the folder; ``on_ask`` is called when the camera is to be judged again."""
         self._view: TrustView | None = None
         self._own_m = OWN_M
         self._resting = ui.debounce(REST_S, on_ask)
@@ -57,20 +57,20 @@ class TrustFolder:
         ui.when_changed(self._curve, self._draw)
 
     def request(self, camera: str) -> TrustRequest:
-        """What is asked of a camera."""
+        """Return the request for a camera."""
         return TrustRequest(camera, float(self._range.value), self._accuracy.value / 1000.0)
 
     def at_range(self, ranges_m: Sequence[float]) -> None:
-        """Ask for the middle of these distances."""
+        """Set the range to the mean of these distances."""
         self._own_m = round(sum(ranges_m) / len(ranges_m), 1)
         self.set(None)
 
     def set(self, range_m: float | None) -> None:
-        """Choose for the person; None takes the scene's own distance."""
+        """Set the range; None takes the scene's own."""
         self._range.value = self._own_m if range_m is None else range_m
 
     def load(self, view: TrustView | None) -> None:
-        """Show the answer; None where there is none."""
+        """Show the result; None clears it."""
         self._view = view
         self._table.content = Markup("") if view is None else trust_table(view)
         self._draw()
@@ -87,7 +87,7 @@ class TrustFolder:
 
 
 def verdict_html(view: TrustView | None) -> Markup:
-    """The verdict as a sign and its sentences."""
+    """Return HTML of the verdict: a sign and its sentences."""
     if view is None:
         return Markup("")
     sign, color = ("✓ PASS", DELIVERED) if view.passed else ("✗ FAIL", LOSS)
@@ -102,7 +102,7 @@ def verdict_html(view: TrustView | None) -> Markup:
 
 
 def trust_table(view: TrustView) -> Markup:
-    """HTML: what noise leaves, and what two halves of the views say of each other."""
+    """Return a table in HTML: the error from noise, and the difference of two halves of the views."""
     return table(
         [
             (

@@ -1,4 +1,4 @@
-"""How far a camera is to be trusted at a range, as pictures over its image and in words."""
+"""The job that judges a camera at a range: maps over its image, and sentences."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from pipeline.types import FloatArray
 
 
 def trust_job(store: Store, spec: Spec, request: TrustRequest) -> Generator[Progress, None, TrustView]:
-    """Judge a camera.
+    """Return the verdict on a camera.
 
     Raises:
-        InputError: it has no lens, or the range makes no sense.
+        InputError: it has no lens, or the range is invalid.
     """
     views = spec.views
     assert views is not None
@@ -43,7 +43,7 @@ def trust_job(store: Store, spec: Spec, request: TrustRequest) -> Generator[Prog
 
 
 def _judged(camera: CameraView, request: TrustRequest, board: Board, may_bend: bool) -> TrustView:
-    """The answer; ``may_bend`` tells whether another shape of the board is still to be tried."""
+    """Return the verdict; ``may_bend``: a bent board has not been tried yet."""
     lens = camera.calibration
     assert lens is not None
     views = [View(one.name, one.points_px, one.board_m) for one in lens.views]
@@ -82,7 +82,7 @@ def _judged(camera: CameraView, request: TrustRequest, board: Board, may_bend: b
 
 
 def _lines(trust: Trust, lens: Calibration, may_bend: bool) -> Iterator[str]:
-    """The verdict, and what to do, in the words of the screen."""
+    """Yield the verdict and the advice, as the screen shows them."""
     judged, halves, following = trust.verdict, trust.halves, trust.following
     asked = f"{1000.0 * judged.accuracy_m:g} mm at {judged.range_m:g} m"
     most = 1000.0 * judged.error_of_most_m
@@ -113,7 +113,7 @@ def _lines(trust: Trust, lens: Calibration, may_bend: bool) -> Iterator[str]:
 
 
 def _most_m(noise_m: FloatArray, apart_m: FloatArray | None) -> float:
-    """Both maps share their colours, so that they can be compared by eye."""
+    """Upper end of the colour scale that both maps share, metres."""
     every = noise_m if apart_m is None else np.concatenate([noise_m, apart_m])
     known = every[np.isfinite(every)]
     return float(np.quantile(known, 0.98)) if len(known) else 1.0

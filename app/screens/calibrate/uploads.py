@@ -1,4 +1,4 @@
-"""The folder for photographs of one's own board."""
+"""The folder for uploaded photographs of a board."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ NONE = Markdown("No photograph yet.")
 
 
 class UploadFolder:
-    """Upload buttons, what is on the board, and a button that finds the cameras."""
+    """Upload buttons, the board's pattern, and a button that finds the cameras."""
 
     def __init__(self, ui: Ui, below: Path, on_views: Callable[[BoardViews | None], None]) -> None:
         """Add the folder.
 
         Args:
-            ui: where to add it.
+            ui: panel to add it to.
             below: folder of the session.
-            on_views: called with the photographs that are to be used; None for the scene's own.
+            on_views: called with the photographs to use; None for the scene's own.
         """
         self._on_views, self._below = on_views, below
         self._edition = 0
@@ -78,12 +78,12 @@ class UploadFolder:
             )
 
     def cameras(self, names: Sequence[str]) -> None:
-        """The cameras that there are."""
+        """Set the cameras to choose from."""
         if tuple(names) != self._node.options:
             self._node.options = tuple(names)
 
     def forget(self) -> None:
-        """Go back to the scene's own photographs."""
+        """Return to the scene's own photographs."""
         if self._folder is not None:
             self._folder, self._have.content = None, NONE
             self._on_views(None)
@@ -103,7 +103,7 @@ class UploadFolder:
         ).format(count, noun, kept[-1])
 
     def _write(self, views: BoardViews) -> None:
-        """Show what a ZIP says of the board."""
+        """Show the board that a ZIP describes."""
         self._pattern.value = views.pattern
         self._columns.value, self._rows.value = views.columns, views.rows
         self._spacing.value = 1000.0 * views.spacing_m
@@ -127,10 +127,10 @@ def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[
     """Keep a photograph, or all of a ZIP, below ``folder`` as ``NODE/NAME``.
 
     Returns:
-        What was kept.
+        Names of the kept files.
 
     Raises:
-        InputError: it is too large, no ZIP that can be read, or holds no photograph.
+        InputError: the upload is too large, an unreadable ZIP, or holds no photograph.
     """
     if len(file.content) > UPLOAD_LIMIT_BYTES:
         raise InputError(
@@ -168,7 +168,7 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
 
 
 def _place(name: str, node: str) -> str:
-    """``NODE/NAME`` of a file, in the node's folder that its own path names or else in ``node``."""
+    """Return ``NODE/NAME`` of a file, in the node's folder in its own path or else in ``node``."""
     path = _path(name)
     if path.name == BOARD_FILE:
         return BOARD_FILE
@@ -177,5 +177,5 @@ def _place(name: str, node: str) -> str:
 
 
 def _path(name: str) -> PurePosixPath:
-    """A file's name as any system writes it."""
+    """Return a file's path as any system writes it."""
     return PurePosixPath(name.replace("\\", "/"))

@@ -1,4 +1,4 @@
-"""Carries a calibration into the chain, and shows what becomes of the surface."""
+"""The row that applies a calibration to the chain and compares the surfaces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class UseRow:
     """Two buttons, and the surface's numbers with and without the calibration."""
 
     def __init__(self, ui: Ui, on_use: Callable[[], None], on_before: Callable[[], None]) -> None:
-        """Add them to the current container."""
+        """Add the row to the current container."""
         self._row = ui.buttons(
             "In the chain",
             {USE: on_use, BEFORE: on_before},
@@ -31,15 +31,15 @@ class UseRow:
         self._surfaces: dict[bool, Any] = {}
 
     def show(self, visible: bool) -> None:
-        """Whether there is a calibration to use."""
+        """Show the row if there is a calibration to use."""
         self._row.visible = visible
 
     def say(self, sentence: str) -> None:
-        """Tell what is going on."""
+        """Show a status sentence."""
         self._text.content = Markdown.escape(sentence)
 
     def used(self, folder: str | None) -> None:
-        """The chain computes with a calibration's folder, or as before."""
+        """Show that the chain uses a calibration's folder; None: that it uses none."""
         name = "" if folder is None else Path(folder).name
         in_use = Markdown("**In use** ({}): every later step computes with it.").format(name)
         self._text.content = in_use if name else Markdown("")
@@ -48,12 +48,12 @@ class UseRow:
         self._draw()
 
     def surface(self, mesh: Any, calibrated: bool) -> None:
-        """A surface has been made, with the calibration or without."""
+        """Take a new surface, computed with the calibration or without."""
         self._surfaces[calibrated] = mesh
         self._draw()
 
     def forget(self) -> None:
-        """Another scene."""
+        """Forget the surfaces, which belong to another scene."""
         self._surfaces = {}
         self.used(None)
 
@@ -66,7 +66,7 @@ class UseRow:
 
 
 def surface_table(columns: dict[str, Any]) -> Markup:
-    """HTML: the surface's numbers, a column for each mesh; a dash for one that is not there."""
+    """Return a table in HTML of the surfaces' numbers, a column per mesh; a dash for a missing one."""
     meshes = list(columns.values())
     rows = [
         (

@@ -1,4 +1,4 @@
-"""Writes the calibration that is shown as a folder that the chain lays over the rig."""
+"""The job that writes the shown calibration as a folder that the chain applies to the rig."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from pipeline.types import CameraIntrinsics, Rig
 
 
 def use_job(store: Store, spec: Spec, folder: str) -> Generator[Progress, None, str]:
-    """Write the cameras, where they stand if all were placed together, and the correction of their depth
-    where it is known. The first camera stays where the rig has it.
+    """Write the cameras, their poses if all were placed together, and the known corrections of their depth.
+    The first camera keeps its pose in the rig.
 
     Returns:
         The folder.
 
     Raises:
-        InputError: no camera has a lens, a lens is one that the chain does not know, or the cameras are not
-            those of the rig.
+        InputError: no camera has a lens, a lens is unknown to the chain, or the cameras are not those of the
+            rig.
     """
     views, source = spec.views, spec.source
     assert views is not None
@@ -49,7 +49,7 @@ def use_job(store: Store, spec: Spec, folder: str) -> Generator[Progress, None, 
 
 
 def _nodes(known: CamerasFound, rig: Rig) -> dict[str, CalibratedNode]:
-    """By name; without poses unless all nodes were placed, as others would be in another world."""
+    """Return the nodes by name; poses only if all were placed, since others have another world frame."""
     if known.rig is None:
         return {
             name: CalibratedNode(report.intrinsics)
@@ -64,7 +64,7 @@ def _nodes(known: CamerasFound, rig: Rig) -> dict[str, CalibratedNode]:
 
 
 def _check(name: str, camera: CameraIntrinsics, rig: Rig) -> None:
-    """Raise InputError where the scene cannot take a camera."""
+    """Raise InputError if the scene cannot take a camera."""
     sizes_px = {frame.name: (frame.intrinsics.width_px, frame.intrinsics.height_px) for frame in rig.frames}
     if name not in sizes_px:
         raise InputError(

@@ -1,4 +1,4 @@
-"""What the Calibrate screen gets of a rig's cameras."""
+"""Results of the Calibrate screen: photographs, cameras, depth biases, the rig and its verdicts."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from pipeline.types import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Photograph:
-    """One picture of the board, and what was found in it."""
+    """One photograph of the board, and the points found in it."""
 
     name: str
-    """The same in several cameras for the same moment."""
+    """Name of the moment, equal in several cameras."""
     jpeg: bytes
-    """Thinned for the panel."""
+    """The photograph, thinned for the panel."""
     zoom: float
-    """Pixels of the thinned picture in one of the photograph."""
+    """Pixels of the thinned picture per pixel of the photograph."""
     points_px: FloatArray
-    """(N, 2) of the board's points; empty if it was not found."""
+    """(N, 2) the board's points; empty if it was not found."""
     blobs_px: FloatArray
-    """(B, 2) what looked like a circle, where the board was not found."""
+    """(B, 2) circle-like blobs, if the board was not found."""
     reason: str
-    """Why it was not found, in a sentence."""
+    """Reason why the board was not found, in a sentence."""
 
     @property
     def found(self) -> bool:
@@ -40,20 +40,20 @@ class Photograph:
 
 @dataclass(frozen=True, slots=True)
 class WarpView:
-    """The board's own shape, as the views of one camera have it."""
+    """The board's own shape, estimated from the views of one camera."""
 
     off_plane_m: FloatArray
-    """(R, C) of its points, above or below the plane that lies best in them."""
+    """(R, C) height of its points over their best-fitting plane."""
     used: bool
-    """Whether the camera was estimated with it: it is where that predicts held-out views better."""
+    """Whether the camera was estimated with it, because that predicts held-out views better."""
     rms_px: float
-    """Of held-out views, with it."""
+    """RMS of held-out views with this shape."""
     flat_rms_px: float
-    """With a flat board."""
+    """RMS of held-out views with a flat board."""
 
     @property
     def bend_m(self) -> float:
-        """From the deepest point to the highest."""
+        """Height difference between the lowest and the highest point."""
         return float(np.ptp(self.off_plane_m))
 
 
@@ -67,56 +67,56 @@ class CameraView:
     calibration: Calibration | None = None
     """None if the views do not determine it."""
     reason: str = ""
-    """Why they do not, in a sentence."""
+    """Reason why they do not, in a sentence."""
     unseen: tuple[FittedView, ...] = ()
-    """Every view by a lens that has not seen it: those held out in turn, and those that were dropped."""
+    """Views by a lens estimated without them: those held out in turn, and the dropped ones."""
     dropped: tuple[str, ...] = ()
     """Names of the views that are left out."""
     truth: dict[str, float] = field(default_factory=dict)
-    """Parameters as they truly are, by name; empty for real cameras."""
+    """True parameters by name; empty for real cameras."""
     warp: WarpView | None = None
-    """None unless it was asked for."""
+    """None unless it was estimated."""
 
     def fitted(self, name: str) -> FittedView | None:
-        """A view as the lens explains it, which may have been dropped; None without board or lens."""
+        """Return a view, dropped or not, as the lens explains it; None without board or lens."""
         if self.calibration is None:
             return None
         placed = [*self.calibration.views, *(view for view in self.unseen if view.name in self.dropped)]
         return next((view for view in placed if view.name == name), None)
 
     def unseen_rms_px(self, name: str) -> float | None:
-        """Error of a view by a lens that has not seen it."""
+        """Return the error of a view by a lens estimated without it."""
         return next((view.rms_px for view in self.unseen if view.name == name), None)
 
 
 @dataclass(frozen=True, slots=True)
 class BiasView:
-    """What the board says of a camera's depth sensor."""
+    """The bias of a camera's depth sensor, measured against the board."""
 
     terms: tuple[str, ...]
-    """Those that held-out views justify."""
+    """Terms that held-out views justify."""
     rows: tuple[tuple[str, float, float, float, str], ...]
-    """Of each number of theirs: its name, value, ends of its 95 % interval and unit."""
+    """For each of their numbers: name, value, ends of its 95 % interval and unit."""
     rms_before_m: float
     rms_after_m: float
     curve: BiasCurve
     note: str
-    """What the views cannot tell apart; empty if they can."""
+    """Terms that the views cannot distinguish; empty if they can."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedCamera:
-    """Where a camera of a rig stands, and how sure that is."""
+    """A camera's pose in a rig, and its uncertainty."""
 
     name: str
     T_first_camera: FloatArray
-    """(4, 4) in the frame of the first camera."""
+    """(4, 4) pose in the frame of the first camera."""
     moments: int
-    """At which it sees the board together with the first; of the first, all of its own."""
+    """Moments at which it and the first camera see the board; for the first, all of its own."""
     rotation_sd_deg: float = 0.0
     position_sd_m: float = 0.0
     held_out_rotation_deg: float | None = None
-    """The most by which its pose changes when a part of the moments is left out; None if none was."""
+    """Largest change of its pose when a part of the moments is left out; None without such a part."""
     held_out_position_m: float | None = None
 
 
@@ -126,67 +126,67 @@ class RigView:
 
     cameras: tuple[PlacedCamera, ...]
     T_first_board: dict[str, FloatArray]
-    """(4, 4) by moment."""
+    """(4, 4) pose by moment."""
     rms_px: float
     held_out_rms_px: float | None
-    """In moments that had no part in the poses."""
+    """RMS in moments that were not used for the poses."""
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationView:
-    """All cameras of which there are photographs; while they are computed, those that are done."""
+    """All photographed cameras; while they are computed, those done so far."""
 
     board: Board
     cameras: tuple[CameraView, ...] = ()
     rig: RigView | str | None = None
-    """All of them together, or why that cannot be; None for one camera, and while it is to come."""
+    """All cameras together, or the reason why not; None for one camera, and before it is computed."""
     depth: dict[str, BiasView | str] = field(default_factory=dict)
-    """By camera: the bias of its depth, or why it is not known; without those that are still to come."""
+    """By camera: the bias of its depth, or why it is unknown; only those computed so far."""
 
     def camera(self, name: str) -> CameraView | None:
-        """The camera of that name, or the first."""
+        """Return the camera of this name, or the first."""
         return next((one for one in self.cameras if one.name == name), next(iter(self.cameras), None))
 
 
 @dataclass(frozen=True, slots=True)
 class TrustRequest:
-    """How far a camera is to be trusted at a range."""
+    """The range and the accuracy for which a camera is judged."""
 
     camera: str
     range_m: float
     accuracy_m: float
-    """Within which a point must be placed, across the ray."""
+    """Largest allowed error of a point across the ray."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrustView:
-    """The answer."""
+    """The verdict on a camera."""
 
     request: TrustRequest
     passed: bool
     lines: tuple[str, ...]
-    """The verdict in a sentence, and what to do, in some more."""
+    """The verdict in a sentence, and advice in some more."""
     outliers: tuple[str, ...]
     """Views that stand out, the worst first."""
     pictures: dict[str, Picture]
-    """Of the size of the thinned photographs: what is known of each pixel."""
+    """Maps over the image, of the size of the thinned photographs."""
     bends: RadialCurve
     left: RadialResiduals
     uncertainty_m: float
-    """Within which noise leaves a point 95 times in 100, root mean square over the image."""
+    """95 % error of a point from noise, root mean square over the image."""
     difference_m: float | None
-    """Between two halves of the views, likewise; None with too few of them."""
+    """Root mean square difference of two halves of the views; None with too few views."""
     halves: tuple[float, float] | None
-    """That difference over what noise lets one expect, and how much that is at most in 95 of 100 cases."""
+    """That difference over the one expected from noise, and the ratio exceeded in 5 of 100 cases."""
     together: Correlations
-    """How the errors of the parameters go together."""
+    """Correlations of the parameters' errors."""
 
 
 @dataclass(frozen=True, slots=True)
 class DepthErrorView:
-    """One view's depth beside the board's plane."""
+    """One view's depth compared with the board's plane."""
 
     camera: str
     view: str
     pictures: dict[str, Picture]
-    """As measured and corrected."""
+    """Depth errors as measured and corrected."""

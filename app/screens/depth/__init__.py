@@ -1,1 +1,1 @@
-"""Depth: sensed and inferred, compared, aligned and judged."""
+"""The Depth screen: sensor depth and inferred depth, compared, aligned and judged."""

@@ -1,4 +1,4 @@
-"""What a brush has painted on a cloud, and which point a click meant."""
+"""The brush that paints discs on a cloud, and the search for the point that was clicked."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from app.screens.depth.view import Disc, SeenSample
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 REACH_DEG = 1.0
-"""A click so far from a point still means it."""
+"""Largest angle between a click's ray and the point that it selects."""
 BEHIND = 0.05
-"""Points up to this share farther than the nearest one in reach are on the same surface."""
+"""Points up to this share farther than the nearest one in reach belong to the same surface."""
 SIZE_M = 1.7 * POINT_SIZE_M
 
 
 class BrushDrawing:
-    """The painted points of one cloud, large and in the colour that pictures give to what is unknown."""
+    """The painted points of one cloud, large and in the colour of unknown pixels."""
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
         self._scene, self._name = scene, name
 
     def draw(self, cloud: SeenSample, T_world_camera: FloatArray, discs: Sequence[Disc]) -> None:
-        """Draw these instead of the last; none without discs."""
+        """Replace the drawn points by those under these discs."""
         self._scene.remove_by_name(self._name)
         points_m = cloud.points_m[painted(cloud, discs)]
         if len(points_m):
@@ -36,7 +36,7 @@ class BrushDrawing:
 
 
 def painted(cloud: SeenSample, discs: Sequence[Disc]) -> BoolArray:
-    """(N,) which points of the cloud the discs cover in its image."""
+    """Return (N,) whether the discs cover each point of the cloud in its image."""
     return covered(discs, cloud.pixels[:, 0], cloud.pixels[:, 1], cloud.width_px, cloud.height_px)
 
 
@@ -47,17 +47,17 @@ def clicked_disc(
     direction: FloatArray,
     size_share: float,
 ) -> Disc | None:
-    """The disc around the pixel of the point that a ray means.
+    """Return the disc around the pixel of the point that a ray selects.
 
     Args:
-        cloud: in the frame of its camera.
-        T_world_camera: (4, 4) where that camera stands.
-        origin_m: (3,) of the ray, world frame.
-        direction: (3,) of the ray, world frame, of any length.
-        size_share: diameter of the disc, in widths of the image.
+        cloud: points in the frame of their camera.
+        T_world_camera: (4, 4) pose of that camera.
+        origin_m: (3,) origin of the ray, world frame.
+        direction: (3,) direction of the ray, world frame, of any length.
+        size_share: diameter of the disc over the image's width.
 
     Returns:
-        None if the ray passes the cloud.
+        None if the ray misses the cloud.
     """
     R = T_world_camera[:3, :3]
     index = picked_point(cloud.points_m, (origin_m - T_world_camera[:3, 3]) @ R, direction @ R)
@@ -68,10 +68,10 @@ def clicked_disc(
 
 
 def picked_point(points_m: FloatArray, origin_m: FloatArray, direction: FloatArray) -> int | None:
-    """The row of the (N, 3) point that a ray means; None if none is within 1 degree of it.
+    """Return the row of the (N, 3) point that a ray selects; None if none is within 1 degree of it.
 
     Of the points in reach, those of the nearest surface count, and of these the one closest to the ray:
-    between the points of a sparse surface one sees what is behind it.
+    between the points of a sparse surface one sees the surface behind it.
     """
     forward = np.asarray(direction, float) / np.linalg.norm(direction)
     offset_m = points_m.astype(float) - origin_m
@@ -86,17 +86,17 @@ def picked_point(points_m: FloatArray, origin_m: FloatArray, direction: FloatArr
 
 
 AROUND = 2.5
-"""Side of the part of an image that is shown for a disc, in its diameters."""
+"""Side of the image part that is shown for a disc, in diameters of the disc."""
 
 
 def disc_px(disc: Disc, width_px: int, height_px: int) -> tuple[float, float, float]:
-    """Column and row of the centre, and the radius."""
+    """Return column and row of the centre, and the radius."""
     x, y = disc.x_share * (width_px - 1), disc.y_share * (height_px - 1)
     return x, y, 0.5 * disc.size_share * width_px
 
 
 def disc_at(u: float, v: float, width_px: int, height_px: int, size_share: float) -> Disc:
-    """The disc around a pixel."""
+    """Return the disc around a pixel."""
     return Disc(u / max(width_px - 1, 1), v / max(height_px - 1, 1), size_share)
 
 
@@ -112,7 +112,7 @@ def covered(
 
 
 def window_around(discs: Sequence[Disc], width_px: int, height_px: int) -> tuple[slice, slice]:
-    """Rows and columns that show all discs, at least one, and what is around them."""
+    """Return the rows and columns that show all discs (at least one) and their surroundings."""
     places = np.array([disc_px(disc, width_px, height_px) for disc in discs])
     half = AROUND * places[:, 2:]
     left, top = np.maximum(0.0, (places[:, :2] - half).min(axis=0)).astype(int)

@@ -1,4 +1,4 @@
-"""The folder that hides a part of what was measured, and sees how well it can be filled."""
+"""The folder that hides a part of the sensor depth and shows how well it can be filled."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ BESIDE = Markdown("No measured point there. Click a point of the node that is ch
 
 
 class HideFolder:
-    """A brush, a button, the pictures before and after, and the errors of all ways to fill."""
+    """A brush, a button, the pictures before and after, and the errors of all fill methods."""
 
     def __init__(self, ui: Ui, on_hide: Callable[[HideRequest], None]) -> None:
-        """Add the folder; ``on_hide`` is called with what to hide, of the node that is shown."""
+        """Add the folder; ``on_hide`` is called with the part of the shown node's depth to hide."""
         self._on_hide = on_hide
         self._drawing = BrushDrawing(ui.scene, "/depth/painted")
         self._cloud: SeenSample | None = None
@@ -70,12 +70,12 @@ class HideFolder:
         )
 
     def show(self, cloud: SeenSample, T_world_camera: FloatArray) -> None:
-        """Paint on this node's points, which have just been drawn."""
+        """Let the brush paint on this node's points, which have just been drawn."""
         self._cloud, self._T_world_camera = cloud, T_world_camera
         self._drawing.draw(cloud, T_world_camera, self.discs)
 
     def clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
-        """Paint where a click in the scene meant, if the brush is in hand."""
+        """Paint at the point that was clicked in the scene, if the brush is on."""
         if not self._brush.value or self._cloud is None:
             return
         size_share = self._size.value / 100.0
@@ -86,7 +86,7 @@ class HideFolder:
             self._paint((*self.discs, disc))
 
     def ask(self, request: HideRequest) -> None:
-        """Paint the discs and press the button, as a person would."""
+        """Paint the discs and press the button."""
         last = request.discs[-1]
         self._x.value, self._y.value = round(100.0 * last.x_share), round(100.0 * last.y_share)
         self._size.value = round(100.0 * last.size_share)
@@ -94,17 +94,17 @@ class HideFolder:
         self._ask()
 
     def clear(self) -> None:
-        """Take all discs away, and what was filled."""
+        """Remove all discs and the filled depth."""
         self._paint(())
 
     def forget(self) -> None:
-        """What was filled with other settings is not what these would fill."""
+        """Remove the filled depth, which belongs to other settings."""
         self._status.content = painted_line(self.discs)
         self._table.content = Markup("")
         self._area.load(None)
 
     def load(self, view: HiddenView | None) -> None:
-        """Show the answer; None was stopped or could not be."""
+        """Show the result; None if the job was stopped or failed."""
         self.forget()
         if view is None:
             self._status.content = SILENT
@@ -134,7 +134,7 @@ class HideFolder:
             self._drawing.draw(self._cloud, self._T_world_camera, discs)
 
     def _ask(self) -> None:
-        """Have the discs filled; without any, the one of the sliders."""
+        """Request the filling of the discs; without any, of the one that the sliders set."""
         if not self.discs:
             self._add()
         self.forget()
@@ -143,7 +143,7 @@ class HideFolder:
 
 
 def painted_line(discs: tuple[Disc, ...]) -> Markdown:
-    """How much is painted; empty for nothing."""
+    """Return a line with the number of painted discs; empty for none."""
     if not discs:
         return Markdown("")
     count = "1 disc" if len(discs) == 1 else f"{len(discs)} discs"
@@ -151,7 +151,7 @@ def painted_line(discs: tuple[Disc, ...]) -> Markdown:
 
 
 def fills_table(view: HiddenView) -> Markup:
-    """HTML: a line for each way to fill: AbsRel, share within 5 %, share filled, time."""
+    """Return a table in HTML with a row per fill method: AbsRel, share within 5 %, share filled, time."""
     hint = (
         "AbsRel: mean of |filled - measured| / measured over the hidden pixels that were filled. Within 5 %: "
         "share of all hidden pixels. Filled: share that got a depth at all. Time without the network's own."

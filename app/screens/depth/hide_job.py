@@ -1,4 +1,4 @@
-"""A part of the sensor depth is hidden, filled in several ways, and compared with what was measured there."""
+"""The job that hides a part of the sensor depth, fills it in several ways, and measures the errors."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 LEAST_HIDDEN_PX = 50
 WITHIN = 0.05
-"""Relative error up to which a filled pixel counts as right."""
+"""Relative error up to which a filled pixel counts as correct."""
 SHOWN_PX = 480
 
 
 def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progress, None, HiddenView]:
-    """Hide discs of one node's sensor depth, align without them, fill them, and measure.
+    """Hide discs of one node's sensor depth, align without them, fill them, and measure the errors.
 
     Raises:
         InputError: the node does not exist, or hardly anything is measured in the discs.
@@ -63,11 +63,7 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
 
 
 def hidden_pixels(sensor: DepthMap, discs: Sequence[Disc]) -> BoolArray:
-    """(H, W) the measured pixels of all discs.
-
-    Raises:
-        InputError: there are fewer than 50.
-    """
+    """Return (H, W) the measured pixels of all discs."""
     rows, columns = sensor.z_m.shape
     y, x = np.ogrid[:rows, :columns]
     hidden = covered(discs, x, y, columns, rows) & sensor.valid
@@ -87,14 +83,14 @@ def believed(
     disparity: bool = False,
     hidden: BoolArray | None = None,
 ) -> DepthMap:
-    """The depth that these settings believe without knowing what was measured in (H, W) ``hidden``."""
+    """Return the depth accepted with these settings, without the measurements in (H, W) ``hidden``."""
     alignment = align_depth(inferred, rest, config.alignment, disparity)
     completed = complete(rest, rgb) if config.completes else None
     return judge(alignment, rest, rgb, config.reach, config.least_confidence, completed, hidden).depth
 
 
 def fill_row(name: str, filled_m: FloatArray, measured_m: FloatArray, elapsed_s: float) -> FillRow:
-    """The errors of (N,) filled depths, NaN where nothing was filled."""
+    """Return the errors of (N,) filled depths, NaN where nothing was filled."""
     relative = np.abs(filled_m.astype(float) - measured_m) / measured_m
     known = np.isfinite(relative)
     return FillRow(
@@ -107,7 +103,7 @@ def fill_row(name: str, filled_m: FloatArray, measured_m: FloatArray, elapsed_s:
 
 
 def _pictures(maps: dict[str, DepthMap], sensor: DepthMap, discs: Sequence[Disc]) -> dict[str, Picture]:
-    """The discs and their surroundings, all in the colours of what was measured there."""
+    """Draw the discs and their surroundings, all with the colour scale of the measured depth."""
     rows, columns = sensor.z_m.shape
     window = window_around(discs, columns, rows)
     range_m = depth_range_m(DepthMap(sensor.z_m[window]))
@@ -117,7 +113,7 @@ def _pictures(maps: dict[str, DepthMap], sensor: DepthMap, discs: Sequence[Disc]
 
 
 def _enlarged(picture: Picture) -> Picture:
-    """Whole pixels grow to squares, so that nothing is blurred."""
+    """Enlarge whole pixels to squares, so that nothing is blurred."""
     times = max(1, SHOWN_PX // max(picture.rgb.shape[:2]))
     rgb = picture.rgb.repeat(times, axis=0).repeat(times, axis=1)
     return Picture(rgb, picture.caption, picture.bar)

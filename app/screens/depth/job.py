@@ -37,13 +37,13 @@ from pipeline.nodes import NodeClouds
 from pipeline.types import BoolArray, DepthMap, PointCloud, PointSource, RgbdFrame, Rig
 
 PICTURE_WIDTH_PX = 640
-"""Wider images are thinned for the panel."""
+"""Width in the panel; wider images are subsampled."""
 RESIDUAL_BINS = 60
 LEAST_RANGE_M = 0.01
 
 
 def depth_job(store: Store, spec: Spec) -> Generator[Progress, None, DepthView]:
-    """Every node's depth, sensed, inferred and fused."""
+    """Return every node's depth, sensed, inferred and fused."""
     rig, nodes = yield from store.stages(spec, "rig", "nodes")
     views = []
     for index, clouds in enumerate(nodes):
@@ -97,12 +97,12 @@ def _pictures(frame: RgbdFrame, clouds: NodeClouds, judged: JudgedDepth) -> dict
 
 
 def _thinned(cloud: PointCloud, share: float) -> Sample:
-    """The same share of every cloud, so that their densities can be compared by eye."""
+    """Return the same share of every cloud, so that densities can be compared by eye."""
     return sample(cloud.points_m, cloud.colors, int(share * len(cloud)) + 1)
 
 
 def _seen(cloud: PointCloud, frame: RgbdFrame, share: float) -> SeenSample:
-    """As ``_thinned``, with the pixels of the points."""
+    """Return a cloud thinned as by ``_thinned``, with the pixels of its points."""
     most = min(len(cloud), int(share * len(cloud)) + 1)
     drawn = cloud.select(np.sort(np.random.default_rng(0).choice(len(cloud), most, replace=False)))
     assert drawn.pixels is not None
@@ -112,7 +112,7 @@ def _seen(cloud: PointCloud, frame: RgbdFrame, share: float) -> SeenSample:
 
 
 def _confidence(cloud: PointCloud, judged: JudgedDepth, share: float) -> np.ndarray:
-    """(N, 3) RGB of the points that ``_thinned`` draws."""
+    """Return (N, 3) RGB of the points that ``_thinned`` draws."""
     assert cloud.pixels is not None
     u, v = cloud.pixels.T
     colors = _thinned(replace(cloud, colors=confidence_colors(judged.confidence[v, u])), share).colors
@@ -127,7 +127,7 @@ def _inferred_rows(cloud: PointCloud) -> BoolArray:
 
 
 def residual_view(aligned: DepthMap, sensor: DepthMap) -> ResidualView:
-    """How far aligned depth is from the sensor's; the bins reach as far as 98 % of the pixels."""
+    """Return the histogram of aligned minus sensor depth; its bins cover 98 % of the pixels."""
     residual_m = (aligned.z_m - sensor.z_m).astype(float)
     residual_m = residual_m[np.isfinite(residual_m)]
     if not len(residual_m):
@@ -141,7 +141,7 @@ def residual_view(aligned: DepthMap, sensor: DepthMap) -> ResidualView:
 
 
 def judged_view(judged: JudgedDepth, blind: BoolArray) -> JudgedView:
-    """What of the inferred depth is believed on the pixels ``blind``, (H, W)."""
+    """Return which share of the inferred depth is accepted on the pixels ``blind``, (H, W)."""
     if not blind.any():
         return JudgedView(float("nan"), float("nan"), float("nan"))
     kept, flying, far = (
@@ -151,7 +151,7 @@ def judged_view(judged: JudgedDepth, blind: BoolArray) -> JudgedView:
 
 
 def _filled_error_m(rig: Rig, index: int, judged: JudgedDepth) -> float | None:
-    """Median absolute error of the inferred depth that is left where the sensor has none."""
+    """Return the median absolute error of accepted inferred depth where the sensor has none."""
     if rig.truth is None:
         return None
     error_m = np.abs(judged.depth.z_m - rig.truth.depth[index].z_m)

@@ -14,14 +14,14 @@ PICTURES: dict[PictureName, str] = {
     "difference": "difference",
     "confidence": "confidence",
 }
-"""What stands left and right of the split."""
+"""Pictures to choose from on both sides of the split."""
 PointColoring = Literal["source", "photo", "confidence"]
 COLORINGS: dict[str, PointColoring] = {
     "source: blue measured, violet inferred": "source",
     "photo": "photo",
     "confidence of inferred points": "confidence",
 }
-"""What the colours of the points mean."""
+"""Colourings of the points."""
 ALIGNMENTS: dict[str, str] = {
     "none": "none (as the network says)",
     "median": "one scale",
@@ -29,10 +29,10 @@ ALIGNMENTS: dict[str, str] = {
     "affine_inverse": "scale and shift of 1/depth",
     "local": "scale, shift, smooth correction",
 }
-"""How inferred depth is made metric."""
+"""Methods that make inferred depth metric."""
 HOLES, EVERYWHERE, UNSEEN = "only in the holes", "everywhere", "hidden"
 DRAWN = (HOLES, EVERYWHERE, UNSEEN)
-"""Which of the inferred points are drawn."""
+"""Choices of the inferred points to draw."""
 FILLS = {
     "measured": "as measured",
     "hidden": "hidden",
@@ -43,12 +43,12 @@ FILLS = {
     "inpaint-ns": "OpenCV inpainting, Navier-Stokes",
     "joint-bilateral": "joint bilateral fill",
 }
-"""What was hidden, before, while and after it was filled in each way."""
+"""The hidden part: as measured, hidden, and filled by each method."""
 AS_IT_SAYS = "as the file says"
 
 
 def _told(literal: object) -> dict[str, Any]:
-    """What a network's user can say of it by name; None leaves it to the network's file."""
+    """Return the choices of a network's property; None takes it from the network's file."""
     return {AS_IT_SAYS: None, **{name: name for name in get_args(literal)}}
 
 

@@ -1,4 +1,4 @@
-"""The lesson of the Depth screen: what a stop can set, and the file that ships."""
+"""The lesson of the Depth screen: the settings of its stops, the numbers of its texts, and its file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MODES: dict[str, AlignmentMode] = {mode: mode for mode in get_args(AlignmentMod
 
 @dataclass(frozen=True, slots=True)
 class DepthLook:
-    """What a stop shows; by default what the screen shows at first."""
+    """State of the screen at a stop; the default is the screen's first state."""
 
     left: PictureName = "photo"
     right: PictureName = "sensor"
@@ -32,7 +32,7 @@ class DepthLook:
     reach: float = _DEFAULT.reach
     least_confidence: float = _DEFAULT.least_confidence
     hide: HideRequest | None = None
-    """What is hidden and filled, of the node that is shown."""
+    """The part of the shown node's depth to hide and fill."""
 
 
 def _hide(look: DepthLook, text: str) -> DepthLook:
@@ -56,7 +56,7 @@ SETTINGS: dict[str, Setting[DepthLook]] = {
     "least confidence": sets("least_confidence", quantity("%", 100.0, 100.0)),
     "hide": _hide,
 }
-"""What a stop can set, by its name in the file."""
+"""The settings of a stop, by their names in the file."""
 
 
 NUMBERS = ("no_depth", "median", "rms", "inliers", "let_in", "flying", "out_of_reach")
@@ -64,7 +64,7 @@ NUMBERS = ("no_depth", "median", "rms", "inliers", "let_in", "flying", "out_of_r
 
 
 def numbers(scene: SceneView, index: int, node: DepthNode) -> Numbers:
-    """Their values for a node, which has that index in the scene."""
+    """Return the fields' values for the node with this index in the scene."""
     judged = node.judged
     shares = {
         "no_depth": 1.0 - scene.nodes[index].coverage,

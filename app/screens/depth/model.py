@@ -1,4 +1,4 @@
-"""The folder with the depth network: the one that ships, or one of the person's own."""
+"""The folder with the depth network: the one that ships, or an uploaded one."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class ModelFolder:
             self._table = gui.add_html(Markup(""))
 
     def _add_input(self, ui: Ui) -> None:
-        """Add the settings of the input of a network that is not ours."""
+        """Add the input settings of an uploaded network."""
         gui = ui.gui
         self._advanced = gui.add_folder("Advanced: its input", expand_by_default=False, visible=False)
         with self._advanced:
@@ -86,7 +86,7 @@ class ModelFolder:
             )
 
     def write(self, config: DepthConfig) -> None:
-        """Show the network that is wanted."""
+        """Show the network of these settings."""
         name = next((name for name, path in self._models.items() if path == config.model), None)
         if name is None:
             name = self._add(Path(str(config.model)).name, str(config.model))
@@ -98,7 +98,7 @@ class ModelFolder:
         self._advanced.visible = config.model is not None
 
     def load(self, view: ModelView | None) -> None:
-        """Show the network that was tried; None could not be used, and the one before stays in use."""
+        """Show the tried network; None could not be used, and the previous one stays."""
         if view is None:
             self._status.content = KEPT
             return
@@ -106,7 +106,7 @@ class ModelFolder:
         self._table.content = model_table(view)
 
     def _picked(self) -> None:
-        """Another file gets the input that it asks for itself."""
+        """Take another file with the input size and normalisation of the file itself."""
         self._size.value, self._normalisation.value = (0.0, 0.0), AS_IT_SAYS
         self._chosen()
 
@@ -133,7 +133,7 @@ class ModelFolder:
         self._picked()
 
     def _add(self, name: str, path: str) -> str:
-        """Put a file into the list, under a name of its own."""
+        """Add a file to the list under a unique name."""
         while name in self._models:
             name += "′"
         self._models[name] = path
@@ -142,7 +142,7 @@ class ModelFolder:
 
 
 def model_table(view: ModelView) -> Markup:
-    """HTML: what was found when the network was tried, and what its file says."""
+    """Return a table in HTML with the results of the trial and the metadata of the file."""
     rows = [
         ("Answers", "What its numbers mean.", f"{view.kind} depth"),
         ("Provider", "The execution provider that onnxruntime really used.", view.provider),

@@ -1,4 +1,4 @@
-"""A depth network is loaded and asked once, before anything depends on it."""
+"""The job that loads a depth network and tries it once before it is used."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from pipeline.config import DepthConfig
 from pipeline.depth import DepthNetwork
 
 TEST_IMAGE = np.dstack(np.broadcast_arrays(*np.ogrid[0:240, 0:320], 128)).astype(np.uint8)
-"""(240, 320, 3) a ramp of colours; any network has something to say to it."""
+"""(240, 320, 3) a ramp of colours, on which any network gives an answer."""
 
 
 def model_job(store: Store, spec: Spec, choice: ModelChoice) -> Generator[Progress, None, ModelView]:
-    """Load a network and infer one image; needs nothing of the chain.
+    """Load a network and infer one image, without results of the chain.
 
     Raises:
-        InputError: it is no depth network, nobody says what kind, or it does not take the size.
-        ReconstructionError: it answers without a depth.
+        InputError: it is no depth network, its kind is unknown, or it does not take the size.
+        ReconstructionError: its answer is no depth.
     """
     yield Progress("loading the network", 0.3)
     network = DepthNetwork.of(choice.put_into(DepthConfig()))

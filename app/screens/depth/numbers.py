@@ -1,4 +1,4 @@
-"""The numbers of one node's depth, each with its definition."""
+"""Tables and a histogram of one node's depth; every number has a definition."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ LINES = {
     "local": "z′ = ({a:.3f} z {b:+.3f} m) · exp C",
     "local of disparity": "1/z′ = ({a:.3f}/z {b:+.3f} 1/m) / exp C",
 }
-"""What every mode of alignment fits: z is the network's depth, z′ the aligned one."""
+"""Equation of every alignment mode: z is the network's depth, z′ the aligned one."""
 
 
 def fitted_line(node: DepthNode) -> str:
-    """The equation with its numbers."""
+    """Return the equation of the alignment with its fitted numbers."""
     local_of_disparity = node.disparity and node.alignment_mode == "local"
     line = LINES["local of disparity" if local_of_disparity else node.alignment_mode]
     return line.format(**node.coefficients)
 
 
 def depth_table(node: DepthNode) -> Markup:
-    """HTML: the network, the alignment, and the points."""
+    """Return a table in HTML of the network, the alignment and the points."""
     duration = "remembered" if node.inference_s is None else number(node.inference_s, 0, "ms", 1000)
     kept, rejected = node.sensor.total, node.outliers.total
     share = rejected / max(1, kept + rejected)
@@ -75,7 +75,7 @@ def depth_table(node: DepthNode) -> Markup:
 
 
 def residual_table(node: DepthNode) -> Markup:
-    """HTML: what was fitted, and what it leaves."""
+    """Return a table in HTML of the fit and its residuals."""
     return table(
         [
             (
@@ -104,7 +104,7 @@ def residual_table(node: DepthNode) -> Markup:
 
 
 def confidence_table(node: DepthNode) -> Markup:
-    """HTML: what of the inferred depth is let in where the sensor is blind."""
+    """Return a table in HTML of the inferred depth that is accepted where the sensor is blind."""
     judged = node.judged
     return table(
         [
@@ -128,7 +128,7 @@ def confidence_table(node: DepthNode) -> Markup:
 
 
 def residual_figure(view: ResidualView | None) -> go.Figure:
-    """Bars in centimetres, a line at the median and lines at plus and minus the RMS; None is empty."""
+    """Return a histogram in centimetres with lines at the median and at ± the RMS; empty for None."""
     figure = bar_figure("aligned minus sensor depth, cm", "pixels")
     if view is None:
         return figure

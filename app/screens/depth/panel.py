@@ -1,4 +1,4 @@
-"""Depth: what the sensor measured, what the network inferred, and how far to believe it."""
+"""The Depth screen's panel: sensor depth, inferred depth, and its confidence."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ CONFIDENCE_TEXT = Markdown(
 )
 
 WORTH = Path(assets.__file__).parent / "depth" / "worth.md"
-"""What filling and its confidence are worth; `make results` writes it from the records."""
+"""Text on the benefit of filling and its confidence; `make results` writes it from the records."""
 
 
 class DepthPanel(Panel):
-    """Sensed and inferred depth of every node."""
+    """Sensor depth and inferred depth of every node."""
 
     title = "Depth"
     step: ClassVar[Step | None] = "depth"
     drawn_below = "/depth"
 
     def build(self) -> None:
-        """Two pictures to compare, alignment, what to draw; numbers of one node; the rest in folders."""
+        """Add two pictures to compare, alignment, colouring and one node's numbers; more is in folders."""
         gui, session = self.gui, self.session
         self._look: DepthLook | None = None
         self._source, self._key = session.spec.source, session.spec.key("depth")
@@ -100,7 +100,7 @@ class DepthPanel(Panel):
         return Controls(self.ui, fields, self.session.spec.config, self.session.edit)
 
     def on_spec(self, spec: Spec) -> None:
-        """Show the settings that are wanted; what was hidden with others is out of date."""
+        """Show the current settings; remove a filled part that belongs to others."""
         for controls in self._controls:
             controls.write(spec.config)
         self._model.write(spec.config.depth)
@@ -120,7 +120,7 @@ class DepthPanel(Panel):
         self._show_node()
         self._show_look()
 
-    # What is drawn.
+    # Drawing.
 
     def _draw(self) -> None:
         scene: SceneView | None = self.session.results.view("scene")
@@ -142,7 +142,7 @@ class DepthPanel(Panel):
             self._show_canvas()
 
     def _inferred(self, node: DepthNode) -> tuple[Sample, tuple[int, int, int] | None] | None:
-        """The inferred points to draw, and their one colour; None where they have their own."""
+        """Return the inferred points to draw, and their single colour; None for colours per point."""
         everywhere = self._drawn.value == EVERYWHERE
         if not everywhere and self._drawn.value != HOLES:
             return None
@@ -154,7 +154,7 @@ class DepthPanel(Panel):
         return points, None if coloring == "photo" else INFERRED
 
     def _shown(self) -> tuple[int, DepthNode] | None:
-        """Index and depth of the node that is chosen."""
+        """Return the chosen node's index and its depth."""
         view: DepthView | None = self.session.results.view("depth")
         if view is None:
             return None
@@ -183,7 +183,7 @@ class DepthPanel(Panel):
     # The folders.
 
     def _show_canvas(self) -> None:
-        """Have the brush paint on the chosen node's points."""
+        """Let the brush paint on the chosen node's points."""
         scene: SceneView | None = self.session.results.view("scene")
         shown = self._shown()
         if scene is not None and shown is not None:
@@ -212,7 +212,7 @@ class DepthPanel(Panel):
                 self._hide.load(view)
 
     def _choose_model(self, choice: ModelChoice) -> None:
-        """Try it first: a file that is no depth network is to change nothing."""
+        """Try the network before it is used: a file that is no depth network changes nothing."""
         self.session.quick_job("depth.model_job:model_job", choice, on_end=self._tried)
 
     def _tried(self, view: ModelView | None) -> None:
@@ -223,7 +223,7 @@ class DepthPanel(Panel):
     # The lesson.
 
     def _lesson_numbers(self) -> Numbers:
-        """Of the node that is chosen; empty while its depth is computed."""
+        """Return the numbers of the chosen node; empty while its depth is computed."""
         session, shown = self.session, self._shown()
         scene: SceneView | None = session.results.view("scene")
         if shown is None or scene is None or not session.results.fresh("depth", session.spec):
@@ -231,7 +231,7 @@ class DepthPanel(Panel):
         return numbers(scene, *shown)
 
     def _take_look(self, look: DepthLook) -> None:
-        """Set the controls as a stop of the lesson says; what is to be hidden waits for the depth."""
+        """Set the controls for a stop of the lesson; hiding waits for the depth."""
         session = self.session
         with self.ui.atomic():
             self._area.set(look.left, look.right, look.split_share)
@@ -254,7 +254,7 @@ class DepthPanel(Panel):
         self._show_look()
 
     def _show_look(self) -> None:
-        """Hide what the stop wants hidden, once the depth it is about has come."""
+        """Hide what the stop hides, once the depth of its settings has been computed."""
         look, session = self._look, self.session
         if look is None or not session.results.fresh("depth", session.spec):
             return

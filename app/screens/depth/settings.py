@@ -1,4 +1,4 @@
-"""The settings of the Depth screen that have a control of their own."""
+"""Controls of the Depth screen's settings."""
 
 from __future__ import annotations
 
@@ -69,5 +69,5 @@ ADVANCED = (
 
 
 def with_model(choice: ModelChoice) -> Callable[[PipelineConfig], PipelineConfig]:
-    """The edit that takes another network."""
+    """Return the edit that sets another network."""
     return lambda config: replace(config, depth=choice.put_into(config.depth))

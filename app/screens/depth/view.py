@@ -1,4 +1,4 @@
-"""What the Depth screen asks for beside the chain, and the answers."""
+"""Requests and results of the Depth screen besides those of the chain."""
 
 from __future__ import annotations
 
@@ -14,68 +14,68 @@ PictureName = Literal["photo", "sensor", "inferred", "difference", "confidence"]
 
 @dataclass(frozen=True, slots=True)
 class SeenSample(Sample):
-    """A thinned cloud whose points know where in the image they were seen."""
+    """A thinned cloud with the image positions of its points."""
 
     pixels: IntArray
     """(N, 2) column and row."""
     width_px: int
-    """This and the height: of the image."""
+    """Width of the image; its height is below."""
     height_px: int
 
 
 @dataclass(frozen=True, slots=True)
 class Disc:
-    """A round part of an image."""
+    """A disc in an image."""
 
     x_share: float = 0.5
-    """Centre, in widths of the image from its left."""
+    """Column of the centre over the image's width."""
     y_share: float = 0.5
-    """Centre, in heights of the image from its top."""
+    """Row of the centre over the image's height."""
     size_share: float = 0.2
-    """Diameter, in widths of the image."""
+    """Diameter over the image's width."""
 
 
 @dataclass(frozen=True, slots=True)
 class HideRequest:
-    """The part of one node's sensor depth that is to be hidden and filled again: all discs together."""
+    """The part of one node's sensor depth to hide and fill: all discs together."""
 
     node: int = 0
-    """Index."""
+    """Index of the node."""
     discs: tuple[Disc, ...] = (Disc(),)
 
 
 @dataclass(frozen=True, slots=True)
 class FillRow:
-    """How well one way filled what was hidden."""
+    """Errors of one fill method in the hidden part."""
 
     name: str
     """"ours", "network" or one of ``pipeline.depth.fillers.PEERS``."""
     abs_rel: float
     """Mean of |filled - measured| / measured over the hidden pixels it filled; NaN if it filled none."""
     within_share: float
-    """Hidden pixels filled with a depth within 5 % of the measured one; what stays empty counts as wrong."""
+    """Share of hidden pixels filled within 5 % of the measured depth; empty pixels count as wrong."""
     filled_share: float
-    """Hidden pixels that got a depth."""
+    """Share of hidden pixels that got a depth."""
     elapsed_s: float
-    """Without the network, whose depth is there already."""
+    """Time of the filling, seconds, without the network, whose output is stored."""
 
 
 @dataclass(frozen=True, slots=True)
 class HiddenView:
-    """A part of the sensor's depth before, while and after it was hidden."""
+    """A part of the sensor's depth: measured, hidden and filled."""
 
     request: HideRequest
     node: str
     hidden_px: int
-    """Measured pixels that were hidden."""
+    """Number of measured pixels that were hidden."""
     rows: tuple[FillRow, ...]
     pictures: dict[str, Picture]
-    """By "measured", "hidden" and every row's name: the discs and what is around them."""
+    """By "measured", "hidden" and every row's name: the discs and their surroundings."""
 
 
 @dataclass(frozen=True, slots=True)
 class ModelChoice:
-    """The depth network that is to be used: the fields of ``DepthConfig`` by the same names."""
+    """The depth network to use: fields of ``DepthConfig`` with the same names."""
 
     model: str | None = None
     preset: NetworkPreset | None = None
@@ -85,24 +85,24 @@ class ModelChoice:
     normalisation: Normalisation | None = None
 
     def put_into(self, config: DepthConfig) -> DepthConfig:
-        """``config`` with this network.
+        """Return ``config`` with this network.
 
         Raises:
-            InputError: the size makes no sense.
+            InputError: the input size is invalid.
         """
         return replace(config, **asdict(self))
 
 
 @dataclass(frozen=True, slots=True)
 class ModelView:
-    """A depth network that could be loaded and answered."""
+    """A depth network that was loaded and gave an answer."""
 
     choice: ModelChoice
     kind: ModelKind
-    """What it gives."""
+    """Kind of the network's output."""
     provider: str
     inference_s: float
-    """One test image, the first, which takes longer than those that follow."""
+    """Time of the first test image, which takes longer than later ones."""
     size_bytes: int
     description: dict[str, str]
-    """From the metadata of the file."""
+    """Metadata of the file."""

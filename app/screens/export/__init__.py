@@ -1,1 +1,1 @@
-"""Export: take the results along."""
+"""The Export screen: results as files."""

@@ -1,4 +1,4 @@
-"""Files to take along, made in a computing process and handed over as bytes."""
+"""The job that makes a file for download and returns it as bytes."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from pipeline.types import SurfaceResult
 
 
 def export_job(store: Store, spec: Spec, name: str, shown: Shown = "after") -> Generator[Any, None, bytes]:
-    """The content of the file called ``name``.
+    """Return the content of the file called ``name``.
 
     Args:
-        store: where results are kept.
-        spec: what is asked for.
-        name: a file of the run folder, ``run.zip`` for all of it, or ``surface.`` with the suffix of any mesh
+        store: store of the results.
+        spec: settings and source.
+        name: a file of the run folder, ``run.zip`` for all files, or ``surface.`` with the suffix of any mesh
             format.
-        shown: the surface that ``surface.*`` holds; a baseline is in ``run.zip``, too.
+        shown: the surface that ``surface.*`` holds; a baseline is added to ``run.zip``.
     """
     if name == "config.json":
         return (json.dumps(config_of(spec), indent=2) + "\n").encode()

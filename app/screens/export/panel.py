@@ -1,4 +1,4 @@
-"""Export: take the results along."""
+"""The Export screen's panel: downloads of all results."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ FILES: dict[Shown, str] = {
     "poisson": "surface_poisson.ply",
     "alpha": "surface_alpha.ply",
 }
-"""What the surface that is shown is called in the run folder."""
+"""File name of each surface in the run folder."""
 KINDS = ("Surface", "Clouds", "Numbers", "To show", "Race", "Delivery", "Network")
-"""In the order of the buttons; those of which nothing is there are hidden."""
+"""Kinds of files in the order of the buttons; kinds without files are hidden."""
 
 
 class ExportPanel(Panel):
@@ -45,7 +45,7 @@ class ExportPanel(Panel):
     drawn_below = "/surface"
 
     def build(self) -> None:
-        """Buttons by kind, the command."""
+        """Add buttons by kind, and the command."""
         gui = self.gui
         self._offers: dict[str, Offers] = {}
         gui.add_markdown(TEXT)
@@ -58,22 +58,22 @@ class ExportPanel(Panel):
         self.on_spec(self.session.spec)
 
     def on_spec(self, spec: Spec) -> None:
-        """Show which surface is exported, and what else there is."""
+        """Show which surface is exported, and the files that are available."""
         self._surface.content = Markdown("Surface and page hold **{}**, as the Surface screen shows.").format(
             SURFACES[spec.shown]
         )
         self._arrange()
 
     def on_view(self, step: Step, view: Any) -> None:
-        """There may be more to take along."""
+        """Update the available files."""
         self._arrange()
 
     def on_show(self) -> None:
-        """Show what there is now."""
+        """Update the available files."""
         self._arrange()
 
     def offers(self) -> tuple[Offers, ...]:
-        """What the chain has, whichever screen is looked at."""
+        """Return the offers of the chain's results, independent of the current screen."""
         spec = self.session.spec
         surfaces = tuple(_file(kind.upper(), f"surface.{kind}", spec.shown) for kind in ("ply", "glb", "obj"))
         clouds = tuple(_file(name, f"{name.lower()}.ply") for name in ("Fused", "Sensor", "Inferred"))
@@ -95,7 +95,7 @@ class ExportPanel(Panel):
         )
 
     def _arrange(self) -> None:
-        """Have a row of buttons for each kind of which there is something."""
+        """Show a row of buttons for each kind with files."""
         self._offers = {offers.kind: offers for offers in self.session.offers()}
         with self.ui.atomic():
             for kind, group in self._groups.items():
@@ -115,7 +115,7 @@ class ExportPanel(Panel):
                     command.content = command_html(plain(offers.command))
 
     def _clicked(self, kind: str, label: str, client: viser.ClientHandle | None) -> None:
-        """Runs on the server's own thread, because a picture waits for the browser to draw."""
+        """Export a file. Runs on the server's own thread, because a picture waits for the browser to draw."""
         offers = self._offers.get(kind)
         offer = next((one for one in offers.files if one.label == label), None) if offers else None
         if offer is None or client is None:
@@ -137,7 +137,7 @@ class ExportPanel(Panel):
         session.side_job(offer.job, *offer.arguments, *seen, on_end=send)
 
     def _photograph(self, client: viser.ClientHandle) -> ByteArray | None:
-        """(H, W, 4) the view as the browser draws it."""
+        """Return (H, W, 4) the view as the browser draws it; None if no picture came."""
         camera = client.camera
         height = min(max(camera.image_height, 240), 2160)
         width = min(max(camera.image_width, 320), 3840)

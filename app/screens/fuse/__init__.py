@@ -1,1 +1,1 @@
-"""Fuse: how the nodes find their places, and up to four methods racing from the same start."""
+"""The Fuse screen: registration of the nodes, and a race of up to four methods from the same start."""

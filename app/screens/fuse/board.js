@@ -1,4 +1,4 @@
-// The board over a race: names, large numbers and the scale of colours. Its other side is board.py.
+// The board over a race: names, large numbers and the colour scale. The server's part is board.py.
 (() => {
   const RULER_CM = 10;
   const DOT_CM = 0.35;
@@ -7,7 +7,7 @@
 
   const bytes = text => Uint8Array.from(atob(text), one => one.charCodeAt(0));
 
-  // As many colours as shades, between stops at equal steps.
+  // Return a colour for every shade, interpolated between equally spaced stops.
   function palette(stops) {
     const channels = stops.map(stop => [1, 3, 5].map(at => parseInt(stop.slice(at, at + 2), 16)));
     return Array.from({length: 256}, (_, shade) => {
@@ -27,7 +27,7 @@
       this.scores = [];
     }
 
-    // It lies over the picture.
+    // The board is placed over the picture.
     home() {
       return document.querySelector("canvas[data-engine]")?.parentElement.parentElement;
     }
@@ -77,7 +77,7 @@
       return made;
     }
 
-    // The corner that the ring marks, cut across: what stays in grey, what moves in the colours of the scale.
+    // Draw the corner marked by the ring, cut across: the target in grey, the source in the scale's colours.
     drawLens({glass, ruler, seeing, seen}) {
       const sharp = window.devicePixelRatio;
       const [width, height] = [glass.clientWidth, glass.clientHeight];

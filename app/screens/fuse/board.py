@@ -1,7 +1,7 @@
-"""The board over the lanes of a race: which method, how far off it is now, and what the colours mean.
+"""The board over the lanes of a race: each lane's method and present error, and the colour scale.
 
-The page's side is ``board.js``, its looks are ``board.css``. What the page is to know is in two hidden pieces
-of HTML, each of which says all of its part.
+The page's part is ``board.js``, its style is ``board.css``. The server sends two hidden pieces of HTML, each
+with the whole of its part.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from pipeline.types import ByteArray
 
 
 class Board:
-    """Stands over the picture while a race is shown."""
+    """Shown over the picture during a race."""
 
     def __init__(self, ui: Ui) -> None:
-        """Add it, empty and hidden."""
+        """Add the board, empty and hidden."""
         self._name = uuid.uuid4().hex
         self._view: RaceView | None = None
         self._visible = False
@@ -36,20 +36,20 @@ class Board:
             self._setup, self._state = ui.gui.add_html(Markup("")), ui.gui.add_html(Markup(""))
 
     def load(self, view: RaceView | None) -> None:
-        """Stand over another race, at its start; None is no race."""
+        """Show another race, at its start; None is no race."""
         self._view = view
         self._send_setup()
         if view is not None:
             self.mark([0] * len(view.lanes))
 
     def show(self, visible: bool) -> None:
-        """Show or hide it."""
+        """Show or hide the board."""
         if visible != self._visible:
             self._visible = visible
             self._send_setup()
 
     def mark(self, rows: Sequence[int]) -> None:
-        """Say how far off every lane is at one of its steps."""
+        """Show the error of every lane at one of its steps."""
         if self._view is not None:
             seen = list(zip(self._view.lanes, rows, strict=True))
             said = [{**score(lane, row), "lens": _bytes(lane.steps[row].lens)} for lane, row in seen]
@@ -72,7 +72,7 @@ class Board:
 
 
 def _head(mark: str, lane: RaceLane) -> dict[str, str]:
-    """What stands over a lane all the time."""
+    """Return the constant heading of a lane."""
     method, metric = lane.rival
     about = METHODS[method]
     return {
@@ -84,7 +84,7 @@ def _head(mark: str, lane: RaceLane) -> dict[str, str]:
 
 
 def _lens(lens: LensView) -> dict[str, Any]:
-    """The magnified corner, without what moves."""
+    """Return the magnified corner without the moving points."""
     return {"window": 100.0 * lens.window_m, "target": _bytes(lens.target)}
 
 
@@ -93,7 +93,7 @@ def _bytes(rows: ByteArray) -> str:
 
 
 def scale(reference: Reference) -> dict[str, Any]:
-    """What the colours of the moving cloud mean."""
+    """Return the legend of the moving cloud's colours."""
     return {
         "text": f"Distance {OFF_FROM[reference]}",
         "stops": [css(stop) for stop in DISTANCE_STOPS],
@@ -104,7 +104,7 @@ def scale(reference: Reference) -> dict[str, Any]:
 
 
 def score(lane: RaceLane, row: int) -> dict[str, str]:
-    """The number over a lane at one of its steps, and how it stands."""
+    """Return the error of a lane at one of its steps, and whether it has arrived."""
     step, ended = lane.steps[row], row == len(lane.steps) - 1
     number, unit = distance_text(step)
     state, note = "running", f"iteration {row} of {lane.iterations}"
@@ -119,8 +119,8 @@ def score(lane: RaceLane, row: int) -> dict[str, str]:
 
 
 def distance_text(step: RaceStep) -> tuple[str, str]:
-    """How far off a step is, and the unit: from where it belongs (RMS), or else from the nearest points
-    (median)."""
+    """Return a step's error and its unit: RMS distance from the reference position, or else the median
+    distance from the nearest points."""
     if step.off_m != step.off_m:
         return UNKNOWN, ""
     return number(step.off_m, OFF_DIGITS, scale=100.0), "cm"

@@ -1,4 +1,4 @@
-"""The folder with the capture-range map: green where a method arrives, red where it does not."""
+"""The folder with the capture-range map: green starts from which a method arrives, red others."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ COMPUTING = Markdown("Computing; the bar at the top shows how far.")
 
 
 class CaptureFolder:
-    """A button that has the map computed, and the map, whose cells start a race."""
+    """A button that computes the map, and the map, whose cells start a race."""
 
     def __init__(
         self,
@@ -50,18 +50,18 @@ class CaptureFolder:
         self.forget()
 
     def forget(self) -> None:
-        """The map of another race is not the map of this one."""
+        """Remove the map, which belongs to another race."""
         self._view = None
         self._lane.visible = self._map.visible = False
         self._status.content = Markdown("")
 
     def wait(self) -> None:
-        """Say that it is being computed."""
+        """Show that the map is being computed."""
         self.forget()
         self._status.content = COMPUTING
 
     def load(self, view: CaptureView | None) -> None:
-        """Show a map; None was stopped."""
+        """Show a map; None if the computation was stopped."""
         self.forget()
         if view is None:
             self._status.content = Markdown("Stopped.")
@@ -78,12 +78,12 @@ class CaptureFolder:
 
 
 def cell_name(turn_deg: float, shift_m: float) -> str:
-    """Name of a start of the map."""
+    """Return the name of a start in the map."""
     return f"{turn_deg:.0f}° {100 * shift_m:.0f} cm"
 
 
 def capture_html(view: CaptureView, lane: int) -> Markup:
-    """Rows of rotations, columns of translations; each cell holds how far off it ends."""
+    """Return the map as HTML: rows of rotations, columns of translations, final errors in the cells."""
     heads = Markup("").join(
         Markup("<th>{:.0f} cm</th>").format(100 * shift_m) for shift_m in CAPTURE_SHIFTS_M
     )
@@ -103,7 +103,7 @@ def capture_html(view: CaptureView, lane: int) -> Markup:
 
 
 def capture_sentence(view: CaptureView) -> str:
-    """How many starts every method arrives from."""
+    """Return a sentence with the number of starts from which each method arrives."""
     counts = (view.errors_m < SUCCESS_M).sum(axis=(1, 2))
     starts = view.errors_m[0].size
     reached = ", ".join(f"{label} {count}" for label, count in zip(view.labels, counts, strict=True))

@@ -1,4 +1,4 @@
-"""The capture range: from which starts the methods of a race arrive (SPEC 4.7)."""
+"""The job that computes the capture range: the starts from which a race's methods arrive (SPEC 4.7)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MAP_POINTS = 2_000
 
 
 def capture_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, CaptureView]:
-    """Register from every start of the map with every rival; the race's own start does not matter."""
+    """Register with every rival from every start of the map; the race's own start has no effect."""
     rig, nodes = yield from store.stages(spec, "rig", "nodes")
     race = replace(race, start=Start())
 
@@ -48,7 +48,7 @@ def capture_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, Non
 
 
 def _end_error_m(contest: Contest, config: RegistrationConfig, T_start: FloatArray) -> float:
-    """Distance from where it belongs at the end; that of the start where no pair is found."""
+    """Return the final distance from the reference position; that of the start if no pair is found."""
     try:
         T = register(contest.source, contest.target, config, T_start).T_target_source
     except ReconstructionError:

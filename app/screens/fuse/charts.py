@@ -1,4 +1,4 @@
-"""The race in charts: the pairs by distance, and RMSE and entropy as far as the race has come."""
+"""Charts of a race: the pairs by distance, and RMSE and entropy up to the player's time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FIRST = f"{MARKS[0]} first"
 
 
 class RaceCharts:
-    """Three charts in tabs, all with the player's place marked."""
+    """Three charts in tabs, each with the player's time marked."""
 
     def __init__(self, ui: Ui) -> None:
         gui = ui.gui
@@ -39,7 +39,7 @@ class RaceCharts:
         self._legend = gui.add_html(Markup(""))
 
     def load(self, view: RaceView, clock: RaceClock) -> None:
-        """Show another race, or the same by another clock."""
+        """Show another race, or the same race with another clock."""
         self._view = view
         lanes = view.lanes
         colors = [css(color_of(lane.rival)) for lane in lanes]
@@ -58,12 +58,12 @@ class RaceCharts:
         self._legend.content = legend(view)
 
     def choose_lane(self, index: int) -> None:
-        """Count the pairs of another lane."""
+        """Show the pairs of another lane."""
         self._lane.value = self._lane.options[min(index, len(self._lane.options) - 1)]
         self._show_pairs()
 
     def mark(self, now: float, rows: tuple[int, ...]) -> None:
-        """Follow the player: the place on the axis, and the step of each lane."""
+        """Follow the player: its place on the axis, and the step of each lane."""
         self._rows = rows
         for curves in (self._rmse, self._entropy):
             curves.mark(now, rows)
@@ -79,7 +79,7 @@ class RaceCharts:
 
 
 def legend(view: RaceView) -> Markup:
-    """The lanes with the colours of their curves."""
+    """Return HTML of the lanes' names in the colours of their curves."""
     names = Markup(" &emsp; ").join(
         Markup("<b style='color:{}; white-space: nowrap'>{} {}</b>").format(
             css(color_of(lane.rival)), mark, lane.label
@@ -93,7 +93,7 @@ BARS, KERNEL, WEIGHT = css(NEUTRAL), css(DELIVERED), css(INFERRED)
 
 
 class HistogramChart:
-    """Grey bars of counts, the kernel f in green and the weight w in violet, all over their own peaks."""
+    """Grey bars of counts, kernel f in green and weight w in violet, each scaled to its own peak."""
 
     def __init__(self, gui: Gui) -> None:
         series = (
@@ -105,7 +105,7 @@ class HistogramChart:
         self._caption = gui.add_html(Markup(""))
 
     def show(self, lane: RaceLane, row: int, edges_m: FloatArray) -> None:
-        """Draw the pairs of a lane's step."""
+        """Draw the pairs of one step of a lane."""
         shown = lane.steps[row].histogram
         most = max(1, *(int(step.histogram.counts.max()) for step in lane.steps))
         edges_cm = 100.0 * edges_m
@@ -120,15 +120,15 @@ class HistogramChart:
 
 
 def kernel(lane: RaceLane, shown: PairHistogram, edges_m: FloatArray) -> FloatArray:
-    """(B + 1,) f(d) = exp(-d^2 / 2 sigma^2) at the bins' edges; NaN for methods without it."""
+    """Return (B + 1,) f(d) = exp(-d^2 / 2 sigma^2) at the bins' edges; NaN for methods without it."""
     if not (lane.kernel and shown.sigma_m > 0):
         return np.full(len(edges_m), np.nan)
     return np.exp(-0.5 * (edges_m / shown.sigma_m) ** 2)
 
 
 def weights(shown: PairHistogram) -> FloatArray:
-    """(B,) mean weight of a pair in each bin over the largest; between known bins empty ones are bridged,
-    beyond the farthest pair nothing weighs."""
+    """Return (B,) the mean weight of each bin over the largest; linear over empty bins, and zero beyond the
+    farthest pair."""
     known = np.flatnonzero(np.isfinite(shown.weights))
     if not len(known):
         return shown.weights

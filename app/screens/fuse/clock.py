@@ -1,4 +1,4 @@
-"""The clock of a race: iterations, or the time that each method took."""
+"""The clock of a race: iterations, or each method's run time."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ NS_PER_MS = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class RaceClock:
-    """From 0 to ``end_ns``; a lane that ended before stays at its end."""
+    """A clock from 0 to ``end_ns``; a lane that has ended stays at its last step."""
 
     steps_ns: tuple[NDArray[np.int64], ...]
-    """One (K,) ascending array a lane: when it reached each step; an iteration takes ``COUNT_NS``."""
+    """One (K,) ascending array per lane: the time of each step; an iteration takes ``COUNT_NS``."""
     in_ms: bool
 
     @staticmethod
     def of(lanes: Sequence[RaceLane], in_ms: bool) -> RaceClock:
-        """The clock of these lanes."""
+        """Return the clock of these lanes."""
         if in_ms:
             times = tuple(np.array([round(1e9 * step.time_s) for step in lane.steps]) for lane in lanes)
         else:
@@ -35,27 +35,27 @@ class RaceClock:
 
     @property
     def end_ns(self) -> int:
-        """When the last lane has ended."""
+        """Time at which the last lane ends."""
         return max(int(steps_ns[-1]) for steps_ns in self.steps_ns)
 
     @property
     def stops_ns(self) -> NDArray[np.int64]:
-        """(S,) when any lane moves."""
+        """(S,) times at which any lane moves."""
         return np.unique(np.concatenate(self.steps_ns))
 
     def rows(self, now_ns: int) -> tuple[int, ...]:
-        """The step of each lane."""
+        """Return the step of each lane."""
         return tuple(int(np.searchsorted(steps_ns, now_ns, side="right")) - 1 for steps_ns in self.steps_ns)
 
     @property
     def label(self) -> str:
-        """Of an axis."""
+        """Label of the axis."""
         return "time, ms" if self.in_ms else "iteration"
 
     def shown(self, t_ns: NDArray[np.int64]) -> FloatArray:
-        """Times on an axis."""
+        """Return times in the units of the axis."""
         return t_ns / (NS_PER_MS if self.in_ms else COUNT_NS)
 
     def at(self, place: float | None) -> int:
-        """The time of an iteration or millisecond; None is the end."""
+        """Return the time of an iteration or millisecond; None is the end."""
         return self.end_ns if place is None else round(place * (NS_PER_MS if self.in_ms else COUNT_NS))

@@ -1,4 +1,4 @@
-"""Registrations side by side: the clouds are sent once, then only poses and pairs move."""
+"""Drawings of registrations side by side: the clouds are sent once, then only poses and pairs change."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ POINT_M = 0.011
 PALETTE = ramp(np.arange(256.0), 255.0, DISTANCE_STOPS)
 """RGB of every shade of a distance."""
 FOV_RAD = np.radians(25.0)
-"""Of the view of a race: from afar all lanes are seen from the same side."""
+"""Field of view of a race: small, so that all lanes are seen from the same side."""
 HEAD, HEAD_PX = 0.2, 78.0
-"""What the names and numbers take of the picture's height, and at least (``board.css``)."""
+"""Space for names and numbers: share of the picture's height, and at least so many px (``board.css``)."""
 FOOT, WHOLE_FOOT = 0.58, 0.95
-"""Where the clouds end in the picture, in its height from the top: above the magnified corner, or without."""
+"""Lower edge of the clouds over the picture's height, from the top: with and without magnified corner."""
 RING, RING_PARTS = (20, 20, 20), 48
-"""Colour of the ring about what is magnified, and its parts."""
+"""Colour of the ring around the magnified corner, and its number of segments."""
 ASPECT, HEIGHT_PX = 1.5, 600.0
-"""Of the picture, while nobody looks."""
+"""Aspect and height of the picture while no browser is connected."""
 MARGIN = 0.04
-"""Of a lane's width, and of the picture's height, that stays free on each side."""
+"""Free margin on each side, over a lane's width and the picture's height."""
 FITTED = 2_000
-"""Points of the clouds that are made to fit."""
+"""Number of cloud points that must fit into the picture."""
 
 
 class RaceDrawing:
-    """The lanes of one race below a scene node, beside each other."""
+    """The lanes of one race side by side, below a scene node."""
 
     def __init__(self, scene: viser.SceneApi, below: str, view: RaceView, stage: Stage) -> None:
         clear(scene, below)
@@ -69,7 +69,7 @@ class RaceDrawing:
         self._spread(ASPECT, HEIGHT_PX)
 
     def _add_ring(self, name: str, lens: LensView) -> None:
-        """A circle about what is magnified, facing the viewer."""
+        """Draw a circle around the magnified corner, facing the viewer."""
         angles = np.linspace(0.0, 2.0 * np.pi, RING_PARTS + 1)[:, None]
         around = np.cos(angles) * self._extent.right + np.sin(angles) * self._extent.up
         ring_m = lens.center_m + 0.5 * lens.window_m * around @ self._view.T_world_target[:3, :3]
@@ -77,7 +77,7 @@ class RaceDrawing:
         self._scene.add_line_segments(name, parts_m, np.array(RING), thickness=4.0, thickness_units="screen")
 
     def look(self, clients: Iterable[viser.ClientHandle]) -> None:
-        """Have all lanes side by side in the picture, each in the middle of its share of the width."""
+        """Turn the view so that all lanes are side by side, each in the middle of its share of the width."""
         extent = self._extent
         for client in clients:
             aspect, height_px = client.camera.aspect, client.camera.image_height
@@ -88,11 +88,11 @@ class RaceDrawing:
                 turn(client, at_m, at_m - 0.5 * height_m / np.tan(0.5 * FOV_RAD) * extent.forward)
 
     def _band(self, height_px: float) -> tuple[float, float]:
-        """Where the clouds are in the picture's height from the top."""
+        """Return the upper and lower edge of the clouds over the picture's height."""
         return max(HEAD, HEAD_PX / max(height_px, 1.0)), self._foot
 
     def _spread(self, aspect: float, height_px: float) -> float:
-        """Place the lanes for a picture so much wider than high; how far they are apart in metres."""
+        """Place the lanes for a picture with this aspect. Returns their distance in metres."""
         extent, count = self._extent, len(self._lanes)
         apart_m = apart(extent.points_m, count, aspect, self._band(height_px))
         for frame, away in zip(self._lanes, _places(count), strict=True):
@@ -113,8 +113,8 @@ class RaceDrawing:
     def add_gizmo(
         self, start: Start, on_drag: Callable[[Start, bool], None]
     ) -> viser.TransformControlsHandle:
-        """Arrows and rings in the first lane that move the cloud; ``on_drag`` gets the start and whether
-        the drag has ended."""
+        """Add a gizmo that moves the cloud of the first lane; ``on_drag`` gets the start and whether the drag
+        has ended."""
         handle = self._scene.add_transform_controls(f"{self._below}/lane0/gizmo", scale=0.5, depth_test=False)
         place(handle, gizmo_pose(start, self._view.center_m))
 
@@ -126,7 +126,7 @@ class RaceDrawing:
         return handle
 
     def preview(self, before: Start, start: Start) -> None:
-        """Put all moving clouds at another start than that of the race, without pairs."""
+        """Move all source clouds from the start ``before`` to ``start`` and hide the pairs."""
         center_m = self._view.center_m
         shift = gizmo_pose(start, center_m) @ inverse(gizmo_pose(before, center_m))
         for lane, source, pairs in zip(self._view.lanes, self._sources, self._pairs, strict=True):
@@ -135,28 +135,28 @@ class RaceDrawing:
 
 
 def gizmo_pose(start: Start, center_m: FloatArray) -> FloatArray:
-    """(4, 4) pose of the gizmo in the target's frame: at the moved centre, turned as the cloud is."""
+    """Return the gizmo's (4, 4) pose in the target frame: at the moved centre, turned like the cloud."""
     return rigid(rotation_exp(np.radians(start.turn_deg)), center_m + np.array(start.shift_cm) / 100.0)
 
 
 def start_of(pose: FloatArray, center_m: FloatArray) -> Start:
-    """The start that a gizmo's (4, 4) pose in the target's frame means."""
+    """Return the start for a gizmo's (4, 4) pose in the target frame."""
     turn_deg = np.degrees(transforms.SO3.from_matrix(pose[:3, :3]).log()).round(2).tolist()
     return Start(tuple(turn_deg), tuple((100.0 * (pose[:3, 3] - center_m)).round(2).tolist()))
 
 
 @dataclass(frozen=True, slots=True)
 class _Extent:
-    """What the clouds of a lane take up, as they are seen."""
+    """The extent of a lane's clouds in the picture."""
 
     right: FloatArray
-    """(3,) unit vectors along the picture and into it."""
+    """(3,) unit vectors to the right of the picture, up and into it."""
     up: FloatArray
     forward: FloatArray
     middle_m: FloatArray
-    """(3,)."""
+    """(3,) middle of the clouds."""
     points_m: FloatArray
-    """(N, 3) some of them from there, along these directions."""
+    """(N, 3) some points relative to the middle, along these directions."""
 
 
 def _extent_of(view: RaceView, stage: Stage) -> _Extent:
@@ -178,15 +178,15 @@ def _extent_of(view: RaceView, stage: Stage) -> _Extent:
 
 
 def apart(points_m: FloatArray, count: int, aspect: float, band: tuple[float, float]) -> float:
-    """The least distance between lanes, in metres, at which each is seen whole within its share of the width.
+    """Return the least distance between lanes, metres, at which each fits into its share of the width.
 
-    What is nearer than the middle looks larger, and in the outer lanes farther out.
+    Perspective enlarges points before the middle and moves them outward in the outer lanes.
 
     Args:
         points_m: (N, 3) from the middle of a lane: to the right, up and away from the viewer.
-        count: of the lanes.
-        aspect: width over height of the picture, whose width is that of all lanes at their middle.
-        band: where the lanes are in the picture's height from the top.
+        count: number of lanes.
+        aspect: width over height of the picture; all lanes at the depth of their middle fill the width.
+        band: upper and lower edge of the lanes over the picture's height, from the top.
     """
     low_m, high_m = 1e-3, 20.0 * max(1.0, float(np.abs(points_m).max()))
     for _ in range(30):
@@ -201,15 +201,15 @@ def apart(points_m: FloatArray, count: int, aspect: float, band: tuple[float, fl
 def in_picture(
     points_m: FloatArray, count: int, aspect: float, band: tuple[float, float], apart_m: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Where points are seen in the outer lanes.
+    """Project points of the outer lanes into the picture.
 
     Args:
         points_m, count, aspect, band: as for ``apart``.
         apart_m: distance between lanes.
 
     Returns:
-        (2, N) in the first and the last lane, as a part of its width from the left, and (N,) as a part of the
-        picture's height from the top; far out if a point is behind the viewer.
+        (2, N) positions in the first and the last lane over its width from the left, and (N,) over the
+        picture's height from the top; far outside if a point is behind the viewer.
     """
     right_m, up_m, away_m = points_m.T
     half_m = 0.5 * count * apart_m / aspect
@@ -222,35 +222,35 @@ def in_picture(
 
 
 def _lift(band: tuple[float, float]) -> float:
-    """How far the middle of the band is above that of the picture, in its height."""
+    """Return the height of the band's middle above the picture's middle, over the picture's height."""
     return 0.5 - 0.5 * sum(band)
 
 
 def _places(count: int) -> FloatArray:
-    """(count,) places of lanes about the middle, in their distance from each other."""
+    """Return (count,) positions of lanes about the middle, in units of their distance."""
     return np.arange(count) - 0.5 * (count - 1)
 
 
 def pair_lines(step: RaceStep) -> tuple[FloatArray, ByteArray]:
-    """(M, 2, 3) segments from source to target points in the target frame, darker for more weight."""
+    """Return (M, 2, 3) segments from source to target points in the target frame, darker for more weight."""
     ends = np.stack([apply(step.T_target_source, step.source_points_m), step.target_points_m], axis=1)
     colors = FAINT + (STRONG - FAINT) * np.clip(step.weights, 0.0, 1.0)[:, None]
     return ends.astype(np.float32), np.repeat(colors[:, None], 2, axis=1).astype(np.uint8)
 
 
 class RaceFraming:
-    """Narrows the view of browsers to a race, and gives them back the angle that they had."""
+    """Narrows the browsers' field of view for a race, and restores it afterwards."""
 
     def __init__(self) -> None:
         self._shapes: tuple[tuple[int, float, int], ...] = ()
         self._fov_rad: float | None = None
 
     def anew(self) -> None:
-        """Something else is to be framed."""
+        """Frame again at the next call, because another drawing is shown."""
         self._shapes = ()
 
     def frame(self, drawing: RaceDrawing, clients: Iterable[viser.ClientHandle]) -> None:
-        """Have all lanes in the picture, once for each shape of the windows."""
+        """Fit all lanes into the picture, once for each shape of the windows."""
         clients = list(clients)
         shapes = tuple(
             (client.client_id, round(client.camera.aspect, 2), client.camera.image_height)
@@ -263,7 +263,7 @@ class RaceFraming:
             drawing.look(clients)
 
     def widen(self, clients: Iterable[viser.ClientHandle]) -> None:
-        """Give the view back the angle that a race narrows."""
+        """Restore the field of view that the race had narrowed."""
         if self._fov_rad is not None:
             for client in clients:
                 client.camera.fov = self._fov_rad
@@ -288,7 +288,7 @@ class NodesDrawing:
         ]
 
     def place(self, before: bool) -> None:
-        """Move them to where the nodes were believed to stand, or to where registration puts them."""
+        """Move the nodes to their poses before registration, or to the registered ones."""
         if self._view is None:
             return
         poses = self._view.believed if before else self._view.registered

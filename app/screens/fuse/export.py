@@ -1,4 +1,4 @@
-"""What the Fuse screen offers to take along."""
+"""Files that the Fuse screen offers for download."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NOTE = Markdown(
 
 
 def race_offers(race: Race) -> Offers:
-    """Of a race that has run."""
+    """Return the offers of a race that has run."""
     job = "fuse.export_job"
     files = (
         Offer("Page", "race.html", f"{job}:page_job", (race,)),

@@ -1,4 +1,4 @@
-"""The race as it is set up, to be taken along: a page that plays it, and a moving picture."""
+"""Jobs that export a race: a page that plays it, and a GIF."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from pipeline.kernels.geometry import apply
 
 
 def page_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, bytes]:
-    """A page that plays the race."""
+    """Return a page that plays the race."""
     show = yield from _show(store, spec, race)
     return race_page(show).encode()
 
 
 def animation_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, bytes]:
-    """The race as a GIF."""
+    """Return the race as a GIF."""
     show = yield from _show(store, spec, race)
     yield Progress("drawing the race", 0.7)
     return race_animation(show)
@@ -45,7 +45,7 @@ def _show(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, Rac
 
 
 def race_show(view: RaceView, title: str) -> RaceShow:
-    """What somebody without PacketMesh is to see of a race."""
+    """Return what an exported race shows."""
     T = view.T_world_target
     target_m = apply(T, view.target.points_m.astype(float))
     start_m = apply(T @ view.lanes[0].steps[0].T_target_source, view.source.points_m.astype(float))

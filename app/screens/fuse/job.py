@@ -1,4 +1,4 @@
-"""What the Fuse screen shows of the nodes' places."""
+"""The job that computes the nodes' registration for the Fuse screen."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.types import FloatArray, Rig
 
 
 def fuse_job(store: Store, spec: Spec) -> Generator[Progress, None, FuseView]:
-    """Where registration placed the nodes."""
+    """Return the nodes' poses and the registrations that led to them."""
     rig, nodes, placement = yield from store.stages(spec, "rig", "nodes", "placement")
     believed = tuple(frame.T_world_camera for frame in rig.frames)
     rows = tuple(
@@ -54,7 +54,7 @@ def _registration_row(
 
 
 def true_pose(rig: Rig, source: int, target: int) -> FloatArray | None:
-    """T_target_source of two nodes, where the truth is known."""
+    """Return the true T_target_source of two nodes; None without ground truth."""
     if rig.truth is None:
         return None
     return geometry.inverse(rig.truth.T_world_camera[target]) @ rig.truth.T_world_camera[source]

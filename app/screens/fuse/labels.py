@@ -1,4 +1,4 @@
-"""Labels of the choices of a race, in the panel and in the lessons."""
+"""Labels of a race's choices, in the panel and in the lessons."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OFF_FROM: dict[Reference, str] = {
     "pixels": "from where its own pixels are",
     "cloud": "to the nearest point",
 }
-"""What the distance is that a race shows."""
+"""Meaning of the distance that a race shows."""
 STARTS: dict[str, tuple[float, float]] = {
     "aligned": (0.0, 0.0),
     "slightly off (3°, 6 cm)": (3.0, 6.0),
@@ -40,7 +40,7 @@ COMPARISONS: dict[str, tuple[Rival, ...]] = {
     "Point or plane": (("icp", "point"), ("icp", "plane")),
     "All four": (("icp", "point"), ("ceicp-a", "point"), ("icp", "plane"), ("ceicp-a", "plane")),
 }
-"""Races that tell apart what the weights do, what the metric does, and both."""
+"""Comparisons of weights, of metrics, and of both."""
 NOBODY = "none"
 DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
     "noise_m": ("Noise (cm)", 10.0, 0.5, 100.0, "More noise along the view rays: its standard deviation."),
@@ -49,11 +49,11 @@ DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
     "crop_share": ("Cut off (%)", 80.0, 5.0, 100.0, "Points removed at one side, so that less overlaps."),
     "depth_bias": ("Bias (%)", 15.0, 0.5, 100.0, "Smooth relative error of the depth: its RMS."),
 }
-"""By field of ``Race``: label, most, step, units shown in one unit of the field, hint."""
+"""By field of ``Race``: label, maximum, step, shown units per unit of the field, hint."""
 MOST_LANES = 4
 MOST_SEED = 20
 MARKS = "①②③④"
-"""Of the lanes."""
+"""Marks of the lanes."""
 TEXT = Markdown(
     """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
 are how far off every point is. **Play** below (space), then compare what made the

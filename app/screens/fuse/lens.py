@@ -1,6 +1,7 @@
-"""The magnified corner of a race: an edge of two surfaces that both clouds show, cut and seen along it.
+"""The magnified corner of a race: an edge between two surfaces that both clouds show, seen along the edge.
 
-Seen so, a surface is a line, and a cloud that is ten centimetres off is a second line ten centimetres away.
+In this view a surface is a line, and a cloud that is off by ten centimetres is a second line ten centimetres
+away.
 """
 
 from __future__ import annotations
@@ -17,31 +18,31 @@ from pipeline.registration.neighbourhood import pca_normals
 from pipeline.types import BoolArray, ByteArray, FloatArray
 
 WINDOW_M = 0.3
-"""Width and height of what is seen."""
+"""Width and height of the view."""
 SLAB_M = 0.1
-"""Half the length of edge that is seen."""
+"""Half the length of the part of the edge that is shown."""
 AROUND_M = 0.15
-"""Surfaces so near a point tell whether it is on an edge."""
+"""Radius of the neighbourhood that decides whether a point is on an edge."""
 LEAST_SHARE = 0.12
-"""Share of the second direction among the normals about an edge."""
+"""Least share of the second direction among the normals at an edge."""
 CLEAR = 0.75
-"""Edges whose second direction has such a part of the greatest share are as good as the clearest."""
+"""Edges whose share of the second direction is at least this part of the largest count as equally clear."""
 LEAST_POINTS = 60
 CLOUD_POINTS, CANDIDATES, DRAWN = 30_000, 800, 900
 
 
 @dataclass(frozen=True, slots=True)
 class Lens:
-    """Where to look, and what of the moving cloud belongs there."""
+    """The view of a corner, and the source points near it."""
 
     view: LensView
     axes: FloatArray
     """(3, 3) rows: to the right, up and towards the viewer, target frame."""
     distances: Distances
-    """Of the source's points that belong here or nearby."""
+    """Distances of the source's points that belong to the corner or near it."""
 
     def at(self, T_target_source: FloatArray) -> ByteArray:
-        """(M, 3) column, row and shade of the points in sight at a pose."""
+        """Return (M, 3) column, row and shade of the visible points at a pose."""
         pixels, inside = _pixels(
             apply(T_target_source, self.distances.points_m), self.view.center_m, self.axes
         )
@@ -52,13 +53,14 @@ class Lens:
 def lens_of(
     source_m: FloatArray, target_m: FloatArray, T_aligned: FloatArray, distances: Distances
 ) -> Lens | None:
-    """Of the edges that both clouds show clearly the farthest out, where a wrong turn shows most, if any.
+    """Return the lens at the farthest edge that both clouds show clearly, where a wrong rotation shows most;
+    None if there is none.
 
     Args:
-        source_m: (N, 3) the moving cloud in its own frame.
-        target_m: (M, 3) the cloud that stays, in the frame of its camera.
-        T_aligned: (4, 4) where the one belongs on the other.
-        distances: of the drawn points, from whose places or partners the colours come.
+        source_m: (N, 3) the source cloud in its own frame.
+        target_m: (M, 3) the target cloud in its camera's frame.
+        T_aligned: (4, 4) correct pose of the source in the target frame.
+        distances: distances of the drawn points, which give the colours.
     """
     aligned_m = apply(T_aligned, source_m)
     found = _edge(_thinned(aligned_m), _thinned(target_m))
@@ -74,7 +76,7 @@ def lens_of(
 
 
 def _edge(aligned_m: FloatArray, target_m: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """(3,) place and (3, 3) axes of the edge where the normals of both clouds have two directions."""
+    """Return (3,) position and (3, 3) axes of an edge where both clouds' normals have two directions."""
     if min(len(aligned_m), len(target_m)) < LEAST_POINTS:
         return None
     clouds = [(cKDTree(points_m), pca_normals(points_m)) for points_m in (target_m, aligned_m)]
@@ -94,7 +96,7 @@ def _edge(aligned_m: FloatArray, target_m: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _two_directions(center_m: FloatArray, tree: cKDTree, normals: FloatArray) -> float:
-    """From 0 to 0.5 how much the normals about a place have a second direction, and no third."""
+    """Rate from 0 to 0.5 how clearly the normals around a point have a second direction and no third."""
     rows = tree.query_ball_point(center_m, AROUND_M)
     if len(rows) < LEAST_POINTS:
         return 0.0
@@ -103,7 +105,7 @@ def _two_directions(center_m: FloatArray, tree: cKDTree, normals: FloatArray) ->
 
 
 def _pixels(points_m: FloatArray, center_m: FloatArray, axes: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """(N, 2) column and row from 0 to 255 across the window, and (N,) whether they are in it."""
+    """Return (N, 2) column and row from 0 to 255 across the window, and (N,) whether they are in it."""
     across = ((points_m - center_m) @ axes[:2].T) / WINDOW_M
     pixels = np.rint(255.0 * (0.5 + across * (1.0, -1.0)))
     return pixels, np.all((pixels >= 0) & (pixels <= 255), axis=1)
@@ -114,28 +116,28 @@ def _thinned(points_m: FloatArray) -> FloatArray:
 
 
 def _some(rows: FloatArray) -> FloatArray:
-    """At most ``DRAWN`` of them, evenly drawn."""
+    """Return at most ``DRAWN`` of the rows, drawn uniformly."""
     if len(rows) <= DRAWN:
         return rows
     return rows[np.sort(np.random.default_rng(0).choice(len(rows), DRAWN, replace=False))]
 
 
 REACH_M = 0.5
-"""A point without a partner so near counts as so far from it."""
+"""Limit of the distance to a partner: a point without a nearer one gets this distance."""
 
 
 @dataclass(frozen=True, slots=True)
 class Distances:
-    """From where each point belongs, or from the nearest point of the target where that is not known."""
+    """Distance of each point from its reference position or, if unknown, from the target's nearest point."""
 
     points_m: FloatArray
     """(N, 3) source frame."""
     T_home: FloatArray | None
     tree: cKDTree
-    """Of the target."""
+    """Search tree of the target."""
 
     def at(self, T_target_source: FloatArray) -> tuple[FloatArray, float]:
-        """(N,) distances in metres at a pose, and their median if they are those from partners, else NaN."""
+        """Return (N,) distances in metres at a pose, and their median (NaN for reference positions)."""
         places_m = apply(T_target_source, self.points_m)
         if self.T_home is not None:
             return np.linalg.norm(places_m - apply(self.T_home, self.points_m), axis=1), float("nan")
@@ -145,5 +147,5 @@ class Distances:
 
 
 def shades_of(distances_m: FloatArray) -> ByteArray:
-    """(N,) 0 to 255 for distances from none to ``MOST_DISTANCE_M`` and beyond."""
+    """Return (N,) 0 to 255 for distances from zero to ``MOST_DISTANCE_M`` and beyond."""
     return np.rint(255.0 * np.minimum(distances_m / MOST_DISTANCE_M, 1.0)).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""The lesson of the race: what a stop can set, and the file that ships."""
+"""The lesson of the race: the settings of its stops, the numbers of its texts, and its file."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from app.window.tables import UNKNOWN, number
 
 SHIPPED = LESSONS / "icp-against-ceicp.md"
 START = (3.0, 6.0)
-"""Start error of a section that names none: degrees, centimetres."""
+"""Start error of a section that sets none: degrees, centimetres."""
 
 
 @dataclass(frozen=True, slots=True)
 class RaceLook:
-    """What a stop shows of which race."""
+    """The race that a stop shows, and how."""
 
     race: Race = field(default_factory=lambda: Race(start=Start.towards(*START, seed=0)))
-    """Without the nodes, which stay those that are chosen."""
+    """The race without its nodes, which stay as chosen."""
     in_ms: bool = False
     """Whether the curves run over time instead of iterations."""
     place: int | None = 0
     """Iteration, or milliseconds, to show; None is the end."""
     lane: int = 0
-    """Whose pairs the histogram shows."""
+    """Lane whose pairs the histogram shows."""
 
 
 def _races(key: str, read: Callable[[str], Any]) -> Setting[RaceLook]:
-    """The setting that puts what ``read`` makes of the text into one field of the race."""
+    """Return a setting that stores what ``read`` makes of the text in one field of the race."""
     return lambda look, text: replace(look, race=replace(look.race, **{key: read(text)}))
 
 
@@ -78,7 +78,7 @@ SETTINGS: dict[str, Setting[RaceLook]] = {
     "position": sets("place", _place),
     "lane": sets("lane", choice({str(index + 1): index for index in range(MOST_LANES)})),
 }
-"""What a stop can set, by its name in the file."""
+"""The settings of a stop, by their names in the file."""
 
 
 PER_LANE = ("end", "iterations", "time")
@@ -86,13 +86,13 @@ NUMBERS = (
     *(f"{name}_{lane}" for name in PER_LANE for lane in range(1, MOST_LANES + 1)),
     *("begin", "turn", "shift", "holes", "bias", "noise", "more", "others"),
 )
-"""Fields of the texts and of choices; those of a lane end with its number."""
+"""Fields of the texts and choices; a lane's fields end with its number."""
 ALIKE_M = 0.005
-"""Ends no farther apart are about the same."""
+"""Final errors that differ by no more than this count as equal."""
 
 
 def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
-    """Their values for a race in a scene; ends are distances from the truth or else from the other cloud."""
+    """Return the fields' values for a race; errors are from the reference position or the other cloud."""
     told = dict.fromkeys(NUMBERS, UNKNOWN)
     for place, lane in enumerate(view.lanes, 1):
         told[f"end_{place}"] = number(lane.steps[-1].off_m, 2, "cm", 100.0)
@@ -111,7 +111,7 @@ def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
 
 
 def _verdicts(ends_m: Mapping[Rival, float]) -> dict[str, str]:
-    """What brings more, the plane or the weights, and how far those end that know no entropy; by words."""
+    """Return words: whether plane or weights help more, and how the methods without entropy compare."""
     told = {}
     plane_m, weights_m = ends_m.get(("icp", "plane")), ends_m.get(("ceicp-a", "point"))
     if plane_m is not None and weights_m is not None:
@@ -126,7 +126,7 @@ def _verdicts(ends_m: Mapping[Rival, float]) -> dict[str, str]:
 
 
 def _which(one_m: float, other_m: float, words: tuple[str, str, str]) -> str:
-    """The first word if the one is less by more than ``ALIKE_M``, the last if the other is."""
+    """Return the first word if ``one_m`` is less by more than ``ALIKE_M``, the last if ``other_m`` is."""
     if abs(one_m - other_m) <= ALIKE_M:
         return words[1]
     return words[0] if one_m < other_m else words[2]

@@ -1,4 +1,4 @@
-"""The methods that race: the colour of each, what it does in two sentences, and where it comes from."""
+"""The methods of a race: colour, description in two sentences, and source."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from app.screens.fuse.view import Rival
 Color = tuple[int, int, int]
 
 PLANE_SHADE = 0.55
-"""Strength of a method's colour where it minimises distances to planes: the same hue, darker."""
+"""Brightness of a method's colour with the plane metric: the same hue, darker."""
 METRICS = {
     "point": "It minimises the distance to the paired point.",
     "plane": "It minimises the distance to the plane at the paired point, so surfaces may slide along "
@@ -21,11 +21,11 @@ METRICS = {
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What a race says of a method."""
+    """Description of a method."""
 
     color: Color
     text: str
-    """Two sentences."""
+    """Two sentences on how it works."""
     source: str
 
 
@@ -114,11 +114,11 @@ METHODS: dict[str, About] = {
         "Zhang, Yao, Deng, TPAMI 2021",
     ),
 }
-"""By the method's name in the settings."""
+"""Descriptions by the method's name in the settings."""
 
 
 def color_of(rival: Rival) -> Color:
-    """The colour of a method with a metric, the same in every race."""
+    """Return the colour of a method with a metric, the same in every race."""
     method, metric = rival
     shade = PLANE_SHADE if metric == "plane" else 1.0
     red, green, blue = np.rint(np.multiply(METHODS[method].color, shade)).astype(int).tolist()
@@ -126,5 +126,5 @@ def color_of(rival: Rival) -> Color:
 
 
 def label_of(rival: Rival) -> str:
-    """What to call it."""
+    """Return the label of a method with a metric."""
     return f"{rival[0].upper()} {rival[1]}"

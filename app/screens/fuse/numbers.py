@@ -1,4 +1,4 @@
-"""The race in numbers and in a sentence, and the chain's own result."""
+"""Tables and sentences about a race and about the chain's own registration."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _OFF: dict[Reference, tuple[str, str]] = {
 
 
 def verdict(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markdown:
-    """A sentence on which method ends nearest to where it belongs, whichever that is."""
+    """Return a sentence on which method ends nearest to the reference position."""
     if reference == "cloud":
         return Markdown(
             "The truth of this scene is not known. RMSE alone does not tell which is better: each method "
@@ -54,14 +54,14 @@ def _alike(one_m: float, other_m: float) -> bool:
 
 
 def _loss(ranking: list[tuple[float, str]]) -> str:
-    """Says so if a method that is not CEICP ends before the best CEICP that races."""
+    """Return a sentence if a method other than CEICP ends before the best CEICP in the race, else nothing."""
     best_m, best = ranking[0]
     ours_m = [error_m for error_m, label in ranking if "CEICP" in label]
     return " So CEICP loses here." if ours_m and "CEICP" not in best and not _alike(best_m, ours_m[0]) else ""
 
 
 def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
-    """A column for each lane; every row's name explains itself."""
+    """Return a table with a column for each lane; every row's name has an explanation."""
 
     def row(name: str, hint: str, value: Callable[[RaceLane], str]) -> Row:
         return (name, hint, *(value(lane) for lane in lanes))
@@ -111,13 +111,13 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
 
 
 def _stopped(reason: str) -> str:
-    """A word for the table."""
+    """Return the reason of the stop in one word."""
     head = reason.partition(":")[0]
     return "lost" if reason.startswith("No point") else STOPS.get(head, head)
 
 
 def places_table(view: FuseView) -> Markup:
-    """The chain's own registrations."""
+    """Return a table of the chain's own registrations."""
     if not view.rows:
         return Markup("")
     rows = [_place_row(row) for row in view.rows]
@@ -128,7 +128,7 @@ def places_table(view: FuseView) -> Markup:
 
 
 def _agreeing(view: FuseView) -> str:
-    """How far the cameras agree; nothing where no two measured the same place."""
+    """Return a sentence on the cameras' agreement; empty if no two measured the same place."""
     if not np.isfinite(view.agreement_share):
         return ""
     return f" Of what two cameras both measured, {view.agreement_share:.1%} is within 2 %."
@@ -146,7 +146,7 @@ def _place_row(row: RegistrationRow) -> Row:
 
 
 def _loop(row: RegistrationRow) -> str:
-    """How well the other registrations agree with this one."""
+    """Return a sentence on how well the other registrations agree with this one."""
     if not row.used:
         return "Not used: it degenerated, or the other registrations or both measurements contradict it."
     if not np.isfinite(row.loop_error_m):

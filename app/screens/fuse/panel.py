@@ -1,4 +1,4 @@
-"""Fuse: how the nodes find their places, and up to four methods racing from the same start."""
+"""The Fuse screen's panel: registration of the nodes, and a race of up to four methods."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from app.window.in_address import STOP, CallbackState, Picked
 from app.window.panel import Offers, Panel
 
 _Wanted: TypeAlias = tuple[tuple[Hashable, ...], Race]
-"""A race of the clouds with this key."""
+"""The key of the clouds and the race of them."""
 
 
 class FusePanel(Panel):
@@ -55,14 +55,14 @@ class FusePanel(Panel):
     step: ClassVar[Step | None] = "fuse"
     drawn_below = "/fuse"
     _raced: _Wanted | None
-    """The race that was asked for last."""
+    """The race that was submitted last."""
     _arrived: _Wanted | None
     """The race that is shown."""
     _mapped: _Wanted | None
-    """The race whose capture range was asked for last."""
+    """The race whose capture range was submitted last."""
 
     def build(self) -> None:
-        """Lesson, what races, the player, charts and table; the rest in folders."""
+        """Add lesson, methods, player, charts and table; the other controls are in folders."""
         gui = self.gui
         self._raced = self._arrived = self._mapped = None
         self._view: RaceView | None = None
@@ -70,7 +70,7 @@ class FusePanel(Panel):
         self._drawn: Start = Start()
         self._gizmo: Any = None
         self._seek_at: float | None = 0.0
-        """Where the next race is to stand when it comes; None is its end."""
+        """Place to which the player goes in the next race; None is its end."""
         self._framing = RaceFraming()
         self._here = False
         self._seen: tuple[int, ...] = ()
@@ -117,11 +117,11 @@ class FusePanel(Panel):
             self._controls = Controls(self.ui, ADVANCED, session.spec.config, session.edit)
 
     def on_spec(self, spec: Spec) -> None:
-        """Show the settings that are wanted."""
+        """Show the current settings."""
         self._controls.write(spec.config)
 
     def on_view(self, step: Step, view: Any) -> None:
-        """New scene: forget the race. New clouds: other nodes. New places: draw the result and race again."""
+        """Take a view: a new scene drops the race, new clouds set the nodes, new poses start a race."""
         if step == "scene":
             self._forget()
         if step == "depth":
@@ -139,21 +139,21 @@ class FusePanel(Panel):
         self._start()
 
     def on_hide(self) -> None:
-        """Leave the picture to others, seen as they see it."""
+        """Hide the board and dock and restore the field of view."""
         self._here = False
         self._show_parts()
         self._framing.widen(self.session.clients())
 
     def on_action(self, action: str) -> None:
-        """Go back to the race of the start, once the session has gone back to its settings."""
+        """Restore the first race on *Reset*, after the session has restored its settings."""
         if action == "Reset":
             self.ui.post(self._reset)
 
     def offers(self) -> tuple[Offers, ...]:
-        """The race that is shown, once it has run."""
+        """Return the exports of the race that is shown, once it has run."""
         return () if self._arrived is None else (race_offers(self._arrived[1]),)
 
-    # What races.
+    # The methods and nodes of the race.
 
     def _choose_nodes(self, names: list[str]) -> None:
         single = len(names) == 1
@@ -179,7 +179,7 @@ class FusePanel(Panel):
         self._arrange()
 
     def _take_stop(self, stop: RaceLook) -> None:
-        """Set the controls as a stop of the lesson says, and race."""
+        """Set the controls for a stop of the lesson, and race."""
         single = RACE_NAMES["nodes"] not in self._shown.options
         race = replace(stop.race, mode="inferred") if single else stop.race
         with self.ui.atomic():
@@ -211,13 +211,13 @@ class FusePanel(Panel):
         self._start()
 
     def _lesson_numbers(self) -> Numbers:
-        """Of the race that is wanted; empty while it is computed."""
+        """Return the numbers of the current race; empty while it is computed."""
         scene = self.session.results.view("scene")
         if scene is None or self._view is None or self._wanted() != self._arrived:
             return {}
         return numbers(scene.title, self._setup.race, self._view)
 
-    # What the address says.
+    # The race's parts of the address.
 
     def _race_text(self) -> str:
         return race_text(self._setup.race)
@@ -231,7 +231,7 @@ class FusePanel(Panel):
         self._start()
 
     def _moment(self) -> str:
-        """Iteration or millisecond, unless it is the start."""
+        """Return the iteration or millisecond for the address; empty at the start."""
         waiting = END if self._seek_at is None else f"{self._seek_at:.6g}"
         at = waiting if waiting != "0" else self._player.rest if self._racing else ""
         return moment_text(at, self._player.in_ms)
@@ -245,7 +245,7 @@ class FusePanel(Panel):
     # The race.
 
     def _start(self) -> bool:
-        """Race if the clouds or the race have changed; whether it has to be waited for."""
+        """Race if the clouds or the race have changed. Returns whether the result has yet to come."""
         session = self.session
         if session.results.view("depth") is None or not session.results.fresh("fuse", session.spec):
             return True
@@ -262,7 +262,7 @@ class FusePanel(Panel):
         return (self.session.spec.key("fuse"), self._setup.race)
 
     def _forget(self) -> None:
-        """Take the race of another scene away."""
+        """Remove the race of another scene."""
         self._raced = self._arrived = self._view = self._drawing = self._gizmo = None
         with self.ui.atomic():
             clear(self.scene, "/fuse/race")
@@ -297,7 +297,7 @@ class FusePanel(Panel):
             self._lesson.refresh()
 
     def _show_parts(self) -> None:
-        """Have board and dock there while a race is shown, and only then."""
+        """Show board and dock while a race is shown, else hide them."""
         self._board.show(self._racing and self._here)
         self._player.show(self._racing and self._here)
 
@@ -321,7 +321,7 @@ class FusePanel(Panel):
     # The gizmo.
 
     def _place_gizmo(self) -> None:
-        """Put the gizmo where the race starts, or away."""
+        """Put the gizmo at the race's start, or hide it."""
         if self._drawing is None or self._view is None:
             return
         if self._gizmo is None and self._dragging.value:
@@ -364,7 +364,7 @@ class FusePanel(Panel):
         return stage_of(self.session.results.view("scene").nodes)
 
     def look(self) -> bool:
-        """Have all lanes in the picture, once for each shape of the window; the session sees to the rest."""
+        """Fit all lanes into the picture, once per window shape. False leaves the view to the session."""
         if self._drawing is None or not self._racing:
             self._framing.widen(self.session.clients())
             return False
@@ -380,7 +380,7 @@ class FusePanel(Panel):
             self._arrange()
 
     def _arrange(self) -> None:
-        """Show the race or the nodes in one of their two places."""
+        """Show the race, or the nodes at their poses before or after registration."""
         racing = self._racing
         self._show_parts()
         for name, visible in (("/fuse/race", racing), ("/fuse/result", not racing)):
@@ -392,5 +392,5 @@ class FusePanel(Panel):
 
 
 def _anywhere(wanted: _Wanted) -> _Wanted:
-    """The race without its start, which its capture range does not depend on."""
+    """Return the race without its start, on which its capture range does not depend."""
     return (wanted[0], replace(wanted[1], start=Start()))

@@ -1,4 +1,4 @@
-"""What the address says of a race: the settings that differ from those of the start, separated by spaces."""
+"""A race in the address: the settings that differ from the first race, separated by spaces."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from packetmesh.errors import InputError
 from packetmesh.settings import settings, with_settings
 
 FIRST = Race(start=Start.towards(*STARTS[SLIGHTLY], seed=0))
-"""The race of the start."""
+"""The race that is shown first."""
 MOST_NODE, MOST_AWAY = 99, 1000.0
-"""The largest index of a node, and degrees or centimetres along an axis, that an address may name."""
+"""Largest node index, and largest degrees or centimetres along an axis, in an address."""
 _RIVALS = "rivals"
 _NAMES: Mapping[str, Rival] = {"-".join(rival): rival for rival in RIVALS.values()}
 
 
 def race_text(race: Race) -> str:
-    """``seed=3 rivals=icp-point,ceicp-a-plane``; empty for the race of the start."""
+    """Return the text of a race: ``seed=3 rivals=icp-point,ceicp-a-plane``; empty for the first race."""
     first = _settings(FIRST)
     return " ".join(f"{key}={value}" for key, value in _settings(race).items() if value != first[key])
 
 
 def race_of(text: str) -> Race:
-    """The race of such a text.
+    """Return the race in a text.
 
     Raises:
-        InputError: a setting that there is not, or a value that it does not take.
+        InputError: a setting is unknown or does not take its value.
     """
     changes = dict(change.partition("=")[::2] for change in text.split())
     rivals = changes.pop(_RIVALS, None)
@@ -46,7 +46,7 @@ def race_of(text: str) -> Race:
 
 
 def moment_text(at: str, in_ms: bool) -> str:
-    """``12``, ``12ms`` or ``end``; empty at the start.
+    """Return ``12``, ``12ms`` or ``end``; empty at the start.
 
     Args:
         at: iteration, millisecond or ``END``; empty or 0 is the start.
@@ -56,10 +56,10 @@ def moment_text(at: str, in_ms: bool) -> str:
 
 
 def moment_of(text: str) -> tuple[float | None, bool]:
-    """Where the race of such a text stands, None for its end, and whether in milliseconds.
+    """Return the moment in a text, None for the end, and whether it is in milliseconds.
 
     Raises:
-        InputError: it is no moment.
+        InputError: the text is no moment.
     """
     number = text.removesuffix(MS)
     if re.fullmatch(rf"{NUMBER}|{END}|", number) is None:

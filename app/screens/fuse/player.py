@@ -1,4 +1,4 @@
-"""The player of a race: the dock with the curve of how far off every method is."""
+"""The player of a race: the dock with the error curve of every method."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from app.screens.fuse.view import OFF_DIGITS, RaceLane, Reference
 from app.window.ui import Ui
 
 RUN_S = 12.0
-"""How long a race takes on the screen, about."""
+"""Approximate playing time of a race, seconds."""
 LANE_PX = 96
 END = "end"
 
 
 class RacePlayer:
-    """Moves over a race's clock."""
+    """Moves the clock of a race."""
 
     def __init__(self, ui: Ui, on_move: Callable[[int], None], on_clock: Callable[[], None]) -> None:
-        """Add the dock; ``on_move`` gets every new time, ``on_clock`` is called with another clock."""
+        """Add the dock. ``on_move`` gets every new time; ``on_clock`` is called after a clock change."""
         self._ui, self._on_clock = ui, on_clock
         self._lanes: Sequence[RaceLane] = ()
         self._reference: Reference = "truth"
@@ -33,7 +33,7 @@ class RacePlayer:
         self.show = self._dock.show
 
     def add_axis(self) -> None:
-        """Add the choice of the clock."""
+        """Add the drop-down for the clock."""
         self._axis = self._ui.gui.add_dropdown(
             "Axis",
             list(CLOCKS),
@@ -44,17 +44,17 @@ class RacePlayer:
 
     @property
     def now_ns(self) -> int:
-        """Where it is."""
+        """Time of the clock."""
         return self._dock.now_ns
 
     @property
     def in_ms(self) -> bool:
-        """Whether it counts milliseconds."""
+        """Whether the clock counts milliseconds."""
         return CLOCKS[self._axis.value]
 
     @property
     def rest(self) -> str:
-        """The iteration or millisecond at which it stands, or stood before it played; ``end`` for the end."""
+        """Iteration or millisecond of the clock when it was last at rest; ``end`` for the end."""
         if self.clock is None:
             return ""
         rest_ns = self._dock.rest_ns
@@ -63,7 +63,7 @@ class RacePlayer:
         return f"{float(self.clock.shown(np.array(rest_ns))):.6g}"
 
     def load(self, lanes: Sequence[RaceLane], reference: Reference) -> None:
-        """Take another race, at its start; none without lanes."""
+        """Load another race, at its start; nothing without lanes."""
         self._lanes, self._reference = lanes, reference
         if not lanes:
             return
@@ -85,7 +85,7 @@ class RacePlayer:
 
 
 def error_lane(reference: Reference, lanes: Sequence[RaceLane], clock: RaceClock) -> CurvesLane:
-    """How far off every method is, all on one scale, and nothing of what is still to come."""
+    """Return a lane of the error of every method on one scale; the time after the clock is hidden."""
     offs_cm = [np.array([100.0 * step.off_m for step in lane.steps]) for lane in lanes]
     high_cm = round_up(max(1.0, *(float(np.nanmax(off_cm, initial=0.0)) for off_cm in offs_cm)))
     curves = [

@@ -1,4 +1,4 @@
-"""Up to four registration methods from the same disturbed start, step by step."""
+"""The job that runs a race: up to four registration methods from the same disturbed start, step by step."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from pipeline.spec import key
 from pipeline.types import FloatArray, PointCloud, RegistrationStep, Rig
 
 LANE_POINTS = 10_000
-"""Of each of the two clouds of a lane."""
+"""Number of drawn points of each cloud of a lane."""
 DRAWN_PAIRS = 250
 BINS = 60
 MOST_BINNED_M = 1.0
@@ -47,29 +47,29 @@ KERNEL_METHODS: tuple[Method, ...] = ("ceicp-n", "ceicp-a", "ceicp-r")
 
 @dataclass(frozen=True, slots=True)
 class Contest:
-    """Two clouds, and where the one belongs on the other."""
+    """Two clouds, and the reference pose of the source."""
 
     source: PointCloud
-    """As the race asks for it, degraded."""
+    """The source cloud with the race's degradation."""
     target: PointCloud
     T_aligned: FloatArray
-    """T_target_source: where it belongs, or what the nodes believe where that is not known."""
+    """T_target_source: the reference pose, or the nodes' believed one if it is unknown."""
     T_home: FloatArray | None
-    """Where it belongs; None if nobody knows."""
+    """The reference pose; None if it is unknown."""
     reference: Reference
     center_m: FloatArray
     """(3,) centre of the aligned source before it was degraded, target frame."""
     error_points_m: FloatArray
-    """(N, 3) points before degradation whose distance from where they belong is the error."""
+    """(N, 3) points before degradation whose distance from their reference positions is the error."""
 
     def start_pose(self, start: Start) -> FloatArray:
-        """T_target_source so far from aligned."""
+        """Return T_target_source of a start: the aligned pose with the start's error."""
         rotation = geometry.rotation_exp(np.radians(start.turn_deg))
         shift_m = self.center_m - rotation @ self.center_m + np.array(start.shift_cm) / 100.0
         return geometry.rigid(rotation, shift_m) @ self.T_aligned
 
     def error_m(self, T: FloatArray) -> float | None:
-        """RMS distance of the points from where they belong; None if that is not known."""
+        """Return the RMS distance of the points from their reference positions; None if these are unknown."""
         return None if self.T_home is None else point_error_m(T, self.T_home, self.error_points_m)
 
 
@@ -104,15 +104,15 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
 
 
 def race_key(spec: Spec) -> tuple[object, ...]:
-    """What a race depends on beside itself."""
+    """Return what a race's result depends on besides the race."""
     return (key(spec, "nodes"), spec.config.node_registration)
 
 
 def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
-    """The clouds of a race.
+    """Return the clouds of a race and their reference pose.
 
     Raises:
-        InputError: the scene has no such node, or it cannot be moved onto itself.
+        InputError: the scene has no such node, or source and target are the same node.
     """
     last = max(race.source, race.target)
     if last >= len(nodes):
@@ -151,7 +151,7 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
 
 
 def config_of(race: Race, rival: Rival, config: RegistrationConfig) -> RegistrationConfig:
-    """The chain's settings with a rival's method."""
+    """Return the chain's settings with a rival's method."""
     method, metric = rival
     return replace(
         config, method=method, metric=metric, direction=race.direction, with_scale=False, start="given"
@@ -159,21 +159,21 @@ def config_of(race: Race, rival: Rival, config: RegistrationConfig) -> Registrat
 
 
 def _every(points_m: FloatArray, most: int) -> FloatArray:
-    """About ``most`` of the points, evenly spaced in their order."""
+    """Return about ``most`` of the points, evenly spaced in their order."""
     return points_m[:: max(1, len(points_m) // most)]
 
 
 @dataclass(frozen=True, slots=True)
 class Watch:
-    """What is looked at in every step."""
+    """What is recorded in every step."""
 
     edges_m: FloatArray
-    """(B + 1,) bins of the histogram."""
+    """(B + 1,) edges of the histogram's bins."""
     distances: Distances
     lens: Lens | None
 
     def seen(self, T_target_source: FloatArray) -> dict[str, Any]:
-        """What a ``RaceStep`` says of where the points are at a pose."""
+        """Return the fields of a ``RaceStep`` that depend on the points' positions at a pose."""
         distances_m, gap_m = self.distances.at(T_target_source)
         lens = np.empty((0, 3), np.uint8) if self.lens is None else self.lens.at(T_target_source)
         return {"gap_m": gap_m, "shades": shades_of(distances_m), "lens": lens}
@@ -181,7 +181,7 @@ class Watch:
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """What a rival did."""
+    """The recorded run of a rival."""
 
     rival: Rival
     T_start: FloatArray
@@ -201,7 +201,7 @@ def _run(contest: Contest, race: Race, rival: Rival, config: RegistrationConfig)
 
 
 def _edges_m(runs: Sequence[Sequence[RegistrationStep]]) -> FloatArray:
-    """Bins that hold nearly all first pairs of every method, up to a metre."""
+    """Return bins that hold nearly all first pairs of every method, up to a metre."""
     reaches_m = [float(np.percentile(records[0].distances_m, 97)) for records in runs if records]
     return np.linspace(0.0, min(max([0.1, *reaches_m]), MOST_BINNED_M), BINS + 1)
 
@@ -248,7 +248,7 @@ def _race_step(
 def _end_step(
     last: RaceStep | None, T: FloatArray, time_s: float, contest: Contest, watch: Watch
 ) -> RaceStep:
-    """The pose after the last update, with the numbers of the last matching."""
+    """Return the step of the pose after the last update, with the numbers of the last matching."""
     nothing, unknown = np.empty((0, 3), np.float32), float("nan")
     histogram = PairHistogram(np.zeros(BINS, int), np.full(BINS, np.nan), unknown)
     return RaceStep(

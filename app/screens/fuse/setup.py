@@ -1,4 +1,4 @@
-"""What races: the clouds, the methods, the start and what is done to the moving cloud."""
+"""Controls of a race: the clouds, the methods, the start and the degradation of the moving cloud."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ class RaceSetup:
     """The controls of a ``Race``."""
 
     def __init__(self, ui: Ui, on_change: Callable[[], object]) -> None:
-        """Set up without controls, which the panel adds where it wants them."""
+        """Start without controls; the panel adds them in its own order."""
         self._ui, self._on_change = ui, on_change
         self._race = FIRST
         self._asked = False
-        """Whether the nodes are those that an address has asked for, which may still have to come."""
+        """Whether the nodes are those of an address, although the scene may not be loaded yet."""
         self._slots: list[viser.GuiDropdownHandle[str]] = []
 
     def add_comparisons(self) -> None:
-        """Buttons for the races that are worth a question."""
+        """Add buttons for the comparisons."""
         actions = {
             name: functools.partial(self._picked_rivals, rivals) for name, rivals in COMPARISONS.items()
         }
@@ -51,7 +51,7 @@ class RaceSetup:
         )
 
     def add_methods(self, labels: Sequence[str]) -> None:
-        """The next drop-downs of methods; all but the first may stay empty."""
+        """Add the next drop-downs of methods; all but the first may stay empty."""
         for label in labels:
             index, rivals = len(self._slots), self._race.rivals
             handle = self._ui.gui.add_dropdown(
@@ -64,7 +64,7 @@ class RaceSetup:
             self._ui.when_changed(handle, self._picked)
 
     def add_preset(self) -> None:
-        """Where the moving cloud starts, by name."""
+        """Add the choice of a start by name."""
         self._preset = self._ui.gui.add_dropdown(
             "Start",
             [*STARTS, BY_HAND],
@@ -75,7 +75,7 @@ class RaceSetup:
         self._ui.when_changed(self._preset, self._picked_preset)
 
     def add_nodes(self) -> None:
-        """Who moves onto whom, and who asks whom for the nearest point."""
+        """Add the choice of the moving and the fixed node, and of the search direction for pairs."""
         gui, names = self._ui.gui, ["node_00", "node_01"]
         self._source = gui.add_dropdown(
             "Move", names, initial_value=names[1], hint="Node whose cloud moves (coloured)."
@@ -88,7 +88,7 @@ class RaceSetup:
             self._ui.when_changed(handle, self._picked)
 
     def add_numbers(self) -> None:
-        """The start in numbers."""
+        """Add the start's rotation and shift."""
         gui, start = self._ui.gui, self._race.start
         self._turn = gui.add_vector3(
             "Turn (°)",
@@ -112,7 +112,7 @@ class RaceSetup:
         self._ui.when_changed(self._seed, self._picked_preset)
 
     def add_degradations(self) -> None:
-        """What is done to the moving cloud."""
+        """Add the sliders of the moving cloud's degradation."""
         self._worse = {
             name: self._ui.gui.add_slider(label, 0.0, most, step, 0.0, hint=hint)
             for name, (label, most, step, _, hint) in DEGRADATIONS.items()
@@ -126,7 +126,7 @@ class RaceSetup:
         return self._race
 
     def reset(self, mode: RaceMode) -> None:
-        """Go back to the race of the start."""
+        """Restore the first race."""
         names = self._source.options
         self._source.value, self._target.value = names[min(1, len(names) - 1)], names[0]
         self.write(Race(mode=mode, start=FIRST.start))
@@ -143,7 +143,7 @@ class RaceSetup:
         self._race = self._read(self._race)
 
     def choose(self, race: Race) -> None:
-        """Show another race, and between its own nodes, now or when the scene's nodes are known."""
+        """Show another race between its own nodes, now or when the scene's nodes are known."""
         self.write(race)
         self._race, self._asked = race, True
         self._show_nodes()
@@ -155,7 +155,7 @@ class RaceSetup:
                 handle.value = names[index]
 
     def choose_mode(self, mode: RaceMode) -> None:
-        """Race nodes, or one node's inferred cloud."""
+        """Race two nodes, or one node's inferred cloud."""
         self._race = replace(self._race, mode=mode)
         self._target.disabled = mode == "inferred"
 
@@ -174,7 +174,7 @@ class RaceSetup:
         self.write_start(race.start)
 
     def write_start(self, start: Start) -> None:
-        """Show another start; a preset if it is one."""
+        """Show another start; as a preset if it is one."""
         self._race = replace(self._race, start=start)
         self._turn.value, self._shift.value = start.turn_deg, start.shift_cm
         self._preset.value = next(
@@ -183,7 +183,7 @@ class RaceSetup:
         )
 
     def _read(self, race: Race) -> Race:
-        """``race`` with the values of the controls of the clouds and methods."""
+        """Return ``race`` with the values of the controls of clouds and methods."""
         names = list(self._source.options)
         worse = {name: handle.value / DEGRADATIONS[name][3] for name, handle in self._worse.items()}
         return replace(

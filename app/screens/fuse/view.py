@@ -1,4 +1,4 @@
-"""What the Fuse screen gets of the nodes' places, of a race and of its capture range."""
+"""Results for the Fuse screen: the nodes' poses, a race and its capture range."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ RaceMode = Literal["nodes", "inferred"]
 """nodes: one node's sensor cloud onto another's; inferred: a node's inferred cloud onto its sensor cloud."""
 
 Reference: TypeAlias = Literal["truth", "pixels", "cloud"]
-"""From what a race measures how far off it is: where the points truly are; where the pixels are that they
-were inferred at, which needs no truth; or, where neither is known, the nearest points of the other cloud."""
+"""Reference of a race's errors: the points' true positions; the pixels at which they were inferred, which
+needs no ground truth; or, if both are unknown, the nearest points of the other cloud."""
 
 Rival: TypeAlias = tuple[Method, Metric]
 
@@ -25,7 +25,7 @@ Vector: TypeAlias = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class RegistrationRow:
-    """How one node was placed beside another."""
+    """The registration of one node to another."""
 
     source: str
     target: str
@@ -33,34 +33,34 @@ class RegistrationRow:
     iterations: int
     stop_reason: str
     rmse_m: float
-    """Of the last matching; NaN if there was none."""
+    """RMSE of the last matching; NaN if there was none."""
     error_before_m: float | None
-    """RMS distance of the source's points from where they truly are, at the believed pose."""
+    """RMS distance of the source's points from their true positions, at the believed pose."""
     error_after_m: float | None
     loop_error_m: float
-    """How far it is from what the other registrations say about these two nodes; NaN where nothing."""
+    """Difference from the other registrations' answer for these two nodes; NaN if there is none."""
     used: bool
-    """False if it degenerated or contradicts the other registrations or what both measured."""
+    """False if it degenerated or contradicts the other registrations or the common measurements."""
 
 
 @dataclass(frozen=True, slots=True)
 class FuseView:
-    """Where the nodes stand after registration."""
+    """The nodes' poses after registration."""
 
     believed: tuple[FloatArray, ...]
-    """T_world_camera before."""
+    """T_world_camera before registration."""
     registered: tuple[FloatArray, ...]
-    """T_world_camera after."""
+    """T_world_camera after registration."""
     rows: tuple[RegistrationRow, ...]
     agreement_share: float
-    """Of what two placed cameras both measured, the share within 2 %; NaN where no two did."""
+    """Share, within 2 %, of the depths that two placed cameras both measured; NaN if there are none."""
     sentences: tuple[str, ...]
-    """What is to be said of nodes that found no place, or one that little speaks for."""
+    """Sentences on nodes that found no pose or have an uncertain one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """How far from aligned a cloud starts: turned about its centre, then shifted, along the target's axes."""
+    """A start error: a rotation about the source's centre, then a shift, along the target's axes."""
 
     turn_deg: Vector = (0.0, 0.0, 0.0)
     """Rotation vector."""
@@ -68,7 +68,7 @@ class Start:
 
     @staticmethod
     def towards(turn_deg: float, shift_cm: float, seed: int) -> Start:
-        """So far in directions that the seed draws; rounded as the panel shows it."""
+        """Return a start of this size in random directions; rounded as the panel shows it."""
         directions = np.random.default_rng(seed).normal(size=(2, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         turn, shift = (directions * [[turn_deg], [shift_cm]]).round(2).tolist()
@@ -77,15 +77,15 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class Race:
-    """What is to be compared: who moves onto whom, from where, and with what done to the moving cloud."""
+    """The settings of a race: the two clouds, the methods, the start and the source's degradation."""
 
     mode: RaceMode = "nodes"
     source: int = 1
-    """Index of the node that moves, or whose inferred cloud moves."""
+    """Index of the source node, which moves, or whose inferred cloud moves."""
     target: int = 0
-    """Index of the node that stays; a node's inferred cloud moves onto its own sensor cloud."""
+    """Index of the target node, which stays; an inferred cloud's target is its own sensor cloud."""
     rivals: tuple[Rival, ...] = (("icp", "point"), ("ceicp-a", "point"))
-    """By default two that differ in their weights only, not in their metric."""
+    """By default two methods that differ in their weights only, not in their metric."""
     direction: Direction = "q2p"
     start: Start = Start()
     noise_m: float = 0.0
@@ -95,7 +95,7 @@ class Race:
     crop_share: float = 0.0
     depth_bias: float = 0.0
     seed: int = 0
-    """Of what is done to the moving cloud."""
+    """Seed of the degradation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,55 +112,55 @@ class PairHistogram:
 
 @dataclass(frozen=True, slots=True)
 class RaceStep:
-    """What a player shows of one iteration."""
+    """One iteration as a player shows it."""
 
     T_target_source: FloatArray
-    """Pose at which the pairs were matched, before the update of this iteration."""
+    """Pose at which the pairs were matched, before this iteration's update."""
     source_points_m: FloatArray
     """(M, 3) float32, source frame."""
     target_points_m: FloatArray
     """(M, 3) float32, target frame."""
     weights: FloatArray
-    """(M,) relative to the largest."""
+    """(M,) weights over the largest."""
     time_s: float
-    """From the start of the method, its preparation included, until it reached this pose."""
+    """Run time of the method, its preparation included, until it reached this pose."""
     rmse_m: float
     entropy_nat: float
-    """NaN for methods without one."""
+    """Entropy; NaN for methods without one."""
     point_error_m: float | None
-    """RMS distance of the points from where they belong, at the same pose; None if no place is known."""
+    """RMS distance of the points from their reference positions at this pose; None if these are unknown."""
     gap_m: float
-    """Median distance of the drawn points from the nearest of the target; NaN where their place is known."""
+    """Median distance of the drawn points from the nearest target point; NaN if an error is known."""
     shades: ByteArray
-    """(N,) distance of each drawn point from where it belongs, or from the nearest point of the target where
-    that is not known: 0 to 255 for none to ``MOST_DISTANCE_M`` and beyond."""
+    """(N,) each drawn point's distance from its reference position or, if unknown, the target's nearest
+    point: 0 to 255 for zero to ``MOST_DISTANCE_M`` and beyond."""
     lens: ByteArray
     """(M, 3) column, row and shade of the points in the magnified corner, placed as in ``LensView``."""
     histogram: PairHistogram
 
     @property
     def off_m(self) -> float:
-        """How far off it is: from where it belongs, or else from the other cloud."""
+        """Error: distance from the reference position, or else from the other cloud."""
         return self.gap_m if self.point_error_m is None else self.point_error_m
 
 
 @dataclass(frozen=True, slots=True)
 class RaceLane:
-    """One method's way from the start pose to its end."""
+    """One method's steps from the start pose to its end."""
 
     rival: Rival
     label: str
     kernel: bool
     """Whether its weights come from the Gaussian kernel f of the pair distance."""
     steps: tuple[RaceStep, ...]
-    """The last step is the end pose, without pairs and with the numbers of the last matching."""
+    """The steps; the last is the end pose, without pairs and with the numbers of the last matching."""
     stop_reason: str
     iterations: int
     elapsed_s: float
     average_hausdorff_m: float
-    """Between the moved source and the target, at the end."""
+    """Average Hausdorff distance between the moved source and the target, at the end."""
     effective_pairs: float
-    """Of the last matching."""
+    """Effective number of pairs in the last matching."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,9 +168,9 @@ class LensView:
     """A corner that is shown magnified."""
 
     center_m: FloatArray
-    """(3,) target frame."""
+    """(3,) middle of the corner in the target frame."""
     window_m: float
-    """Width and height of what is seen."""
+    """Width and height of the view."""
     target: ByteArray
     """(K, 2) column and row of the target's points, 0 to 255 across the window."""
 
@@ -187,20 +187,20 @@ class RaceView:
     center_m: FloatArray
     """(3,) centre of the aligned source in the target's frame; the start turns about it."""
     edges_m: FloatArray
-    """(B + 1,) bins of all histograms."""
+    """(B + 1,) edges of the bins of all histograms."""
     lens: LensView | None
-    """None where the clouds share no corner."""
+    """The magnified corner; None if the clouds share no corner."""
     reference: Reference
     lanes: tuple[RaceLane, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class CaptureView:
-    """From which starts the methods of a race arrive."""
+    """The capture range: the final errors of a race's methods by their start."""
 
     labels: tuple[str, ...]
     errors_m: FloatArray
-    """(lanes, rotations, translations) distance from where the cloud belongs, at the end."""
+    """(lanes, rotations, translations) final distance from the reference position."""
 
 
 CAPTURE_TURNS_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
@@ -209,7 +209,7 @@ CAPTURE_SHIFTS_M = (0.1, 0.2, 0.3, 0.4, 0.6)
 """Start errors of a capture-range map (SPEC 4.7)."""
 
 OFF_DIGITS = 2
-"""Behind the point of a distance in centimetres: tenths of a millimetre, wherever it stands."""
+"""Decimals of a distance in centimetres: tenths of a millimetre everywhere."""
 
 SUCCESS_M = 0.02
-"""A registration that ends closer to where it belongs than this has succeeded (SPEC 4.7)."""
+"""A registration that ends closer to the reference position than this has succeeded (SPEC 4.7)."""

@@ -1,1 +1,1 @@
-"""Network: nodes, packets and what their ways cost, on one timeline."""
+"""The Network screen: cameras or vehicles that send images, with nodes and packets on one timeline."""

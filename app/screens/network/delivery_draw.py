@@ -1,4 +1,4 @@
-"""A delivery in the room: cameras with what arrived of their pictures, frames on their way, the mesh."""
+"""Drawing of a delivery in the room: cameras with their arrived pictures, moving frames, and the mesh."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from pipeline.types import FloatArray
 FRUSTUM = 0.08
 """Depth of a frustum over the distance from the cameras to what they see."""
 BESIDE = 0.5
-"""How far beside the cameras the sink is drawn, over the same distance: it may stand far outside."""
+"""Distance from the cameras to the drawn sink, in the same unit: the real sink may be far outside."""
 ELEVATION_RAD = np.radians(40.0)
 FILLED = 0.8
-"""Share of the window that all of it takes."""
+"""Share of the window that the drawing fills."""
 PACKET_M, POINT_M = 0.011, 0.008
-"""Sizes over the same distance, and of a point."""
+"""Sizes of a packet and of a point, in the same unit."""
 NAME_BELOW = 0.05
-"""A camera, over the same distance: between room and viewer, where it covers neither pictures nor mesh."""
+"""Distance of a name below its camera, in the same unit: there it covers neither pictures nor mesh."""
 NARROW_PX = 600.0
-"""Width of a picture that has room for the cameras' names only, not for what they have sent and used."""
+"""Width below which only the cameras' names are shown, without data and energy."""
 LONGEST = 8
-"""Letters that may still come behind a node's name and share: its energy."""
+"""Letters of the energy that can still be added after a node's name and share."""
 LIT = (255, 230, 0)
 BUSY, DOWN = BRAND, LOSS
 FULL, EMPTY = DELIVERED, SOURCE
@@ -38,7 +38,7 @@ Number = tuple[int, int, int]
 
 
 class DeliveryDrawing:
-    """Everything of one delivery below a scene node, at any time."""
+    """A delivery below a scene node, at any time."""
 
     def __init__(self, scene: viser.SceneApi, below: str, view: DeliveryView) -> None:
         clear(scene, below)
@@ -54,9 +54,9 @@ class DeliveryDrawing:
         self._frusta: list[viser.CameraFrustumHandle] = []
         self._names: list[viser.LabelHandle] = []
         self._marks: dict[str, viser.LabelHandle] = {}
-        """Names of the sink, the cloud and the client."""
+        """Labels of the sink, the cloud and the client."""
         self._lifts_m: list[FloatArray] = [np.zeros(3)] * len(view.nodes)
-        """(3,) how much farther down the name of each node stands, so that it covers no other."""
+        """(3,) extra distance of each node's name below its camera, so that names do not overlap."""
         self._narrow = False
         self._batteries: list[viser.IcosphereHandle] = []
         self._clouds: list[viser.PointCloudHandle | None] = [None] * len(view.nodes)
@@ -81,7 +81,7 @@ class DeliveryDrawing:
         )
 
     def viewpoint(self, fov_rad: float, aspect: float) -> tuple[FloatArray, FloatArray]:
-        """(3,) where to look and (3,) where to stand to see room, cameras, sink and client in a window."""
+        """Return (3,) look-at point and (3,) camera position that show room, cameras, sink and client."""
         stage = self._view.stage
         ends_m = 0.5 * stage.width_m * stage.right
         seen_m = np.vstack(
@@ -100,7 +100,7 @@ class DeliveryDrawing:
         return middle_m, middle_m + distance_m * away
 
     def spread_names(self, fov_rad: float, aspect: float, height_px: float) -> None:
-        """Have no name cover another one, as a window so wide and high shows them; short ones if narrow."""
+        """Move the names so that none overlaps another in this window; shorten them if it is narrow."""
         self._narrow = aspect * height_px < NARROW_PX
         middle_m, stand_m = self.viewpoint(fov_rad, aspect)
         forward = (middle_m - stand_m) / np.linalg.norm(middle_m - stand_m)
@@ -116,7 +116,7 @@ class DeliveryDrawing:
         more = len(" · off") if self._narrow else len(" · 100 %") + LONGEST
         letters += [len(node.name) + more for node in self._view.nodes]
         down_px = np.column_stack([from_m @ right, -(from_m @ up)]) / px_m[:, None]
-        down_px[: len(self._marks), 1] -= LINE_PX  # they stand above their places, the others below
+        down_px[: len(self._marks), 1] -= LINE_PX  # these labels are above their places, the others below
         lifts_px = lifts(down_px, np.array(letters), len(self._marks))
         self._lifts_m = [
             -lift_px * one_m * up for lift_px, one_m in zip(lifts_px, px_m[len(self._marks) :], strict=True)
@@ -125,17 +125,17 @@ class DeliveryDrawing:
             self._stand(row, self._pose(row, self._shown))
 
     def place_m(self, name: str) -> FloatArray:
-        """(3,) where a node's radio is drawn, or the sink."""
+        """Return the (3,) drawn place of a node's radio, or of the sink."""
         run = self._view.run
         if name == "sink":
             return self._places_m[run.roles.index(name)]
         node = next(one for one in self._view.nodes if one.name == name)
         return self._places_m[node.row] if node.row >= 0 else node.T_world_camera[:3, 3]
 
-    # What is there at a time.
+    # The state at a time.
 
     def show(self, now_ns: int, shown_ns: int) -> None:
-        """The frames at a time; they take at least ``shown_ns`` for their way, and losses stay so long."""
+        """Show the frames at a time; flights last at least ``shown_ns``, and losses stay that long."""
         at = self._places_m
         points, colors = self._flights.packets(now_ns, shown_ns, at)
         lost_m, red = self._flights.losses(now_ns, shown_ns, at)
@@ -148,10 +148,10 @@ class DeliveryDrawing:
         self._show_causes(now_ns, shown_ns)
 
     def show_moment(self, moment: MomentView | None, most_j: float = 0.0) -> None:
-        """Pictures, clouds and mesh of a moment; None is before anything has arrived.
+        """Show pictures, clouds and mesh of a moment; None is before anything has arrived.
 
         Args:
-            moment: which one.
+            moment: the moment.
             most_j: energy at which a node's battery has the colour of an empty one.
         """
         self._show_batteries(moment, most_j)
@@ -170,14 +170,14 @@ class DeliveryDrawing:
         self._show_mesh(b"" if moment is None else moment.glb)
 
     def _stand(self, row: int, T_world_camera: FloatArray) -> None:
-        """The camera where its cloud is: a rig may not know its poses before they are found."""
+        """Put a camera where its cloud is: a rig may not know its poses before registration."""
         place(self._frusta[row], T_world_camera)
         below_m = np.array((0.0, 0.0, NAME_BELOW * self._size_m))
         self._names[row].position = T_world_camera[:3, 3] - below_m + self._lifts_m[row]
         self._names[row].text = self._name(row)
 
     def _name(self, row: int) -> str:
-        """A camera's name, and what it has sent and used."""
+        """Return a camera's name with the data that it has sent and the energy that it has used."""
         node, shown = self._view.nodes[row], self._shown
         if node.row < 0:
             return f"{node.name} · off"
@@ -188,7 +188,7 @@ class DeliveryDrawing:
         return f"{node.name} · {percent:.0f} % · {now.energy_j:.3g} J"
 
     def _show_picture(self, row: int) -> None:
-        """What has arrived of a node's picture."""
+        """Show the arrived part of a node's picture."""
         shown = self._shown
         dark = _dark(self._view.nodes[row].aspect)
         self._frusta[row].image = dark if shown is None else shown.nodes[row].picture
@@ -201,7 +201,7 @@ class DeliveryDrawing:
                 battery.color = color
 
     def light(self, packet: PacketView | None) -> None:
-        """Light up the pixels and points of a packet; None puts out what is lit."""
+        """Highlight the pixels and points of a packet; None removes the highlight."""
         name = f"{self._below}/lit"
         if self._scene.get_handle_by_name(name) is not None:
             self._scene.remove_by_name(name)
@@ -243,7 +243,7 @@ class DeliveryDrawing:
         self._clouds[row] = handle
 
     def _show_mesh(self, glb: bytes) -> None:
-        """The one before stays until the browser has read this one."""
+        """Add a mesh; the previous one stays until the browser has read the new one."""
         while len(self._meshes) > 1:
             self._meshes.pop(0).remove()
         if not glb:
@@ -254,12 +254,12 @@ class DeliveryDrawing:
         self._meshes.append(self._scene.add_glb(f"{self._below}/mesh-{self._made}", glb, cast_shadow=False))
 
     def drop_old(self) -> None:
-        """Take away the mesh that a newer one has replaced."""
+        """Remove the mesh that a newer one has replaced."""
         while len(self._meshes) > 1:
             self._meshes.pop(0).remove()
 
     def _show_causes(self, now_ns: int, shown_ns: int) -> None:
-        """Why something was lost a moment ago, in words where it happened."""
+        """Show the causes of recent losses as words at the places where they happened."""
         failures, recent = self._flights.failures, {}
         first, last = np.searchsorted(failures.start_ns, (now_ns - shown_ns, now_ns), side="right")
         for index in range(max(first, last - 20), last):
@@ -278,11 +278,11 @@ class DeliveryDrawing:
             elif self._losses[node].text != text:
                 self._losses[node].text = text
 
-    # What stays.
+    # Constant parts.
 
     def _places(self, cameras_m: FloatArray) -> FloatArray:
-        """(N, 3) of everybody in the network: nodes at their cameras, unless somebody has moved their radios;
-        the sink and the cloud beside them.
+        """Return (N, 3) places of the network's members: nodes at their cameras, unless their radios were
+        moved; the sink and the cloud next to them.
         """
         run, left = self._view.run, -self._view.stage.right
         sink_m = cameras_m.mean(axis=0) + (np.ptp(cameras_m @ left) / 2.0 + BESIDE * self._size_m) * left
@@ -319,7 +319,7 @@ class DeliveryDrawing:
             self._names[-1].anchor = "top-center"
 
     def _add_moved(self, cameras_m: FloatArray) -> None:
-        """Radios that do not stand at their cameras."""
+        """Draw radios that are not at their cameras."""
         for node, camera_m in zip(self._view.nodes, cameras_m, strict=True):
             radio_m = self.place_m(node.name)
             if np.linalg.norm(radio_m - camera_m) > 1e-3:
@@ -351,7 +351,7 @@ class DeliveryDrawing:
             self._lines("to-client", np.array([[sink_m, cloud_m], [cloud_m, client_m]]))
 
     def _add_routes(self) -> None:
-        """Who has sent to whom."""
+        """Draw a line between each pair of nodes that sent a frame."""
         frames = self._flights.frames
         frames = frames.where(frames.what == What.AIR)
         pairs = np.unique(np.column_stack([frames.node, frames.peer]), axis=0)
@@ -392,7 +392,7 @@ def _state_color(down: bool, share: float) -> Number:
 
 
 def _between(first: Number, second: Number, share: float) -> Number:
-    """A colour on the way from one to another."""
+    """Return a colour between two others."""
     start, end = np.array(first, float), np.array(second, float)
     red, green, blue = np.rint(start + share * (end - start)).astype(int).tolist()
     return red, green, blue

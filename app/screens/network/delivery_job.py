@@ -1,4 +1,4 @@
-"""The rig's own images through a network: the frames at once, then one moment after the other."""
+"""The job that sends the rig's images through a network: the frames first, then moment after moment."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ from pipeline.spec import key as spec_key
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, PointCloud, RgbdFrame, SurfaceResult
 
 NODE_POINTS = 6000
-"""Of the cloud of one node."""
+"""Points of the cloud of one node."""
 CURVE_POINTS = 400
-"""Of the curve of bytes."""
+"""Points of the curve of bytes."""
 NOTHING_YET = (48, 52, 58)
-"""Pixels of which nothing has arrived."""
+"""Colour of pixels that have not arrived."""
 Steps = Generator[Progress | DeliveryView | MomentView, None, DeliveryView]
 
 
 def delivery_job(store: Store, spec: Spec) -> Steps:
-    """A delivery; yielded as soon as the frames are there, and then every moment.
+    """Return a delivery; yield the frames as soon as they are simulated, then every moment.
 
-    The last moment comes first: it says what the losses cost.
+    The last moment is computed first: it shows what the losses cost.
     """
     return (yield from store.remember(("delivery", spec.key("network")), partial(_delivered, store, spec)))
 
@@ -64,14 +64,14 @@ def delivery_job(store: Store, spec: Spec) -> Steps:
 def packet_job(
     store: Store, spec: Spec, row: int, first_byte: int, byte_count: int
 ) -> Generator[Progress, None, PacketView]:
-    """What bytes [first_byte, first_byte + byte_count) of a node's images say by themselves.
+    """Return what bytes [first_byte, first_byte + byte_count) of a node's images give without the others.
 
     Args:
-        store: where results are kept.
-        spec: whose delivery it is.
-        row: of the node in the rig.
-        first_byte: of the packet.
-        byte_count: of the packet.
+        store: store of the results.
+        spec: spec of the delivery.
+        row: index of the node in the rig.
+        first_byte: first byte of the packet.
+        byte_count: number of bytes of the packet.
     """
     sending = yield from sending_of(store, spec)
     frame, stream = sending.rig.frames[row], sending.streams[row]
@@ -84,7 +84,7 @@ def packet_job(
 
 
 def sending_of(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
-    """The images on their way, and what became of them."""
+    """Return the sent images and the simulated run."""
     key = ("sending", spec_key(spec, "rig"), spec.sent)
     return (yield from store.remember(key, partial(_send, spec)))
 
@@ -113,7 +113,7 @@ def _delivered(store: Store, spec: Spec) -> Steps:
 def moment_of(
     store: Store, spec: Spec, rebuilder: Rebuilder, index: int, done: int
 ) -> Generator[Progress, None, Moment]:
-    """One of the moments, after so many others are done."""
+    """Return one of the moments, after ``done`` others have been computed."""
     count = len(rebuilder.sending.times_ns)
     stage, low, high = f"moment {done + 1} of {count}", (done + 0.5) / (count + 1), (done + 1.5) / (count + 1)
     compute = partial(part, rebuilder.moment(index), stage, low, high)
@@ -193,7 +193,7 @@ def _moment_view(sending: Sending, moment: Moment, t_ns: int) -> MomentView:
 
 
 def _colors(surface: SurfaceResult, received: Sequence[Received]) -> ByteArray | None:
-    """Of its vertices; none before any colour has arrived."""
+    """Return the colours of the surface's vertices; None before any colour has arrived."""
     return surface.colors if any(one.rgb_known.any() for one in received) else None
 
 
@@ -224,14 +224,14 @@ def _node_moment(
 
 
 def cloud_of(frame: RgbdFrame) -> PointCloud:
-    """The frame's points, of which there may be none."""
+    """Return the frame's points; the cloud may be empty."""
     if not frame.depth.valid.any():
         return PointCloud(np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
     return back_project(frame)
 
 
 def _picture(frame: RgbdFrame, known: BoolArray, range_m: tuple[float, float]) -> ByteArray:
-    """Colour where it has arrived, depth as brightness where only that has, dark where nothing has."""
+    """Return the arrived picture: colour, or depth as brightness where only depth has arrived, or dark."""
     near_m, far_m = range_m
     z_m = frame.depth.z_m
     if frame.coarse is not None:
@@ -254,7 +254,7 @@ LIT = np.array((255, 230, 0), np.uint8)
 
 
 def _lit(rgb: ByteArray, pixels: BoolArray) -> ByteArray:
-    """The picture dimmed, with some pixels in a bright colour, and thick enough to be seen when small."""
+    """Return the picture dimmed, with these pixels bright and thick enough to be visible when small."""
     shown = (0.45 * rgb).astype(np.uint8)
     shown[cv2.dilate(pixels.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = LIT
     return _small(shown)

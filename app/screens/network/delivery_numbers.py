@@ -1,4 +1,4 @@
-"""The numbers of a delivery: at the clock, in the end, and what another one would change."""
+"""Tables and sentences on a delivery: at the clock, at the end, and compared with another delivery."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ REASONS = {
     Cause.LINK: "Lost as the slider above asks for.",
     Cause.ACK_LOST: "The frame came, but the sender never heard so.",
 }
-"""By the cause of a loss: how it comes about."""
+"""Explanation of each cause of a loss."""
 BYTES_MB = 1e-6
 MOST_CHANGES = 4
-"""That are told one by one."""
+"""Most changes that are named one by one."""
 
 
 def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Markup:
-    """HTML of what matters: at the clock ``now_ns``, in the end, and where nothing is lost."""
+    """Return a table of the main numbers in HTML: at ``now_ns``, at the end, and without losses."""
     end = view.moment_at(view.times_ns[-1])
     done = end is not None and end.t_ns == view.times_ns[-1]
     end_ns = max(view.run.end_ns, view.times_ns[-1])
@@ -90,7 +90,7 @@ def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Mar
 
 
 def _head(view: DeliveryView, now: MomentView | None, now_ns: int) -> Head:
-    """Over the column of the clock: after the last moment nothing changes any more."""
+    """Return the head of the clock's column; after the last moment nothing changes."""
     if now is None:
         return "nothing yet"
     if now.t_ns == view.times_ns[-1]:
@@ -99,7 +99,7 @@ def _head(view: DeliveryView, now: MomentView | None, now_ns: int) -> Head:
 
 
 def _by_cause(view: DeliveryView, now: MomentView | None, last: MomentView | None) -> list[Row]:
-    """Why frames were lost, the most frequent cause first."""
+    """Return rows with the causes of lost frames, the most frequent first."""
     pieces = view.run.pieces
     lost = pieces.where((pieces.what == What.LOSS) & (pieces.start_ns <= view.times_ns[-1]))
     counts = np.bincount(lost.cause, minlength=1)
@@ -117,7 +117,7 @@ def _by_cause(view: DeliveryView, now: MomentView | None, last: MomentView | Non
 
 
 def more_rows(view: DeliveryView, now: MomentView | None) -> Markup:
-    """HTML of what the sink has of each camera."""
+    """Return a table in HTML of what the sink has of each camera."""
     if now is None:
         return Markup("")
     rows = [
@@ -136,7 +136,7 @@ def more_rows(view: DeliveryView, now: MomentView | None) -> Markup:
 
 
 def summary(view: DeliveryView) -> Markdown:
-    """What is there so far."""
+    """Return a sentence on the computed part of the delivery."""
     computed, planned = len(view.moments), len(view.times_ns)
     sentence = Markdown("{} cameras sent {:.2f} MB in {:,} packets; simulated in {:.1f} s.").format(
         len([node for node in view.nodes if node.row >= 0]),
@@ -154,7 +154,7 @@ def summary(view: DeliveryView) -> Markdown:
 
 
 def difference(before: DeliveryView, after: DeliveryView, what: str) -> Markdown:
-    """In a sentence what another setting changed, in the network and in the mesh; empty while unknown."""
+    """Return a sentence on the effect of a setting on network and mesh; empty while unknown."""
     one, two = (view.moment_at(view.times_ns[-1]) for view in (before, after))
     if one is None or two is None or two.t_ns != after.times_ns[-1]:
         return Markdown("")
@@ -174,7 +174,7 @@ def difference(before: DeliveryView, after: DeliveryView, what: str) -> Markdown
 
 
 def changes(before: DeliveryView, after: DeliveryView) -> str:
-    """Which settings differ, in a few words."""
+    """Return the settings that differ, in a few words."""
     words = [f"{name} off" for name in after.sent.down if name not in before.sent.down]
     if before.sent.coding != after.sent.coding:
         words.append(f"coding {after.sent.coding} instead of {before.sent.coding}")
@@ -185,7 +185,7 @@ def changes(before: DeliveryView, after: DeliveryView) -> str:
 
 
 def _network_changes(before: NetworkConfig, after: NetworkConfig) -> list[str]:
-    """Places and walls in words, other settings as they are written."""
+    """Return changed places and walls in words, and other settings as they are written."""
     words, told = [], {"nodes.count", "nodes.places_m", "radio.walls_m", "radio.wall_db"}
     if before.mac.kind != after.mac.kind:  # which brings its radio's power
         told |= {f"energy.{state}_w" for state in ("tx", "rx", "idle", "sleep")}
@@ -216,7 +216,7 @@ def _count(count: int | None) -> str:
 
 
 def legend(view: DeliveryView) -> Sequence[tuple[str, Number]]:
-    """What the colours of the stage mean."""
+    """Return the names and colours of the drawing's legend."""
     some = [("camera, nothing arrived", BUSY), ("camera, all arrived", FULL)]
     if any(node.row < 0 for node in view.nodes):
         some.append(("camera down", DOWN))
@@ -233,7 +233,7 @@ def legend(view: DeliveryView) -> Sequence[tuple[str, Number]]:
 
 
 def most_j(view: DeliveryView) -> float:
-    """What a node's battery holds; without one, the most that any node uses until the last moment."""
+    """Return a node's battery capacity; without one, the most energy that any node uses."""
     battery_j = view.sent.network.energy.battery_j
     used_j = [node.energy_j for moment in view.moments for node in moment.nodes]
     return max(used_j, default=0.0) if battery_j is None else battery_j

@@ -1,4 +1,4 @@
-"""What the Network screen gets of a delivery: who stands where, and what has arrived at each moment."""
+"""Results of a delivery for the Network screen: the places of the nodes, and the data at each moment."""
 
 from __future__ import annotations
 
@@ -22,43 +22,43 @@ class CameraNode:
 
     name: str
     T_world_camera: FloatArray
-    """(4, 4) as believed before anything is registered."""
+    """(4, 4) pose believed before registration."""
     fov_rad: float
     """Vertical field of view."""
     aspect: float
     """Width over height."""
     total_bytes: int
-    """Of its encoded images."""
+    """Size of its encoded images."""
     row: int
-    """Its number in the network; -1 if it is down."""
+    """Its index in the network; -1 if it is down."""
 
 
 @dataclass(frozen=True, slots=True)
 class NodeMoment:
-    """One node as the sink knows it at a moment."""
+    """One node's data at the sink at a moment."""
 
     delivered_bytes: int
     color_share: float
-    """Of its pixels, 0 to 1."""
+    """Share of its pixels with colour, 0 to 1."""
     depth_share: float
-    """Of its measured pixels, 0 to 1."""
+    """Share of its measured pixels with depth, 0 to 1."""
     coarse_share: float
-    """Of its pixels, 0 to 1: depth known coarsely only."""
+    """Share of its pixels with coarse depth only, 0 to 1."""
     picture: ByteArray
-    """(h, w, 3) as far as it has arrived: colour, or depth where that came first, or dark."""
+    """(h, w, 3) the arrived picture: colour, or depth if that came first, or dark."""
     points_m: FloatArray
-    """(N, 3) float32 of measured depth that has arrived, thinned, camera frame."""
+    """(N, 3) float32 arrived measured points, thinned, camera frame."""
     colors: ByteArray
-    """(N, 3)."""
+    """(N, 3) RGB."""
     T_world_camera: FloatArray
-    """(4, 4) registered, or as believed."""
+    """(4, 4) registered pose, or the believed one."""
     energy_j: float
-    """That its radio and the computer that carries it have used; 0 if it is down."""
+    """Energy that its radio and computer have used; 0 if it is down."""
 
 
 @dataclass(frozen=True, slots=True)
 class MomentView:
-    """What has arrived at one time, and what it is good for."""
+    """The data that has arrived at one time, and the surface that it gives."""
 
     t_ns: int
     sent_bytes: int
@@ -68,16 +68,16 @@ class MomentView:
     energy_j: float
     nodes: tuple[NodeMoment, ...]
     glb: bytes
-    """The surface; empty where there is none yet."""
+    """The surface; empty if there is none yet."""
     triangles: int
     no_hit_share: float | None
     f_score: float | None
-    """At 5 cm, 0 to 1; None without a surface or without a truth."""
+    """F-score at 5 cm, 0 to 1; None without a surface or without ground truth."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lossless:
-    """What the images are good for when all of them arrive."""
+    """The surface's quality when all images arrive."""
 
     no_hit_share: float
     f_score: float | None
@@ -91,38 +91,38 @@ class DeliveryView:
     run: NetworkView
     nodes: tuple[CameraNode, ...]
     stage: Stage
-    """Where to stand to see the room and its cameras."""
+    """Viewpoint from which the room and its cameras are visible."""
     times_ns: tuple[int, ...]
-    """Of all moments, computed or not."""
+    """Times of all moments, computed or not."""
     arrived_ns: NDArray[np.int64]
-    """(T,) times, some hundreds at most."""
+    """(T,) times, at most some hundreds."""
     arrived_bytes: NDArray[np.int64]
-    """(T,) of the images that are at the sink by then."""
+    """(T,) bytes of the images that are at the sink by then."""
     moments: tuple[MomentView, ...] = ()
-    """By time; while it is computed, those that are there."""
+    """Computed moments by time."""
     lossless: Lossless | None = None
     """None while it is computed, or if there is no surface without losses either."""
 
     @property
     def total_bytes(self) -> int:
-        """Of all nodes' images, those of failed nodes included."""
+        """Size of all nodes' images, including those of failed nodes."""
         return sum(node.total_bytes for node in self.nodes)
 
     def moment_at(self, t_ns: int) -> MomentView | None:
-        """The nearest earlier moment that is there."""
+        """Return the last computed moment up to this time."""
         return next((one for one in reversed(self.moments) if one.t_ns <= t_ns), None)
 
 
 @dataclass(frozen=True, slots=True)
 class PacketView:
-    """What one packet says of an image."""
+    """The part of an image that one packet carries."""
 
     row: int
-    """Of the node in the rig."""
+    """Index of the node in the rig."""
     depth: BoolArray
-    """(H, W) pixels whose depth it tells by itself."""
+    """(H, W) pixels whose depth the packet gives without others."""
     color: BoolArray
     picture: ByteArray
-    """(h, w, 3) the node's own picture with these pixels lit up."""
+    """(h, w, 3) the node's own picture with these pixels highlighted."""
     points_m: FloatArray
-    """(N, 3) float32 of the pixels with depth, camera frame."""
+    """(N, 3) float32 points of the pixels with depth, camera frame."""

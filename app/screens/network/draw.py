@@ -1,4 +1,4 @@
-"""Networks seen from above: nodes, ranges and streets to scale, and packets as one batch of points."""
+"""Drawing of networks from above: nodes, ranges and streets to scale, packets as one batch of points."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from network_sim.types import Cause
 from pipeline.types import ByteArray, FloatArray
 
 SIDE = 10.0
-"""The longer side of a network in units of the scene; all lengths are drawn to one scale."""
+"""Length of a network's longer side in scene units; all lengths are drawn to one scale."""
 BAR_ROOM = 0.6
-"""South of the ground, for the scale bar."""
+"""Space south of the ground for the scale bar."""
 GAP = 1.12
 """Distance of two networks over their width."""
 ROLE_LOOKS: dict[str, tuple[tuple[int, int, int], float]] = {
@@ -37,45 +37,45 @@ ROLE_LOOKS: dict[str, tuple[tuple[int, int, int], float]] = {
 CLOUD_HEIGHT = 1.6
 MOST_NAMES = 26
 MOST_PACKETS = 400
-"""Of each network; of more, evenly chosen ones are drawn."""
+"""Most drawn packets of each network; of more, evenly chosen ones are drawn."""
 PACKET_SIZE = 0.11
 ARC = 0.12
-"""How high a packet rises over the length of its way."""
+"""Height of a packet's arc over the length of its path."""
 LOSS_HEIGHT = 0.22
 ON_THE_WAY = (Cause.COLLISION, Cause.NOISE, Cause.RANGE, Cause.UPLINK, Cause.LINK)
-"""Causes of losses that are drawn where the frame went."""
+"""Causes of losses that are drawn at the frame's receiver."""
 CIRCLE = np.linspace(0.0, 2.0 * np.pi, 73)
 STREET, RANGE, NODE_RANGE = (170, 176, 182), (0, 158, 115), (150, 170, 190)
 ELEVATION_RAD = np.radians(52.0)
 LANE = 0.05
-"""From the middle of a street to the line of one direction, in units of the scene."""
+"""Distance from the middle of a street to the line of one direction, in scene units."""
 ROAD_WIDTH = 4.5
 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """What is drawn of the ground, in units of the scene."""
+    """The size and scale of the ground, in scene units."""
 
     scale: float
-    """Units in a metre."""
+    """Scene units per metre."""
     middle_m: FloatArray
-    """(2,) the middle of every network, which is put at its own origin."""
+    """(2,) middle of every network, which is drawn at its own origin."""
     width: float
     depth: float
     networks: int
 
     def offset(self, index: int) -> float:
-        """How far east of the middle a network is drawn."""
+        """Return how far east of the middle a network is drawn."""
         return (index - 0.5 * (self.networks - 1)) * GAP * self.width
 
     def place(self, points_m: FloatArray, index: int, height: float = 0.0) -> FloatArray:
-        """(N, 3) places of points (N, 2) of a network."""
+        """Return (N, 3) places of points (N, 2) of a network."""
         flat = (points_m - self.middle_m) * self.scale
         return np.column_stack([flat[:, 0] + self.offset(index), flat[:, 1], np.full(len(flat), height)])
 
 
 def ground_of(views: Sequence[NetworkView]) -> Ground:
-    """The ground that holds all nodes of all views at any time, and the ranges of those that stand still."""
+    """Return the ground that holds all nodes of all views at any time, and the fixed nodes' ranges."""
     lows_m, highs_m = [], []
     for view in views:
         low_m, high_m = view.tracks_m.min(axis=(0, 1)), view.tracks_m.max(axis=(0, 1))
@@ -132,11 +132,11 @@ class NetworkDrawing:
         self._add_scale_bar()
 
     def show(self, now_ns: int, shown_ns: int) -> None:
-        """Everything at a time.
+        """Show the state at a time.
 
         Args:
             now_ns: simulated time.
-            shown_ns: packets take at least so long for their way, and losses stay so long.
+            shown_ns: least duration of a packet's flight, and time that a loss stays visible.
         """
         points, colors = [], []
         for index, (view, flights) in enumerate(zip(self._views, self._flights, strict=True)):
@@ -151,7 +151,7 @@ class NetworkDrawing:
         self._show_packets(np.concatenate(points), np.concatenate(colors))
 
     def _show_packets(self, points: FloatArray, colors: ByteArray) -> None:
-        """The batch keeps its length; what is not needed waits unseen, far below."""
+        """Set the packets' batch, which keeps its length; unused points are hidden far below."""
         batch = np.tile(np.array((0.0, 0.0, -100.0), np.float32), (len(self._packets.points), 1))
         shade = np.tile(np.array(BACKGROUND, np.uint8), (len(batch), 1))
         batch[: len(points)], shade[: len(colors)] = points, colors
@@ -159,7 +159,7 @@ class NetworkDrawing:
         self._packets.visible = bool(len(points))
 
     def _places(self, index: int, view: NetworkView, positions_m: FloatArray) -> FloatArray:
-        """(N, 3), so high that the ground is below the points."""
+        """Return (N, 3) places high enough that the ground is below the points."""
         places = self.ground.place(positions_m, index)
         heights = [CLOUD_HEIGHT if role == "cloud" else 0.5 * ROLE_LOOKS[role][1] for role in view.roles]
         places[:, 2] = heights
@@ -205,7 +205,7 @@ class NetworkDrawing:
                 self._lines(f"{index}/range-{roles[0]}", self._circles(centers_m, view, index), color, width)
 
     def _add_roads(self, index: int, view: NetworkView, sights: RoadCoverage) -> Roads:
-        """A line for every cell that was seen, at the right where each direction has its own."""
+        """Add a line for every cell that was seen, to the right of the street's middle per direction."""
         street, scheme = view.config.street, view.config.scheme
         cells = np.unique(sights.cell)
         ends = self.ground.place(cells_m(street, scheme.cell_m)[cells].reshape(-1, 2), index, 0.01)
@@ -218,7 +218,7 @@ class NetworkDrawing:
         return Roads(lines, sights, cells)
 
     def _circles(self, centers_m: FloatArray, view: NetworkView, index: int) -> FloatArray:
-        """(S, 2, 3) segments of the receive range around each centre."""
+        """Return (S, 2, 3) segments of the receive range around each centre."""
         rim_m = reach_m(view.config) * np.column_stack([np.cos(CIRCLE), np.sin(CIRCLE)])
         flat = [self.ground.place(center_m + rim_m, index, -0.01) for center_m in centers_m]
         return np.concatenate([np.stack([one[:-1], one[1:]], axis=1) for one in flat])
@@ -257,15 +257,15 @@ class NetworkDrawing:
 
 
 class Roads:
-    """The roads in the colours of their coverage until a time; grey while nobody was there."""
+    """The roads in the colours of their coverage up to a time; grey without a vehicle so far."""
 
     def __init__(self, lines: viser.LineSegmentsHandle, sights: RoadCoverage, cells: np.ndarray) -> None:
-        """``lines`` has one for each of ``cells`` (C,), all that were ever seen."""
+        """``lines`` has one line for each of ``cells`` (C,), the cells that were ever seen."""
         self._lines, self._sights, self._cells = lines, sights, cells
         self._shown = np.zeros(0, np.uint8)
 
     def show(self, now_ns: int) -> None:
-        """Paint them as of a time."""
+        """Colour the lines for a time."""
         seen, covered = (one[self._cells] for one in self._sights.counts(now_ns, int(self._cells.max()) + 1))
         colors = ramp(covered / np.maximum(seen, 1), 1.0, COVERAGE_STOPS)
         colors[seen == 0] = STREET
@@ -275,7 +275,7 @@ class Roads:
 
 
 def road_legend(views: Sequence[NetworkView]) -> Markup:
-    """HTML: what the colours of the roads mean; empty without roads."""
+    """Return HTML of the roads' colour scale; empty without roads."""
     schemes = [view.config.scheme for view in views if view.roads is not None]
     if not schemes:
         return Markup("")
@@ -302,7 +302,7 @@ class Flights:
 
     @classmethod
     def of(cls, pieces: Pieces) -> Flights:
-        """Those that have a receiver, and failures that no frame shows."""
+        """Return the frames that have a receiver, and failures that no frame shows."""
         flying = np.isin(pieces.what, (What.AIR, What.ACK)) & (pieces.peer >= 0)
         frames = pieces.where(flying)
         colors = np.full((len(frames), 3), ANSWER, np.uint8)
@@ -312,7 +312,7 @@ class Flights:
         return cls(frames, colors, longest_ns, pieces.where(np.isin(pieces.what, (What.LOSS, What.DROP))))
 
     def packets(self, now_ns: int, shown_ns: int, at: FloatArray) -> tuple[FloatArray, ByteArray]:
-        """(M, 3) places and colours of what is under way between places ``at`` (N, 3)."""
+        """Return (M, 3) places and colours of the frames in flight between places ``at`` (N, 3)."""
         frames = self.frames
         rows = _since(frames, now_ns - max(shown_ns, self.longest_ns), now_ns)
         took_ns = np.maximum(frames.end_ns[rows] - frames.start_ns[rows], shown_ns)
@@ -326,8 +326,8 @@ class Flights:
         return places, self.colors[rows]
 
     def losses(self, now_ns: int, shown_ns: int, at: FloatArray) -> tuple[FloatArray, ByteArray]:
-        """The same, one for each place where something was lost a moment ago: the receiver that did not get
-        it, or who could not send it.
+        """Return places and colours of recent losses: at the receiver that did not get the frame, or at the
+        node that could not send it.
         """
         failures = self.failures
         rows = _since(failures, now_ns - shown_ns, now_ns)
@@ -339,7 +339,7 @@ class Flights:
 
 
 def _since(pieces: Pieces, from_ns: int, now_ns: int) -> np.ndarray:
-    """Indices of the pieces that start in between."""
+    """Return the indices of the pieces that start in between."""
     first, last = np.searchsorted(pieces.start_ns, (from_ns, now_ns), side="right")
     return np.arange(first, last)
 
@@ -353,11 +353,11 @@ def _having(view: NetworkView, role: str) -> np.ndarray:
 
 
 def _still(view: NetworkView) -> np.ndarray:
-    """(N,) who stands still and has a range."""
+    """Return (N,) whether a node is fixed and has a range."""
     return np.array([role in ("node", "sink", "access-point") for role in view.roles])
 
 
 def _round_down(length_m: float) -> float:
-    """The nearest of 1, 2, 5, 10 and so on that is not longer."""
+    """Return the largest of 1, 2, 5, 10 and so on that is not longer."""
     power = 10.0 ** np.floor(np.log10(length_m))
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length_m))

@@ -1,4 +1,4 @@
-"""What the Network screen offers to take along."""
+"""Files that the Network screen offers for download."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ JOB = "network.export_job"
 
 
 def delivery_offers(view: DeliveryView, now_ns: int, command: str) -> Offers:
-    """Of a delivery whose moments are all there, and of what has arrived at the clock's moment."""
+    """Return offers of a complete delivery, and of the data at the clock's moment."""
     files = [
         Offer("Page", "delivery.html", f"{JOB}:page_job"),
         Offer("GIF", "delivery.gif", f"{JOB}:animation_job"),
@@ -32,7 +32,7 @@ of what has arrived by the moment that the Network screen's clock shows ({at})."
 
 
 def network_offers(labels: tuple[str, ...], commands: str) -> Offers:
-    """Of the network's time: runs with these labels and commands, or a delivery without any."""
+    """Return offers of the timeline of runs with these labels and commands; no labels: of a delivery."""
     files = (
         Offer("Timeline, PNG", "timeline.png", f"{JOB}:timeline_job", (labels,)),
         Offer("Trace, ZIP", "trace.zip", f"{JOB}:trace_job", (labels,)),

@@ -1,4 +1,4 @@
-"""What the network did and delivered, to be taken along."""
+"""Jobs that export a delivery or the timeline of network runs."""
 
 from __future__ import annotations
 
@@ -45,24 +45,24 @@ Content = Generator[Progress, None, bytes]
 
 
 def page_job(store: Store, spec: Spec) -> Content:
-    """The page that plays the delivery."""
+    """Return the page that plays the delivery."""
     hand_out = yield from _hand_out(store, spec)
     yield Progress("writing the page", 0.9)
     return delivery_page(hand_out).encode()
 
 
 def animation_job(store: Store, spec: Spec) -> Content:
-    """The delivery as a GIF."""
+    """Return the delivery as a GIF."""
     hand_out = yield from _hand_out(store, spec)
     yield Progress("drawing the moments", 0.9)
     return delivery_animation(hand_out)
 
 
 def mesh_job(store: Store, spec: Spec, index: int, file: str) -> Content:
-    """The surface of what has arrived by a moment, in a mesh format by the file's name.
+    """Return the surface of a moment's data, in the mesh format of the file's name.
 
     Raises:
-        InputError: there is none yet.
+        InputError: there is no surface yet.
     """
     sending = yield from sending_of(store, spec)
     moment = yield from moment_of(store, spec, Rebuilder(sending), index, 0)
@@ -73,10 +73,10 @@ def mesh_job(store: Store, spec: Spec, index: int, file: str) -> Content:
 
 
 def cloud_job(store: Store, spec: Spec, index: int) -> Content:
-    """The measured points of all nodes that have arrived by a moment, in the world, as PLY.
+    """Return all nodes' measured points that have arrived by a moment, world frame, as PLY.
 
     Raises:
-        InputError: there are none yet.
+        InputError: there are no points yet.
     """
     sending = yield from sending_of(store, spec)
     moment = yield from moment_of(store, spec, Rebuilder(sending), index, 0)
@@ -94,7 +94,7 @@ def cloud_job(store: Store, spec: Spec, index: int) -> Content:
 
 
 def timeline_job(store: Store, spec: Spec, labels: tuple[str, ...]) -> Content:
-    """The whole timeline as PNG; the labels are those of runs that are compared."""
+    """Return the whole timeline as PNG; the labels are those of compared runs."""
     seen = yield from network_job(store, spec)
     lanes: list[Lane]
     if isinstance(seen, DeliveryView):
@@ -112,7 +112,7 @@ def timeline_job(store: Store, spec: Spec, labels: tuple[str, ...]) -> Content:
 
 
 def trace_job(store: Store, spec: Spec, labels: tuple[str, ...]) -> Content:
-    """A ZIP with trace.ndjson, trace.csv and trace.json; of two runs, each in a folder of its own."""
+    """Return a ZIP with trace.ndjson, trace.csv and trace.json; for two runs, in one folder each."""
     traces: dict[str, NetworkTrace] = {}
     if spec.sent is not None:
         traces[""] = (yield from sending_of(store, spec)).trace

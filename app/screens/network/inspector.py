@@ -1,4 +1,4 @@
-"""Tells of the frame that was picked on the timeline, and lights up what it carried."""
+"""The folder that describes the picked frame and highlights what it carried."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Inspector:
     """The folder of one packet."""
 
     def __init__(self, ui: Ui, session: PanelSession) -> None:
-        """Add it to the current container."""
+        """Add the folder to the current container."""
         self._ui, self._session = ui, session
         self._frames: Sequence[Frames] = ()
         self._view: DeliveryView | None = None
@@ -34,18 +34,18 @@ class Inspector:
         view: DeliveryView | None = None,
         drawing: DeliveryDrawing | None = None,
     ) -> None:
-        """There are other frames, of none of which anything is told yet.
+        """Take other frames and describe none of them yet.
 
         Args:
-            frames: of each lane of the timeline.
-            view: the delivery that they are of, unless they are of vehicles.
-            drawing: where its pixels and points light up.
+            frames: the frames of each lane of the timeline.
+            view: their delivery; None for frames of vehicles.
+            drawing: drawing in which pixels and points are highlighted.
         """
         self._frames, self._view, self._drawing = frames, view, drawing
         self._text.content = PICK
 
     def pick(self, lane: int, item: int) -> None:
-        """Tell of a frame, and light up what it carried; a negative ``item`` is none."""
+        """Describe a frame and highlight what it carried; a negative ``item`` is none."""
         if self._drawing is not None:
             self._drawing.light(None)
         if item < 0 or lane >= len(self._frames):

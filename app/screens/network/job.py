@@ -1,4 +1,4 @@
-"""What the Network screen asks for: a delivery of the rig's own images, or runs of a network of its own."""
+"""The job of the Network screen: a delivery of the rig's images, or runs of other networks."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from packetmesh.progress import Progress, part
 
 
 def network_job(store: Store, spec: Spec) -> Generator[Any, None, Any]:
-    """A ``DeliveryView``, yielded as far as it is there, or the ``NetworkView`` of every run."""
+    """Return a ``DeliveryView``, after partial ones, or the ``NetworkView`` of every run."""
     if spec.sent is not None:
         return (yield from delivery_job(store, spec))
     return (yield from runs_job(store, spec))
 
 
 def runs_job(store: Store, spec: Spec) -> Generator[Progress, None, tuple[NetworkView, ...]]:
-    """The views of all runs that are asked for, simulated one after the other."""
+    """Simulate all runs of the spec one after the other and return their views."""
     views, share = [], 1.0 / max(1, len(spec.networks))
     for index, config in enumerate(spec.networks):
         work = store.remember(("simulate", config), partial(_simulated, config))

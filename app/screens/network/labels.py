@@ -17,15 +17,15 @@ from packetmesh.settings import with_settings
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """A network to begin with."""
+    """A predefined network."""
 
     title: str
     sentence: str
-    """What it is."""
+    """Description."""
     settings: tuple[str, ...] = ()
-    """What the screen changes of the preset of the same name, so that a run takes seconds."""
+    """Settings that the screen changes in the preset of the same name, so that a run takes seconds."""
     street: bool = False
-    """Whether vehicles send images of their own, by schemes; otherwise the scene's cameras send theirs."""
+    """Whether vehicles send images by schemes; otherwise the scene's cameras send theirs."""
 
 
 NETWORKS: Mapping[str, Preset] = MappingProxyType(
@@ -53,7 +53,7 @@ NETWORKS: Mapping[str, Preset] = MappingProxyType(
         ),
     }
 )
-"""By the name of the preset."""
+"""Presets by their names."""
 
 CODINGS: Mapping[str, str] = MappingProxyType(
     {
@@ -68,7 +68,7 @@ CODINGS: Mapping[str, str] = MappingProxyType(
         "layered": "Coarse base, then tiles",
     }
 )
-"""Titles of ``pipeline.delivery.CODINGS``, whose libraries the serving process does without."""
+"""Titles of ``pipeline.delivery.CODINGS``, whose libraries the server process does not load."""
 
 SCHEMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -82,7 +82,7 @@ SCHEMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 
 def _power(of: EnergyConfig) -> tuple[str, ...]:
-    """The power of a radio as settings."""
+    """Return the power of a radio as settings."""
     return tuple(f"energy.{state}_w={getattr(of, f'{state}_w')}" for state in ("tx", "rx", "idle", "sleep"))
 
 
@@ -117,7 +117,7 @@ PACKET_NAMES: Mapping[PacketKind, str] = MappingProxyType(
     }
 )
 ANSWER = (70, 78, 86)
-"""Darker than nodes and lines. Colour of acknowledgements."""
+"""Colour of acknowledgements, darker than nodes and lines."""
 CAUSES: Mapping[Cause, str] = MappingProxyType(
     {
         Cause.NONE: "no cause given",
@@ -138,7 +138,7 @@ CAUSES: Mapping[Cause, str] = MappingProxyType(
 
 
 def ways(preset: str) -> dict[str, tuple[str, ...]]:
-    """Schemes or ways of medium access that a preset can be run with; its own comes first."""
+    """Return the schemes or access methods that a preset can run with; its own comes first."""
     offered = SCHEMES if NETWORKS[preset].street else ACCESS
     own = PRESETS[preset]
     able = {name: settings for name, settings in offered.items() if _possible(own, settings)}

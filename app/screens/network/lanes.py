@@ -1,4 +1,4 @@
-"""The rows of the dock: frames of each node, and what has become of them."""
+"""The lanes of the dock: the frames of each node, and the curves of their results."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from network_sim.types import Cause, to_ns
 from pipeline.types import FloatArray
 
 HALTS = (What.AIR, What.LOSS, What.DROP, What.ARRIVE, What.EXPIRE)
-"""What the step buttons halt at."""
+"""Events at which the step buttons stop."""
 
 
 def frames_lane(view: NetworkView, frames: Frames, run: str = "") -> FramesLane:
-    """One row a node; the name of its run stands before it where two are compared."""
+    """Return a lane with one row per node; names start with the run's name if two are compared."""
     names = [f"{run} · {view.names[node]}" if run else view.names[node] for node in view.lane_nodes]
     return FramesLane(view.levels, names, frames.line, [CAUSES[cause] for cause in Cause])
 
 
 def run_names(runs: Sequence[NetworkView]) -> list[str]:
-    """Short names of runs that are compared; nothing for a single one."""
+    """Return short names of compared runs; an empty one for a single run."""
     if len(runs) < 2:
         return [""] * len(runs)
     schemes = [run.label.split(":")[0] for run in runs]
@@ -35,12 +35,12 @@ def run_names(runs: Sequence[NetworkView]) -> list[str]:
 
 
 def stops_ns(*views: NetworkView) -> NDArray[np.int64]:
-    """(S,) when anything begins that a step leads to."""
+    """Return (S,) start times of all events at which the step buttons stop."""
     return np.unique(np.concatenate([one.pieces.start_ns[np.isin(one.pieces.what, HALTS)] for one in views]))
 
 
 def growth_lane(view: DeliveryView) -> CurvesLane:
-    """What has arrived, and what the surface of it is worth, by the moments that are computed."""
+    """Return a lane of the arrived data and the quality of its surface over the computed moments."""
     return CurvesLane("At the sink", _growth(view))
 
 
@@ -65,7 +65,7 @@ def _growth(view: DeliveryView) -> list[Curve]:
 
 
 def run_curves(view: NetworkView) -> CurvesLane:
-    """How much of what was sent arrives, and how much a minute, over a run of its own."""
+    """Return a lane of the delivery ratio and the throughput over a run."""
     delivery, throughput = view.series["delivery"], view.series["throughput"]
     most = float(np.nanmax(throughput.values, initial=1.0))
     curves = [

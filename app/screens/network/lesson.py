@@ -1,4 +1,4 @@
-"""The lessons of the network: what a stop can set, and the files that ship."""
+"""The lessons of the network: the settings of their stops, the numbers of their texts, their files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _CAUSES = {words: cause for cause, words in CAUSES.items()}
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where on the timeline a stop looks."""
+    """A stop's place on the timeline."""
 
     kind: Literal["share", "frame", "answer", "cause"] = "share"
     """A share of the run, the N-th frame with image bytes or its acknowledgement, or the first loss by a
@@ -35,11 +35,11 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class NetworkLook:
-    """What a stop sends through which network, and where it looks; by default what the screen shows first."""
+    """State of the screen at a stop: the network and the place; the default is the screen's first state."""
 
     preset: str = "office"
     way: str = ""
-    """Medium access or scheme by its title; empty is the preset's own."""
+    """Title of the medium access or scheme; empty is the preset's own."""
     beside: str = ""
     """Scheme of a second run; empty is none."""
     coding: str = "raw"
@@ -48,16 +48,16 @@ class NetworkLook:
     again: bool = True
     """Whether lost packets are sent again."""
     off: str = ""
-    """Name of the camera that has failed."""
+    """Name of the failed camera."""
     settings: tuple[str, ...] = ()
-    """Of anything that has no control, ``key=value``."""
+    """Settings without a control, ``key=value``."""
     at: Place = Place()
     window_s: float | None = None
-    """How much of the timeline is shown around it; None is all."""
+    """Length of the shown part of the timeline; None is all."""
 
 
 def find(place: Place, run: NetworkView, frames: Frames) -> tuple[int, int]:
-    """The time in ns where a stop looks, and the frame there, or -1; the end where there is no such thing."""
+    """Return a stop's time in ns and its frame, or -1; the end of the run if the place does not exist."""
     air, pieces, value = frames.pieces, run.pieces, int(place.value)
     if place.kind == "share":
         return run.start_ns + round(place.value * (run.end_ns - run.start_ns)), -1
@@ -123,7 +123,7 @@ SETTINGS: dict[str, Setting[NetworkLook]] = {
     "at": sets("at", _place),
     "window": sets("window_s", quantity("ms", 60_000.0, per_unit=1000.0, above_zero=True)),
 }
-"""What a stop can set, by its name in the file."""
+"""The settings of a stop, by their names in the file."""
 
 
 SHARES = ("arrived", "color", "depth", "missed", "f_score", "missed_lossless", "f_score_lossless", "collided")
@@ -145,11 +145,11 @@ NUMBERS = (
 )
 """Fields of the texts and choices of both lessons."""
 LEFT_SHARE, SEEN_SHARE = 0.05, 0.005
-"""Of its depth with which a camera is as good as gone, and of the rays, from which on more of them miss."""
+"""Depth share below which a camera counts as lost, and increase of missing rays that counts."""
 
 
 def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
-    """Their values for a delivery of a scene; empty until its last moment is there."""
+    """Return the fields' values for a delivery of a scene; empty until its last moment is there."""
     end = view.moment_at(view.times_ns[-1])
     if end is None or end.t_ns != view.times_ns[-1]:
         return {}
@@ -181,7 +181,7 @@ def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
 
 
 def _frame_numbers(view: DeliveryView, frames: Frames) -> dict[str, str]:
-    """Of what is on the air; nothing where no frame carried an image."""
+    """Return the numbers of the frames; empty if no frame carried an image."""
     air = frames.pieces
     images = [item for item in range(len(air.node)) if frames.carries_image(item)]
     if not images:
@@ -210,7 +210,7 @@ def _frame_numbers(view: DeliveryView, frames: Frames) -> dict[str, str]:
 
 
 def _worst(view: DeliveryView, end: MomentView) -> str:
-    """The camera of which least depth is there, in a sentence."""
+    """Return a sentence on the camera with the least depth."""
     name, node = min(
         zip((one.name for one in view.nodes), end.nodes, strict=True), key=lambda one: one[1].depth_share
     )
@@ -218,7 +218,7 @@ def _worst(view: DeliveryView, end: MomentView) -> str:
 
 
 def _cost(view: DeliveryView, end: MomentView) -> str:
-    """What is missing of the surface, by a word."""
+    """Return a word for what is missing of the surface."""
     if min(node.depth_share for node in end.nodes) < LEFT_SHARE:
         return "camera"
     if view.lossless is None or end.no_hit_share is None:
@@ -227,5 +227,5 @@ def _cost(view: DeliveryView, end: MomentView) -> str:
 
 
 def street_numbers(scene: str, runs: tuple[NetworkView, ...]) -> Numbers:
-    """Values of the fields for runs on streets."""
+    """Return the fields' values for runs on streets."""
     return {**dict.fromkeys(NUMBERS, UNKNOWN), SCENE: scene, "verdict": verdict(runs)}

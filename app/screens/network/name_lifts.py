@@ -1,4 +1,4 @@
-"""Where the names of the cameras stand, so that each can be read."""
+"""Placement of the cameras' name labels without overlaps."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ LETTER_PX, LINE_PX = 6.2, 20.0
 
 
 def lifts(at_px: FloatArray, letters: IntArray, fixed: int) -> FloatArray:
-    """How far labels have to go so that none covers another one, the first on that way staying first.
+    """Return how far labels must move so that none overlaps another; their order along the way is kept.
 
     Args:
-        at_px: (N, 2) middle of each label's edge, to the right and the way they may go: up or down.
-        letters: (N,) in each label.
-        fixed: so many, the first, stay where they are.
+        at_px: (N, 2) middle of each label's edge: to the right, and along the way of the move (up or down).
+        letters: (N,) number of letters of each label.
+        fixed: the first so many labels do not move.
 
     Returns:
-        (N - fixed,) of the others.
+        (N - fixed,) moves of the other labels, px.
     """
     widths_px = LETTER_PX * letters
     from_px, at_px = at_px, at_px.copy()

@@ -1,4 +1,4 @@
-"""The numbers of one run or two, each with its unit and its definition, and a sentence on each run."""
+"""Tables of the numbers of one or two runs, with units and definitions, and sentences on the runs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FIRST = (
     "energy_radio",
     "energy_total",
 )
-"""What the first table holds, as far as there is such a number; all others are in the second."""
+"""Metrics of the first table, if the run has them; all others are in the second."""
 LOST_TO = "attempts_lost_"
 LOST_WORDS = {
     "collision": "collisions",
@@ -39,13 +39,13 @@ LOST_WORDS = {
     "no_route": "missing routes",
 }
 TITLES = {"images_per_minute": "images that arrived", "images_taken_per_minute": "images that were taken"}
-"""Of numbers whose name says their unit."""
+"""Titles of metrics whose name contains their unit."""
 SHARES = ("ratio", "share", "coverage", "redundancy")
-"""Words in the names of numbers that are shown in per cent."""
+"""Words in the names of metrics that are shown in per cent."""
 
 
 def metric_tables(views: Sequence[NetworkView]) -> tuple[Markup, Markup]:
-    """HTML of the most telling numbers, and of all others that are not zero in every run."""
+    """Return HTML of the main metrics, and of all others that are not zero in every run."""
     by_name: dict[str, list[Metric | None]] = {}
     for index, view in enumerate(views):
         for name, metric in view.metrics.items():
@@ -62,7 +62,7 @@ def metric_tables(views: Sequence[NetworkView]) -> tuple[Markup, Markup]:
 
 
 def verdict(views: Sequence[NetworkView]) -> Markdown:
-    """What the second of two runs brings and keeps, in a sentence; empty where there is nothing to weigh."""
+    """Return a sentence on what the second of two runs gains and loses; empty if not comparable."""
     nothing = Markdown("")
     if len(views) != 2:
         return nothing
@@ -87,7 +87,7 @@ def _row(name: str, metrics: Sequence[Metric | None]) -> Row:
 
 
 def value_text(name: str, metric: Metric | None) -> str:
-    """The value with its unit; a dash where a run has no such number."""
+    """Return the value with its unit; a dash if a run has no such metric."""
     if metric is None:
         return "–"
     if metric.unit == "1" and any(word in name for word in SHARES):
@@ -104,7 +104,7 @@ def value_text(name: str, metric: Metric | None) -> str:
 
 
 def runs_summary(views: Sequence[NetworkView]) -> Markdown:
-    """What was simulated, and whether the timeline holds all of it."""
+    """Return a sentence on what was simulated, and on a timeline that is cut."""
     sentences: list[str] = []
     for view in views:
         name = Markdown("**{}**: ").format(view.label) if len(views) > 1 else Markdown("")

@@ -1,4 +1,4 @@
-"""One frame of a run in words: whose bytes it carried, how it fared, and why."""
+"""Descriptions of single frames: their content, their fate, and its cause."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from app.web.markup import Markdown, Markup
 from network_sim.types import Cause, PacketKind
 
 ANSWER_WITHIN_NS = 2_000_000
-"""After the end of a frame an acknowledgement belongs to it."""
+"""Time after a frame's end within which an acknowledgement belongs to it."""
 
 
 class Frames:
@@ -30,7 +30,7 @@ class Frames:
         self._cameras = dict(zip(taken.image.tolist(), taken.node.tolist(), strict=True))
 
     def line(self, item: int) -> str:
-        """About one frame, for the pointer."""
+        """Return one line about a frame, for the pointer."""
         one, names = self.pieces, self._view.names
         return f"{names[one.node[item]]} → {names[one.peer[item]]}: {self._content(item)}; {self._fate(item)}"
 
@@ -39,7 +39,7 @@ class Frames:
         return self.pieces.carries[item] == PacketKind.IMAGE
 
     def story(self, item: int) -> Markdown:
-        """Markdown about one frame, for the inspector."""
+        """Return markdown about a frame, for the inspector."""
         one, names = self.pieces, self._view.names
         tries = np.flatnonzero((one.packet == one.packet[item]) & (one.node == one.node[item]))
         took_ns = int(one.end_ns[item] - one.start_ns[item])
@@ -62,11 +62,11 @@ class Frames:
         )
 
     def bytes_of(self, item: int) -> tuple[int, int]:
-        """First byte and number of bytes of its image that it carries."""
+        """Return the first byte and the number of bytes of the image that the frame carries."""
         return int(self.pieces.first_byte[item]), int(self.pieces.size_bytes[item]) - self._view.header_bytes
 
     def camera_of(self, item: int) -> int:
-        """Which node took the image of which it carries a piece."""
+        """Return the node that took the image of which the frame carries a piece."""
         return int(self._cameras.get(int(self.pieces.image[item]), -1))
 
     def _content(self, item: int) -> str:
@@ -98,7 +98,7 @@ class Frames:
 
 
 def told(packet: PacketView) -> str:
-    """What a packet says of its image, in a sentence."""
+    """Return a sentence on the part of an image in a packet."""
     parts = []
     for what, pixels in (("depth", packet.depth), ("colour", packet.color)):
         rows = np.flatnonzero(pixels.any(axis=1))
@@ -111,7 +111,7 @@ def told(packet: PacketView) -> str:
 
 
 def legend_html(colors: Sequence[tuple[str, tuple[int, int, int]]]) -> Markup:
-    """HTML: what the colours of the drawing mean."""
+    """Return HTML of the drawing's legend."""
     words = Markup(" &ensp; ").join(
         Markup("<span style='white-space: nowrap'><b style='color: {}'>●</b> {}</span>").format(
             css(color), name

@@ -1,4 +1,4 @@
-"""Network: the room's cameras send their images; what is lost on the way, and what that costs the mesh."""
+"""The Network screen's panel: the cameras send their images; losses and their cost for the mesh."""
 
 from __future__ import annotations
 
@@ -51,15 +51,15 @@ from app.window.panel import Offers, Panel
 from packetmesh.errors import InputError
 
 LESSONS = {STOP: CROSSING, f"{STOP}-lost": LOST_PACKET}
-"""By their keys in the address."""
+"""Lessons by their keys in the address."""
 REST_S = 0.6
-"""How long the settings have to rest before a run begins."""
+"""Time that the settings must be unchanged before a run begins, seconds."""
 HAND_S = 0.15
-"""How long the hand has to rest on a time before its moment is drawn."""
+"""Time that the clock must be still before its moment is drawn, seconds."""
 MESH_S = 0.5
-"""While it plays, a moment is drawn at once if the one before is so old."""
+"""During playback a moment is drawn at once if the last drawing is this old."""
 SHOWN = 10
-"""How many pictures of the player a packet is seen moving at least, and a loss stays."""
+"""Number of player pictures for which a packet moves at least, and a loss stays visible."""
 
 
 class NetworkPanel(Panel):
@@ -71,7 +71,7 @@ class NetworkPanel(Panel):
     only_when_shown: ClassVar[bool] = True
 
     def build(self) -> None:
-        """Controls, numbers, inspector; the dock."""
+        """Add controls, numbers, inspector and dock."""
         gui, ui = self.gui, self.ui
         self._source, self._other_room = self.session.spec.source, False
         self._delivery: DeliveryView | None = None
@@ -122,18 +122,18 @@ class NetworkPanel(Panel):
             self._run()
 
     def on_hide(self) -> None:
-        """Stop the clock, and leave the lower edge to others."""
+        """Stop the clock and hide the dock."""
         self._here = False
         self._dock.show(False)
 
     def on_action(self, action: str) -> None:
-        """Go back to the settings of the start with the rest of the session."""
+        """Restore the first settings on *Reset*."""
         if action == "Reset" and self._visited:
             self._setup.reset()
             self.ui.post(self._run)
 
     def on_spec(self, spec: Spec) -> None:
-        """What streams in from now on belongs to something else; in another room nothing has happened yet."""
+        """Ignore partial results of other settings; another scene also drops the previous delivery."""
         if spec.source != self._source:
             self._source = spec.source
             self._before, self._other_room, self._difference.content = None, True, Markdown("")
@@ -143,7 +143,7 @@ class NetworkPanel(Panel):
             self._streaming = False
 
     def on_partial(self, view: Any) -> None:
-        """Show the frames at once, and every moment when it is there."""
+        """Show the frames at once, and every moment when it is computed."""
         if isinstance(view, DeliveryView):
             self._streaming = view.sent == self.session.spec.sent
             if self._streaming:
@@ -170,7 +170,7 @@ class NetworkPanel(Panel):
         self.session.frame_view()
 
     def on_failure(self, step: Step, sentence: str) -> None:
-        """Show that there is nothing to show, and why."""
+        """Remove the drawing and show the error."""
         if step == self.step:
             with self.ui.atomic():
                 self._forget()
@@ -179,7 +179,7 @@ class NetworkPanel(Panel):
                 )
 
     def look(self) -> bool:
-        """Turn the view to the cameras and the room, or the streets, once for each shape of the window."""
+        """Turn the view to the room with its cameras, or to the streets, once per window shape."""
         clients = list(self.session.clients())
         shape = tuple(
             (client.client_id, round(client.camera.aspect, 1), client.camera.image_height)
@@ -198,7 +198,7 @@ class NetworkPanel(Panel):
         return True
 
     def offers(self) -> tuple[Offers, ...]:
-        """The delivery or the runs that are shown, once all of it is there."""
+        """Return the offers of the delivery or runs shown, once they are complete."""
         session = self.session
         if not session.results.fresh("network", session.spec):
             return ()
@@ -208,13 +208,13 @@ class NetworkPanel(Panel):
 
     @property
     def command(self) -> str:
-        """The command lines that compute the same."""
+        """Return the command lines that compute the same."""
         return self._setup.command(self.session.spec)
 
-    # What is asked for, and what came.
+    # Requests and results.
 
     def _run(self) -> None:
-        """Ask for what the controls say."""
+        """Request what the controls set."""
         setup, session = self._setup, self.session
         preset = NETWORKS[setup.preset]
         self._text.content = STREET_TEXT if preset.street else TEXT
@@ -234,7 +234,7 @@ class NetworkPanel(Panel):
             self.on_view("network", session.results.view("network"))
 
     def _take_delivery(self, view: DeliveryView) -> None:
-        """Another delivery: its frames, and as many moments as are there."""
+        """Show another delivery: its frames, and the moments computed so far."""
         now_ns = self._dock.now_ns if self._delivery is not None else None
         if self._delivery is not None and self._delivery.moments and self._delivery.nodes:
             same_room = not self._other_room
@@ -255,7 +255,7 @@ class NetworkPanel(Panel):
         self.session.frame_view()
 
     def _grow(self, view: DeliveryView) -> None:
-        """The same delivery with more moments."""
+        """Show more moments of the same delivery."""
         self._delivery = view
         self._status.content = summary(view)
         self._dock.update(self._lanes())
@@ -276,7 +276,7 @@ class NetworkPanel(Panel):
         self._load(start_ns, end_ns, stops_ns(*runs))
         self._aim(runs[0])
 
-    # What the address says.
+    # The network's parts of the address.
 
     def _take_place(self, place: str) -> None:
         try:
@@ -285,13 +285,13 @@ class NetworkPanel(Panel):
             self._run()
 
     def _first_ns(self) -> int:
-        """Where the clock stands when a run has come."""
+        """Return the clock's first time after a run has come."""
         if self._delivery is not None:
             return self._delivery.run.end_ns
         return min(run.start_ns for run in self._runs)
 
     def _moment(self) -> str:
-        """Simulated seconds, unless it is where the clock stands at first."""
+        """Return the simulated seconds for the address; empty for the clock's first time."""
         if self._asked_ns is None and (self._drawing is None or self._dock.rest_ns == self._first_ns()):
             return ""
         at_ns = self._dock.rest_ns if self._asked_ns is None else self._asked_ns
@@ -308,7 +308,7 @@ class NetworkPanel(Panel):
             self._asked_ns = None
 
     def _take_look(self, lesson: str, look: NetworkLook) -> None:
-        """Send as a stop of a lesson says; where it looks is seen when the frames are there."""
+        """Send as a stop of a lesson sets; its place is shown when the frames are there."""
         for key, other in self._lessons.items():
             if key != lesson and other.place():
                 other.take("")
@@ -317,10 +317,10 @@ class NetworkPanel(Panel):
         self._look = look
         self._run()
         if self._delivery is not None and self._delivery.sent == self.session.spec.sent:
-            self._aim(self._delivery.run)  # it is being computed already
+            self._aim(self._delivery.run)  # it is already being computed
 
     def _lesson_numbers(self) -> Numbers:
-        """Of what is shown; empty while something else is computed."""
+        """Return the numbers of what is shown; empty while something else is computed."""
         session = self.session
         scene = session.results.view("scene")
         if scene is None or self._look is not None or not session.results.fresh("network", session.spec):
@@ -330,7 +330,7 @@ class NetworkPanel(Panel):
         return numbers(scene.title, self._delivery, self._frames[0])
 
     def _aim(self, run: NetworkView) -> None:
-        """Go where the stop of a lesson looks, and tell of the frame there."""
+        """Go to the place of the lesson's stop and describe the frame there."""
         look, self._look = self._look, None
         if look is not None:
             self._aim_at(look, run)
@@ -364,7 +364,7 @@ class NetworkPanel(Panel):
         return f"{self.drawn_below}/runs/{self._drawn}"
 
     def _forget(self) -> None:
-        """Show nothing: what was there has other settings."""
+        """Show nothing, because the results belong to other settings."""
         self._runs, self._delivery, self._drawing, self._streaming = (), None, None, False
         self._before = None
         self._setup.what_if.clear()
@@ -387,7 +387,7 @@ class NetworkPanel(Panel):
         self._hand.restart()
 
     def _show_moment(self) -> None:
-        """Pictures, clouds, mesh and numbers of the clock's time."""
+        """Show pictures, clouds, mesh and numbers of the clock's time."""
         view, drawing = self._delivery, self._drawing
         if view is None or not isinstance(drawing, DeliveryDrawing):
             return

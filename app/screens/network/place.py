@@ -1,4 +1,4 @@
-"""What the address says of a network: the controls that are not as its preset has them."""
+"""A network in the address: the controls whose values differ from the preset's."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from packetmesh.errors import InputError
 
 
 def text_of(values: Mapping[str, str], own: Mapping[str, str]) -> str:
-    """``name=value;name=value`` of what is not as it is of its own."""
+    """Return ``name=value;name=value`` of the values that differ from ``own``."""
     return ";".join(f"{name}={value}" for name, value in values.items() if value != own.get(name, ""))
 
 
 def values_of(text: str) -> dict[str, str]:
-    """The values by their names."""
+    """Return the values by their names."""
     return dict(part.partition("=")[::2] for part in text.split(";") if part)
 
 
 def shown(handle: Any) -> str:
-    """The value of a control as text."""
+    """Return the value of a control as text."""
     value = handle.value
     if isinstance(value, bool):
         return str(value).lower()
@@ -27,10 +27,10 @@ def shown(handle: Any) -> str:
 
 
 def show(name: str, handle: Any, text: str) -> None:
-    """Have a control show the value.
+    """Set a control to a value.
 
     Raises:
-        InputError: it cannot.
+        InputError: the control does not take it.
     """
     value: Any = None
     if isinstance(handle.value, bool):

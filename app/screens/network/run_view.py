@@ -1,4 +1,4 @@
-"""The columns of a run that the Network screen draws."""
+"""The parts of a simulated run that the Network screen draws."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from network_sim.types import NS_PER_S, EventKind, PacketKind, to_ns
 from pipeline.types import FloatArray
 
 MOST_PIECES = 500_000
-"""Of a timeline; later ones are left out, and the screen says so."""
+"""Most pieces of a timeline; later ones are left out, and the screen shows a note."""
 INTERVALS = 60
-"""Of each curve."""
+"""Number of intervals of each curve."""
 TRACK_S = 1.0
-"""Between two places of a vehicle that are kept; it drives straight between crossings."""
+"""Time between two stored places of a vehicle; it drives straight between crossings."""
 INSTANTS = {
     EventKind.CAPTURE: What.CAPTURE,
     EventKind.ARRIVE: What.ARRIVE,
@@ -34,7 +34,7 @@ INSTANTS = {
 
 
 def run_view(trace: NetworkTrace, elapsed_s: float) -> NetworkView:
-    """What the screen shows of a run that took so long to simulate."""
+    """Return the view of a run; ``elapsed_s`` is the time of its simulation."""
     start_ns = min(to_ns(trace.config.run.warmup_s), trace.horizon_ns)
     pieces = pieces_of(trace, start_ns)
     kept_until_ns = trace.horizon_ns
@@ -73,7 +73,7 @@ def _header_bytes(config: NetworkConfig) -> int:
 
 
 def _levels(trace: NetworkTrace, pieces: Pieces) -> tuple[tuple[int, ...], Levels]:
-    """Who has a row, and the frames in these rows."""
+    """Return the nodes that have a row, and the frames in these rows."""
     frames = pieces.where(pieces.what == What.AIR)
     sends = np.isin(np.arange(len(trace.names)), frames.node)
     nodes = np.flatnonzero(sends | camera_nodes(trace))
@@ -82,7 +82,7 @@ def _levels(trace: NetworkTrace, pieces: Pieces) -> tuple[tuple[int, ...], Level
 
 
 def pieces_of(trace: NetworkTrace, start_ns: int) -> Pieces:
-    """The pieces that end after ``start_ns``, by their start."""
+    """Return the pieces that end after ``start_ns``, by their start."""
     events, nodes = trace.events, len(trace.names)
     losses = events.of(EventKind.LOSS)
     frames = events.of(EventKind.AIR)
@@ -126,7 +126,7 @@ def _pieces(
 
 
 def _waits(events: Events, nodes: int, horizon_ns: int) -> Pieces:
-    """From entering a buffer to the first frame there, or to being given up."""
+    """Return the waits: from entering a buffer to the packet's first frame there, or to its drop."""
     entered = events.of(EventKind.ENQUEUE)
     ended = events.of(EventKind.AIR, EventKind.DROP)
     keys, first = np.unique(ended.packet.astype(np.int64) * nodes + ended.node, return_index=True)
@@ -157,7 +157,7 @@ def _downtimes(events: Events, horizon_ns: int) -> Pieces:
 
 
 def series_of(trace: NetworkTrace, start_ns: int) -> dict[Curve, Series]:
-    """Every curve over the time after the warm-up."""
+    """Return every curve over the time after the warm-up."""
     edges_s = np.linspace(start_ns, trace.horizon_ns, INTERVALS + 1) / NS_PER_S
     middles_s = (edges_s[:-1] + edges_s[1:]) / 2.0
     images = trace.events.where(trace.events.packet_kind == PacketKind.IMAGE)
@@ -178,7 +178,7 @@ def _binned(events: Events, edges_s: FloatArray, weights: FloatArray | None = No
 
 
 def _delays_s(events: Events, edges_s: FloatArray) -> FloatArray:
-    """Mean delay of the images that are completed in each interval; NaN where none is."""
+    """Return the mean delay of the images completed in each interval; NaN without any."""
     taken, arrived = events.of(EventKind.CAPTURE), events.of(EventKind.ARRIVE)
     if not len(arrived):
         return np.full(len(edges_s) - 1, np.nan)
@@ -189,7 +189,7 @@ def _delays_s(events: Events, edges_s: FloatArray) -> FloatArray:
 
 
 def _radio_j(trace: NetworkTrace) -> Series:
-    """Energy of the camera nodes' radios since the end of the warm-up."""
+    """Return the energy of the camera nodes' radios since the end of the warm-up."""
     counters = trace.counters
     edges_s = counters.edges_ns[counters.warmup_minutes :] / NS_PER_S
     return Series(edges_s, cumulative_radio_j(counters, camera_nodes(trace), trace.config.energy))
@@ -199,7 +199,7 @@ def _radio_j(trace: NetworkTrace) -> Series:
 
 
 def _tracks(trace: NetworkTrace) -> tuple[FloatArray, NDArray[np.float32]]:
-    """Times (K,) and positions (K, N, 2) in metres; one of each where nobody moves."""
+    """Return times (K,) and positions (K, N, 2) in metres; one of each if nothing moves."""
     if trace.positions_m is not None:
         return np.zeros(1), trace.positions_m[None].astype(np.float32)
     config = trace.config

@@ -1,4 +1,4 @@
-"""What is sent, and how: a preset, a few controls, what might go wrong, and free text for the rest."""
+"""Controls of the network: a preset, main settings, possible faults, and free text for other settings."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ FREE = Markdown(
 
 
 class NetworkSetup:
-    """The controls of a delivery, or of one street run or two."""
+    """The controls of a delivery, or of one or two street runs."""
 
     def __init__(self, ui: Ui, on_change: Callable[[], None]) -> None:
-        """Add the controls of the first screen; ``on_change`` is called when something else is wanted."""
+        """Add the first controls; ``on_change`` is called after a change of the settings."""
         gui = ui.gui
         self._ui, self._on_change = ui, on_change
         self._extra: tuple[str, ...] = ()
         self._beside_extra: tuple[str, ...] = ()
         self._ways = ways(FIRST)
         self._own: dict[str, str] = {}
-        """What the controls show where nobody has changed them."""
+        """Values of the controls before the user changes them."""
         self._wished: dict[str, str] = {}
-        """Of the nodes, which are known when a delivery has come."""
+        """Values for the nodes, which are known only after a delivery has come."""
         self._preset = gui.add_dropdown("Preset", list(TITLES), hint="Which network carries the images.")
         self._coding = gui.add_dropdown(
             "Coding", list(CODING_NAMES), hint="How images become bytes, and which bytes go first."
@@ -92,11 +92,11 @@ class NetworkSetup:
             ui.when_changed(handle, on_change)
 
     def add_what_if(self, below: str) -> None:
-        """What may happen to the nodes; drawn below that scene node."""
+        """Add the faults of nodes; they are drawn below this scene node."""
         self.what_if = WhatIf(self._ui, below, self._on_change)
 
     def add_advanced(self) -> None:
-        """Medium access, moments, and free text for every other setting."""
+        """Add medium access, moments, and free text for all other settings."""
         gui, ui = self._ui.gui, self._ui
         self._access = gui.add_dropdown("Medium access", list(self._ways), hint="Who may send when.")
         self._shadowing = gui.add_slider(
@@ -128,7 +128,7 @@ class NetworkSetup:
         return NETWORKS[self.preset].street
 
     def reset(self) -> None:
-        """Go back to the settings of the start."""
+        """Restore the first settings."""
         self._preset.value = NETWORKS[FIRST].title
         self._coding.value = next(iter(CODING_NAMES))
         self._moments.value = MOMENTS
@@ -137,15 +137,15 @@ class NetworkSetup:
         self._own |= self._values()
 
     def place(self) -> str:
-        """What an address says of it."""
+        """Return the settings as text for the address."""
         values, own = self._values() | self._wished, self._own | {"preset": FIRST}
         return text_of({"preset": self.preset, **values}, own)
 
     def take_place(self, place: str) -> None:
-        """Set the controls as an address says; what is of a node waits for it.
+        """Set the controls from an address; values of nodes wait until the nodes are known.
 
         Raises:
-            InputError: some of it is not known; the rest is set.
+            InputError: some of the text is unknown; all else is set.
         """
         asked, wrong = values_of(place), list[InputError]()
         preset = asked.pop("preset", FIRST)
@@ -174,7 +174,7 @@ class NetworkSetup:
             raise wrong[0]
 
     def grant(self) -> bool:
-        """Do to the nodes what was asked for before they were known; whether there was anything to do."""
+        """Apply node settings that were requested before the nodes existed. Returns whether any were."""
         wished, what_if = self._wished, self.what_if
         if not wished or not what_if.in_room:
             return False
@@ -204,7 +204,7 @@ class NetworkSetup:
         return names | self.what_if.handles
 
     def _values(self) -> dict[str, str]:
-        """By the names that an address has for them."""
+        """Return the values of the controls by their names in the address."""
         texts = {"extra": " ".join(self._extra), "beside-extra": " ".join(self._beside_extra)}
         return {name: shown(handle) for name, handle in self._handles().items()} | {
             **texts,
@@ -212,7 +212,7 @@ class NetworkSetup:
         }
 
     def take(self, look: NetworkLook) -> None:
-        """Set the controls as a stop of a lesson says."""
+        """Set the controls for a stop of a lesson."""
         self._preset.value = NETWORKS[look.preset].title
         self._load()
         if look.way:
@@ -230,10 +230,10 @@ class NetworkSetup:
         self._text.value = " ".join(look.settings)
 
     def sent(self) -> Sent:
-        """The delivery that the controls ask for.
+        """Return the delivery that the controls set.
 
         Raises:
-            InputError: settings that do not go together.
+            InputError: some settings contradict each other.
         """
         changes = (
             f"radio.shadowing_db={float(self._shadowing.value)}",
@@ -250,10 +250,10 @@ class NetworkSetup:
         return Sent(network, coding, moments, self.what_if.off)
 
     def runs(self) -> dict[str, NetworkConfig]:
-        """The street runs that the controls ask for, each by what the screen calls it.
+        """Return the street runs that the controls set, by their labels.
 
         Raises:
-            InputError: settings that do not go together.
+            InputError: some settings contradict each other.
         """
         way, beside = self._scheme.value, self._beside.value
         runs = {way: self._run(way, self._extra)}
@@ -265,7 +265,7 @@ class NetworkSetup:
         return runs
 
     def command(self, spec: Spec) -> str:
-        """The command lines that compute the same."""
+        """Return the command lines that compute the same."""
         if not self.street:
             return deliver_command(spec, self.preset, self.sent())
         lines = []
@@ -282,12 +282,12 @@ class NetworkSetup:
         return with_settings(config, (*shown, *self._ways[way], *extra))
 
     def _picked(self) -> None:
-        self.what_if.put_back()  # the sink of another preset stands elsewhere
+        self.what_if.put_back()  # the sink of another preset has another place
         self._load()
         self._on_change()
 
     def _load(self) -> None:
-        """Show the preset's own values, and the controls that it has."""
+        """Show the preset's own values and its controls."""
         own, street = settings(PRESETS[self.preset]), self.street
         self._ways = ways(self.preset)
         self._seed.value = int(own["run.seed"])
@@ -314,7 +314,7 @@ class NetworkSetup:
         self._own |= {name: shown(self._handles()[name]) for name in loaded}
 
     def _use_text(self) -> None:
-        """Take the free settings, unless they are wrong: then the ones before stay."""
+        """Take the free settings; if they are wrong, the previous ones stay."""
         self._read_text()
         self._on_change()
 
@@ -330,7 +330,7 @@ class NetworkSetup:
 
 
 def deliver_command(spec: Spec, preset: str, sent: Sent) -> str:
-    """The command line that delivers the same rig in the same way."""
+    """Return the command line that delivers the same rig in the same way."""
     words = ["packetmesh", "deliver", *spec.source.arguments(), "--preset", preset, "--coding", sent.coding]
     words += ["--moments", str(sent.moments)]
     if sent.down:

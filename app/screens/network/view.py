@@ -1,4 +1,4 @@
-"""What the Network screen shows of a run: columns of numbers, no more than what is drawn."""
+"""A run as the Network screen shows it: columns of numbers, only as many as are drawn."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pipeline.types import FloatArray
 
 
 class What(IntEnum):
-    """What happened in a piece of the timeline. Those from ``LOSS`` on are instants."""
+    """The event of a timeline's piece. Those from ``LOSS`` on are instants."""
 
     WAIT = 0
     """A packet waited in the node's buffer for its first frame."""
@@ -48,18 +48,18 @@ class Pieces:
 
     start_ns: NDArray[np.int64]
     end_ns: NDArray[np.int64]
-    """The same as the start for instants."""
+    """Equal to the start for instants."""
     packet: NDArray[np.int32]
     image: NDArray[np.int32]
     first_byte: NDArray[np.int32]
     size_bytes: NDArray[np.int32]
     node: NDArray[np.int16]
     peer: NDArray[np.int16]
-    """The other end of a frame; -1 where there is none."""
+    """The other end of a frame; -1 without one."""
     what: NDArray[np.int8]
     """``What``."""
     cause: NDArray[np.int8]
-    """``Cause`` of a failure; of a frame, why its receiver did not get it."""
+    """``Cause`` of a failure; for a frame, why its receiver did not get it."""
     carries: NDArray[np.int8]
     """``PacketKind``."""
 
@@ -67,7 +67,7 @@ class Pieces:
         return len(self.start_ns)
 
     def where(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Pieces:
-        """Those that a mask (P,) or an array of indices selects."""
+        """Return the pieces selected by a mask (P,) or an array of indices."""
         return Pieces(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
@@ -79,49 +79,49 @@ class Series:
     """One quantity over the simulated time."""
 
     t_s: FloatArray
-    """(T,) middles of the intervals, or their ends for what adds up."""
+    """(T,) middles of the intervals, or their ends for cumulative quantities."""
     values: FloatArray
-    """(T,) NaN where there is none."""
+    """(T,) values, NaN without a value."""
 
 
 @dataclass(frozen=True, slots=True)
 class NetworkView:
-    """One run."""
+    """A simulated run."""
 
     config: NetworkConfig
     names: tuple[str, ...]
-    """Of the N nodes, access points, sink and cloud."""
+    """Names of the N nodes, access points, sink and cloud."""
     roles: tuple[str, ...]
     track_s: FloatArray
-    """(K,) times of ``tracks_m``; a single one where nobody moves."""
+    """(K,) times of ``tracks_m``; a single one if nothing moves."""
     tracks_m: NDArray[np.float32]
     """(K, N, 2) metres east and north."""
     start_ns: int
-    """End of the warm-up, where the timeline begins."""
+    """End of the warm-up, at which the timeline starts."""
     end_ns: int
     pieces: Pieces
     lane_nodes: tuple[int, ...]
-    """Nodes that have a row on the timeline: cameras, and whoever else sends."""
+    """Nodes that have a row on the timeline: cameras, and all other senders."""
     levels: Levels
-    """Frames by their index in ``pieces``' own order among ``What.AIR``, for the rows of the timeline."""
+    """Frames for the rows of the timeline; an index counts the ``What.AIR`` pieces in their order."""
     kept_until_ns: int
-    """The pieces end here if the run had more of them than are kept; otherwise ``end_ns``."""
+    """End of the stored pieces if the run had more than are kept; otherwise ``end_ns``."""
     series: dict[Curve, Series]
     metrics: dict[str, Metric]
-    """Numbers of the whole run by name."""
+    """Metrics of the whole run by name."""
     elapsed_s: float
-    """Time that the simulation took on this machine."""
+    """Time of the simulation on this machine."""
     packets: int
-    """That were created in all."""
+    """Number of packets created."""
     roads: RoadCoverage | None
-    """What of the streets the images show; None without streets."""
+    """Coverage of the streets by the images; None without streets."""
     header_bytes: int
-    """Of a frame with image bytes: those of the medium access and of all above it."""
+    """Header bytes of a frame with image bytes: of the medium access and all layers above."""
     label: str = ""
-    """What the screen calls it where two are compared."""
+    """The screen's label for it if two are compared."""
 
     def positions_m(self, t_ns: int) -> FloatArray:
-        """(N, 2) where everybody is."""
+        """Return (N, 2) positions at a time."""
         if len(self.track_s) == 1:
             return self.tracks_m[0].astype(float)
         at = float(np.interp(t_ns / 1e9, self.track_s, np.arange(len(self.track_s))))

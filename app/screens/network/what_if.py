@@ -1,4 +1,4 @@
-"""What may happen to the nodes of a delivery: one fails, a wall goes up before it, its radio moves."""
+"""Faults of a delivery's nodes: a node fails, a wall stands before it, or its radio moves."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ RATES: dict[str, tuple[str, ...]] = {
     for index, rate_bps in enumerate(sorted(IEEE80211B, reverse=True))
 }
 WALL_AWAY, WALL_HALF = 0.2, 0.25
-"""How far the wall is from its node on the way to the sink, and half its length, over that way."""
+"""Distance of the wall from its node, and half its length, over the path from the node to the sink."""
 MOST_AWAY_M, MOST_HALF_M = 1.0, 1.0
 APART = 0.4
-"""Half the length of the wall over the distance to the nearest other node, at most: it stands before one."""
+"""Most of half the wall's length over the distance to the nearest other node: it affects one node."""
 MOVED_TEXT = Markdown(
     "Drag the arrows: the radio moves and frames are sent from there; its camera stays. Choose *nobody* to "
     "put all radios back."
@@ -40,20 +40,20 @@ WALL_DB = 30.0
 
 
 class WhatIf:
-    """The controls, and what they change of a network."""
+    """The controls of faults and the changes that they make to a network."""
 
     def __init__(self, ui: Ui, below: str, on_change: Callable[[], None]) -> None:
         """Add the controls.
 
         Args:
-            ui: their panel and scene.
-            below: where walls and arrows are drawn.
-            on_change: called when something else is wanted.
+            ui: the panel and the scene.
+            below: scene node below which walls and arrows are drawn.
+            on_change: called after a change.
         """
         gui = ui.gui
         self._ui, self._below, self._on_change = ui, below, on_change
         self._places_m: dict[str, FloatArray] = {}
-        """(2,) of every node and of the sink, as long as nobody moves them."""
+        """(2,) place of every node and of the sink before anything was moved."""
         self._moved_m: dict[str, FloatArray] = {}
         self._drawn: list[Any] = []
         self._off = gui.add_dropdown("Switch off", [NOBODY], hint="This node has failed and sends nothing.")
@@ -90,18 +90,18 @@ class WhatIf:
 
     @property
     def off(self) -> tuple[str, ...]:
-        """The node that has failed."""
+        """The failed node, if any."""
         return () if self._off.value == NOBODY else (self._off.value,)
 
     @property
     def handles(self) -> dict[str, Any]:
-        """The controls that an address names."""
+        """The controls by their names in an address."""
         names = ("off", "wall", "wall-db", "retries", "rate")
         return dict(zip(names, self._controls, strict=True))
 
     @property
     def moved(self) -> str:
-        """The radios that were moved, each as name, metres east and north."""
+        """The moved radios, each as name, metres east and north."""
         return ",".join(f"{name},{_text(place_m)}" for name, place_m in self._moved_m.items())
 
     @property
@@ -110,7 +110,7 @@ class WhatIf:
         return self._at_m is not None or len(self._off.options) > 1
 
     def settings(self) -> tuple[str, ...]:
-        """What is changed of the network, as ``key=value``."""
+        """Return the changes of the network as ``key=value``."""
         changes = []
         places_m = self._places_m | self._moved_m
         if self._moved_m:
@@ -123,7 +123,7 @@ class WhatIf:
         return (*changes, *RETRIES[self._retries.value], *RATES[self._rate.value])
 
     def forget(self) -> None:
-        """Nothing has happened."""
+        """Remove all faults."""
         for handle in (self._off, self._walled):
             handle.value = NOBODY
         self._wall_db.value = WALL_DB
@@ -132,14 +132,14 @@ class WhatIf:
         self.put_back()
 
     def put_back(self) -> None:
-        """Have all radios at their cameras, without arrows; what is drawn goes."""
+        """Put all radios back to their cameras; remove arrows and walls."""
         self._mover.value = NOBODY
         self._moved_m.clear()
         self._text.content = Markdown("")
         self.clear()
 
     def leave_room(self) -> bool:
-        """Forget the room, whose nodes stand elsewhere than the next one's; whether anything had happened."""
+        """Forget the nodes of the room, as the next room has others. Returns whether there were faults."""
         happened = bool(self.off or self.settings())
         self.forget()
         self._places_m, self._at_m = {}, None
@@ -147,7 +147,7 @@ class WhatIf:
         return happened
 
     def show(self, visible: bool) -> None:
-        """Show the controls or hide them; without them, what they have drawn goes, too."""
+        """Show or hide the controls and their drawings."""
         for handle in (*self._controls, self._mover, self._text):
             handle.visible = visible
         self._visible = visible
@@ -155,11 +155,11 @@ class WhatIf:
             self.clear()
 
     def load(self, view: DeliveryView, at_m: Callable[[str], FloatArray]) -> None:
-        """Take a delivery: its nodes can be chosen, and what has happened to them is drawn.
+        """Take a delivery: offer its nodes and draw their faults.
 
         Args:
             view: the delivery.
-            at_m: where a node, or the sink, is drawn: (3,) by its name.
+            at_m: returns the (3,) drawn place of a node, or of the sink, by its name.
         """
         if not view.sent.network.nodes.places_m:
             self._places_m = places_of(view)
@@ -168,11 +168,11 @@ class WhatIf:
         self._draw()
 
     def offer(self, names: Sequence[str], apart: bool = True) -> None:
-        """Have these nodes to choose from; a single one cannot be switched off.
+        """Offer these nodes; a single one cannot be switched off.
 
         Args:
-            names: of the nodes.
-            apart: whether it is known where they stand; only then their radios can be moved.
+            names: names of the nodes.
+            apart: whether their places are known; only then their radios can be moved.
         """
         for handle in (self._off, self._walled, self._mover):
             able = apart if handle is self._mover else handle is self._walled or len(names) > 1
@@ -183,7 +183,7 @@ class WhatIf:
                 handle.value = chosen if chosen in options else NOBODY
 
     def _put_back_or_show(self) -> None:
-        """Arrows at another node; with nobody chosen, all radios go back to their cameras."""
+        """Show arrows at the chosen node; without one, all radios go back to their cameras."""
         self._text.content = Markdown("") if self._mover.value == NOBODY else MOVED_TEXT
         self._draw()
         if self._mover.value == NOBODY and self._moved_m:
@@ -191,7 +191,7 @@ class WhatIf:
             self._on_change()
 
     def clear(self) -> None:
-        """Take away what is drawn."""
+        """Remove the drawings."""
         while self._drawn:
             self._drawn.pop().remove()
 
@@ -205,7 +205,7 @@ class WhatIf:
             self._draw_arrows(self._mover.value, self._at_m(self._mover.value))
 
     def _draw_wall(self, node_m: FloatArray, sink_m: FloatArray) -> None:
-        """Where it crosses the way that frames are drawn on; the sink may be drawn nearer than it is."""
+        """Draw the wall across the drawn path of the frames; the sink may be drawn nearer than it is."""
         way_m = sink_m - node_m
         length_m = float(np.linalg.norm(way_m))
         size_m = 0.35 * length_m
@@ -237,19 +237,19 @@ class WhatIf:
         self._drawn.append(arrows)
 
     def move(self, name: str, place_m: FloatArray) -> None:
-        """Have the radio of a node of this room stand somewhere else: (2,)."""
+        """Move the radio of a node of this room to a (2,) place, and recompute."""
         if self.put(name, place_m):
             self._on_change()
 
     def put(self, name: str, place_m: FloatArray) -> bool:
-        """The same before anything is asked for; whether there is such a node."""
+        """Move a radio without recomputing. Returns whether the node exists."""
         if name in self._places_m:
             self._moved_m[name] = place_m
         return name in self._places_m
 
 
 def places_of(view: DeliveryView) -> dict[str, FloatArray]:
-    """(2,) of every node of a delivery and, last, of its sink; of a node that is down, its camera's."""
+    """Return (2,) places of a delivery's nodes and, last, its sink; for a failed node, its camera's."""
     positions_m = view.run.positions_m(view.run.start_ns)
     places_m = {
         node.name: positions_m[node.row] if node.row >= 0 else node.T_world_camera[:2, 3]
@@ -259,13 +259,13 @@ def places_of(view: DeliveryView) -> dict[str, FloatArray]:
 
 
 def _apart(view: DeliveryView) -> bool:
-    """Whether the cameras stand at different places; a rig without poses has all of them at one."""
+    """Whether the cameras have different places; in a rig without poses all have the same."""
     cameras_m = np.array([node.T_world_camera[:3, 3] for node in view.nodes])
     return len(cameras_m) == 1 or bool(np.ptp(cameras_m, axis=0).max() > 1e-6)
 
 
 def wall_m(places_m: dict[str, FloatArray], name: str) -> FloatArray:
-    """(4,) both ends of a wall across the way from a node to the sink, which leaves the others' ways free."""
+    """Return (4,) both ends of a wall across a node's path to the sink that leaves other paths free."""
     way_m = places_m[SINK] - places_m[name]
     length_m = max(float(np.linalg.norm(way_m)), 1e-6)
     others_m = [place_m for other, place_m in places_m.items() if other not in (name, SINK)]

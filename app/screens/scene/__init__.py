@@ -1,1 +1,1 @@
-"""Scene: which place, and what its camera nodes deliver."""
+"""The Scene screen: the choice of a scene, and the images and clouds of its camera nodes."""

@@ -1,4 +1,4 @@
-"""What the Scene screen shows of a rig."""
+"""The job of the Scene screen: a loaded rig with its images and thinned clouds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.types import RgbdFrame
 
 
 def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
-    """The rig as it was loaded."""
+    """Return the rig as it was loaded."""
     rig = yield from store.stage(spec, "rig")
     most = SCREEN_POINTS // len(rig.frames)
     nodes = tuple(_scene_node(frame, most) for frame in rig.frames)

@@ -1,4 +1,4 @@
-"""The folder for a person's own images: a pair of them, or a recording."""
+"""The folder for uploads: a pair of images, or a recording."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ INSTEAD = "use packetmesh import and reconstruct for larger files"
 
 
 class OwnFolder:
-    """Upload buttons, how long a unit of depth is, and a button that reconstructs the pair."""
+    """Upload buttons, the unit of depth, and a button that reconstructs the pair."""
 
     def __init__(
         self,
@@ -52,12 +52,12 @@ class OwnFolder:
         """Add the folder.
 
         Args:
-            ui: where to add it.
+            ui: panel to add it to.
             below: folder of the session.
             new_folder: makes a folder for one upload.
-            on_pair: called with a pair that is to be reconstructed.
-            on_recording: called with the file of a recording, a name for its rig, depth units in a metre if
-                they are given, and how many frames become nodes.
+            on_pair: called with a pair to reconstruct.
+            on_recording: called with the file of a recording, a name for its rig, depth units per metre or
+                None, and the number of frames that become nodes.
         """
         self._ui, self._below, self._new_folder = ui, below, new_folder
         self._on_pair, self._on_recording = on_pair, on_recording
@@ -88,7 +88,7 @@ class OwnFolder:
             self._notes = gui.add_markdown(Markdown(""))
 
     def tell(self, notes: tuple[str, ...]) -> None:
-        """Show what was found in a recording, or that nothing was."""
+        """Show the notes on a recording; none clears them."""
         self._notes.content = Markdown("\n").join(Markdown("- {}").format(note) for note in notes)
 
     def _add_button(self, label: str, mime: str, action: Callable[..., None], *arguments: str) -> None:
@@ -111,7 +111,7 @@ class OwnFolder:
         folder.mkdir()
         for kind, path in self._files.items():
             place = path_below(folder, path.name)
-            if place.exists():  # as where images of both kinds are numbered
+            if place.exists():  # for example if images of both kinds are numbered alike
                 place = path_below(folder, kind, path.name)
                 place.parent.mkdir()
             files[kind] = str(shutil.copyfile(path, place))

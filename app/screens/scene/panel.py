@@ -1,4 +1,4 @@
-"""Scene: which place, and what its camera nodes deliver."""
+"""The Scene screen's panel: the choice of a scene, and the images and clouds of its nodes."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ EMPTY = np.full((480, 640, 3), 235, np.uint8)
 
 
 class ScenePanel(Panel):
-    """Choose or upload a scene; its images and clouds."""
+    """Choice or upload of a scene, with its images and clouds."""
 
     title = "Scene"
     step: ClassVar[Step | None] = "scene"
     drawn_below = "/scene"
 
     def build(self) -> None:
-        """Scene, preset, node, upload; the node's images and numbers."""
+        """Add the choice of scene, preset and node, the upload, and the node's images and numbers."""
         gui, spec = self.gui, self.session.spec
         gui.add_markdown(TEXT)
         title = _title(spec)
@@ -69,7 +69,7 @@ class ScenePanel(Panel):
         self._numbers = gui.add_html(Markup(""))
 
     def on_spec(self, spec: Spec) -> None:
-        """Show the preset and the scene that are wanted."""
+        """Show the current preset and scene."""
         self._preset.value = spec.preset
         title = _title(spec)
         if title not in self._demo.options:
@@ -154,7 +154,7 @@ class ScenePanel(Panel):
 
 
 def _title(spec: Spec) -> str:
-    """What to call the scene: a demo by its title, a rig by its folder's name, a pair by its colour image."""
+    """Return the scene's name: a demo's title, a rig's folder name, or a pair's colour image."""
     if isinstance(spec.source, RigFolder | ImagePair):
         return Path(spec.source.title).name
     return DEMOS.get(spec.source.title, spec.source.title)

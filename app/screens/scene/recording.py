@@ -1,4 +1,4 @@
-"""What an uploaded recording became."""
+"""The rig that was made from an uploaded recording."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pipeline.sources import RigFolder
 
 @dataclass(frozen=True, slots=True)
 class ReadRecording:
-    """A rig in the session's folder, and what is to be said of it."""
+    """A rig in the session's folder, and notes on it."""
 
     source: RigFolder
     notes: tuple[str, ...]
-    """One sentence each."""
+    """Notes, one sentence each."""

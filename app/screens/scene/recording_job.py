@@ -1,4 +1,4 @@
-"""An uploaded recording becomes a rig."""
+"""The job that makes a rig from an uploaded recording."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ INSTEAD = "use packetmesh import and reconstruct for larger ones"
 def recording_job(
     store: Store, spec: Spec, path: Path, name: str, depth_scale: float | None, frames: int
 ) -> Generator[Progress, None, ReadRecording]:
-    """Unpack a ZIP and make a rig of what is in it; needs nothing of the chain.
+    """Unpack a ZIP and make a rig from its content, without results of the chain.
 
     Args:
         store: not used.
         spec: not used.
         path: a bag or a ZIP, in a folder of its own.
-        name: of the rig, which will lie beside that folder.
-        depth_scale: depth units in a metre; None takes what the images or the kind of recording use.
-        frames: how many frames of a recording become nodes.
+        name: name of the rig, which is made next to that folder.
+        depth_scale: depth units per metre; None takes the one of the images or the kind of recording.
+        frames: number of frames of a recording that become nodes.
 
     Raises:
-        InputError: a file that cannot be read, that is too large, or that holds no recording or several.
+        InputError: a file cannot be read, is too large, or holds no recording or several.
     """
     yield Progress("reading the recording", 0.0)
     rig = path_below(path.parent.parent, name)
@@ -51,7 +51,7 @@ def recording_job(
             (unpacked / "rig").mkdir()
             found = found.rename(unpacked / "rig" / "node_00").parent
         if is_rig(found):
-            read = load_rig(found, depth_scale=depth_scale)  # says now what is wrong with it
+            read = load_rig(found, depth_scale=depth_scale)  # reports errors of the rig now
             found.rename(rig)
             return ReadRecording(RigFolder(str(rig), depth_scale), (_rig_note(read),))
         return (yield from _imported(found, rig, frames, depth_scale))
@@ -64,7 +64,7 @@ def _rig_note(rig: Rig) -> str:
 
 
 def _the_only(unpacked: Path) -> Path:
-    """The rig, pair or recording in a folder; the folder itself if there is none.
+    """Return the rig, pair or recording in a folder; the folder itself if there is none.
 
     Raises:
         InputError: there are several.
@@ -81,10 +81,10 @@ def _the_only(unpacked: Path) -> Path:
 
 
 def unpack(path: Path, folder: Path) -> None:
-    """All files of a ZIP below ``folder``.
+    """Unpack all files of a ZIP into ``folder``.
 
     Raises:
-        InputError: it cannot be read as a ZIP, or holds too much.
+        InputError: the file cannot be read as a ZIP, or its content is too large.
     """
     with opened_zip(path, "The file cannot be read as a ZIP; pack the recording again.") as archive:
         inside = archive.infolist()

@@ -1,1 +1,1 @@
-"""Surface: a ball rolls over the points; its radius decides what becomes a surface and what a hole."""
+"""The Surface screen: a ball rolls over the points; its radius decides which gaps become holes."""

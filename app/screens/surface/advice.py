@@ -1,4 +1,4 @@
-"""The folder that answers which ball radius to take: from the points, and from a sweep of all radii."""
+"""The folder with advice on the ball radius: from the points, and from a sweep of all radii."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ NO_ADVICE = "No point has neighbours on all sides, so no radius can be read off 
 WAITING = Markdown("The first ball is about to roll.")
 STOPPED = Markdown("Stopped; the curves end where the sweep did.")
 UNNAMED = "–"
-"""Of the only button before there is a suggestion; it is not shown."""
+"""Label of the only button before there is a suggestion; it is hidden."""
 
 
 class AdviceFolder:
-    """Suggested radii to take with a button, and a sweep that shows what every radius does."""
+    """Buttons that take suggested radii, and a sweep that shows the effect of every radius."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class AdviceFolder:
         on_stop: Callable[[], None],
         on_radius_m: Callable[[float], None],
     ) -> None:
-        """Add the folder; ``on_radius_m`` is called with a suggested radius that is taken."""
+        """Add the folder; ``on_radius_m`` is called with the suggested radius of a pressed button."""
         self._on_sweep, self._on_radius_m = on_sweep, on_radius_m
         self._radii_m: dict[str, float] = {}
         self._view: SweepView | None = None
@@ -60,7 +60,7 @@ class AdviceFolder:
         self.forget()
 
     def suggest(self, rows: tuple[Suggestion, ...]) -> None:
-        """Show what the points suggest."""
+        """Show the radii that the points suggest."""
         self._radii_m = {row.name: row.radius_m for row in rows}
         if rows:
             self._take.options = tuple(self._radii_m)
@@ -68,7 +68,7 @@ class AdviceFolder:
         self._table.content = suggestions_html(rows)
 
     def load(self, view: SweepView | None) -> None:
-        """Show a sweep, or as much of it as there is; None was stopped."""
+        """Show a sweep, complete or partial; None if it was stopped."""
         if view is None:
             self._status.content = Markdown("Stopped.") if self._view is None else STOPPED
             return
@@ -78,7 +78,7 @@ class AdviceFolder:
         self._status.content = sweep_sentence(view) if view.done else running
 
     def forget(self) -> None:
-        """The radii of another cloud are not those of this one."""
+        """Remove the radii, which belong to another cloud."""
         self._radii_m, self._view = {}, None
         self._take.visible = False
         self._draw()
@@ -101,7 +101,7 @@ class AdviceFolder:
 
 
 def suggestions_html(rows: tuple[Suggestion, ...]) -> Markup:
-    """A line for each suggested radius: its name, the radius, and what it closes."""
+    """Return HTML with a line per suggested radius: name, radius, and the share that it closes."""
     if not rows:
         return Markup("<div style='padding: 0 0.8em; font-size: 13px'>{}</div>").format(NO_ADVICE)
     return table(

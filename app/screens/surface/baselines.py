@@ -1,4 +1,4 @@
-"""Surfaces of other methods over the same points, made when they are first looked at."""
+"""Surfaces of other methods over the same points, computed when they are first shown."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from app.window.panel import PanelSession
 
 
 class Baselines:
-    """Those that have been made of the surface that is wanted."""
+    """The baselines computed for the current surface."""
 
     def __init__(
         self,
@@ -23,24 +23,24 @@ class Baselines:
         line: Piece[Markup],
         on_made: Callable[[BaselineName, bool], None],
     ) -> None:
-        """Keep none yet.
+        """Start without any.
 
         Args:
-            session: who makes them.
-            stage: where they are drawn.
-            line: says something about the one that is shown.
-            on_made: called when one has been made, or could not be.
+            session: the session that computes them.
+            stage: the stage that draws them.
+            line: HTML line about the baseline that is shown.
+            on_made: called when one has been computed or has failed.
         """
         self._session, self._stage, self._line, self._on_made = session, stage, line, on_made
         self.views: dict[BaselineName, BaselineView] = {}
-        """All that are there."""
+        """The computed baselines by name."""
 
     def forget(self) -> None:
-        """The surface that is wanted is another one."""
+        """Drop all baselines: the surface is another one."""
         self.views = {}
 
     def show(self, name: BaselineName) -> None:
-        """Draw one, or say that it is being made."""
+        """Draw a baseline; compute it first if necessary, with a note that it is being computed."""
         session, view = self._session, self.views.get(name)
         if view is None:
             made = functools.partial(self._made, name, session.spec.key("surface"))

@@ -1,4 +1,4 @@
-"""Other methods over the cloud that the ball rolls over after fusion."""
+"""The job that computes another method's surface over the cloud after fusion."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from pipeline.surface.radii import radii
 
 
 def baseline_job(store: Store, spec: Spec, name: BaselineName) -> Generator[Progress, None, BaselineView]:
-    """The surface of another method, measured as the ball's is.
+    """Return the surface of another method, measured like the ball's surface.
 
     Raises:
-        InputError: a method that there is not.
+        InputError: the method is unknown.
         ReconstructionError: the method finds no surface.
     """
     if name not in get_args(BaselineName):
@@ -33,7 +33,7 @@ def baseline_job(store: Store, spec: Spec, name: BaselineName) -> Generator[Prog
 
 
 def _note(clouds: FusedCloud, name: BaselineName, spec: Spec) -> str:
-    """How the surface was made, in a sentence."""
+    """Return a sentence on how the surface was made."""
     if name == "alpha":
         largest_m = radii(spec.config.surface, clouds.r_F_m, clouds.sigma_D_m)[-1]
         return (

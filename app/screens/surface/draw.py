@@ -1,4 +1,4 @@
-"""Surfaces before and after fusion, their holes as red loops, and the points that the ball left out."""
+"""Drawings of a surface: the mesh, its holes as red loops, and the points that the ball left out."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class SurfaceDrawing:
         self._frame = scene.add_frame(below, show_axes=False)
 
     def draw(self, view: MeshView | PaintedMesh, unseen: bool = False) -> None:
-        """Draw this one; ``drop_old`` then takes the one before away.
+        """Draw a mesh; ``drop_old`` then removes the one before.
 
-        A browser needs some frames to read a mesh. The one before stays until then, so that the surface
-        does not blink; or at least, where it is ``unseen`` as the browser draws nothing in between, its
-        material stays, so that the browser need not compile its shader again.
+        A browser needs some frames to read a mesh. The one before stays until then, so that the surface does
+        not blink. If the browser draws nothing in between (``unseen``), it is only hidden, so that its
+        material stays and the browser need not compile the shader again.
         """
         self._made += 1
         if unseen:
@@ -60,23 +60,23 @@ class SurfaceDrawing:
             handle.visible = self._points_shown
 
     def show_unused(self, shown: bool) -> None:
-        """Whether those points are shown."""
+        """Show or hide those points."""
         self._points_shown = shown
         for handle in self._points.values():
             handle.visible = shown
 
     def drop_old(self) -> None:
-        """Remove all but what was drawn last."""
+        """Remove all meshes but the last."""
         for handles in (self._meshes, self._rims):
             _shorten(handles, 1)
 
     def clear(self) -> None:
-        """Draw nothing."""
+        """Remove everything."""
         for handles in (self._meshes, self._rims):
             _shorten(handles, 0)
 
     def show(self, visible: bool, rims: bool, offset_m: FloatArray, top_m: FloatArray | None) -> None:
-        """Whether and where to show it; a label at ``top_m`` tells two apart."""
+        """Show or hide it at an offset; a label at ``top_m`` distinguishes two surfaces."""
         self._frame.visible = visible
         self._frame.position = offset_m
         self._rims_shown = rims
@@ -93,6 +93,6 @@ class SurfaceDrawing:
 
 
 def _shorten(handles: list[viser.GlbHandle], most: int) -> None:
-    """Remove the first ones."""
+    """Remove the oldest handles until at most ``most`` are left."""
     while len(handles) > most:
         handles.pop(0).remove()

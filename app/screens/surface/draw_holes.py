@@ -1,4 +1,4 @@
-"""The chosen hole in the scene, and which hole a click meant."""
+"""The chosen hole in the scene, and the search for the hole that was clicked."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from app.screens.surface.view import HoleView
 from pipeline.types import ByteArray, FloatArray
 
 TAPE = ((255, 225, 0), (0, 0, 0))
-"""Yellow and black in turn, as on warning tape: seen on light and dark surfaces and beside red rims."""
+"""Alternating yellow and black, as on warning tape: visible on any surface and next to red rims."""
 THICKNESS_PX = 6.0
 REACH_DEG = 1.5
-"""A click so far from a hole still means it."""
+"""Largest angle between a click's ray and the hole that it selects."""
 
 
 class HoleDrawing:
@@ -26,7 +26,7 @@ class HoleDrawing:
         self._handles: list[viser.SceneNodeHandle] = []
 
     def draw(self, hole: HoleView, name: str, offset_m: FloatArray) -> None:
-        """Draw this hole instead of the last; ``offset_m`` is where its surface stands."""
+        """Draw this hole in place of the last; ``offset_m`` is the offset of its surface."""
         self.clear()
         points, colors = tape(hole.loop_m)
         loop = self._scene.add_line_segments(
@@ -39,14 +39,14 @@ class HoleDrawing:
         self._frame.position = offset_m
 
     def clear(self) -> None:
-        """Draw none."""
+        """Remove the drawn hole."""
         for handle in self._handles:
             handle.remove()
         self._handles = []
 
 
 def tape(loop_m: FloatArray) -> tuple[FloatArray, ByteArray]:
-    """(2 L, 2, 3) segments, two for each edge of an (L, 3) closed loop, and their colours in turn."""
+    """Return (2 L, 2, 3) segments, two per edge of an (L, 3) closed loop, in alternating colours."""
     middle_m = 0.5 * (loop_m + np.roll(loop_m, -1, axis=0))
     stops_m = np.stack([loop_m, middle_m], axis=1).reshape(-1, 3)
     points = np.stack([stops_m, np.roll(stops_m, -1, axis=0)], axis=1)
@@ -55,16 +55,16 @@ def tape(loop_m: FloatArray) -> tuple[FloatArray, ByteArray]:
 
 
 def picked_hole(holes: Sequence[HoleView], origin_m: FloatArray, direction: FloatArray) -> int | None:
-    """Which hole a ray means.
+    """Return the hole that a ray selects.
 
-    The nearest hole that the ray passes through; else the one whose edges it passes at the smallest
-    angle, up to 1.5 degrees; rims only where no hole is meant. The rim around a surface is passed
-    through wherever one looks at the surface, so a rim counts as passed through only if it runs as the
-    loop of a hole does: clockwise seen from the ray's origin.
+    This is the nearest hole that the ray passes through; else the one whose edges it passes at the smallest
+    angle, up to 1.5 degrees; rims only if there is no hole. A ray to any part of a surface passes through the
+    rim around that surface, so a rim counts as passed through only if it runs as the loop of a hole does:
+    clockwise seen from the ray's origin.
 
     Args:
-        holes: of one surface.
-        origin_m: (3,) in the frame of the holes.
+        holes: holes of one surface.
+        origin_m: (3,) origin in the frame of the holes.
         direction: (3,) of any length.
 
     Returns:
@@ -85,7 +85,7 @@ def picked_hole(holes: Sequence[HoleView], origin_m: FloatArray, direction: Floa
 
 
 def _axes(direction: FloatArray) -> FloatArray:
-    """(3, 3) right-handed unit axes as rows, the last along the direction."""
+    """Return (3, 3) right-handed unit axes as rows, the last along the direction."""
     forward = np.asarray(direction, float) / np.linalg.norm(direction)
     right = np.cross(np.eye(3)[np.argmin(np.abs(forward))], forward)
     right /= np.linalg.norm(right)
@@ -93,7 +93,7 @@ def _axes(direction: FloatArray) -> FloatArray:
 
 
 def _turns(loop: FloatArray) -> int:
-    """How often an (L, 3) loop runs clockwise around the z axis, looking along it; 0 if not all ahead."""
+    """Return the clockwise turns of an (L, 3) loop around the z axis, looking along it; 0 if z <= 0."""
     if loop[:, 2].min() <= 0.0:
         return 0
     bearing = np.arctan2(loop[:, 1], loop[:, 0])
@@ -102,10 +102,10 @@ def _turns(loop: FloatArray) -> int:
 
 
 def _edge_angle_deg(loop: FloatArray) -> float:
-    """Smallest angle between the z axis and the edges of an (L, 3) loop, seen from the origin."""
+    """Return the smallest angle between the z axis and the edges of an (L, 3) loop from the origin."""
     edge = np.roll(loop, -1, axis=0) - loop
     along, ee, ss = ((a * b).sum(axis=1) for a, b in ((loop, edge), (edge, edge), (loop, loop)))
-    # Where z / |loop + t edge|, the cosine, is stationary; the corners are looked at as well.
+    # t at which the cosine z / |loop + t edge| is stationary; the corners are candidates too.
     below = edge[:, 2] * along - loop[:, 2] * ee
     t = np.divide(loop[:, 2] * along - edge[:, 2] * ss, below, out=np.zeros_like(below), where=below != 0.0)
     points = np.concatenate([loop, loop + np.clip(t, 0.0, 1.0)[:, None] * edge])

@@ -1,4 +1,4 @@
-"""The rolling ball: the mesh is sent once, in pieces; then only its newest part, the front and the ball."""
+"""Drawing of the rolling ball: the mesh is sent once, in pieces; then its newest part, front and ball."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from app.screens.surface.walk_view import WalkView
 from pipeline.types import FloatArray, IntArray
 
 PIECES = 100
-"""About so many meshes make up the whole."""
+"""Approximate number of meshes into which the whole is split."""
 POINT_SHARE = 0.3
 """Size of a point over the smallest radius."""
 BALL_OPACITY = 0.45
 SHADES = ((222, 233, 245), (178, 200, 226), (136, 164, 202), (100, 126, 172))
-"""Of the triangles of the first ball, the second and so on; the last for all beyond."""
+"""Colours of the triangles of the first ball, the second and so on; the last for all others."""
 WIRE = (70, 84, 104)
 
 
 class RollingDrawing:
     """One walk below a scene node, at any of its steps.
 
-    The browser remembers how a node of the same name was, so every walk needs a node of its own.
+    The browser remembers a node's state by its name, so every walk needs a node of its own.
     """
 
     def __init__(self, scene: viser.SceneApi, below: str, view: WalkView) -> None:
@@ -45,7 +45,7 @@ class RollingDrawing:
         )
 
     def show(self, done: int, place: int) -> None:
-        """The mesh after ``done`` steps; the ball at rest, or at a place from 1 on of its way to the next."""
+        """Show the mesh after ``done`` steps, and the ball at rest or at a place (from 1) on its next arc."""
         view = self._view
         if done != self._done:
             self._done = done
@@ -60,7 +60,7 @@ class RollingDrawing:
         self._ball.position = view.places_m[step, at]
 
     def _show_mesh(self, count: int) -> None:
-        """The first ``count`` triangles: whole pieces, and the beginning of the next."""
+        """Show the first ``count`` triangles: whole pieces, and the beginning of the next."""
         whole = int(np.searchsorted(self._ends, count, side="right"))
         for index in range(min(whole, self._whole), max(whole, self._whole)):
             self._pieces[index].visible = index < whole
@@ -102,7 +102,7 @@ class RollingDrawing:
     def _add_mesh(
         self, name: str, triangles: IntArray, ball: int, points_m: FloatArray | None = None
     ) -> list[viser.MeshHandle]:
-        """A hidden mesh, and in a close-up its edges below it; of all points if it is to change."""
+        """Add a hidden mesh, in a close-up with its edges below; with all points if it will change."""
         if points_m is None:
             used, corners = np.unique(triangles, return_inverse=True)
             points_m, triangles = self._view.points_m[used], corners.reshape(-1, 3)
@@ -118,7 +118,7 @@ class RollingDrawing:
 
 
 def pieces(view: WalkView) -> tuple[IntArray, IntArray]:
-    """(P,) where each piece of the triangles ends, and (P,) the one ball that made it."""
+    """Return (P,) the end of each piece of the triangles, and (P,) the index of the ball that made it."""
     count = len(view.triangles)
     ball = np.repeat(view.step_radius, np.diff(view.step_ends, prepend=0))
     size = -(-count // PIECES)

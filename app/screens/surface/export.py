@@ -1,4 +1,4 @@
-"""What the Surface screen offers to take along."""
+"""Files that the Surface screen offers for download."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NOTE = Markdown(
 
 
 def surface_offers(shown: str, colors: str, rims: bool) -> Offers:
-    """Of what the screen shows, perhaps with rims; a baseline has its points' colours only."""
+    """Return offers of the surface shown, with its rims if drawn; a baseline has its points' colours."""
     coloring: Coloring = "color" if shown in BASELINES else COLORINGS[colors]
     job = "surface.export_job"
     files = (

@@ -1,4 +1,4 @@
-"""What is taken along of the surfaces as they are shown: a page, a way along the cameras, the view."""
+"""Jobs that export surfaces as shown: a page, a flight along the cameras, a picture of the view."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ from pipeline.types import ByteArray, PointSource, Rig, Surface, SurfaceResult
 
 PICTURE_WIDTH_PX = 480
 MOST_PICTURES, LEG_PICTURES = 32, 16
-"""Of the whole way along the cameras, and from one camera to the next; the way back shows them again."""
+"""Most pictures of the whole flight, and of one leg between cameras; the way back repeats them."""
 PICTURE_MS, REST_MS = 120, 800
-"""How long a picture stays, and one at an end of the way."""
+"""Display time of a picture, and of one at an end of the flight."""
 SWING_DEG = 15.0
-"""To both sides of a single camera."""
+"""Swing of a single camera to each side."""
 
 
 def page_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progress, None, bytes]:
-    """A page with the surfaces before and after fusion or, if a baseline is shown, the ball's and that.
+    """Return a page with the surfaces before and after fusion or, for a baseline, the ball's and it.
 
     Raises:
         InputError: neither surface has a triangle.
@@ -63,7 +63,7 @@ def page_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progress
 
 
 def flight_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progress, None, bytes]:
-    """A way from camera to camera and back along the surface that is shown, as a GIF.
+    """Return a flight from camera to camera and back along the surface shown, as a GIF.
 
     Raises:
         InputError: the surface has no triangle.
@@ -85,7 +85,7 @@ def flight_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progre
 def view_job(
     store: Store, spec: Spec, coloring: Coloring, rims: bool, rgba: ByteArray
 ) -> Generator[Progress, None, bytes]:
-    """The view as the browser drew it, (H, W, 4), on the app's background with its title and legend."""
+    """Return the browser's picture (H, W, 4) on the app's background, with title and legend, as PNG."""
     (rig,) = yield from store.stages(spec, "rig")
     share = rgba[..., 3:] / 255.0
     rgb = (rgba[..., :3] * share + np.array(BACKGROUND) * (1.0 - share)).astype(np.uint8)
@@ -96,7 +96,7 @@ def view_job(
 
 
 def _pair(shown: Shown) -> tuple[Shown, Shown]:
-    """What is left and right of the line."""
+    """Return the surfaces to the left and to the right of the line."""
     return ("before", "after") if shown in ("before", "after") else ("after", shown)
 
 
@@ -118,7 +118,7 @@ def _side(name: Shown, surface: SurfaceResult, coloring: Coloring, rig: Rig, pla
 def _painter(
     surface: Surface, coloring: Coloring, rig: Rig, placement: Placement
 ) -> Callable[[Camera], ByteArray]:
-    """What paints a picture of the surface in its colours, from any camera."""
+    """Return a function that draws the surface in its colours from any camera."""
     colors = vertex_colors(surface, coloring, rig, cameras_of(rig, placement))
     painted = replace(surface, colors=colors)
     texture = dressed(rig, placement, surface) if coloring in ("photo", "violet") else None
@@ -129,7 +129,7 @@ def _painter(
     def picture(camera: Camera) -> ByteArray:
         seen = on_background(mesh_picture(painted, camera, texture=texture))
         if guessed:
-            tinted = mesh_picture(marked, camera)[..., 1] > 64  # what no ray meets has no green
+            tinted = mesh_picture(marked, camera)[..., 1] > 64  # pixels without a hit have no green
             seen[tinted] = seen[tinted] * VIOLET
         return seen
 
@@ -137,7 +137,7 @@ def _painter(
 
 
 def _way(cameras: Sequence[Camera], surface: Surface) -> Iterator[Camera]:
-    """From the first camera to the last through all others, slower near each; a single one swings."""
+    """Yield cameras from the first to the last through all others, slower near each; one alone swings."""
     first = cameras[0]
     K = first.intrinsics
     K = scaled(K, PICTURE_WIDTH_PX / K.width_px)

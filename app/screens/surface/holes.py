@@ -1,4 +1,4 @@
-"""The folder with the holes of a surface: which there are, why they are there, and what filling costs."""
+"""The folder with a surface's holes: their list, their causes, and the cost of filling them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ WHICH: tuple[Which, ...] = ("after", "before")
 
 
 class HolesFolder:
-    """A list of the holes, the chosen one in the scene, and the reason why it is there."""
+    """A list of the holes, the chosen one in the scene, and its cause."""
 
     def __init__(
         self,
@@ -47,8 +47,8 @@ class HolesFolder:
         """Add the folder.
 
         Args:
-            ui: where to add it.
-            on_ask: called with a surface and the index of its hole that is to be explained.
+            ui: panel to add it to.
+            on_ask: called with a surface and the index of its hole to explain.
             on_fill: called with the length in metres of the longest hole to fill; None for none.
         """
         self._on_ask, self._on_fill = on_ask, on_fill
@@ -89,8 +89,8 @@ class HolesFolder:
     def load(self, holes: Mapping[Which, tuple[HoleView, ...]], shown: Which | None) -> None:
         """Take the holes of the surfaces, and list those of the one that is shown alone.
 
-        A hole of a surface that is the same as before stays chosen. A new surface after fusion is not
-        filled, so the slider goes back to off.
+        A hole stays chosen if its surface is unchanged. A new surface after fusion is not filled, so the
+        slider returns to off.
         """
         same = {which: _alike(holes.get(which, NOTHING), self._holes.get(which, NOTHING)) for which in WHICH}
         self._holes = dict(holes)
@@ -103,22 +103,22 @@ class HolesFolder:
             self._choose(None)
 
     def parts(self, parts: RayParts | None) -> None:
-        """Tell where the rays of all pixels end; None if it is not known."""
+        """Show where the rays of all pixels end; None if it is not known."""
         self._parts.content = Markdown("") if parts is None else parts_sentence(parts)
 
     def picked(
         self, ray_origin_m: FloatArray, ray_direction: FloatArray, which: Which, offset_m: FloatArray
     ) -> bool:
-        """Choose the hole that a click in the scene meant.
+        """Choose the hole that was clicked in the scene.
 
         Args:
-            ray_origin_m: (3,) in the world.
-            ray_direction: (3,).
-            which: the surface on whose holes to look.
-            offset_m: (3,) where that surface stands in the scene.
+            ray_origin_m: (3,) world frame.
+            ray_direction: (3,) world frame.
+            which: the surface whose holes are searched.
+            offset_m: (3,) offset of that surface in the scene.
 
         Returns:
-            Whether the click meant one.
+            Whether the click selected a hole.
         """
         holes = self._holes.get(which, NOTHING)
         index = picked_hole(holes, np.asarray(ray_origin_m) - offset_m, np.asarray(ray_direction))
@@ -129,12 +129,12 @@ class HolesFolder:
         return True
 
     def choose_largest(self) -> None:
-        """Choose the first of the list, as a person would."""
+        """Choose the first hole of the list."""
         if self._shown:
             self._choose(0)
 
     def explain(self, answer: ExplainView | None) -> None:
-        """Show why the chosen hole is there; None if no answer came."""
+        """Show the cause of the chosen hole; None if no answer came."""
         if self._index is None:
             return
         if answer is None:
@@ -144,7 +144,7 @@ class HolesFolder:
             self._shares.content = shares_table(answer.found)
 
     def filled(self, view: FilledView | None) -> None:
-        """Show what filling made of the surface; None if no answer came."""
+        """Show the filled surface's numbers; None if no answer came."""
         if not self.filling:
             self._filled.content = FILL_OFF
         else:
@@ -152,16 +152,16 @@ class HolesFolder:
 
     @property
     def filling(self) -> bool:
-        """Whether small holes are to be filled."""
+        """Whether small holes are filled."""
         return self._fill.value > 0.0
 
     def unfill(self) -> None:
-        """Turn filling off, as the surface is drawn again without it."""
+        """Turn filling off, because the surface is drawn again without it."""
         self._fill.value = 0.0
         self.filled(None)
 
     def forget(self) -> None:
-        """The surfaces are gone."""
+        """Remove all holes: the surfaces are gone."""
         self._holes, self._which, self._alone = {}, None, None
         self._choose(None)
         self.parts(None)
@@ -172,7 +172,7 @@ class HolesFolder:
         self._choose(next((index for index, name in names.items() if name == self._list.value), None))
 
     def _step(self, by: int) -> None:
-        """Choose the next or previous hole; past the last comes the first."""
+        """Choose the next or previous hole; after the last comes the first."""
         count = len(self._shown)
         if count:
             start = -1 if self._index is None and by > 0 else self._index or 0
@@ -197,7 +197,7 @@ class HolesFolder:
         return NOTHING if self._which is None else self._holes.get(self._which, NOTHING)
 
     def _names(self) -> dict[int, str]:
-        """What the list calls the largest holes, the longest rims and the chosen one, by index."""
+        """Return the list's names of the largest holes, longest rims and the chosen one, by index."""
         holes = [index for index, hole in enumerate(self._shown) if not hole.rim]
         rims = [index for index, hole in enumerate(self._shown) if hole.rim]
         listed = {*holes[:LISTED_HOLES], *rims[:LISTED_RIMS]} | (
@@ -206,7 +206,7 @@ class HolesFolder:
         return {index: hole_name(index, self._shown[index]) for index in sorted(listed)}
 
     def _invitation(self) -> Markdown:
-        """What to do while no hole is chosen."""
+        """Return the advice that is shown while no hole is chosen."""
         if not self._holes:
             return Markdown("")
         if self._which is None:
@@ -231,21 +231,21 @@ def _count(number_of: int, what: str) -> str:
 
 
 def hole_name(index: int, hole: HoleView) -> str:
-    """Number, kind, length and area."""
+    """Return a hole's number, kind, length and area as text."""
     if hole.rim:
         return f"{index + 1}: rim, {100.0 * hole.length_m:,.0f} cm long"
     return f"{index + 1}: {100.0 * hole.length_m:,.0f} cm around, {1e4 * hole.area_m2:,.1f} cm²"
 
 
 def reason_text(found: Explanation) -> Markdown:
-    """Markdown: the reason in a word and in a sentence, and what to do about it."""
+    """Return markdown: the cause in a word and a sentence, and the remedy."""
     return Markdown("**{}.** {}\n\n**What to try:** {}").format(
         found.reason.capitalize(), found.sentence, found.remedy
     )
 
 
 def shares_table(found: Explanation) -> Markup:
-    """HTML: who has a depth for the pixels that look into the hole; empty if no camera does."""
+    """Return a table in HTML of the depth sources for the pixels in the hole; empty if no camera sees it."""
     rows = [
         (name, hint, number(share, 0, "%", 100.0))
         for name, hint, share in (
@@ -270,7 +270,7 @@ def shares_table(found: Explanation) -> Markup:
 
 
 def parts_sentence(parts: RayParts) -> Markdown:
-    """Markdown: where the rays of all pixels end on the surface after fusion."""
+    """Return markdown: where the rays of all pixels end on the surface after fusion."""
 
     def share(value: float) -> str:
         return number(value, 1, "%", 100.0)
@@ -293,7 +293,7 @@ def parts_sentence(parts: RayParts) -> Markdown:
 
 
 def filled_sentence(view: FilledView) -> Markdown:
-    """Markdown: what was invented, and how to judge it."""
+    """Return markdown: the invented area, and how to judge it."""
     if not view.holes:
         return Markdown("No hole is that small. Drag the slider further.")
     truth = view.mesh.truth

@@ -1,4 +1,4 @@
-"""The holes of a surface: where they are, why they are there, and what filling them costs."""
+"""Jobs on the holes of a surface: their places, their causes, and the cost of filling them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pipeline.types import SurfaceResult
 
 
 def hole_views(surface: SurfaceResult) -> tuple[HoleView, ...]:
-    """The holes of a surface in the order of ``find_holes``."""
+    """Return the holes of a surface in the order of ``find_holes``."""
     return tuple(
         HoleView(
             loop_m=surface.vertices_m[hole.loop].astype(np.float32),
@@ -39,7 +39,7 @@ def hole_views(surface: SurfaceResult) -> tuple[HoleView, ...]:
 
 
 def views_of(store: Store, spec: Spec) -> Generator[Progress, None, list[View]]:
-    """What every registered camera knows of its pixels."""
+    """Return every registered camera with its pixels' sensor and inferred validity."""
     rig, nodes, placement = yield from store.stages(spec, "rig", "nodes", "placement")
     return [
         View(camera, frame.depth.valid, node.alignment.depth.valid)
@@ -50,13 +50,13 @@ def views_of(store: Store, spec: Spec) -> Generator[Progress, None, list[View]]:
 
 
 def parts_of(store: Store, spec: Spec, surface: SurfaceResult) -> Generator[Progress, None, RayParts]:
-    """Where the pixel rays of all cameras end on a surface of the spec."""
+    """Return where the pixel rays of all cameras end on a surface of the spec."""
     views = yield from views_of(store, spec)
     return ray_parts(surface, views)
 
 
 def explain_job(store: Store, spec: Spec, which: Which, index: int) -> Generator[Progress, None, ExplainView]:
-    """Why one hole of the surface after or before fusion is there."""
+    """Return the cause of one hole of the surface after or before fusion."""
 
     def explain() -> Generator[Progress, None, ExplainView]:
         views = yield from views_of(store, spec)
@@ -75,7 +75,7 @@ def explain_job(store: Store, spec: Spec, which: Which, index: int) -> Generator
 
 
 def fill_job(store: Store, spec: Spec, longest_cm: float) -> Generator[Progress, None, FilledView]:
-    """The surface after fusion with its holes up to so long a rim filled, and what that makes of it."""
+    """Fill the holes of the surface after fusion up to this rim length, and measure the result."""
     rig, placement, after = yield from store.stages(spec, "rig", "placement", "after")
     yield Progress("filling small holes", 0.6)
     filled = fill_holes(after, longest_cm / 100.0)
@@ -86,7 +86,7 @@ def fill_job(store: Store, spec: Spec, longest_cm: float) -> Generator[Progress,
 
 
 def _marked_glb(filled: Filled) -> bytes:
-    """The surface with every invented triangle in one colour, for which it gets its own vertices."""
+    """Return the surface with every invented triangle in one colour, on vertices of its own."""
     surface = filled.surface
     count, corners = len(surface.vertices_m), surface.triangles[filled.filled].ravel()
     own = count + np.arange(len(corners), dtype=np.int32).reshape(-1, 3)

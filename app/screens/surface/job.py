@@ -1,4 +1,4 @@
-"""What the Surface screen shows of the surfaces before and after fusion."""
+"""The job of the Surface screen: the surfaces before and after fusion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ HISTOGRAM_BINS = 60
 
 
 def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, None, SurfaceView]:
-    """The surfaces and everything about them; yielded as far as they are there."""
+    """Return the surfaces with holes and numbers; yield partial results."""
     clouds = yield from store.stage(spec, "fused")
     rolled = yield from compute(spec, "after", store)
     after = rolled.value
@@ -63,14 +63,14 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
 
 
 def _worn(surface: SurfaceResult, in_photographs: Callable[[Surface], Texture]) -> MeshView:
-    """A surface in photographs without its seams, and the numbers as the ball left it."""
+    """Return a surface in photographs without its seams, with the triangle count of the ball's mesh."""
     closed = without_seams(surface)
     view = mesh_view(closed, None, in_photographs(closed))
     return replace(view, triangles=len(surface.triangles))
 
 
 def spacing_of(clouds: FusedCloud) -> SpacingView:
-    """The histogram of the distances of nearest points, up to five standard deviations over their mean."""
+    """Return the histogram of nearest-point distances, up to five standard deviations over the mean."""
     r_F_m, sigma_D_m = clouds.r_F_m, clouds.sigma_D_m
     distances_m = nearest_distances_m(clouds.fused.points_m)
     counts, edges_m = np.histogram(distances_m, bins=HISTOGRAM_BINS, range=(0.0, r_F_m + 5 * sigma_D_m))

@@ -27,9 +27,9 @@ BASELINES: dict[str, BaselineName] = {POISSON: "poisson", ALPHA: "alpha"}
 BASELINE_HEADS: dict[BaselineName, str] = {"poisson": "Poisson", "alpha": "alpha shape"}
 OWN_COLORS = "Colours cannot be chosen: a baseline makes vertices of its own, of which no point is known."
 SHOWN: dict[str, Shown] = {AFTER: "after", BEFORE: "before", BOTH: "after", **BASELINES}
-"""Which surface is drawn, and so exported; of two side by side the one after fusion."""
+"""The surface that is drawn and exported; of two side by side, the one after fusion."""
 PLACES = {"after": AFTER, "before": BEFORE, "both": BOTH, "poisson": POISSON, "alpha": ALPHA}
-"""The same in the address."""
+"""The surfaces' names in the address."""
 COLORINGS: dict[str, Coloring] = {
     "photographs": "photo",
     "inferred in violet (on photographs)": "violet",
@@ -38,20 +38,20 @@ COLORINGS: dict[str, Coloring] = {
     "distance to the truth": "distance",
     "normal": "normal",
 }
-"""What the colours of a surface mean."""
+"""Colourings of a surface."""
 RULES: dict[str, RadiusRule] = {
     "r_F + {0, 1, 2, 4} σ_D": "thesis+",
     "thesis: r_F + {0, ¼, ½, 1} σ_D": "thesis",
     "one radius (slider)": "manual",
 }
-"""Which balls roll."""
+"""Rules for the radii of the balls."""
 NAMES: dict[Shown, str] = {
     "after": "After fusion",
     "before": "Before fusion",
     "poisson": "Poisson surface",
     "alpha": "Alpha shape",
 }
-"""What a surface is called where it is taken along."""
+"""Names of the surfaces in exported files."""
 HINTS = {
     "Radii": "r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the fused "
     "cloud. Several balls roll one after the other, the small ones first.",
@@ -66,7 +66,7 @@ def picked(
     coloring: viser.GuiDropdownHandle[str],
     on_coloring: Callable[[], None],
 ) -> dict[str, InAddress]:
-    """The lists of the screen, each with what answers a change of it, by their keys in the address."""
+    """Return the screen's lists, each with its callback, by their keys in the address."""
     colors: dict[str, str] = {key: label for label, key in COLORINGS.items()}
     return {"surface": Picked(shown, PLACES, on_shown), "color": Picked(coloring, colors, on_coloring)}
 
@@ -81,7 +81,7 @@ _OWN: dict[Coloring, str] = {
 
 
 def legend_of(coloring: Coloring, has_truth: bool) -> Legend:
-    """Of what is taken along, where the cameras' own colours are told, too."""
+    """Return the legend of an export, which also explains the cameras' own colours."""
     if coloring in _OWN:
         return Legend(_OWN[coloring])
     if coloring == "violet":
@@ -98,7 +98,7 @@ def legend_of(coloring: Coloring, has_truth: bool) -> Legend:
 
 
 def legend_html(coloring: Coloring, has_truth: bool, baseline: bool = False) -> Markup:
-    """What the colours mean, of a baseline why it has others, and those of points that the ball left out."""
+    """Return HTML of the legend of surface, baseline or left-out points."""
     left_out = Legend("Points the ball left out:", (("measured", TARGET), _INFERRED))
     surface = Legend() if coloring in _OWN else legend_of(coloring, has_truth)
     closed = Legend(CLOSED if coloring in ("photo", "violet") else "")

@@ -1,4 +1,4 @@
-"""The lesson of the surface: what a stop can set, and the file that ships."""
+"""The lesson of the surface: the settings of its stops, the numbers of its texts, and its file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.config import RadiusRule, SurfaceConfig
 
 SHIPPED = LESSONS / "which-ball-radius.md"
 Watch: TypeAlias = Literal["off", "close up", "whole"]
-"""The rolling ball: not shown, a few triangles slowly, or the whole surface."""
+"""The rolling ball: hidden, a few triangles slowly, or the whole surface."""
 _DEFAULT = SurfaceConfig()
 _ON_OFF = {"on": True, "off": False}
 _RULES: dict[str, RadiusRule] = {rule: rule for rule in RULES.values() if rule != "manual"}
@@ -25,13 +25,13 @@ _MOST_R_F = 20.0
 
 @dataclass(frozen=True, slots=True)
 class SurfaceLook:
-    """What a stop shows of which surface; by default what the screen shows at first."""
+    """The surface that a stop shows, and how; the default is the screen's first state."""
 
     shown: str = AFTER
     """One of ``app.screens.surface.labels.SHOWN``."""
     rule: RadiusRule = _DEFAULT.radius_rule
     radius_in_r_F: float | None = None
-    """The ball radius over r_F of the fused cloud, so that it suits every scene; only with rule manual."""
+    """Ball radius over r_F of the fused cloud, so that it suits every scene; only with rule manual."""
     coloring: Coloring = "photo"
     rims: bool = True
     """Whether the rims of the holes are drawn."""
@@ -43,7 +43,7 @@ class SurfaceLook:
 
 
 def surface_of(look: SurfaceLook, config: SurfaceConfig) -> SurfaceConfig:
-    """The settings a stop wants; a ball in units of r_F is set when the cloud's spacing is known."""
+    """Return a stop's settings; a ball in units of r_F is set when the cloud's spacing is known."""
     config = replace(config, max_points=look.max_points, smoothing_passes=look.smoothing_passes)
     return config if look.rule == "manual" else replace(config, radius_rule=look.rule, radii_m=())
 
@@ -60,7 +60,7 @@ def _radii(look: SurfaceLook, text: str) -> SurfaceLook:
 
 
 def _count(least: int, most: int) -> Callable[[str], int]:
-    """Reads a whole number such as 8000 or 8,000."""
+    """Return a reader of whole numbers such as 8000 or 8,000."""
 
     def read(text: str) -> int:
         digits = text.replace(",", "")
@@ -81,22 +81,22 @@ SETTINGS: dict[str, Setting[SurfaceLook]] = {
     "watch": sets("watch", choice({name: name for name in get_args(Watch)})),
     "hole": sets("holes", choice({"largest": True, "none": False})),
 }
-"""What a stop can set, by its name in the file."""
+"""The settings of a stop, by their names in the file."""
 
 
 SURFACES = ("", "_before", "_poisson")
-"""After fusion, before it, and Poisson's: how their fields end."""
+"""Suffixes of the fields after fusion, before it, and of Poisson's surface."""
 MEASURES = ("missed", "unused", "f_score", "guessed")
 NUMBERS = (
     *(f"{measure}{which}" for which in SURFACES for measure in MEASURES),
     *("r_f", "sigma_d", "ball", "ball_width", "cut_off", "thesis_ball", "largest_ball", "hole_area"),
     "better",
 )
-"""Fields of the texts and of choices."""
+"""Fields of the texts and choices."""
 
 
 def numbers(scene: str, view: SurfaceView, baselines: Mapping[BaselineName, BaselineView]) -> Numbers:
-    """Their values for the surfaces in a scene."""
+    """Return the fields' values for the surfaces in a scene."""
     poisson = baselines.get("poisson")
     meshes = {"": view.after, "_before": view.before, "_poisson": None if poisson is None else poisson.mesh}
     told: dict[str, str] = {SCENE: scene}
@@ -112,7 +112,7 @@ def numbers(scene: str, view: SurfaceView, baselines: Mapping[BaselineName, Base
 
 
 def _better(ball: MeshView, poisson: MeshView) -> str:
-    """Which of them has the higher F-score, by a word."""
+    """Return a word for the surface with the higher F-score."""
     if not ball.truth or not poisson.truth:
         return "untold"
     return "poisson" if poisson.truth["f_score_5cm"] > ball.truth["f_score_5cm"] else "ball"

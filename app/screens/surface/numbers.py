@@ -1,4 +1,4 @@
-"""The numbers of the surfaces, each explained."""
+"""Tables of the surfaces' numbers, each with an explanation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.window.tables import UNKNOWN, WAITING, Row, number, table, truth_rows
 
 
 def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_truth: bool) -> Markup:
-    """HTML: before and after fusion and, beside them, the baselines that have been computed."""
+    """Return a table in HTML of the surfaces before and after fusion and of the computed baselines."""
     columns: dict[str, MeshView | None] = {"before": view.before, "after fusion": view.after}
     columns |= {BASELINE_HEADS[baseline.name]: baseline.mesh for baseline in baselines}
 
@@ -85,13 +85,13 @@ WAIT = Markup("<div style='padding: 0 0.8em; font-size: 13px'>Computing the base
 
 
 def note_html(view: BaselineView) -> Markup:
-    """What a baseline is, and what it took."""
+    """Return HTML with a baseline's note and computing time."""
     text = f"{view.note} It took {view.elapsed_s:.1f} s."
     return Markup("<div style='padding: 0 0.8em; font-size: 13px'>{}</div>").format(text)
 
 
 def quick_line(view: PaintedView) -> Markup:
-    """What the quick look shows, while the numbers below are still those before it."""
+    """Return the line of a quick look, while the numbers below are still the previous ones."""
     mesh, radius_mm = next(iter(view.meshes.values())), 1000 * (view.request.radius_m or 0.0)
     part = "" if view.points == view.all_points else f" of {view.all_points:,}; the rest when you let go"
     return Markup(
@@ -102,7 +102,7 @@ def quick_line(view: PaintedView) -> Markup:
 
 
 def _rule(view: SurfaceView) -> Markup:
-    """What is counted as a hole and, where there are more after fusion, why."""
+    """Return the rule for holes and, if there are more after fusion, the reason."""
     text = Markup(
         "A <b>hole</b> is a patch of a camera's picture, of any size, whose rays miss the surface. The outer "
         "rim of the scene is not one."
@@ -118,7 +118,7 @@ def _rule(view: SurfaceView) -> Markup:
 
 
 def _price(view: SurfaceView) -> Markup:
-    """Says so if the filled surface is nearer to complete but farther from the truth; empty otherwise."""
+    """Return a sentence if the filled surface has a lower F-score; else empty."""
     if view.before is None or view.before.truth is None or view.after.truth is None:
         return Markup("")
     before, after = (mesh.truth["f_score_5cm"] for mesh in (view.before, view.after) if mesh.truth)

@@ -1,4 +1,4 @@
-"""Surfaces in the colours that somebody asked for, and quick looks while the radius is dragged."""
+"""Jobs that draw surfaces in chosen colours, and quick looks while the radius is dragged."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from pipeline.surface.voxel import voxel_average, voxel_for_count
 from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
 
 PHOTOGRAPHED: tuple[Coloring, ...] = ("photo", "violet", "color")
-"""What has a camera's light and shadow in it."""
+"""Colourings that contain a camera's light and shadow."""
 QUICK_UNUSED = 8_000
-"""Points left out that are sent in a quick look, at most."""
+"""Most left-out points in a quick look."""
 
 
 def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Progress, None, PaintedView]:
-    """The surfaces of a spec, or of one ball instead of the spec's, in colours."""
+    """Return the surfaces of a spec, or of one ball in place of the spec's, in colours."""
     rig, placement = yield from store.stages(spec, "rig", "placement")
     whole = yield from _clouds(store, spec)
     if request.radius_m is None:
@@ -66,7 +66,7 @@ def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Prog
 
 
 def _spacing_m(store: Store, spec: Spec, most_points: int) -> Generator[Progress, None, float]:
-    """Mean distance of nearest points in what a quick look rolls over."""
+    """Return the mean distance of nearest points in the cloud of a quick look."""
 
     def measure() -> Generator[Progress, None, float]:
         thin = yield from _thinned(store, spec, most_points)
@@ -83,7 +83,7 @@ def _clouds(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, P
 def _thinned(
     store: Store, spec: Spec, most_points: int
 ) -> Generator[Progress, None, dict[Which, PointCloud]]:
-    """Both clouds with about ``most_points`` points at most."""
+    """Return both clouds with at most about ``most_points`` points."""
 
     def thin() -> Generator[Progress, None, dict[Which, PointCloud]]:
         clouds = yield from _clouds(store, spec)
@@ -96,7 +96,7 @@ def _thinned(
 
 
 def _painted(surface: Surface, request: PaintRequest, rig: Rig, placement: Placement) -> PaintedMesh:
-    """The rims come when the radius rests, and so do photographs: both are costly to draw in software."""
+    """Return the surface for the browser; a quick look has no rims or photographs, which draw slowly."""
     quick = request.radius_m is not None
     glb = colored_glb(surface, request.coloring, rig, placement, worn=not quick)
     rims_glb = b"" if quick else lines_glb(rim_segments_m(surface), LOSS)
@@ -106,7 +106,7 @@ def _painted(surface: Surface, request: PaintRequest, rig: Rig, placement: Place
 def colored_glb(
     surface: Surface, coloring: Coloring, rig: Rig, placement: Placement, worn: bool = True
 ) -> bytes:
-    """The mesh in its colours; photographs only where they may be ``worn``."""
+    """Return the mesh in its colours; photographs only if ``worn``."""
     if coloring in ("photo", "violet") and worn:
         closed = without_seams(surface)
         return photographed_glb(closed, dressed(rig, placement, closed), tinted=coloring == "violet")
@@ -115,7 +115,7 @@ def colored_glb(
 
 
 def vertex_colors(surface: Surface, coloring: Coloring, rig: Rig, cameras: list[Camera]) -> ByteArray | None:
-    """(V, 3) RGB; grey where it is not known what the colour would say."""
+    """Return (V, 3) RGB; grey where the coloured quantity is unknown."""
     count = len(surface.vertices_m)
     if not count or coloring in PHOTOGRAPHED:
         return surface.colors

@@ -1,4 +1,4 @@
-"""Surface: a ball rolls over the points; its radius decides what becomes a surface and what a hole."""
+"""The Surface screen's panel: the ball radius, the surfaces and their quality."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ NAMES = {rule: name for name, rule in RULES.items()}
 
 
 class SurfacePanel(Panel):
-    """The surface before and after fusion, live while the radius is dragged."""
+    """The surface before and after fusion, drawn live while the radius is dragged."""
 
     title = "Surface"
     step: ClassVar[Step | None] = "surface"
     drawn_below = "/surface"
 
     def build(self) -> None:
-        """Radius, rule, what to draw; histogram and quality."""
+        """Add radius, rule, drawing choices, histogram and quality."""
         gui, session = self.gui, self.session
         self._view: SurfaceView | None = None
         self._look: SurfaceLook | None = None
@@ -108,11 +108,11 @@ class SurfacePanel(Panel):
             self._look_quickly = QuickLook(session, self._painted, self._drawn, self._rested)
 
     def on_show(self) -> None:
-        """Have the walk's dock there again."""
+        """Show the walk's dock again."""
         self._rolling.visit(True)
 
     def on_hide(self) -> None:
-        """Leave the lower edge to others."""
+        """Hide the walk's dock."""
         self._rolling.visit(False)
 
     @property
@@ -126,7 +126,7 @@ class SurfacePanel(Panel):
         return self._quickly_drawn or self._look_quickly.moving
 
     def on_spec(self, spec: Spec) -> None:
-        """Show the settings that are wanted; what was made with others goes."""
+        """Show the current settings; remove what belongs to others."""
         if spec.key("surface") == self._key:
             return
         self._key = spec.key("surface")
@@ -143,7 +143,7 @@ class SurfacePanel(Panel):
         self._arrange()
 
     def on_view(self, step: Step, view: Any) -> None:
-        """Draw both surfaces; a new cloud has other radii to suggest."""
+        """Draw both surfaces; a new cloud drops the suggested radii and the holes."""
         if step == "fuse":
             self._advice.forget()
             self._holes.forget()
@@ -153,7 +153,7 @@ class SurfacePanel(Panel):
             self.on_partial(view)
 
     def on_partial(self, view: SurfaceView) -> None:
-        """Draw what is there; while the radius is dragged, only remember it."""
+        """Draw the partial result; while the radius is dragged, only keep it."""
         self._view = view
         if not self._look_quickly.moving:
             self._take(view)
@@ -169,7 +169,7 @@ class SurfacePanel(Panel):
         self.session.show_staleness()
 
     def _drawn(self) -> None:
-        """What was sent last stands on the screen; its numbers waited, as the page is slow to write them."""
+        """Remove older meshes and show the quick look's numbers, which slow the page, after its drawing."""
         with self.ui.atomic():
             self._stage.drop_old()
             if self._look_quickly.moving:
@@ -189,7 +189,7 @@ class SurfacePanel(Panel):
     def _picked_rule(self) -> None:
         self.session.edit(with_rule(RULES[self._rule.value], self._radius.value))
 
-    # What is drawn.
+    # Drawing.
 
     def _take(self, view: SurfaceView) -> None:
         """Show a view of the chain."""
@@ -220,7 +220,7 @@ class SurfacePanel(Panel):
             self._show_look()
             self._lesson.refresh()
             if BASELINES.get(self._shown.value) not in (None, *self._baselines.views):
-                self._picked_shown()  # as an address asks, before there is anything to make it of
+                self._picked_shown()  # the address asked for a baseline before there was a surface
             self._walks.folder.resume()
 
     def _show_numbers(self) -> None:
@@ -229,7 +229,7 @@ class SurfacePanel(Panel):
             self._lesson.refresh()
 
     def _repaint(self) -> None:
-        """Have the surfaces of the settings in the colours chosen."""
+        """Request the surfaces of the settings in the chosen colours."""
         coloring = COLORINGS[self._coloring.value]
         if coloring != "photo" and self.session.results.view("fuse") is not None:
             session = self.session
@@ -237,7 +237,7 @@ class SurfacePanel(Panel):
             session.quick_job("surface.paint_job:paint_job", request, on_end=self._painted)
 
     def _painted(self, view: PaintedView | None) -> None:
-        """Draw it, unless something else is wanted by now."""
+        """Draw the painted surface, unless another one is due by now."""
         if view is None or view.request.coloring != COLORINGS[self._coloring.value]:
             return
         quick = view.request.radius_m is not None
@@ -254,7 +254,7 @@ class SurfacePanel(Panel):
         self.ui.flush()
 
     def _picked_shown(self) -> None:
-        """Show another surface; that of a baseline is made first."""
+        """Show another surface; a baseline is computed first."""
         name = BASELINES.get(self._shown.value)
         self._quick.content = Markup("")
         if name is None or self._view is None:
@@ -264,7 +264,7 @@ class SurfacePanel(Panel):
         self._arrange()
 
     def _made(self, name: BaselineName, made: bool) -> None:
-        """A baseline is there, or could not be made."""
+        """Handle a baseline that was computed or failed."""
         if not made:
             self._shown.value, self._quick.content = AFTER, Markup("")
         else:
@@ -291,7 +291,7 @@ class SurfacePanel(Panel):
             loops, unused = bool(self._loops.value), bool(self._unused.value)
             self._stage.arrange(place, loops, unused, self._rolling.showing)
             baseline = self._shown.value in BASELINES
-            self._coloring.disabled = baseline  # its vertices are no points with a source
+            self._coloring.disabled = baseline  # a baseline's vertices are no points with a source
             self._legend.content = legend_html(COLORINGS[self._coloring.value], self._has_truth(), baseline)
         shown = SHOWN[self._shown.value]
         if shown != self.session.spec.shown:
@@ -299,7 +299,7 @@ class SurfacePanel(Panel):
         self.session.frame_view()
 
     def offers(self) -> tuple[Offers, ...]:
-        """The surfaces as they are drawn."""
+        """Return the offers of the surfaces as they are drawn."""
         return (surface_offers(self._shown.value, self._coloring.value, bool(self._loops.value)),)
 
     # The folders.
@@ -330,7 +330,7 @@ class SurfacePanel(Panel):
         if session.results.fresh("surface", session.spec):
             session.quick_job("surface.holes_job:explain_job", which, index, on_end=self._explained)
         else:
-            self._explained(None)  # the holes listed are of a surface that is being computed again
+            self._explained(None)  # the listed holes belong to a surface that is computed again
 
     def _explained(self, answer: ExplainView | None) -> None:
         self._holes.explain(answer)
@@ -356,7 +356,7 @@ class SurfacePanel(Panel):
                 self._take(self._view)
 
     def look(self) -> bool:
-        """Have the patch of a close-up in the picture; the session sees to the rest."""
+        """Show a close-up's patch in the picture. False leaves the view to the session."""
         focus = self._rolling.focus
         if focus is not None:
             for client in self.session.clients():
@@ -364,7 +364,7 @@ class SurfacePanel(Panel):
         return focus is not None
 
     def _take_look(self, look: SurfaceLook) -> None:
-        """Set the controls as a stop of the lesson says; what needs the surface waits for it."""
+        """Set the controls for a stop of the lesson; parts that need the surface wait for it."""
         session = self.session
         with self.ui.atomic():
             self._shown.value = look.shown
@@ -378,7 +378,7 @@ class SurfacePanel(Panel):
             self._take(self._view)
 
     def _lesson_numbers(self) -> Numbers:
-        """Of the surfaces that are wanted; empty while they are computed."""
+        """Return the numbers of the current surfaces; empty while they are computed."""
         session, view = self.session, self._view
         scene: SceneView | None = session.results.view("scene")
         if scene is None or view is None or self._look is not None:
@@ -387,7 +387,7 @@ class SurfacePanel(Panel):
         return numbers(scene.title, view, self._baselines.views) if fresh else {}
 
     def _show_look(self) -> None:
-        """What the stop wants of the surface that has just come."""
+        """Apply the stop's settings that needed the surface, which has just come."""
         look, session = self._look, self.session
         if look is None or self._view is None or not session.results.fresh("surface", session.spec):
             return

@@ -1,4 +1,4 @@
-"""Surfaces of a radius while a hand moves it: always the newest, and no faster than the browser draws."""
+"""Surfaces for a radius that is being dragged: always the newest, no faster than the browser draws."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from app.window.acknowledgement import DrawAcknowledgement
 from app.window.panel import PanelSession
 
 QUIET_S = 0.4
-"""When the radius has not moved for so long, it rests."""
+"""Time without a change after which the radius counts as at rest, seconds."""
 
 FEWEST_POINTS = QUICK_POINTS // 4
 SLOW_S, FAST_S = 0.25, 0.11
-"""A look that takes longer than the one is halved; shorter than the other, doubled. As half the points take
-about half the time, the two must differ by more than a factor of two, or the detail would swing."""
+"""Above the first time, a look's points are halved; below the second, doubled. Half the points take about
+half the time, so the two must differ by more than a factor of two, or the detail would oscillate."""
 LOOKS = 2
-"""So many in a row must agree, as one may be late by chance."""
+"""Number of consecutive times that must agree, because one may be late by chance."""
 
 
 class QuickLook:
-    """One surface at a time: rolled, sent, drawn; then that of where the hand is by now."""
+    """Computes, sends and draws one surface, then the one for the slider's newest value."""
 
     def __init__(
         self,
@@ -31,13 +31,13 @@ class QuickLook:
         on_drawn: Callable[[], None],
         on_rest: Callable[[], None],
     ) -> None:
-        """Add the hidden parts to the current container.
+        """Add the hidden controls to the current container.
 
         Args:
-            session: where to add them and who runs the jobs.
-            on_view: called with each surface; it is to draw it and to call ``sent``.
-            on_drawn: called when what was sent last stands on the screen.
-            on_rest: called when the radius rests.
+            session: the session that shows the surfaces and runs the jobs.
+            on_view: called with each surface; it must draw it and call ``sent``.
+            on_drawn: called when the browser has drawn what was sent last.
+            on_rest: called when the radius is at rest.
         """
         self._session, self._on_view, self._on_drawn, self._on_rest = session, on_view, on_drawn, on_rest
         self._settle = session.ui.debounce(QUIET_S, self._rest)
@@ -53,7 +53,7 @@ class QuickLook:
         return self._settle.pending
 
     def want(self, request: PaintRequest) -> None:
-        """The radius has moved."""
+        """Take a new radius."""
         if not self.moving:
             self._acknowledgement.hold()
         self._settle.restart()
@@ -61,7 +61,7 @@ class QuickLook:
         self._go_on()
 
     def sent(self, vertices: Sequence[int] = ()) -> None:
-        """Surfaces are on their way to the browser; quick ones, of so many vertices each."""
+        """Note that surfaces were sent; ``vertices`` are the vertex counts of quick ones."""
         self._acknowledgement.ask(vertices, hold=self.moving)
 
     def _go_on(self) -> None:
@@ -93,14 +93,14 @@ class QuickLook:
 
 
 class Detail:
-    """The number of points, which follows what a browser manages."""
+    """The number of points of a quick look, adapted to the browser's speed."""
 
     def __init__(self) -> None:
         self.points = QUICK_POINTS
         self._times_s: list[float] = []
 
     def took(self, seconds: float) -> None:
-        """A look at so many points was rolled, sent and drawn in this time."""
+        """Take the time in which a look was computed, sent and drawn."""
         self._times_s.append(seconds)
         if len(self._times_s) < LOOKS:
             return

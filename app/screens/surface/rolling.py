@@ -1,4 +1,4 @@
-"""The folder in which the rolling ball is watched, and its dock."""
+"""The folder of the rolling ball, and its dock."""
 
 from __future__ import annotations
 
@@ -39,27 +39,27 @@ HAPPENED: dict[Happening, str] = {
     "end": "no edge is left to turn about",
 }
 SPEEDS = {True: 2.0, False: 10.0}
-"""Steps a second at first, of a close-up and of the whole."""
+"""Initial steps per second, of a close-up and of the whole."""
 FASTEST_ARC = 6.0
-"""With more steps a second the ball jumps from rest to rest."""
+"""Steps per second above which the ball jumps from rest to rest."""
 SAMPLES = 200
-"""Steps, at most, at which the edges of the front are counted for its curve."""
+"""Most steps at which the edges of the front are counted for its curve."""
 AWAY = 1.8
-"""How far to stand from a close-up, over its reach."""
+"""Distance of the camera from a close-up, over the close-up's reach."""
 
 
 class RollingFolder:
-    """Asks for walks, and plays the one that came."""
+    """Requests walks, and plays the one that came."""
 
     def __init__(self, ui: Ui, on_request: Callable[[WalkRequest | None], None]) -> None:
-        """Add the folder; ``on_request`` is called with the walk that is wanted, None when it is closed."""
+        """Add the folder; ``on_request`` is called with the walk to compute, None when it is closed."""
         self._ui, self._on_request = ui, on_request
         self._view: WalkView | None = None
         self._drawing: RollingDrawing | None = None
         self._drawn = 0
         self._waiting = self._here = False
         self._asked: int | None = None
-        """The step of the walk that an address has asked for, until it is played."""
+        """Step of the walk that an address asks for, until it is played."""
         with ui.gui.add_folder("Watch the ball roll", expand_by_default=False):
             ui.gui.add_markdown(TEXT)
             self._add_choices(ui)
@@ -78,34 +78,34 @@ class RollingFolder:
 
     @property
     def showing(self) -> bool:
-        """Whether a walk is drawn, so that the surfaces had better be hidden."""
+        """Whether a walk is drawn, so that the surfaces are hidden."""
         return self._drawing is not None
 
     @property
     def focus(self) -> tuple[FloatArray, FloatArray] | None:
-        """(3,) centre of a close-up and (3,) where to stand to see it, world frame."""
+        """(3,) centre of a close-up and (3,) camera position for it, world frame."""
         if self._view is None or not self._view.request.close_up:
             return None
         view = self._view
         return view.center_m, view.center_m + AWAY * view.reach_m * view.outward
 
     def watch(self, close_up: bool) -> None:
-        """Ask for a walk, as a person would."""
+        """Request a walk."""
         self._way.value = CLOSE_UP if close_up else WHOLE
         self._request()
 
     def place(self) -> str:
-        """``close-after-120``, for the address: the way, the cloud and the step; empty without a walk."""
+        """Return ``close-after-120`` for the address: kind, cloud and step; empty without a walk."""
         if self._asked is None and self._view is None:
             return ""
         step = self._dock.rest_ns // COUNT_NS if self._asked is None else self._asked
         return f"{WAYS[self._way.value]}-{CLOUDS[self._cloud.value]}-{step}"
 
     def take(self, place: str) -> None:
-        """Show that walk once there are points; none for an empty place.
+        """Show the walk in an address once there are points; none for an empty text.
 
         Raises:
-            InputError: there is none like it.
+            InputError: there is no such walk.
         """
         if not place:
             self._asked = None
@@ -119,12 +119,12 @@ class RollingFolder:
         self._request()
 
     def resume(self) -> None:
-        """There is a surface: ask for the walk that an address has asked for before."""
+        """Request the walk that an address asked for, now that there is a surface."""
         if self._asked is not None:
             self._request()
 
     def load(self, view: WalkView | None) -> None:
-        """Play a walk from its start; None did not come."""
+        """Play a walk from its start; None if none came."""
         self.forget()
         if view is None:
             self._status.content = Markdown("Stopped.")
@@ -146,7 +146,7 @@ class RollingFolder:
         self._asked = None
 
     def forget(self) -> None:
-        """Take the walk away; its cloud or radii are no longer those of the screen."""
+        """Remove the walk, whose cloud or radii are no longer the screen's."""
         self._waiting = False
         self._dock.pause()
         with self._ui.atomic():
@@ -157,7 +157,7 @@ class RollingFolder:
             self._dock.show(False)
 
     def visit(self, here: bool) -> None:
-        """The screen is shown, or others are."""
+        """Show or hide the dock, as the screen is shown or hidden."""
         self._here = here
         self._dock.show(here and self.showing)
 
@@ -166,7 +166,7 @@ class RollingFolder:
         self.forget()
 
     def _chose(self) -> None:
-        """Another choice takes effect at once while a walk is shown or awaited."""
+        """Apply another choice at once if a walk is shown or awaited."""
         if self.showing or self._waiting:
             self._request()
 
@@ -186,7 +186,7 @@ class RollingFolder:
 
 
 def front_lane(view: WalkView) -> CurvesLane:
-    """Triangles and open edges after each step, each on a scale of its own."""
+    """Return a lane with the triangles and open edges after each step, on separate scales."""
     steps = np.unique(np.linspace(0, view.steps, min(view.steps, SAMPLES) + 1).astype(int))
     open_edges = [view.open_edges(int(done)) for done in steps]
     counts = {
@@ -202,7 +202,7 @@ def front_lane(view: WalkView) -> CurvesLane:
 
 
 def status_line(view: WalkView, done: int) -> Markdown:
-    """What has happened after ``done`` steps."""
+    """Return a line about the first ``done`` steps."""
     front, dead = view.open_edges(done)
     ball = int(view.step_radius[max(done - 1, 0)])
     radius = f"ball {1000.0 * view.radii_m[ball]:.1f} mm"
@@ -224,12 +224,12 @@ class Walks:
     """The folder of the rolling ball, with its jobs and its close-up."""
 
     def __init__(self, session: PanelSession, on_change: Callable[[], None]) -> None:
-        """Add the folder; ``on_change`` is called when a walk comes or goes."""
+        """Add the folder; ``on_change`` is called when a walk is shown or removed."""
         self._session, self._on_change = session, on_change
         self.folder = RollingFolder(session.ui, self._watch)
 
     def close(self) -> None:
-        """Take the walk away, and stand back again after a close-up."""
+        """Remove the walk, and restore the view after a close-up."""
         near = self.folder.focus is not None
         self.folder.forget()
         if near:

@@ -1,4 +1,4 @@
-"""The settings of the ball: fields with a control of their own, and what the radius slider sets."""
+"""Controls of the ball's settings, and the effect of the radius slider."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ ADVANCED = (
 
 
 def with_rule(rule: RadiusRule, radius_mm: float) -> Callable[[PipelineConfig], PipelineConfig]:
-    """The edit that chooses a radius rule; the manual one rolls a single ball."""
+    """Return the edit that chooses a radius rule; the manual one rolls a single ball."""
     radii_m = (round(float(radius_mm), 3) / 1000.0,) if rule == "manual" else ()
     return lambda config: replace(config, surface=replace(config.surface, radius_rule=rule, radii_m=radii_m))
 
 
 def slider_range_mm(spacing: SpacingView, radii_m: Sequence[float]) -> tuple[float, float]:
-    """From half the spacing of the points to balls that are clearly too large."""
+    """Return the slider's range: from half the points' spacing to clearly too large balls."""
     widest_m = 1.5 * (spacing.r_F_m + 4.0 * spacing.sigma_D_m)
     most_m = max(*radii_m, widest_m, 6.5 * spacing.r_F_m)
     return max(0.5, math.floor(500.0 * spacing.r_F_m)), math.ceil(1000.0 * most_m)

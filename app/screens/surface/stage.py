@@ -1,4 +1,4 @@
-"""Which surfaces stand where in the 3-D scene."""
+"""Placement of the surfaces in the 3-D scene."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from pipeline.types import FloatArray
 
 BALL_OPACITY = 0.55
 APART = 0.63
-"""From the middle to each of two surfaces side by side, over the width of the scene: what stands nearer to
-the view than its middle looks wider."""
+"""Distance of each of two surfaces from the middle over the scene's width: perspective widens the parts
+before the middle."""
 
 
 class SurfaceStage:
-    """The surfaces after and before fusion, and a baseline's, of which some are shown."""
+    """The surfaces after and before fusion, and a baseline's, some of which are shown."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         """Draw below "/surface"."""
@@ -49,22 +49,22 @@ class SurfaceStage:
 
     @property
     def which(self) -> tuple[Which, ...]:
-        """The ball's surfaces that are shown, or that stand ready behind a baseline."""
+        """The ball's surfaces that are shown, or that are ready while a baseline is shown."""
         if self.shown == BOTH:
             return ("after", "before")
         return ("before",) if self.shown == BEFORE else ("after",)
 
     def offset_m(self, which: Which) -> FloatArray:
-        """(3,) from the middle of the scene to a surface."""
+        """Return the (3,) offset of a surface from the middle of the scene."""
         return self._offset_m if which == "after" else -self._offset_m
 
     def draw(self, which: Which, mesh: MeshView | PaintedMesh, unseen: bool = False) -> bool:
         """Draw one of the ball's surfaces; False if it is drawn already.
 
         Args:
-            which: which one.
-            mesh: what it is now.
-            unseen: whether the browser draws nothing until it has this one.
+            which: the surface.
+            mesh: its new mesh.
+            unseen: whether the browser draws nothing until it has this mesh.
         """
         if which in self._drawn and self._drawn[which].glb == mesh.glb:
             return False
@@ -73,12 +73,12 @@ class SurfaceStage:
         return True
 
     def draw_unused(self, unused: Mapping[Which, UnusedView]) -> None:
-        """Draw the points that the ball left out, of the surfaces that are given."""
+        """Draw the points that the ball left out of these surfaces."""
         for which, points in unused.items():
             self._drawings[which].draw_unused(points)
 
     def draw_ball(self, center_m: FloatArray | None, radius_m: float) -> None:
-        """The ball on the first surface that is shown, or none."""
+        """Draw the ball on the first surface that is shown, or hide it."""
         self._ball.visible = center_m is not None
         if center_m is not None:
             self._ball.radius = radius_m
@@ -93,13 +93,13 @@ class SurfaceStage:
             self._baseline.draw(mesh)
 
     def arrange(self, place: Stage | None, loops: bool, unused: bool, hidden: bool) -> None:
-        """Show what is to be shown, two side by side.
+        """Show the surfaces to be shown, two of them side by side.
 
         Args:
-            place: where the scene is; None before there is one.
+            place: the scene's viewpoint; None before there is one.
             loops: whether the rims of holes are drawn.
-            unused: whether the points that the ball left out are.
-            hidden: whether something else is watched instead.
+            unused: whether the points that the ball left out are drawn.
+            hidden: whether the surfaces are hidden by a walk.
         """
         both = self.shown == BOTH and place is not None
         self._offset_m = APART * place.width_m * place.right if both and place is not None else np.zeros(3)
@@ -112,15 +112,15 @@ class SurfaceStage:
         self._baseline.show(baseline and not hidden, loops, np.zeros(3), None)
 
     def drop_old(self) -> None:
-        """Take away what a newer mesh has replaced, once that one stands on the screen."""
+        """Remove meshes that a newer one has replaced, after the browser has drawn that one."""
         for drawing in self._drawings.values():
             drawing.drop_old()
 
 
 class ChosenBall:
-    """It lies where the scene was clicked last or, before that, in the middle of the view.
+    """The ball at the last clicked point or, before a click, in the middle of the view.
 
-    While the radius is dragged, the pointer is on the slider, so it cannot say where.
+    While the radius is dragged, the pointer is on the slider, so it cannot set the place.
     """
 
     def __init__(self, session: PanelSession, stage: SurfaceStage) -> None:
@@ -128,15 +128,15 @@ class ChosenBall:
         self._clicked: tuple[FloatArray, FloatArray] | None = None
 
     def clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
-        """Lie here from now on; the ray is in the world."""
+        """Put the ball where this ray meets the cloud; world frame."""
         self._clicked = origin_m, direction
 
     def forget(self) -> None:
-        """Another scene: the place that was clicked is gone."""
+        """Forget the clicked place, which belongs to another scene."""
         self._clicked = None
 
     def ray(self) -> Ray | None:
-        """The line of sight to its place, in the frame of the first surface shown; None if nobody looks."""
+        """Return the ray to its place, in the frame of the first surface shown; None without a browser."""
         seen = self._clicked or self._middle()
         if seen is None:
             return None
@@ -145,11 +145,11 @@ class ChosenBall:
         return Ray(tuple(origin_m.tolist()), tuple(direction.tolist()))
 
     def show(self, view: PaintedView) -> None:
-        """Draw it as a quick look says."""
+        """Draw the ball of a quick look."""
         self._stage.draw_ball(view.ball_m, view.request.radius_m or 0.0)
 
     def hide(self) -> None:
-        """Draw it no more."""
+        """Hide the ball."""
         self._stage.draw_ball(None, 0.0)
 
     def _middle(self) -> tuple[FloatArray, FloatArray] | None:

@@ -1,4 +1,4 @@
-"""Which ball radius to take: what the points suggest, and what each radius of a sweep does."""
+"""The job that sweeps the ball radius, and the radii that the points suggest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.surface.sweep import iterate_sweep, sweep_radii_m
 
 
 def suggestions_of(store: Store, spec: Spec) -> Generator[Progress, None, tuple[Suggestion, ...]]:
-    """The radii that the cloud after fusion suggests; none if it has no inner point."""
+    """Return the radii that the cloud after fusion suggests; none if it has no inner point."""
     clouds = yield from store.stage(spec, "fused")
 
     def suggest() -> Generator[Progress, None, tuple[Suggestion, ...]]:
@@ -27,7 +27,7 @@ def suggestions_of(store: Store, spec: Spec) -> Generator[Progress, None, tuple[
 
 
 def sweep_job(store: Store, spec: Spec) -> Generator[Progress | SweepView, None, SweepView]:
-    """Roll one ball after another over the cloud after fusion, each alone; yields what there is so far."""
+    """Roll each ball alone over the cloud after fusion; yield the balls done so far."""
     rig, placement, clouds = yield from store.stages(spec, "rig", "placement", "fused")
     suggested = yield from suggestions_of(store, spec)
 

@@ -1,4 +1,4 @@
-"""What each ball radius of a sweep does: rays and accuracy above, triangles and time below."""
+"""Plots over the ball radius of a sweep: rays and accuracy above, triangles and time below."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from pipeline.surface.findings import SweepPoint
 NO_HIT, ACCURATE, LEFT, RIGHT = css(LOSS), css(TARGET), css(NEUTRAL), css(INFERRED)
 WORK, POINTS = "triangles and time", "unused points and hole area"
 BELOW = (WORK, POINTS)
-"""What the lower plot shows."""
+"""Choices for the lower plot."""
 TICKS_MM = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 AXIS_ENDS = (0.47, 6.4)
-"""Of a whole sweep, in r_F."""
+"""Ends of the axis of a whole sweep, in r_F."""
 LEVEL_SHARE = 0.01
-"""Larger balls that close less than this share of the rays close nothing worth speaking of."""
+"""Larger balls that close less than this share of the rays have no noticeable effect."""
 
 
 def sweep_figure(view: SweepView | None, below: str = WORK) -> go.Figure:
-    """Two plots above each other over the radius in millimetres, on a logarithmic axis.
+    """Return two plots above each other over the radius in millimetres, on a logarithmic axis.
 
     Args:
-        view: the balls; an empty figure without.
+        view: the balls; None gives an empty figure.
         below: one of ``BELOW``.
     """
     figure = go.Figure()
@@ -89,7 +89,7 @@ def _fill(figure: go.Figure, view: SweepView, below: str) -> None:
 
 
 def sweep_sentence(view: SweepView) -> Markdown:
-    """The sweep in a sentence: from where on larger balls close hardly anything, and what they cost."""
+    """Return a sentence: the radius above which balls close hardly anything, and their cost."""
     rows = [row for row in view.points if row.triangles]
     if not rows:
         return Markdown("No ball of the sweep leaves a triangle.")
@@ -113,7 +113,7 @@ def _mm(row: SweepPoint) -> str:
 
 
 def _went(first: float, last: float) -> str:
-    """Compared as they are written, so that no rise from 93 % to 93 % is claimed."""
+    """Return the change as text; rounded shares are compared, so that 93 % does not rise to 93 %."""
     before, after = round(100 * first), round(100 * last)
     if before == after:
         return f"stays at {after} %"
@@ -132,7 +132,7 @@ def _radius_axis(view: SweepView | None) -> dict[str, object]:
         "anchor": "y2",
     }
     if view is not None and view.points:
-        # From the first ball on as wide as for all, so that the curves grow without a jump.
+        # As wide for the first ball as for all, so that the curves grow without a jump.
         widest_m = max(AXIS_ENDS[1] * view.r_F_m, 1.05 * view.points[-1].radius_m)
         ends_mm = 1000 * AXIS_ENDS[0] * view.r_F_m, 1000 * widest_m
         axis["range"] = [math.log10(end_mm) for end_mm in ends_mm]
@@ -143,7 +143,7 @@ THESIS = {"r<sub>F</sub>": 0.0, "r<sub>F</sub>+¼σ": 0.25, "r<sub>F</sub>+½σ"
 """The thesis's four radii as multiples of sigma_D above r_F (SPEC 5)."""
 USED, ADVISED, OF_THESIS = "in use", "suggested", "thesis"
 ROWS = (OF_THESIS, ADVISED, USED)
-"""Rows of marks above the bars, the lowest first."""
+"""Rows of marks above the bars, from the lowest."""
 MARK_COLORS = {USED: css(LOSS), ADVISED: css(INFERRED), OF_THESIS: css(BRAND)}
 MARK_SYMBOLS = {USED: "circle", ADVISED: "diamond", OF_THESIS: "triangle-down"}
 BARS_TOP, MARKS_BOTTOM = 0.62, 0.66
@@ -152,10 +152,10 @@ BARS_TOP, MARKS_BOTTOM = 0.62, 0.66
 def spacing_figure(
     view: SpacingView | None, radii_m: Sequence[float] = (), suggested_m: Sequence[float] = ()
 ) -> go.Figure:
-    """Bars in millimetres, lines at r_F and r_F + sigma_D, and above the bars the radii as marks.
+    """Return a histogram in millimetres, lines at r_F and r_F + sigma_D, and marks at the radii.
 
     Args:
-        view: the distances; an empty figure without.
+        view: the distances; None gives an empty figure.
         radii_m: balls in use.
         suggested_m: balls that the points suggest.
     """

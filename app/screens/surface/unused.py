@@ -1,4 +1,4 @@
-"""The points that the ball left out, and where it rests on the others."""
+"""The points that the ball left out, and the ball's rest position on the others."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from app.screens.surface.view import Ray, UnusedView
 from pipeline.types import BoolArray, FloatArray, PointCloud, PointSource, Surface
 
 NEARLY_NOTHING = 0.05
-"""A mesh of fewer of the points, as a share, is no surface: all points are shown."""
+"""Share of the points below which a mesh is no surface: all points are shown."""
 MOST_POINTS = 30_000
 POINT_SHARE = 0.5
 """Size of a point on the screen over the mean distance of nearest points."""
 AIM = 0.01
-"""Tangent of the angle beside a ray within which the first point is meant, and the share of its distance
-within which another is as near."""
+"""Tangent of the angle to a ray within which the first point is selected, and the share of its distance
+within which another point is as near."""
 
 
 def unused_view(cloud: PointCloud, surface: Surface, size_m: float, most: int = MOST_POINTS) -> UnusedView:
-    """The points of a cloud that no triangle of its surface uses.
+    """Return the points of a cloud that no triangle of its surface uses.
 
     Args:
-        cloud: that the ball rolled over.
+        cloud: the cloud over which the ball rolled.
         surface: its vertices are points of the cloud.
-        size_m: of a point on the screen.
-        most: more are thinned evenly.
+        size_m: size of a point on the screen.
+        most: largest number of points; more are thinned evenly.
     """
     rows = np.flatnonzero(_unused(cloud.points_m, surface.vertices_m))
     rows = rows[:: max(1, -(-len(rows) // most))]
@@ -36,24 +36,24 @@ def unused_view(cloud: PointCloud, surface: Surface, size_m: float, most: int = 
 
 
 def _unused(points_m: FloatArray, vertices_m: FloatArray) -> BoolArray:
-    """(N,) True for points that are no vertex; True for all where nearly none is one."""
+    """Return (N,) True for points that are no vertex; True for all if nearly none is one."""
     if len(vertices_m) < NEARLY_NOTHING * len(points_m):
         return np.ones(len(points_m), bool)
     return ~np.isin(_keys(points_m), _keys(vertices_m))
 
 
 def _keys(points_m: FloatArray) -> np.ndarray:
-    """(N,) one value a point, equal for equal points only."""
+    """Return (N,) one value per point, equal for equal points only."""
     return np.ascontiguousarray(points_m, float).view([("x", float), ("y", float), ("z", float)])[:, 0]
 
 
 def resting_ball_m(cloud: PointCloud, ray: Ray, radius_m: float) -> FloatArray | None:
-    """(3,) centre of a ball that lies on the point that a ray means; None if no point is ahead.
+    """Return (3,) the centre of a ball at rest on the point that a ray selects; None if none is ahead.
 
     Args:
-        cloud: with normals towards the outside.
-        ray: it means the first point very near to it or, if there is none, the nearest by angle.
-        radius_m: of the ball.
+        cloud: points with outward normals.
+        ray: it selects the first point very near to it or, if there is none, the nearest by angle.
+        radius_m: radius of the ball.
     """
     origin_m, direction = np.array(ray.origin_m), np.array(ray.direction)
     direction = direction / max(float(np.linalg.norm(direction)), 1e-12)

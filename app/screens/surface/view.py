@@ -1,4 +1,4 @@
-"""What the Surface screen gets of surfaces, their holes, balls and baselines."""
+"""Requests and results of the Surface screen: surfaces, holes, balls and baselines."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from pipeline.surface.findings import Explanation, RayParts, Suggestion, SweepPo
 from pipeline.types import FloatArray, IntArray
 
 Coloring = Literal["photo", "violet", "color", "source", "distance", "normal"]
-"""What the colours of a surface mean."""
+"""The quantity that the colours of a surface show."""
 
 Which = Literal["after", "before"]
-"""Fusion."""
+"""The surface after or before fusion."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpacingView:
-    """How far apart the points are that the ball rolls over."""
+    """The distances between the points over which the ball rolls."""
 
     r_F_m: float
     sigma_D_m: float
     edges_m: FloatArray
-    """(B + 1,) bins of the nearest-neighbour distance."""
+    """(B + 1,) bin edges of the nearest-neighbour distance."""
     counts: IntArray
-    """(B,)."""
+    """(B,) number of points."""
 
 
 QUICK_POINTS = 20_000
-"""Of a quick look, where the browser draws fast enough."""
+"""Points of a quick look, if the browser draws fast enough."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,16 +43,16 @@ class Ray:
 
 @dataclass(frozen=True, slots=True)
 class PaintRequest:
-    """Surfaces to draw in certain colours; with a radius, a quick look while the ball is being chosen."""
+    """Surfaces to draw in these colours; with a radius, a quick look while the radius is dragged."""
 
     which: tuple[Which, ...]
     coloring: Coloring
     radius_m: float | None = None
-    """None takes the surfaces of the settings as they are."""
+    """Radius of a quick look's ball; None takes the surfaces of the settings."""
     most_points: int = QUICK_POINTS
-    """A larger cloud is thinned to about so many for a quick look."""
+    """Most points in a quick look; a larger cloud is thinned to about this number."""
     ray: Ray | None = None
-    """Where it meets the cloud, the ball of a quick look lies."""
+    """Ray on which a quick look's ball is placed, where it meets the cloud."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +70,11 @@ class UnusedView:
     """Points that the ball left out."""
 
     measured_m: FloatArray
-    """(N, 3) float32, world frame: those of the sensors."""
+    """(N, 3) float32, world frame: points of the sensors."""
     inferred_m: FloatArray
-    """(M, 3) float32, those of the depth network."""
+    """(M, 3) float32, points of the depth network."""
     size_m: float
-    """Of a point on the screen."""
+    """Size of a point on the screen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,20 +84,20 @@ class PaintedView:
     request: PaintRequest
     meshes: dict[Which, PaintedMesh]
     points: int
-    """That the ball rolled over, of the cloud after fusion or, if that is not shown, before."""
+    """Points over which the ball rolled, of the cloud after fusion or, if it is not shown, before."""
     all_points: int
-    """Of the whole cloud."""
+    """Points of the whole cloud."""
     roll_s: float
-    """The ball alone."""
+    """Time of the ball alone."""
     unused: Mapping[Which, UnusedView] = field(default_factory=dict)
-    """Of a quick look."""
+    """Left-out points of a quick look."""
     ball_m: FloatArray | None = None
     """(3,) centre of the ball of a quick look, at rest on a point."""
 
 
 @dataclass(frozen=True, slots=True)
 class HoleView:
-    """One loop of edges that have one triangle only."""
+    """One loop of edges that belong to one triangle only."""
 
     loop_m: FloatArray
     """(L, 3) float32, world frame, closed without repeating the first point; a hole's loop runs clockwise
@@ -105,18 +105,18 @@ class HoleView:
     length_m: float
     area_m2: float
     center_m: FloatArray
-    """(3,)."""
+    """(3,) centre."""
     rim: bool
-    """Whether the surface, or a piece that hangs on it by a point, ends there instead of having a hole."""
+    """Whether it is the outer rim of the surface, or of a piece attached by a point, not a hole."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExplainView:
-    """Why there is a hole."""
+    """The cause of a hole."""
 
     which: Which
     index: int
-    """In that surface's holes."""
+    """Index in that surface's holes."""
     found: Explanation
 
 
@@ -125,27 +125,27 @@ class FilledView:
     """The surface after fusion with its small holes filled."""
 
     mesh: MeshView
-    """What was invented is drawn in its own colour; the numbers are those of the filled surface."""
+    """Invented triangles have their own colour; the numbers are those of the filled surface."""
     holes: int
-    """How many were filled."""
+    """Number of filled holes."""
     area_m2: float
-    """Of what was invented."""
+    """Area of the invented triangles."""
 
 
 @dataclass(frozen=True, slots=True)
 class SweepView:
-    """The balls of a sweep; while it runs, those that have rolled."""
+    """The balls of a sweep; while it runs, those that are done."""
 
     points: tuple[SweepPoint, ...]
-    """By radius, ascending."""
+    """By ascending radius."""
     r_F_m: float
     sigma_D_m: float
     planned: int
-    """How many balls there will be."""
+    """Number of balls of the whole sweep."""
 
     @property
     def done(self) -> bool:
-        """Whether all of them have rolled."""
+        """Whether all balls are done."""
         return len(self.points) == self.planned
 
 
@@ -154,31 +154,31 @@ BaselineName = Literal["poisson", "alpha"]
 
 @dataclass(frozen=True, slots=True)
 class BaselineView:
-    """The surface of another method over the same points, to hold the ball's against."""
+    """The surface of another method over the same points, for comparison with the ball's."""
 
     name: BaselineName
     mesh: MeshView
     elapsed_s: float
-    """From the cloud to the surface, without the measures."""
+    """Time from the cloud to the surface, without the measurements."""
     note: str
     """One sentence on the method and its parameters."""
 
 
 @dataclass(frozen=True, slots=True)
 class SurfaceView:
-    """The surfaces before and after fusion; while they are computed, only what is there so far."""
+    """The surfaces before and after fusion; while they are computed, a partial result."""
 
     spacing: SpacingView
     radii_m: tuple[float, ...]
     after: MeshView
     before: MeshView | None
     elapsed_s: float
-    """From the clouds to the surface after fusion."""
+    """Time from the clouds to the surface after fusion."""
     holes: Mapping[Which, tuple[HoleView, ...]] = field(default_factory=dict)
-    """Of both surfaces, at the end."""
+    """Holes of both surfaces, in the final result."""
     parts: RayParts | None = None
-    """Of the surface after fusion."""
+    """Ray ends on the surface after fusion."""
     suggestions: tuple[Suggestion, ...] = ()
     """Ball radii that the cloud after fusion suggests."""
     unused: Mapping[Which, UnusedView] = field(default_factory=dict)
-    """Of the surfaces that are there."""
+    """Left-out points of the surfaces computed so far."""

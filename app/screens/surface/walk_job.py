@@ -1,4 +1,4 @@
-"""The ball's walk over the clouds of a spec, from pivot to pivot on a patch or in batches over all points."""
+"""The job that records a ball's walk: pivot by pivot on a patch, or in batches over all points."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from pipeline.types import PointCloud
 
 PATCH_POINTS = 550
 PLACES = 10
-"""Places of the ball on one arc."""
+"""Positions of the ball on one arc."""
 BATCHES = 170
 HAPPENINGS: dict[int, Happening] = {Kind.SEED: "seed", Kind.JOIN: "join", Kind.GLUE: "glue"}
 
 
 def walk_job(store: Store, spec: Spec, request: WalkRequest) -> Generator[Progress, None, WalkView]:
-    """Roll the spec's balls and keep every step.
+    """Roll the spec's balls and record every step.
 
     Raises:
         InputError: the cloud has no points.
@@ -44,7 +44,7 @@ def walk_job(store: Store, spec: Spec, request: WalkRequest) -> Generator[Progre
 def walk_over(
     cloud: PointCloud, radii_m: tuple[float, ...], request: WalkRequest
 ) -> Generator[Progress, None, WalkView]:
-    """The walk over a cloud with normals, or over a patch of it; raises as ``walk_job``."""
+    """Return the walk over a cloud with normals, or over a patch of it; raises like ``walk_job``."""
     if request.close_up:
         triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
         assert cloud.normals is not None  # or the ball would not have rolled

@@ -1,4 +1,4 @@
-"""What the player of the rolling ball shows; light enough for the serving process."""
+"""A recorded walk of the rolling ball, with imports light enough for the server process."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from app.screens.surface.view import Which
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 Happening = Literal["seed", "join", "glue", "end"]
-"""A ball was put down on three points, turned onto an unused point or onto one of the front, or came to its
-end because no edge is left to turn about."""
+"""A ball was put on three points, pivoted onto an unused point or onto one of the front, or stopped because
+no edge is left to pivot about."""
 
 
 @dataclass(frozen=True, slots=True)
 class WalkRequest:
-    """Which walk to watch."""
+    """The walk to record."""
 
     which: Which
     close_up: bool
@@ -26,7 +26,7 @@ class WalkRequest:
 
 @dataclass(frozen=True, slots=True)
 class WalkView:
-    """The walk of one ball, or of several after each other, step by step."""
+    """The walk of one ball, or of several in sequence, step by step."""
 
     request: WalkRequest
     points_m: FloatArray
@@ -34,46 +34,46 @@ class WalkView:
     colors: ByteArray | None
     """(N, 3) RGB."""
     triangles: IntArray
-    """(F, 3) int32 in the order made."""
+    """(F, 3) int32 in the order in which they were made."""
     radii_m: tuple[float, ...]
     step_ends: IntArray
-    """(S,) int32 triangles after each step."""
+    """(S,) int32 number of triangles after each step."""
     step_radius: ByteArray
-    """(S,) which ball rolls."""
+    """(S,) index of the rolling ball."""
     places_m: FloatArray
-    """(S, K, 3) float32 where the ball is on its way through each step; the last is where it rests."""
+    """(S, K, 3) float32 positions of the ball during each step; the last is its rest position."""
     happenings: tuple[Happening, ...]
-    """(S,) of a close-up; empty otherwise."""
+    """(S,) events of a close-up; empty otherwise."""
     glued_by: IntArray
-    """(3 F,) int32 triangle that took a half-edge off the boundary, F for none.
+    """(3 F,) int32 triangle that removed a half-edge from the boundary, F for none.
 
     Half-edge 3 t + k starts at corner k of triangle t.
     """
     left_front: IntArray
-    """(R, 3 F) uint16 first step without the half-edge on each ball's front."""
+    """(R, 3 F) uint16 first step at which the half-edge has left each ball's front."""
     center_m: FloatArray
-    """(3,) middle of what is shown."""
+    """(3,) middle of the points."""
     reach_m: float
-    """How far the farthest point is from it."""
+    """Distance of the farthest point from the middle."""
     outward: FloatArray
     """(3,) unit vector, the mean of the normals: the side to look from."""
 
     @property
     def steps(self) -> int:
-        """How many there are."""
+        """Number of steps."""
         return len(self.step_ends)
 
     @property
     def places(self) -> int:
-        """Places of the ball in one step."""
+        """Positions of the ball in one step."""
         return self.places_m.shape[1]
 
     def count(self, done: int) -> int:
-        """Triangles after ``done`` steps."""
+        """Return the number of triangles after ``done`` steps."""
         return int(self.step_ends[done - 1]) if done else 0
 
     def open_edges(self, done: int) -> tuple[IntArray, IntArray]:
-        """(E, 2) points of the front after ``done`` steps; (D, 2) of edges where the ball found nothing."""
+        """Return (E, 2) points of the front after ``done`` steps; (D, 2) of edges without any hit."""
         count = self.count(done)
         unglued = np.flatnonzero(self.glued_by[: 3 * count] >= count)
         on_front = self.left_front[self.step_radius[done - 1], unglued] >= done
@@ -88,7 +88,7 @@ class WalkView:
         return ends[on_front], ends[~on_front]
 
     def pivot(self, step: int) -> IntArray | None:
-        """(2,) points of the edge about which the ball turns in a close-up's step; None for no such edge."""
+        """Return (2,) points of the edge about which the ball pivots in a close-up's step, or None."""
         if not self.happenings or self.happenings[step] not in ("join", "glue"):
             return None
         return self.triangles[self.count(step), 1::-1]

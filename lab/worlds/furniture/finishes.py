@@ -1,4 +1,4 @@
-"""What things are made of: materials with plausible colour, gloss and infrared response."""
+"""Materials of furniture and objects, with plausible colour, gloss and infrared response."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ BOOKS = (
 
 
 def pick(rng: Rng, palette: Sequence[str], color: str | None = None) -> FloatArray:
-    """The colour asked for, or one of a palette, slightly off."""
+    """Return ``color`` or one of a palette, slightly varied."""
     if color is not None:
         return linear(color)
     return np.clip(linear(palette[int(rng.integers(len(palette)))]) * rng.uniform(0.85, 1.15, 3), 0.0, 0.95)

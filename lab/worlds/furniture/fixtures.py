@@ -1,4 +1,4 @@
-"""What belongs to the room: windows, doors, rugs, pictures; wall pieces have their back at y = 0."""
+"""Parts of a room: windows, doors, rugs, pictures; wall pieces have their back at y = 0."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def window(
     panes: int = 2,
     recess_m: float = 0.0,
 ) -> list[Part]:
-    """A window with the world outside, a white frame and a sill; the origin is in the middle below.
+    """A window with an outdoor view, a white frame and a sill; the origin is in the middle below.
 
     ``recess_m`` sets it back into a hole of the wall.
     """

@@ -1,4 +1,4 @@
-"""Lamps; each piece only glows, so a scene adds a ``Light`` at its bulb."""
+"""Lamps. A piece only glows; the scene adds a ``Light`` at its bulb."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Putting solids together: a piece stands on its own floor, its front towards -y, and is moved as a whole."""
+"""Placement of solids: a piece stands on its own floor, its front towards -y, and is moved as a whole."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ORIGIN = np.eye(4)
 
 
 def place(x_m: float, y_m: float, yaw_rad: float = 0.0, z_m: float = 0.0) -> FloatArray:
-    """T_world_piece of a piece at (x, y, z), turned about the vertical; its front looks along -y at yaw 0."""
+    """Return T_world_piece at (x, y, z), turned about the vertical; the front looks along -y at yaw 0."""
     return rigid(rotation_exp(np.array([0.0, 0.0, yaw_rad])), np.array([x_m, y_m, z_m]))
 
 
@@ -25,7 +25,7 @@ def solid(
     turn_rad: Vector = (0.0, 0.0, 0.0),
     smooth: bool = True,
 ) -> Part:
-    """A part of a piece, shifted, and turned about the axis ``turn_rad`` by its length."""
+    """Return a part of a piece, shifted, and turned about the axis ``turn_rad`` by its length."""
     T_piece_part = rigid(rotation_exp(np.asarray(turn_rad, float)), np.asarray(at_m, float))
     return Part(*mesh, material, T_world @ T_piece_part, smooth)
 
@@ -44,5 +44,5 @@ def board(
 
 
 def corners(x_m: float, y_m: float) -> list[tuple[float, float]]:
-    """The four corners of a rectangle of half sizes ``x_m`` and ``y_m``, for legs."""
+    """Return the four corners of a rectangle of half sizes ``x_m`` and ``y_m``, for legs."""
     return [(x, y) for x in (-x_m, x_m) for y in (-y_m, y_m)]

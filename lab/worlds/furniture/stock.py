@@ -1,4 +1,4 @@
-"""What stands and lies about in a workshop: timber, shavings, a broom, a gas bottle."""
+"""Objects in a workshop: timber, shavings, a broom, a gas bottle."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.types import FloatArray
 
 
 def timber(rng: Rng, T_world: FloatArray = ORIGIN) -> list[Part]:
-    """Five planks of uneven length that lean against a wall behind them; the origin is where they stand."""
+    """Five planks of uneven length that lean against a wall behind them; the origin is at their foot."""
     parts = []
     for k in range(5):
         length, wide = 2.1 * rng.uniform(0.75, 1.0), rng.uniform(0.09, 0.16)

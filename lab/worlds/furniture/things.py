@@ -1,4 +1,4 @@
-"""Small things that stand on tables and shelves."""
+"""Small objects on tables and shelves."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def cup(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> lis
 def bottle(
     rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None, label: bool = True
 ) -> list[Part]:
-    """A dark wine bottle, 0.3 m high: glass gives the sensor no depth."""
+    """A dark wine bottle, 0.3 m high: the sensor measures no depth on glass."""
     body = [(0.0, 0.006), (0.03, 0.0), (0.037, 0.006), (0.037, 0.19), (0.03, 0.215)]
     neck = [(0.0145, 0.235), (0.0135, 0.29), (0.016, 0.292), (0.016, 0.302), (0.0, 0.302)]
     glass = plain(color or "#1f3a29", 0.9, infrared=0.1)

@@ -1,4 +1,4 @@
-"""Hand tools and the board they hang on."""
+"""Hand tools and their wall board."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def tool_board(rng: Rng, T_world: FloatArray = ORIGIN) -> list[Part]:
 
 
 def tape_roll(rng: Rng, T_world: FloatArray = ORIGIN) -> list[Part]:
-    """A roll of tape on a peg, and a coil of cable beside it."""
+    """A roll of tape on a peg, and a coil of cable next to it."""
     roll = lathe([(0.038, 0.0), (0.055, 0.0), (0.055, 0.045), (0.038, 0.045), (0.038, 0.0)], 32, 0.001)
     turns = np.linspace(0.0, 10.0 * np.pi, 121)
     radius = 0.085 + 0.006 * np.sin(1.7 * turns)

@@ -1,4 +1,4 @@
-"""What random rooms are filled with: furniture with things on it, wall pieces, clutter and plain solids.
+"""The contents of random rooms: furniture with objects on it, wall pieces, clutter and plain solids.
 
 A piece is a list of parts that stands on z = 0 about the origin, its front towards -y, as in ``furniture``.
 """

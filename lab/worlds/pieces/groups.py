@@ -1,4 +1,4 @@
-"""Furniture with what belongs to it: desks with screens, tables with chairs, beds with pillows."""
+"""Groups of furniture: desks with screens, tables with chairs, beds with pillows."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def office(rng: Rng) -> list[Part]:
 
 
 def dining(rng: Rng) -> list[Part]:
-    """A table with chairs about it and things on it."""
+    """A table with chairs around it and objects on it."""
     size = rng.uniform((0.8, 0.7, 0.7), (1.8, 1.0, 0.78))
     parts = laden(rng, tables.table(rng, size_m=size))
     color = f"#{int(rng.integers(0x202020, 0xE0E0E0)):06x}" if rng.random() < 0.3 else None
@@ -90,5 +90,5 @@ def filled_crate(rng: Rng) -> list[Part]:
 
 
 def _standing(x_m: float, y_m: float, z_m: float) -> Mesh:
-    """A box that stands on z = 0."""
+    """Return a box that stands on z = 0."""
     return shifted(box((x_m, y_m, z_m)), z_m=0.5 * z_m)

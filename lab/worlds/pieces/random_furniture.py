@@ -1,4 +1,4 @@
-"""One of many: which furniture and clutter a room gets, and how often."""
+"""Random choices of furniture and clutter for a room, with their frequencies."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from lab.worlds.scene import Part, Rng
 
 
 def random_wall_furniture(rng: Rng) -> list[Part]:
-    """Something large that stands with its back to a wall, with things on it."""
+    """A random large piece with its back to a wall and objects on it."""
     makers: Makers[list[Part]] = [
         (1.5, lambda: sofa(rng)),
         (2.0, lambda: storage.bookshelf(rng, size_m=rng.uniform((0.6, 0.25, 0.8), (1.4, 0.4, 2.1)))),
@@ -31,7 +31,7 @@ def random_wall_furniture(rng: Rng) -> list[Part]:
 
 
 def random_group(rng: Rng) -> list[Part]:
-    """Something for the middle of a room: a table with chairs, a coffee table, an armchair."""
+    """A random group for the middle of a room: a table with chairs, a coffee table, an armchair."""
     makers: Makers[list[Part]] = [
         (2.5, lambda: dining(rng)),
         (2.0, lambda: laden(rng, tables.coffee_table(rng, round_top=bool(rng.integers(2))), 0.7)),
@@ -43,7 +43,7 @@ def random_group(rng: Rng) -> list[Part]:
 
 
 def random_floor_thing(rng: Rng) -> list[Part]:
-    """Something that stands about: a chair, box, bucket, plant or plain solid."""
+    """A random object on the floor: a chair, box, bucket, plant or plain solid."""
     makers: Makers[list[Part]] = [
         (1.0, lambda: seating.dining_chair(rng)),
         (1.0, lambda: seating.office_chair(rng)),

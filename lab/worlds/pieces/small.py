@@ -1,4 +1,4 @@
-"""Things that stand or lie on tables and shelves."""
+"""Random small objects on tables and shelves."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pipeline.types import FloatArray
 
 
 def small_thing(rng: Rng) -> list[Part]:
-    """Something that stands or lies on a table or shelf."""
+    """A random small object for a table or shelf."""
     makers: Makers[list[Part]] = [
         (2.0, lambda: things.cup(rng)),
         (2.0, lambda: things.bottle(rng)),
@@ -40,7 +40,7 @@ def small_thing(rng: Rng) -> list[Part]:
 def things_on(
     rng: Rng, low_m: tuple[float, float], high_m: tuple[float, float], z_m: float, count: int
 ) -> list[Part]:
-    """Small things that stand at random on a board, without meeting each other."""
+    """Small objects at random places on a board, without overlaps."""
     parts: list[Part] = []
     taken: list[tuple[FloatArray, FloatArray]] = []
     for _ in range(count):
@@ -55,7 +55,7 @@ def things_on(
 
 
 def laden(rng: Rng, furniture: list[Part], share: float = 0.85) -> list[Part]:
-    """Furniture with things on its top."""
+    """Furniture with objects on its top."""
     low, high = bounds(furniture)
     (x, y, _), (half_x, half_y, _) = 0.5 * (low + high), 0.5 * share * (high - low)
     top, count = float(high[2]) + 1e-3, int(rng.integers(0, 9))

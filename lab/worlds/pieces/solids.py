@@ -1,4 +1,4 @@
-"""Plain solids of any material, heaps and stacks of them."""
+"""Plain solids of random materials, in heaps and stacks."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def random_solid(rng: Rng, smallest_m: float, largest_m: float) -> list[Part]:
 
 
 def stack(rng: Rng) -> list[Part]:
-    """Boxes on boxes."""
+    """A stack of boxes."""
     parts, z = [], 0.0
     for k in range(int(rng.integers(2, 5))):
         size = rng.uniform((0.3, 0.25, 0.12), (0.55, 0.45, 0.4)) * (0.9**k)

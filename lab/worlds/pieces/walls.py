@@ -1,4 +1,4 @@
-"""What hangs on walls or is built into them."""
+"""Objects that hang on walls or are built into them."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class WallPiece:
 
     parts: list[Part]
     width_m: float
-    """Room that it takes along the wall."""
+    """Width along the wall."""
     height_m: float
-    """Of its origin above the floor."""
+    """Height of its origin above the floor."""
     daylight: bool = False
     """Whether light comes in through it."""
 

@@ -1,7 +1,7 @@
 """Procedural surfaces: each function returns a Texture, a solid or box-mapped linear albedo.
 
-Colours are linear RGB, 0 to 1, or "#rrggbb" as a colour picker shows them; lengths are metres. Box-mapped
-textures lie on the face that the normal points out of, so boxes need no unwrapping.
+Colours are linear RGB, 0 to 1, or "#rrggbb" in sRGB; lengths are metres. A box-mapped texture is projected on
+the box face that the normal points out of, so boxes need no unwrapping.
 """
 
 from lab.worlds.textures.building import brick, concrete, marble, paint, parquet, planks, plaster, tiles

@@ -1,4 +1,4 @@
-"""Carpets, cloth, wallpaper: what is woven or has a repeat."""
+"""Textures of carpets, cloth and wallpaper."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def carpet(color: Color, seed: int = 0, pile_m: float = 0.008, mottling: float =
 
 
 def fabric(color: Color, second: Color | None = None, seed: int = 0, thread_m: float = 0.006) -> Texture:
-    """Woven cloth: crossing threads of one or two colours, with folds' soft unevenness."""
+    """Woven cloth: crossing threads of one or two colours, with soft variation from folds."""
     color = as_color(color)
     second = color * 0.72 if second is None else as_color(second)
 

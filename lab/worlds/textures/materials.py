@@ -1,4 +1,4 @@
-"""What furniture and things are made of."""
+"""Textures of furniture and objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Colours and their mixtures, the small change of all textures."""
+"""Colours and their mixtures, the basis of all textures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Color = str | Sequence[float] | FloatArray
 
 
 def linear(color: Color) -> FloatArray:
-    """(3,) linear RGB of a colour."""
+    """Return a colour as (3,) linear RGB."""
     if not isinstance(color, str):
         return np.asarray(color, float)
     c = np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
@@ -23,7 +23,7 @@ def linear(color: Color) -> FloatArray:
 
 
 def random_palette(rng: Rng, count: int) -> FloatArray:
-    """(count, 3) float32 linear colours of things people own: from muted to vivid, dark to light."""
+    """Return (count, 3) float32 linear colours of everyday objects: from muted to vivid, dark to light."""
     hue = rng.random(count)[:, None] + np.array([0.0, 1.0, 2.0]) / 3.0
     vivid = np.clip(np.abs((hue % 1.0) * 6.0 - 3.0) - 1.0, 0.0, 1.0)
     chroma = 0.75 * rng.random((count, 1)) ** 0.7
@@ -32,33 +32,33 @@ def random_palette(rng: Rng, count: int) -> FloatArray:
 
 
 def as_color(color: Color) -> FloatArray:
-    """(3,) float32 linear RGB."""
+    """Return (3,) float32 linear RGB."""
     return linear(color).astype(np.float32)
 
 
 def mix(a: FloatArray, b: FloatArray, share: FloatArray) -> FloatArray:
-    """(N, 3) blend of two colours ((3,) or (N, 3)), by (N,) share of the second, inside 0 to 1."""
+    """Return the (N, 3) blend of two colours ((3,) or (N, 3)), by (N,) share of the second, within 0 to 1."""
     return np.clip(a + (b - a) * np.asarray(share, np.float32)[:, None], 0.0, 1.0)
 
 
 def shade(color: FloatArray, tone: FloatArray) -> FloatArray:
-    """(N, 3) a (3,) colour, or (N, 3) colours, made lighter or darker by an (N,) factor, inside 0 to 1."""
+    """Return (N, 3) a (3,) colour, or (N, 3) colours, times an (N,) brightness, within 0 to 1."""
     return np.clip(color * np.asarray(tone, np.float32)[:, None], 0.0, 1.0)
 
 
 def soft_step(x: FloatArray, softness: float) -> FloatArray:
-    """(N,) 0 below zero, 1 above, with a ramp about zero."""
+    """Return (N,) 0 below zero, 1 above, with a ramp about zero."""
     return np.clip(0.5 + x / softness, 0.0, 1.0)
 
 
 def joint_share(a: FloatArray, b: FloatArray, a_m: float, b_m: float, joint_m: float) -> FloatArray:
-    """(N,) 1 within half a joint of the border of a cell, given the place in the cell, 0 to 1."""
+    """Return (N,) 1 within half a joint of the border of a cell, given the position in the cell, 0 to 1."""
     distance_m = np.minimum((0.5 - np.abs(a - 0.5)) * a_m, (0.5 - np.abs(b - 0.5)) * b_m)
     return np.clip(1.5 - 2.0 * distance_m / joint_m, 0.0, 1.0)
 
 
 def wood_grain(points_m: FloatArray, seed: int, scale_m: float, axis: int) -> FloatArray:
-    """(N,) darkness of wood, 0 to 1: warped year rings and fibres along an axis."""
+    """Return (N,) darkness of wood, 0 to 1: warped year rings and fibres along an axis."""
     stretch, fibre = np.full(3, scale_m), np.full(3, scale_m / 12.0)
     stretch[axis], fibre[axis] = 12.0 * scale_m, 4.0 * scale_m
     rings = (9.0 * fbm(points_m, stretch, seed, 2)) % 1.0

@@ -52,13 +52,13 @@ def _fbm(lattice, points, frequency, offset, octaves, gain, out):  # type: ignor
 def fbm(
     points_m: FloatArray, scale_m: float | FloatArray, seed: int, octaves: int = 3, gain: float = 0.5
 ) -> FloatArray:
-    """(N,) float32 fractal value noise, 0 to 1, mean one half, of (N, 3) places.
+    """Return (N,) float32 fractal value noise, 0 to 1, mean one half, at (N, 3) positions.
 
     Args:
         points_m: (N, 3).
-        scale_m: size of the largest blobs, the same in all directions or (3,) one for each axis.
+        scale_m: size of the largest blobs, in all directions or (3,) one for each axis.
         seed: chooses the part of the (tileable) noise.
-        octaves: each is half the size of the one before.
+        octaves: number of octaves; each is half the size of the one before.
         gain: strength of an octave relative to the one before.
     """
     out = np.empty(len(points_m), np.float32)
@@ -70,7 +70,7 @@ def fbm(
 
 @numba.njit(cache=True, nogil=True)
 def face_uv(points, normals):  # type: ignore[no-untyped-def]
-    """(N, 2) float32 coordinates on the face of the box that each normal points out of; v is up on walls."""
+    """Return (N, 2) float32 coordinates on the box face that each normal points out of; v is up on walls."""
     out = np.empty((len(points), 2), np.float32)
     for n in range(len(points)):
         ax, ay, az = abs(normals[n, 0]), abs(normals[n, 1]), abs(normals[n, 2])
@@ -85,7 +85,7 @@ def face_uv(points, normals):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def cell_random(i, j, seed):  # type: ignore[no-untyped-def]
-    """(N,) float32 uniform random numbers, one for each pair of (N,) whole numbers."""
+    """Return (N,) float32 uniform random numbers, one for each pair of (N,) whole numbers."""
     out = np.empty(len(i), np.float32)
     for n in range(len(i)):
         h = np.uint32(np.int64(i[n])) * np.uint32(0x9E3779B1)

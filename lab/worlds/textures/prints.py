@@ -1,4 +1,4 @@
-"""Pictures of something else: paintings, books, pages, screens, the view from a window."""
+"""Textures of pictures: paintings, books, pages, screens, the view from a window."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def paper(seed: int = 0, line_m: float = 0.008) -> Texture:
 
 
 def display(seed: int, size_m: Vector) -> Texture:
-    """What a computer screen shows: a desktop with windows full of lines, about the part's origin."""
+    """A computer screen: a desktop with windows full of lines, about the part's origin."""
     rng = np.random.default_rng(seed)
     palette = random_palette(rng, 4)
     windows = [(rng.uniform(-0.3, 0.3, 2), rng.uniform(0.1, 0.3, 2), rng.random() < 0.7) for _ in range(3)]
@@ -73,7 +73,7 @@ def display(seed: int, size_m: Vector) -> Texture:
 
 
 def outdoors(seed: int) -> Texture:
-    """What is seen through a window: a bright sky, clouds, far trees or houses below z = -0.2."""
+    """A view through a window: a bright sky, clouds, far trees or houses below z = -0.2."""
     rng = np.random.default_rng(seed)
     sky, haze = np.array([0.45, 0.68, 0.98]), np.array([0.93, 0.95, 0.97])
     ground = np.array([[0.12, 0.22, 0.08], [0.32, 0.29, 0.26]][int(rng.integers(2))])
