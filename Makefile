@@ -8,13 +8,19 @@ ARGS   ?=
 # Where no bytecode is kept, every process compiles all that it imports: two seconds each.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test check audit bench reproduce results results-record lock scenes clean
+.PHONY: run test test-fast mutants check audit bench reproduce results results-record lock scenes clean
 
 run: $(VENV)/.core  ## the app in the browser, with a scene reconstructed
 	$(BIN)/packetmesh serve --scene $(SCENE) --open $(ARGS)
 
 test: $(VENV)/.dev  ## all tests, in parallel
 	$(BIN)/python -m pytest -n 2 --dist loadgroup $(ARGS)
+
+test-fast: $(VENV)/.dev  ## the quick tests, without a browser
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not browser and not slow" $(ARGS)
+
+mutants: $(VENV)/.dev  ## plant faults one at a time; docs/mutants.md says which no test sees
+	$(BIN)/python -m lab.mutants $(ARGS)
 
 check: $(VENV)/.dev  ## style, types, import rules
 	$(BIN)/ruff check .

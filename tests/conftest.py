@@ -4,6 +4,7 @@ import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # more only spin when tests run side by side
 
+from fnmatch import fnmatch
 from pathlib import Path
 
 import hypothesis
@@ -15,7 +16,32 @@ hypothesis.settings.register_profile("untimed", deadline=None)
 hypothesis.settings.load_profile("untimed")
 
 
+SLOW = (
+    *("lab", "real", "bad_input", "app/cli", "app/lesson", "app/web/attack", "app/test_one_chain.py"),
+    *("app/compute/test_ahead.py", "app/compute/test_faults.py", "app/screens/*/test_*panel.py"),
+    *("app/screens/*/test_*jobs.py", "app/screens/*/test_lesson.py", "app/screens/surface/test_[bhsw]*.py"),
+    *("app/screens/fuse/test_race*.py", "pipeline/calibration/test_[de]*.py", "pipeline/test_*.py"),
+    *(
+        "pipeline/calibration/test_rig*.py",
+        "pipeline/depth/test_inference.py",
+        "pipeline/placement/test_*.py",
+    ),
+    *(
+        "pipeline/registration/test_[agpr]*.py",
+        "pipeline/surface/test_baselines.py",
+        "packetmesh/test_[ei]*.py",
+    ),
+)
+"""Files below ``tests`` that ``make test-fast`` leaves out: several seconds each."""
 LONGEST_ID = 60
+
+
+def pytest_collection_modifyitems(items):
+    """Mark slow tests."""
+    for item in items:
+        path = item.path.relative_to(ROOT / "tests").as_posix()
+        if any(path.startswith(f"{one}/") or fnmatch(path, one) for one in SLOW):
+            item.add_marker(pytest.mark.slow)
 
 
 def pytest_make_parametrize_id(val):

@@ -1,5 +1,7 @@
 """Pictures of a board as a camera sees it that is known to the last digit."""
 
+import functools
+
 import cv2
 import numpy as np
 
@@ -48,5 +50,10 @@ def views(board: Board, noise_px=0.0, seed=0, count=8):
 
 
 def photograph(board: Board, T_camera_board):
-    """(H, W) what the camera takes of the printed sheet."""
-    return take(board, T_camera_board, CAMERA)
+    """(H, W) what the camera takes of the printed sheet; the same again is not rendered again."""
+    return _photograph(board, np.asarray(T_camera_board, float).tobytes()).copy()
+
+
+@functools.lru_cache(maxsize=256)
+def _photograph(board: Board, T_camera_board: bytes):
+    return take(board, np.frombuffer(T_camera_board).reshape(4, 4), CAMERA)
