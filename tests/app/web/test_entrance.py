@@ -6,6 +6,8 @@ import http.client
 import re
 from base64 import b64encode
 from contextlib import closing
+from itertools import count
+from types import SimpleNamespace
 from urllib.parse import quote
 
 import pytest
@@ -79,7 +81,7 @@ def test_a_link_gives_a_cookie_that_lets_in_and_keeps_the_rest_of_the_address(se
 
 
 @pytest.mark.parametrize("key", ["token", "teacher"])
-@pytest.mark.parametrize("text", ["", "x", "é", "{other}", "{own}x"])
+@pytest.mark.parametrize("text", ["", "x", "é", "{other}", "{own}x", "{own[0]}", "{own:.21}"])
 def test_another_token_is_refused(server, key, text):
     own, other = ENTRANCE.visitor, ENTRANCE.teacher
     if key == "teacher":
@@ -88,6 +90,13 @@ def test_another_token_is_refused(server, key, text):
     response = get(server, f"/?{key}={wrong}")
     assert response.status == 403
     assert "Set-Cookie" not in response.headers
+
+
+def test_a_cookie_lets_in_with_the_whole_token_and_nothing_else():
+    token = ENTRANCE.visitor
+    for text in ("", token.text[:1], token.text[:-1], token.text[1:], f"{token.text}x", 2 * token.text):
+        assert not ENTRANCE.lets_in(f"{token.cookie}={text}"), text
+    assert ENTRANCE.lets_in(f"{token.cookie}={token.text}")
 
 
 def test_a_websocket_needs_the_cookie_and_its_own_page(server):
@@ -193,6 +202,19 @@ def test_a_file_is_too_large_too_many_or_more_than_it_said():
     quick = UploadGate()
     assert all(quick.begins(0, 0, str(k)) for k in range(MOST_A_MINUTE))
     assert not quick.begins(0, 0, "one more")
+
+
+def test_an_upload_makes_room_for_another_when_it_is_a_minute_old(monkeypatch):
+    clock = SimpleNamespace(now_s=1000.0, monotonic=lambda: clock.now_s)
+    monkeypatch.setattr("app.web.upload_gate.time", clock)
+    gate, names = UploadGate(), map(str, count())
+    for k in range(MOST_A_MINUTE):
+        clock.now_s = 1000.0 + k / 8
+        assert gate.begins(0, 0, next(names))
+    for clock.now_s, may in ((1059.99, False), (1060.0, True), (1060.0, False), (1060.125, True)):
+        assert gate.begins(0, 0, next(names)) == may
+    clock.now_s = 1000.0 + (MOST_A_MINUTE - 1) / 8 + 60.0
+    assert sum(gate.begins(0, 0, next(names)) for _ in range(MOST_A_MINUTE)) == MOST_A_MINUTE - 2
 
 
 def test_what_is_too_much_is_not_kept():

@@ -193,6 +193,18 @@ def test_the_same_slot_is_a_collision_and_the_window_doubles() -> None:
     assert it.deliveries[B] == it.deliveries[C] == [Delivery(True, Cause.NONE, 2)]
 
 
+def test_after_a_success_the_backoff_is_of_the_smallest_window_again() -> None:
+    it = Scene(3, 3, 7, 63, 40, 63)
+    it.send(A, 0)
+    it.send(B, 100 * US)
+    it.send(C, 200 * US, 200 * US)
+    it.run()
+    second = EXCHANGE + DIFS + 3 * SLOT + DATA + LOST + 40 * SLOT
+    of_b = second + EXCHANGE + DIFS + 23 * SLOT
+    # As above; then C draws 63, which is 31 of 32, and counts 23 of them before B's frame.
+    assert it.times(EventKind.AIR, C)[2] == of_b + EXCHANGE + DIFS + 8 * SLOT
+
+
 def test_who_could_not_read_a_frame_waits_for_an_eifs() -> None:
     it = Scene(3, 3, 7, 2, 63, 50)
     it.send(A, 0)

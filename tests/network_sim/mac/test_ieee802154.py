@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 import simpy
 
 from network_sim.config import MacConfig, NetworkConfig, NodesConfig
-from network_sim.mac.context import MacContext
+from network_sim.mac.context import MacContext, random_below
 from network_sim.mac.ieee802154 import Ieee802154
 from network_sim.mac.medium import Medium
 from network_sim.mac.saturation import saturation
@@ -38,7 +39,7 @@ AROUND_M = [[0.0, 0.0], [20.0, 0.0], [0.0, 20.0], [-20.0, 0.0], [0.0, -20.0], [1
 class Scene:
     """Nodes around a sink, everyone hears everyone; ``run`` it and look at ``events``."""
 
-    def __init__(self, *slots: int, ack: bool = True) -> None:
+    def __init__(self, *slots: int, ack: bool = True, drawn: np.random.Generator | None = None) -> None:
         self.env = simpy.Environment()
         self.config = NetworkConfig(mac=MacConfig(ack=ack))
         rng = np.random.default_rng(0)
@@ -48,7 +49,7 @@ class Scene:
         self.down: set[int] = set()
         self.received: list[tuple[int, int]] = []
         self.deliveries: list[tuple[int, Delivery]] = []
-        backoffs = FixedBackoffs(*slots)
+        backoffs = FixedBackoffs(*slots) if drawn is None else drawn
         self.mac = Ieee802154(
             MacContext(
                 self.env, self.medium, self.config, self.recorder, backoffs, self._is_up, self._receive
@@ -132,6 +133,30 @@ def test_backoff_exponent_grows_to_its_maximum_and_five_busy_looks_are_a_failure
     assert scene.deliveries == [(given_up, Delivery(False, Cause.CHANNEL, 0))]
     assert lines[EventKind.LOSS] == [(given_up, NODE, Cause.CHANNEL)]
     assert lines[EventKind.AIR] == []
+
+
+def assert_even(numbers: np.ndarray, most: int) -> None:
+    """All numbers below ``most`` and no others, each as often, within five standard deviations."""
+    assert set(numbers) == set(range(most))
+    expected = len(numbers) / most
+    assert (np.abs(np.bincount(numbers) - expected) < 5.0 * np.sqrt(expected)).all()
+
+
+def test_the_first_backoff_is_drawn_evenly_from_eight_numbers_of_slots() -> None:
+    """0 to 2^BE - 1 with BE = 3."""
+    scene = Scene(drawn=np.random.default_rng(0))
+    scene.send(NODE, count=6000, size_bytes=8)
+    begins_ns = np.array([t_ns for t_ns, _, _ in scene.run()[EventKind.AIR]])
+    exchange = (6 + 11 + 8) * 32 * US + TURN + ACK + LIFS + FIRST
+    slots, rest_ns = np.divmod(np.diff(begins_ns) - exchange, SLOT)
+    assert not rest_ns.any()
+    assert_even(slots, 8)
+
+
+def test_numbers_for_backoffs_are_drawn_evenly_from_those_below_the_window() -> None:
+    draws = np.fromiter(islice(random_below(32, np.random.default_rng(0)), 32_000), int)
+    for window in (8, 16, 32):
+        assert_even(draws & (window - 1), window)
 
 
 @pytest.mark.parametrize(("late_ns", "sent"), [(-1, 4 * SLOT + FIRST), (0, 13 * SLOT + CCA + FIRST)])

@@ -128,13 +128,14 @@ def test_minutes_are_those_of_the_counters():
 @pytest.mark.parametrize(
     ("t_s", "sent_bytes", "lost", "radio_j", "platform_j"),
     [
+        (72.0, 1500, 1, (4 + 4 * 68) + 4 * 72, 16 * 2 * 72),
         (76.05, 2000, 1, (8 + 2 * 0.05 + 4 * 68) + 4 * 76.05, 16 * 2 * 76.05),
         (155.0, 3540, 2, (10.5 + 2 * 4.1 + 4 * 140.4) + (4 + 8 * 10 + 4 * 141), 16 * (155 + 145) + 32 * 10),
     ],
 )
 def test_what_the_small_run_spent_is_what_paper_says(t_s, sent_bytes, lost, radio_j, platform_j):
-    """In the middle of an acknowledgement, and after a sleep; sending takes 1 W, receiving 2, listening 4,
-    sleeping 8, and the rest of a node 16 and 32.
+    """When a frame fails and the next begins, in the middle of an acknowledgement, and after a sleep; sending
+    takes 1 W, receiving 2, listening 4, sleeping 8, and the rest of a node 16 and 32.
     """
     spent = until(trace_of(small_run), to_ns(t_s))
     assert (spent.sent_bytes, spent.lost) == (sent_bytes, lost)

@@ -73,6 +73,15 @@ def test_log_distance_with_exponent_two_is_free_space() -> None:
     np.testing.assert_allclose(steep[~near], (free * (distances_m / 7.0) ** -1.5)[~near], rtol=1e-12)
 
 
+def test_a_power_law_never_gives_more_than_is_sent() -> None:
+    """A reference too near for free space is moved to lambda / (4 pi), where all of it arrives."""
+    least_m = 0.125 / (4.0 * np.pi)
+    law = r.power_law(0.1, 0.125, 3.0, 0.1 * least_m, 1.2, 1.1)
+    all_of_it_w = 0.1 * 1.2**2 / 1.1
+    found_w = [law.power_w(times * least_m) for times in (0.01, 1.0, 10.0)]
+    np.testing.assert_allclose(found_w, [all_of_it_w, all_of_it_w, 1e-3 * all_of_it_w], rtol=1e-12)
+
+
 @pytest.mark.parametrize("config", CONFIGS)
 def test_power_falls_from_what_is_sent(config: RadioConfig) -> None:
     law = r.path_loss(config)

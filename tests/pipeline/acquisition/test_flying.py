@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.acquisition import acquire, back_project, filter_outliers
 from pipeline.acquisition.flying import flying_score
-from pipeline.acquisition.planes import FARTHEST_SD, local_planes
+from pipeline.acquisition.planes import FARTHEST_SD, LocalPlanes, local_planes
 from pipeline.config import AcquisitionConfig
 from pipeline.types import DepthMap, DepthNoise, RgbdFrame
 from tests.pipeline.acquisition.depths import (
@@ -92,6 +92,40 @@ def test_a_veil_between_front_and_back_goes_to_the_last_pixel(transposed):
     if transposed:
         z_m, veil = z_m.T, veil.T
     np.testing.assert_array_equal(flies(DepthMap(z_m.astype(np.float32))), veil)
+
+
+def planes_of(pixels, slope=0.0):
+    """Of 7 x 7 pixels, from 1/z and sd of the known ones; 1/z grows by so much down and to the right."""
+    inverse, sd = np.zeros((2, 7, 7), np.float32)
+    for place, (known, known_sd) in pixels.items():
+        inverse[place], sd[place] = known, known_sd
+    slopes = np.full_like(inverse, slope)
+    return LocalPlanes(inverse, slopes, slopes, sd)
+
+
+@pytest.mark.parametrize(("down", "right"), [(0, 1), (1, 0), (1, 1), (1, -1)])
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize(("behind", "score"), [(0.5, 4.0), (0.3, 6.0)])
+def test_a_pixel_flies_by_the_lesser_distance_in_sds_of_both_pixels(down, right, way, behind, score):
+    """Its sd of 0.03 and those beside it of 0.04 are together 0.05; 0.3 before it and 0.2 or 0.4 behind."""
+    front, back = (3 + way * down, 3 + way * right), (3 - way * down, 3 - way * right)
+    planes = planes_of({(3, 3): (0.7, 0.03), front: (1.0, 0.04), back: (behind, 0.04)})
+    assert flying_score(planes)[3, 3] == pytest.approx(score, rel=1e-5)
+
+
+@pytest.mark.parametrize(("down", "right"), [(0, 2), (2, 0)])
+def test_planes_are_continued_over_the_gap_beside_a_pixel(down, right):
+    """By 2 x 0.05: one meets the pixel's line at 1.1, the other at 0.4."""
+    front, back = (3 - down, 3 - right), (3 + down, 3 + right)
+    planes = planes_of({(3, 3): (0.7, 0.03), front: (1.0, 0.04), back: (0.5, 0.04)}, slope=0.05)
+    assert flying_score(planes)[3, 3] == pytest.approx(6.0, rel=1e-5)
+
+
+def test_who_stands_alone_has_far_planes_on_three_sides_and_flies_by_the_nearest():
+    before = {(3, 2): (1.0, 0.04), (2, 3): (1.1, 0.04), (2, 2): (1.2, 0.04)}
+    for count, score in ((2, 0.0), (3, 6.0)):
+        planes = planes_of({(3, 3): (0.7, 0.03), **dict(list(before.items())[:count])})
+        assert flying_score(planes)[3, 3] == pytest.approx(score, rel=1e-5)
 
 
 def test_wires_stay_and_lone_pixels_go():

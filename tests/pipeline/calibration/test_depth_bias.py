@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import sem
 
 from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
@@ -77,6 +78,16 @@ def test_errors_are_as_large_as_the_intervals_say():
         values = np.array([one[term] for one in off if term in one])
         assert len(values) >= 15
         assert 0.6 < np.sqrt((values**2).mean()) < 1.4
+
+
+def test_the_bias_at_a_depth_is_what_the_correction_takes_off_and_as_sure_as_its_parameters():
+    fit = fit_depth(quick_samples(CURVED, seed=0))
+    assert fit.terms == ("offset", "scale", "curvature")
+    z_m = np.array([0.6, 1.0, 1.7])
+    bias_m, sd_m = fit.bias_m(z_m)
+    np.testing.assert_allclose(bias_m, z_m - fit.correction.corrected_m(z_m, np.zeros((3, 2))), atol=1e-12)
+    by_terms = np.stack([z_m**0, z_m, z_m**2])
+    np.testing.assert_allclose(sd_m**2, np.diag(by_terms.T @ fit.covariance @ by_terms), rtol=1e-9)
 
 
 def test_a_sensor_without_bias_is_left_alone_most_times():
@@ -154,6 +165,12 @@ def test_hands_before_the_board_and_ink_change_nothing():
     assert fit.correction.offset_m == pytest.approx(plain.offset_m, abs=0.001)
     offset_m, sd_m = fit.ink_offset_m
     assert abs(offset_m - 0.01) < 3.0 * sd_m + 5e-4
+    off_m = fit.correction.corrected_m(inked.measured_m, inked.pixels) - inked.true_m
+    apart_m = [
+        np.median(off_m[(inked.view == one) & black]) - np.median(off_m[(inked.view == one) & ~black])
+        for one in np.unique(inked.view)
+    ]
+    assert (offset_m, sd_m) == pytest.approx((np.mean(apart_m), sem(apart_m)))
 
 
 def test_what_is_found_goes_through_its_file(tmp_path):

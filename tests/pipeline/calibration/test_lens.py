@@ -40,6 +40,15 @@ def test_where_a_lens_folds_back_there_is_no_ray():
     assert np.isnan(rays[1]).all()
 
 
+def test_beyond_a_fold_there_is_no_ray_though_the_image_grows_again():
+    """r (1 - r^2 + 0.3 r^4) turns at 0.65 and at 1.26, and 1.8 is seen at 1.64."""
+    twice = Optics("thesis", MATRIX, np.array([-1.0, 0.3, 0.0, 0.0, 0.0]))
+    ways = np.array([[0.3, 0.4, 1.0], [1.8, 0.0, 1.0]])
+    rays = twice.rays(twice.project(ways))
+    np.testing.assert_allclose(rays[0] / rays[0, 2], ways[0], atol=1e-9)
+    assert np.isnan(rays[1]).all()
+
+
 @pytest.mark.parametrize("lens", LENSES)
 def test_derivatives_are_differences(lens):
     told, step = optics(lens).linearised(BOARD.points_m, POSE), 1e-6

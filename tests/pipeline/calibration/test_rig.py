@@ -94,6 +94,25 @@ def test_standard_errors_say_how_far_poses_and_lenses_are_off():
     assert 0.7 < np.std(z_lens) < 1.3
 
 
+def test_covariances_are_those_of_least_squares_with_their_degrees_of_freedom():
+    """(J^T J)^-1 times the squares over observations less parameters, with J by differences."""
+    given = session(cameras=2, moments=4, noise_px=0.3)
+    found = calibrate_rig(given.lenses(), given.seen, BOARD)
+    bundle = found.adjusted.bundle
+
+    def off_px(step):
+        return np.concatenate([one.ravel() for one in bundle.moved(step).residuals_px(found.sightings)])
+
+    J = np.stack([(off_px(h) - off_px(-h)) / 2e-6 for h in 1e-6 * np.eye(sum(bundle.sizes))], axis=1)
+    size, rest_px = np.linalg.norm(J, axis=0), off_px(np.zeros(J.shape[1]))
+    variance_px2 = rest_px @ rest_px / (J.shape[0] - J.shape[1])
+    spread = variance_px2 * np.linalg.inv((J / size).T @ (J / size)) / np.outer(size, size)
+    expected = np.split(np.sqrt(np.diag(spread)), np.cumsum(bundle.sizes)[:-1])
+    told = found.adjusted.camera_covariance, *found.adjusted.lens_covariances
+    for covariance, sds in zip(told, (expected[0], *expected[2:]), strict=True):
+        np.testing.assert_allclose(np.sqrt(np.diag(covariance)), sds, rtol=1e-4)
+
+
 def test_a_rig_knows_its_lenses_better_than_each_camera_does_and_so_its_poses():
     alone_px, together_px, held_mm, free_mm = [], [], [], []
     for seed in range(6):

@@ -1,13 +1,16 @@
 """How sure a camera is at a range: against many simulated calibrations, and lenses of a wrong kind."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import View, calibrate, settle
 from pipeline.calibration.lens import Optics
-from pipeline.calibration.trust import half_difference_px, projected_sd_px, sight
+from pipeline.calibration.trust import half_difference_px, projected_sd_px, sd_map, sight
 from pipeline.kernels.geometry import apply, rigid, rotation_exp
 from tests.pipeline.calibration.views import CAMERA
 
@@ -74,6 +77,25 @@ def test_millimetres_are_pixels_at_the_range():
         assert error_m == pytest.approx(told.range_m * error_px / 600.0, rel=0.05)
 
 
+def test_cells_cover_the_image_evenly_from_edge_to_edge():
+    """From half a pixel before the first pixel's middle to half a pixel behind the last one's."""
+    seen = sight(calibrate(views(0.0, 0), SIZE).optics, SIZE, 2.0)
+    for middles_px, size_px in ((seen.columns_px, SIZE[0]), (seen.rows_px, SIZE[1])):
+        half_px = 0.5 * size_px / len(middles_px)
+        np.testing.assert_allclose(np.diff(middles_px), 2.0 * half_px)
+        assert (middles_px[0], middles_px[-1]) == pytest.approx((half_px - 0.5, size_px - 0.5 - half_px))
+
+
+def test_the_worst_direction_is_the_longer_axis_of_the_ellipse():
+    """Variances 6 and 1 px^2 along (2, 1) and (-1, 2)."""
+    seen = sight(calibrate(views(0.0, 0), SIZE).optics, SIZE, 2.0)
+    count = len(seen.points_m)
+    flat = replace(seen, metres=np.tile(0.01 * np.eye(2), (count, 1, 1)))
+    told = sd_map(flat, np.tile([[5.0, 2.0], [2.0, 2.0]], (count, 1, 1)))
+    np.testing.assert_allclose(told.error_px, np.sqrt(6.0))
+    np.testing.assert_allclose(told.error_m, 0.01 * np.sqrt(6.0))
+
+
 def test_more_views_make_surer():
     few, many = (projected_sd_px(calibrate(views(0.2, 0, count), SIZE), 2.0).error_px for count in (6, 24))
     assert np.median(many) < 0.7 * np.median(few)
@@ -82,7 +104,10 @@ def test_more_views_make_surer():
 def test_halves_agree_within_noise_when_the_lens_is_right():
     told = [half_difference_px(views(0.2, seed), SIZE, 2.0) for seed in range(20)]
     assert sum(one.beyond_noise for one in told) <= 3
-    assert 0.6 < np.sqrt(np.mean([one.ratio**2 for one in told])) < 1.4
+    assert 0.5 < np.mean([one.ratio**2 for one in told]) < 1.2
+    # As for the root of the mean square of six normal numbers alike, of one alone, or between.
+    alike, alone = np.sqrt(chi2.ppf(0.95, [6, 1]) / [6, 1])
+    assert all(0.95 * alike < one.most_by_noise < 1.05 * alone for one in told)
 
 
 @pytest.mark.parametrize(

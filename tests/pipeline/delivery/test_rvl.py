@@ -74,6 +74,7 @@ def test_a_stream_without_its_end_is_refused(values, data):
         "04",  # four others
         "0000",  # neither zeros nor others, and no end
         "0310",  # a first depth of -1
+        "03a191a1",  # a second depth of 0, which is none
         "03fffffff0",  # a difference of more than 17 bits
         "03fffff700",  # a depth above 65535
         "3000",  # a whole stream, and a byte behind it

@@ -71,6 +71,15 @@ def test_a_lost_packet_leaves_all_but_the_tiles_in_it(name, room):
         np.testing.assert_array_equal(result.depth[~gone], room.depth[~gone])
 
 
+def test_tiles_that_follow_each_other_are_no_neighbours_in_the_image(room):
+    result = received(CODINGS["tiles"], room, 108, lambda count: np.abs(np.arange(count) - 700) > 30)
+    gone = np.argwhere((room.depth > 0) & (result.depth == 0)) // 32
+    tiles = np.unique(gone, axis=0)
+    assert len(tiles) > 5
+    apart = np.abs(tiles[:, None] - tiles).max(axis=2)
+    assert apart[~np.eye(len(tiles), dtype=bool)].min() > 1
+
+
 @pytest.mark.parametrize("name", ["tiles", "layered"])
 def test_every_color_tile_is_the_one_sent_or_the_base(name, room):
     coding = CODINGS[name]

@@ -3,6 +3,7 @@ import pytest
 
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.depth import align_depth
+from pipeline.depth.alignment import corrected
 from pipeline.types import DepthMap
 
 HEIGHT_PX, WIDTH_PX = 120, 160
@@ -64,6 +65,13 @@ def test_local_removes_a_smooth_bias_that_a_line_cannot(truth_m):
     assert error["local"] < 0.5 * error["affine_depth"]
 
 
+@pytest.mark.parametrize(("residual", "kept"), [(0.3, 0.3), (2.0, 0.5), (-2.0, -0.5)])
+def test_a_local_correction_follows_a_residual_up_to_a_half_either_way(truth_m, residual, kept):
+    everywhere = np.ones(truth_m.shape, bool)
+    found_m = corrected(truth_m * np.exp(-residual), truth_m, everywhere)
+    np.testing.assert_allclose(np.log(found_m / truth_m), kept - residual, atol=1e-3)
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_perfect_depth_stays_as_it_is(truth_m, mode):
     result = align_depth(DepthMap(truth_m.astype(np.float32)), _sensor(truth_m), mode)
@@ -111,6 +119,15 @@ def test_a_disparity_as_good_as_zero_leaves_the_depth_unknown(truth_m):
     z_m = align_depth(DepthMap(inferred_m.astype(np.float32)), sensor, "affine_inverse").depth.z_m
     assert np.isnan(z_m[0, :5]).all()
     assert np.isfinite(z_m[1:]).all()
+
+
+def test_a_depth_from_disparity_is_known_up_to_three_times_the_sensors_farthest(truth_m):
+    sensor_m, inferred_m = truth_m.copy(), truth_m.copy()
+    sensor_m[0, :2] = np.nan
+    inferred_m[0, :2] = np.nanmax(sensor_m) * np.array([2.99, 3.01])
+    result = align_depth(DepthMap(inferred_m), DepthMap(sensor_m), "affine_inverse")
+    assert result.depth.z_m[0, 0] == pytest.approx(inferred_m[0, 0], rel=1e-5)
+    assert np.isnan(result.depth.z_m[0, 1])
 
 
 def test_a_flat_wall_determines_a_scale_only(truth_m):

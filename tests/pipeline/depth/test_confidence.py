@@ -5,7 +5,16 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.depth import align_depth
-from pipeline.depth.confidence import judge, meet_rims
+from pipeline.depth.alignment import AlignmentResult
+from pipeline.depth.completion import CompletedDepth
+from pipeline.depth.confidence import (
+    confidence_of,
+    confirmed_relief,
+    distance_to_measured,
+    features_of_completion,
+    judge,
+    meet_rims,
+)
 from pipeline.types import DepthMap
 
 HEIGHT_PX, WIDTH_PX = 240, 320
@@ -133,6 +142,46 @@ def test_confidence_falls_inwards_and_with_the_residual():
     assert (bad[HOLE] < good[HOLE]).all()
     assert good[sensor.valid].min() > 0.99
     assert bad[sensor.valid].mean() < 0.75
+
+
+@pytest.mark.parametrize(("ratio", "agrees"), [(1.049, 1.0), (1.051, 0.0), (0.951, 1.0), (0.949, 0.0)])
+def test_depth_agrees_with_the_sensor_within_five_per_cent_of_the_sensors(ratio, agrees):
+    sensor_m = floor_m().astype(np.float32)
+    aligned = AlignmentResult(DepthMap(ratio * sensor_m), "median", {}, 0.0, 0.0)
+    everywhere = np.zeros(sensor_m.shape, np.float32)
+    confidence = confidence_of(aligned, DepthMap(sensor_m), everywhere)
+    np.testing.assert_allclose(confidence, agrees, atol=1e-3)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_relief_is_the_share_of_slopes_that_the_sensor_confirms_off_its_edges(axis):
+    """A depth step of 0.3 at which the network has only 0.1 is an edge, and does not count."""
+    place = np.indices((HEIGHT_PX, WIDTH_PX))[axis].astype(np.float32)
+    log_z = 0.002 * place
+    log_p = 0.6 * log_z + np.where(place > 100, np.float32(0.3), np.float32(0.0))
+    log_z += np.where(place > 100, np.float32(0.1), np.float32(0.0))
+    everywhere = np.ones(place.shape, bool)
+    assert confirmed_relief(log_z, log_p, everywhere) == pytest.approx(0.6, abs=1e-3)
+
+
+def test_what_tells_of_completed_depth_is_worked_out():
+    aligned, completed = np.full((2, 2, 3), 2.0, np.float32)
+    aligned[0, 0], completed[1] = np.nan, 3.0
+    distance = np.full((2, 3), 0.1, np.float32)
+    log_scale = np.full((2, 3), -2.2, np.float32)  # half more than the usual -2.7
+    features = features_of_completion(
+        DepthMap(aligned), CompletedDepth(DepthMap(completed), log_scale), distance
+    )
+    same, apart = np.log(0.005), np.log(np.log(1.5) + 0.005)
+    dissent = [[same, same, same], [apart, apart, apart]]
+    for found, expected in zip(features, (0.5, 0.25, np.log(0.1), dissent), strict=True):
+        np.testing.assert_allclose(found, np.broadcast_to(expected, (2, 3)), rtol=1e-5)
+
+
+def test_distances_are_shares_of_the_diagonal():
+    measured = np.ones((300, 400), bool)
+    measured[:, 100:] = False
+    assert distance_to_measured(measured)[150, 149] == pytest.approx(50 / 500, rel=1e-3)
 
 
 def test_less_is_kept_the_more_confidence_is_asked_for():

@@ -42,6 +42,19 @@ def test_a_slope_goes_on_past_the_rim_and_fades():
     assert steps[-30:].mean() < 0.5 * steps[:8].mean()
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_slope_loses_three_per_cent_of_the_mean_of_the_rings_before(axis):
+    """Behind a straight rim slopes fall as l^k, with 1 = .97 (w1 / l + w2 / l^2 + w3 / l^3)."""
+    shape = (320, 240) if axis == 0 else (240, 320)
+    field = 0.004 * np.indices(shape)[axis].astype(np.float32)
+    known = np.indices(shape)[axis] < 200
+    filled = extrapolated(np.where(known, field, np.float32(0.0)), known, np.full((*shape, 3), 90, np.uint8))
+    weights = np.exp(-(np.arange(1, 4) ** 2) / (2.0 * 1.7**2))
+    decay = max(np.roots([1.0, *(-0.97 * weights / weights.sum())]).real)
+    steps = np.diff(np.moveaxis(filled, axis, 0)[:, 120])
+    assert steps[270] / steps[220] == pytest.approx(decay**50, rel=0.01)
+
+
 @pytest.mark.parametrize("shape", [(2, 2), (5, 700), (37, 53), (480, 640), (300, 1280)])
 @pytest.mark.parametrize("share", [0.02, 0.9])
 def test_what_is_known_stays_and_the_rest_is_finite_whatever_the_size(shape, share):

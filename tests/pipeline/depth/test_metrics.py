@@ -15,6 +15,8 @@ def test_a_hand_computed_map():
     assert errors.sq_rel == pytest.approx((0 + 0.5 + 1.0) / 3)
     assert errors.rmse_log == pytest.approx(math.sqrt((math.log(1.5) ** 2 + math.log(2) ** 2) / 3))
     assert (errors.delta_1, errors.delta_2, errors.delta_3) == pytest.approx((1 / 3, 2 / 3, 2 / 3))
+    mean = (math.log(1.5) - math.log(2)) / 3
+    assert errors.silog == pytest.approx(math.sqrt(errors.rmse_log**2 - mean**2))
 
 
 def test_a_perfect_map_has_no_error():
@@ -41,9 +43,11 @@ def test_ratio_errors_are_symmetric():
         assert getattr(forward, name) == pytest.approx(getattr(backward, name))
 
 
-def test_depth_beyond_the_cap_does_not_count():
+def test_depth_beyond_the_cap_or_nearer_than_ten_centimetres_does_not_count():
     truth_m = np.array([[2.0, 12.0]])
     assert depth_errors(np.array([[2.0, 1.0]]), truth_m).rmse_m == 0.0
+    assert depth_errors(np.array([[2.0, 1.0]]), np.array([[2.0, 0.09]])).rmse_m == 0.0
+    assert depth_errors(np.array([[2.0, 1.0]]), np.array([[2.0, 0.11]])).rmse_m > 0.6
     assert depth_errors(np.array([[2.0, 1.0]]), truth_m, cap_m=80.0).rmse_m > 7.0
 
 

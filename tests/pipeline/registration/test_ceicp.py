@@ -74,6 +74,11 @@ def test_the_scale_of_a_shrinks_to_its_floor_and_doubles_once():
     assert CeicpA(0.15, 0.2, 0.03, 0.5).widened().sigma_m == 0.2
 
 
+def test_the_scale_of_n_is_the_root_mean_square_of_the_kept_distances():
+    kept = CeicpN(0.1).weigh(pairs_at([0.01, 0.5, 0.07]))  # (1 + 49) / 2 = 5^2
+    assert kept.sigma_m == pytest.approx(0.05, rel=1e-12)
+
+
 def test_a_noisy_sensor_lifts_the_floor():
     grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3) * 0.01
     config = RegistrationConfig()

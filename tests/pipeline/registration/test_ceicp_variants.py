@@ -1,5 +1,7 @@
 """CEICP-R, CEICP-ML and kernel correlation against what SPEC 4.4 says of them."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -107,6 +109,14 @@ def test_the_box_turns_with_the_cloud():
     assert volume_m3 == pytest.approx(8.0, rel=0.15)
     assert box_volume_m3(PointCloud(points_m).transformed(AWAY).points_m, 0.1) == pytest.approx(volume_m3)
     assert box_volume_m3(points_m * [1.0, 1.0, 0.0], 0.1) == pytest.approx(0.2, rel=0.15)
+
+
+def test_an_outlier_of_ml_is_anywhere_in_the_targets_box():
+    """w0 / (1 - w0) |Q| / V with w0 = 0.2: a quarter of 300 points in 8 cubic metres."""
+    target = PointCloud(np.array(list(product((0.0, 1.0), (0.0, 2.0), (0.0, 4.0)))))
+    source = PointCloud(np.random.default_rng(0).normal(size=(300, 3)))
+    method = CeicpMl.starting(RegistrationConfig("ceicp-ml"), source, target)
+    assert method.outlier_density == pytest.approx(0.25 * 300 / 8.0)
 
 
 def test_ml_asks_five_or_all_of_a_small_source():

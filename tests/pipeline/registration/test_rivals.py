@@ -184,8 +184,7 @@ def test_levels_shrink_to_all_points_when_they_come_to_rest(start, thinning):
         tolerances.append(method.tolerance)
     assert levels == list(range(levels[0], -1, -1))
     assert shares == [thinning**-level for level in levels]
-    assert tolerances[-1] == 1.0
-    assert (np.diff(tolerances) < 0.0).all()
+    assert tolerances == ([8, 4, 2, 1] if thinning == 4 else [25, 16, 9, 4, 1])
     assert levels[0] == (3 if thinning == 4 else 4)
     assert method.following(None, still=True).settled
 
@@ -237,6 +236,17 @@ def test_ricp_knows_the_present_pose():
     rows = np.arange(100)
     pairs = Matching(rows, rows, source_m, target_m, np.linalg.norm(source_m - target_m, axis=1))
     assert Ricp(0).weigh(pairs).rows.tolist() == list(range(49, 100))
+
+
+@pytest.mark.parametrize(("far_m", "kept"), [(6.7, 10), (6.9, 8)])
+def test_ricp_keeps_two_and_a_half_robust_sds_which_are_wider_for_few_pairs(far_m, kept):
+    """2.5 x 1.4826 (1 + 5 / (10 - 4)) = 6.8: no motion of one place makes a ring around it any nearer."""
+    turn = 2.0 * np.pi * np.arange(8) / 8
+    ring_m = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+    target_m = np.concatenate([ring_m, [[0.0, 0.0, far_m], [0.0, 0.0, -far_m]]])
+    rows = np.arange(10)
+    pairs = Matching(rows, rows, np.zeros((10, 3)), target_m, np.linalg.norm(target_m, axis=1))
+    assert Ricp(0).weigh(pairs).rows.tolist() == list(range(kept))
 
 
 def test_ricp_draws_anew_every_iteration_and_the_same_for_a_seed(halves):

@@ -1,5 +1,7 @@
 """Our own ball pivoting on clouds whose surface is known, and beside Open3D's."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,8 @@ from pipeline.kernels.rays import triangle_areas_m2
 from pipeline.surface.boundary import boundary_loops, edges_and_faces
 from pipeline.surface.normals import estimate_normals
 from pipeline.surface.pivoting import Roller, iterate_roll, roll
+from pipeline.surface.pivoting.ball import is_empty
+from pipeline.surface.pivoting.grid import build_grid
 from pipeline.surface.radii import spacing
 from pipeline.surface.voxel import voxel_average
 from pipeline.types import PointCloud
@@ -82,6 +86,27 @@ def test_a_larger_ball_goes_on_and_closes_the_hole():
     np.testing.assert_array_equal(large.triangles[: len(small.triangles)], small.triangles)
     assert np.all(large.radius_index == (np.arange(len(large.triangles)) >= len(small.triangles)))
     assert triangle_areas_m2(cloud.points_m, large.triangles).sum() == pytest.approx(0.09, rel=0.01)
+
+
+@pytest.mark.parametrize("corners", list(permutations(range(3))))
+def test_a_balls_own_three_points_leave_it_empty_and_any_other_does_not(corners):
+    """However deep rounding has put them."""
+    points_m = 0.3 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    found = np.empty(5, np.int32)
+    for ids, empty in (([0, 1, 2], True), ([0, 1, 2, 3], False)):
+        grid = build_grid(points_m, np.array(ids), 2.0)
+        assert is_empty(grid, found, *corners, 0.0, 0.0, 0.0, 1.0) == empty
+
+
+def test_the_first_triangle_is_the_one_whose_farther_corner_is_nearest():
+    """Corners 1.0 and 1.2 away, not 0.5 and 1.5; what lies outside without a normal moves the grid."""
+    away_m, angle = np.array([0.0, 1.0, 1.2, 0.5, 1.5]), np.radians([0.0, 200.0, 150.0, 20.0, 60.0])
+    points_m = np.column_stack([away_m * np.cos(angle), away_m * np.sin(angle), 0.0 * angle])
+    points_m[0, 2] = 0.001  # the first in its cell
+    outside_m = -np.arange(5.0, 9.0)[:, None] * np.ones(3)
+    normals = np.concatenate([np.tile(UP, (5, 1)), np.zeros((4, 3))])
+    first = next(Roller(np.concatenate([points_m, outside_m]), normals).iterate(1.0, batch=1))
+    assert sorted(first.triangles[0].tolist()) == [0, 1, 2]
 
 
 def test_a_ball_smaller_than_half_the_spacing_falls_through():

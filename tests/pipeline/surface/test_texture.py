@@ -104,6 +104,40 @@ def test_what_one_camera_cannot_see_takes_the_other():
     assert (texture.camera[hidden] != 0).all()
 
 
+def triangle_at(x_m, z_m):
+    """A small one on the wall."""
+    corners_m = np.array([[-0.04, 0.0, -0.02], [0.04, 0.0, -0.02], [0.0, 0.0, 0.04]])
+    return Surface(corners_m + np.array([x_m, 0.0, z_m]), np.array([[0, 1, 2]], np.int32))
+
+
+def chosen(surface, *places_m):
+    """Of cameras there that look at the wall's middle, which each triangle takes."""
+    cameras = [Camera(LENS, look_at(place_m, (0.0, 0.0, 1.0))) for place_m in places_m]
+    return photographed(surface, cameras, [(np.zeros((240, 320, 3), np.uint8), None)] * len(cameras)).camera
+
+
+@pytest.mark.parametrize(("cosine", "taken"), [(0.65, 1), (0.5, 0)])
+def test_pixels_for_an_area_go_with_the_cosine_over_the_square_of_the_distance(cosine, taken):
+    """1 / 2^2 = 0.25 straight before it, and 0.65 / 1.5^2 = 0.29 or 0.5 / 1.5^2 = 0.22 from beside."""
+    beside_m = 1.5 * np.sqrt(1.0 - cosine**2), -1.5 * cosine, 1.0
+    assert chosen(triangle_at(0.0, 1.0), (0.0, -2.0, 1.0), beside_m).tolist() == [taken]
+
+
+@pytest.mark.parametrize(("first_column", "taken"), [(161, 1), (162, 0)])
+def test_beside_the_rim_of_what_stands_before_it_another_camera_is_taken(first_column, taken):
+    """The triangle's middle is at pixel (160, 120), and a board hides all from a column on its right on."""
+    edge_m = (first_column - 0.5 - 159.5) / 200.0
+    board = grid((edge_m, -1.0, 0.5), (0.5, 0.0, 0.0), (0.0, 0.0, 1.0), 1)
+    wall = triangle_at(0.005, 0.995)
+    scene = Surface(
+        np.concatenate([wall.vertices_m, board.vertices_m]),
+        np.concatenate([wall.triangles, board.triangles + 3]).astype(np.int32),
+    )
+    before_m, beside_m = (0.0, -2.0, 1.0), (-2.4, -1.8, 1.0)
+    assert chosen(scene, before_m, beside_m)[0] == taken
+    assert chosen(scene, before_m)[0] == 0
+
+
 def test_what_nobody_sees_has_no_photograph_and_is_white():
     away = Camera(LENS, look_at((0.0, -3.0, 1.0), (0.0, -6.0, 1.0)))
     texture = photographed(WALL, [away], [(photograph(LEFT), None)])
