@@ -113,8 +113,8 @@ def trust_table(view: TrustView) -> Markup:
             ),
             (
                 "Two halves apart",
-                f"{TWO_HALVES} This is how far apart both put a point at the range, root mean square over the "
-                "image. A lens of the wrong kind shows here.",
+                f"{TWO_HALVES} This is how far apart both put a point at the range, root mean square over "
+                "the image. A lens of the wrong kind shows here.",
                 number(view.difference_m, 2, "mm", 1000.0),
             ),
             (
