@@ -117,7 +117,11 @@ class LessonFolder(Generic[Look]):
         return "" if self._index() < 0 else str(self._index() + 1)
 
     def take(self, place: str) -> None:
-        """Go to the stop with this number; leave the lesson if it is empty."""
+        """Go to the stop with this number; leave the lesson if it is empty.
+
+        Raises:
+            InputError: there is no such stop.
+        """
         numbers = ["", *(str(number) for number in range(1, len(self._names) + 1))]
         if place not in numbers:
             raise InputError(f"The address has stop {place[:9]}; this lesson has 1 to {len(self._names)}")

@@ -32,7 +32,11 @@ class Markdown(Markup):
 
     @classmethod
     def escape(cls, s: Any, /) -> Markdown:
-        """Return a value as markdown that shows its plain text; markup stays markup."""
+        """Return a value as markdown that shows its plain text; markup stays markup.
+
+        Args:
+            s: any value; ``Markup`` keeps its tags, ``Markdown`` is returned unchanged.
+        """
         if isinstance(s, Markdown):
             return s
         line = re.sub(r"\s+", " ", escape(s))

@@ -150,6 +150,9 @@ def split(left: ByteArray, right: ByteArray, share: float) -> ByteArray:
         left: (H, W, 3) RGB.
         right: (H, W, 3) RGB.
         share: share of the width that shows ``left``, 0 to 1; at 0 and 1 there is no line.
+
+    Returns:
+        (H, W, 3), with a white line edged in black.
     """
     width = left.shape[1]
     column = round(share * width)

@@ -64,7 +64,11 @@ def get(config: Any, path: str) -> Any:
 
 
 def put(config: Any, path: str, value: Any) -> Any:
-    """Return ``config`` with the value at a dotted path replaced."""
+    """Return ``config`` with the value at a dotted path replaced.
+
+    Raises:
+        InputError: the config refuses the value.
+    """
     head, _, rest = path.partition(".")
     inner = put(getattr(config, head), rest, value) if rest else value
     return dataclasses.replace(config, **{head: inner})

@@ -13,7 +13,7 @@ from app.compute.records import Picture
 from app.compute.state import Spec
 from app.compute.store import Store
 from app.drawing.pictures import depth_picture, depth_range_m
-from app.screens.depth.brush import covered, window_around
+from app.screens.depth.discs import covered, window_around
 from app.screens.depth.view import Disc, FillRow, HiddenView, HideRequest
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
@@ -63,7 +63,11 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
 
 
 def hidden_pixels(sensor: DepthMap, discs: Sequence[Disc]) -> BoolArray:
-    """Return (H, W) the measured pixels of all discs."""
+    """Return (H, W) the measured pixels of all discs.
+
+    Raises:
+        InputError: there are fewer than 50.
+    """
     rows, columns = sensor.z_m.shape
     y, x = np.ogrid[:rows, :columns]
     hidden = covered(discs, x, y, columns, rows) & sensor.valid

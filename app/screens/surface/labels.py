@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import viser
-
 from app.compute.records import ColorBar, Shown
 from app.drawing.colors import DISTANCE_STOPS, INFERRED, MOST_DISTANCE_M, NEUTRAL, TARGET, css
 from app.drawing.legend import Legend
 from app.screens.surface.view import BaselineName, Coloring
 from app.web.markup import Markdown, Markup
-from app.window.in_address import InAddress, Picked
 from app.window.tables import bar_html
 from pipeline.config import RadiusRule
 from pipeline.surface.findings import SEAM_M
@@ -45,6 +40,7 @@ RULES: dict[str, RadiusRule] = {
     "one radius (slider)": "manual",
 }
 """Rules for the radii of the balls."""
+RULE_NAMES = {rule: name for name, rule in RULES.items()}
 NAMES: dict[Shown, str] = {
     "after": "After fusion",
     "before": "Before fusion",
@@ -58,17 +54,6 @@ HINTS = {
     "Show": "Which surface is drawn: the ball's, or that of another method over the same points.",
     "Colours": "What the colours of the surface mean.",
 }
-
-
-def picked(
-    shown: viser.GuiDropdownHandle[str],
-    on_shown: Callable[[], None],
-    coloring: viser.GuiDropdownHandle[str],
-    on_coloring: Callable[[], None],
-) -> dict[str, InAddress]:
-    """Return the screen's lists, each with its callback, by their keys in the address."""
-    colors: dict[str, str] = {key: label for label, key in COLORINGS.items()}
-    return {"surface": Picked(shown, PLACES, on_shown), "color": Picked(coloring, colors, on_coloring)}
 
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"

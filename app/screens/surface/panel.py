@@ -10,27 +10,16 @@ from app.compute.state import Spec, Step
 from app.drawing.cameras import stage_of, turn
 from app.lesson.files import Numbers, read_lesson
 from app.lesson.player import LessonFolder
+from app.screens.surface import labels
 from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.baselines import Baselines
 from app.screens.surface.export import surface_offers
 from app.screens.surface.holes import HolesFolder
-from app.screens.surface.labels import (
-    AFTER,
-    BASELINES,
-    BOTH,
-    COLORINGS,
-    HINTS,
-    RULES,
-    SHOWN,
-    TEXT,
-    legend_html,
-    picked,
-)
 from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook, numbers, surface_of
 from app.screens.surface.numbers import quality_table, quick_line
 from app.screens.surface.quick import QuickLook
 from app.screens.surface.rolling import Walks
-from app.screens.surface.settings import ADVANCED, slider_range_mm, with_rule
+from app.screens.surface.settings import ADVANCED, picked, slider_range_mm, with_rule
 from app.screens.surface.stage import ChosenBall, SurfaceStage
 from app.screens.surface.sweep_plot import spacing_figure
 from app.screens.surface.view import (
@@ -47,8 +36,6 @@ from app.window.controls import Controls
 from app.window.in_address import STOP
 from app.window.panel import Offers, Panel
 from pipeline.types import FloatArray
-
-NAMES = {rule: name for name, rule in RULES.items()}
 
 
 class SurfacePanel(Panel):
@@ -67,19 +54,21 @@ class SurfacePanel(Panel):
         self._by_click = self._quickly_drawn = False
         self._thinning: tuple[int, int] | None = None
         self._key = session.spec.key("surface")
-        gui.add_markdown(TEXT)
+        gui.add_markdown(labels.TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, SurfaceLook(), NUMBERS)
         self._lesson = LessonFolder(self.ui, lesson, self._take_look, self._lesson_numbers)
         self._radius = gui.add_slider(
             "Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint="Radius of the ball; drag to roll another."
         )
         self.ui.when_changed(self._radius, self._dragged)
-        rule = NAMES[session.spec.config.surface.radius_rule]
-        self._rule = gui.add_dropdown("Radii", list(RULES), initial_value=rule, hint=HINTS["Radii"])
+        rule = labels.RULE_NAMES[session.spec.config.surface.radius_rule]
+        self._rule = gui.add_dropdown(
+            "Radii", list(labels.RULES), initial_value=rule, hint=labels.HINTS["Radii"]
+        )
         self.ui.when_changed(self._rule, self._picked_rule)
-        self._shown = gui.add_dropdown("Show", list(SHOWN), hint=HINTS["Show"])
-        self._coloring = gui.add_dropdown("Colours", list(COLORINGS), hint=HINTS["Colours"])
-        self._legend = gui.add_html(legend_html("photo", False))
+        self._shown = gui.add_dropdown("Show", list(labels.SHOWN), hint=labels.HINTS["Show"])
+        self._coloring = gui.add_dropdown("Colours", list(labels.COLORINGS), hint=labels.HINTS["Colours"])
+        self._legend = gui.add_html(labels.legend_html("photo", False))
         self._loops = gui.add_checkbox("Hole rims", True, hint="Edges with one triangle only, in red.")
         self._unused = gui.add_checkbox("Points left out", True, hint="Those that the ball never rested on.")
         self.ui.when_changed(self._coloring, self._picked_coloring)
@@ -118,7 +107,7 @@ class SurfacePanel(Panel):
     @property
     def wide(self) -> bool:
         """Whether both surfaces are shown."""
-        return self._shown.value == BOTH
+        return self._shown.value == labels.BOTH
 
     @property
     def ahead(self) -> bool:
@@ -131,14 +120,14 @@ class SurfacePanel(Panel):
             return
         self._key = spec.key("surface")
         self._controls.write(spec.config)
-        self._rule.value = NAMES[spec.config.surface.radius_rule]
+        self._rule.value = labels.RULE_NAMES[spec.config.surface.radius_rule]
         thinning = (spec.config.surface.max_points, spec.config.surface.smoothing_passes)
         if thinning != self._thinning:
             self._advice.forget()
         self._thinning = thinning
         self._baselines.forget()
-        if self._shown.value in BASELINES:
-            self._shown.value = AFTER
+        if self._shown.value in labels.BASELINES:
+            self._shown.value = labels.AFTER
         self._walks.close()
         self._arrange()
 
@@ -160,10 +149,10 @@ class SurfacePanel(Panel):
 
     def _dragged(self) -> None:
         """Show this ball's surface at once, and compute everything when the slider rests."""
-        if self._shown.value in BASELINES:
-            self._shown.value = AFTER
+        if self._shown.value in labels.BASELINES:
+            self._shown.value = labels.AFTER
             self._arrange()
-        which, coloring = self._stage.which, COLORINGS[self._coloring.value]
+        which, coloring = self._stage.which, labels.COLORINGS[self._coloring.value]
         request = PaintRequest(which, coloring, self._radius.value / 1000.0, ray=self._ball.ray())
         self._look_quickly.want(request)
         self.session.show_staleness()
@@ -187,7 +176,7 @@ class SurfacePanel(Panel):
         self._radius.value = round(2000.0 * radius_m) / 2.0
 
     def _picked_rule(self) -> None:
-        self.session.edit(with_rule(RULES[self._rule.value], self._radius.value))
+        self.session.edit(with_rule(labels.RULES[self._rule.value], self._radius.value))
 
     # Drawing.
 
@@ -197,7 +186,7 @@ class SurfacePanel(Panel):
             self._quickly_drawn = False
             self._ball.hide()
             self._stage.draw_unused(view.unused)
-            if COLORINGS[self._coloring.value] == "photo":
+            if labels.COLORINGS[self._coloring.value] == "photo":
                 self._stage.draw("after", view.after)
                 if view.before is not None:
                     self._stage.draw("before", view.before)
@@ -219,7 +208,7 @@ class SurfacePanel(Panel):
                 self._load_holes()
             self._show_look()
             self._lesson.refresh()
-            if BASELINES.get(self._shown.value) not in (None, *self._baselines.views):
+            if labels.BASELINES.get(self._shown.value) not in (None, *self._baselines.views):
                 self._picked_shown()  # the address asked for a baseline before there was a surface
             self._walks.folder.resume()
 
@@ -230,7 +219,7 @@ class SurfacePanel(Panel):
 
     def _repaint(self) -> None:
         """Request the surfaces of the settings in the chosen colours."""
-        coloring = COLORINGS[self._coloring.value]
+        coloring = labels.COLORINGS[self._coloring.value]
         if coloring != "photo" and self.session.results.view("fuse") is not None:
             session = self.session
             request = PaintRequest(("after", "before"), coloring)
@@ -238,7 +227,7 @@ class SurfacePanel(Panel):
 
     def _painted(self, view: PaintedView | None) -> None:
         """Draw the painted surface, unless another one is due by now."""
-        if view is None or view.request.coloring != COLORINGS[self._coloring.value]:
+        if view is None or view.request.coloring != labels.COLORINGS[self._coloring.value]:
             return
         quick = view.request.radius_m is not None
         if quick != self._look_quickly.moving:
@@ -255,7 +244,7 @@ class SurfacePanel(Panel):
 
     def _picked_shown(self) -> None:
         """Show another surface; a baseline is computed first."""
-        name = BASELINES.get(self._shown.value)
+        name = labels.BASELINES.get(self._shown.value)
         self._quick.content = Markup("")
         if name is None or self._view is None:
             self._load_holes()
@@ -266,16 +255,16 @@ class SurfacePanel(Panel):
     def _made(self, name: BaselineName, made: bool) -> None:
         """Handle a baseline that was computed or failed."""
         if not made:
-            self._shown.value, self._quick.content = AFTER, Markup("")
+            self._shown.value, self._quick.content = labels.AFTER, Markup("")
         else:
             self._show_numbers()
-            if BASELINES.get(self._shown.value) == name:
+            if labels.BASELINES.get(self._shown.value) == name:
                 self._baselines.show(name)
         self._arrange()
 
     def _picked_coloring(self) -> None:
         self._holes.unfill()
-        self._legend.content = legend_html(COLORINGS[self._coloring.value], self._has_truth())
+        self._legend.content = labels.legend_html(labels.COLORINGS[self._coloring.value], self._has_truth())
         if self._view is not None:
             self._take(self._view)
 
@@ -290,10 +279,12 @@ class SurfacePanel(Panel):
             place = None if scene is None else stage_of(scene.nodes)
             loops, unused = bool(self._loops.value), bool(self._unused.value)
             self._stage.arrange(place, loops, unused, self._rolling.showing)
-            baseline = self._shown.value in BASELINES
+            baseline = self._shown.value in labels.BASELINES
             self._coloring.disabled = baseline  # a baseline's vertices are no points with a source
-            self._legend.content = legend_html(COLORINGS[self._coloring.value], self._has_truth(), baseline)
-        shown = SHOWN[self._shown.value]
+            self._legend.content = labels.legend_html(
+                labels.COLORINGS[self._coloring.value], self._has_truth(), baseline
+            )
+        shown = labels.SHOWN[self._shown.value]
         if shown != self.session.spec.shown:
             self.session.want(replace(self.session.spec, shown=shown))
         self.session.frame_view()
@@ -312,12 +303,12 @@ class SurfacePanel(Panel):
 
     def _load_holes(self) -> None:
         if self._view is not None and self._view.holes:
-            shown = None if self.wide or self._shown.value in BASELINES else self._stage.which[0]
+            shown = None if self.wide or self._shown.value in labels.BASELINES else self._stage.which[0]
             self._holes.load(self._view.holes, shown)
 
     def _clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
         """Explain the hole that was clicked."""
-        if self._rolling.showing or self._shown.value in BASELINES:
+        if self._rolling.showing or self._shown.value in labels.BASELINES:
             return
         self._ball.clicked(origin_m, direction)
         for which in self._stage.which:
@@ -368,7 +359,9 @@ class SurfacePanel(Panel):
         session = self.session
         with self.ui.atomic():
             self._shown.value = look.shown
-            self._coloring.value = next(name for name, key in COLORINGS.items() if key == look.coloring)
+            self._coloring.value = next(
+                name for name, key in labels.COLORINGS.items() if key == look.coloring
+            )
             self._loops.value = look.rims
             self._walks.close()
             self._picked_coloring()
@@ -398,7 +391,7 @@ class SurfacePanel(Panel):
                 self._show_look()
             return
         self._look = None
-        if look.shown in BASELINES:
+        if look.shown in labels.BASELINES:
             self._shown.value = look.shown
         self._picked_shown()
         if look.holes:

@@ -6,8 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import viser
+
+from app.screens.surface.labels import COLORINGS, PLACES
 from app.screens.surface.view import SpacingView
 from app.window.controls import Number
+from app.window.in_address import InAddress, Picked
 from pipeline.config import PipelineConfig, RadiusRule
 
 ADVANCED = (
@@ -43,3 +47,14 @@ def slider_range_mm(spacing: SpacingView, radii_m: Sequence[float]) -> tuple[flo
     widest_m = 1.5 * (spacing.r_F_m + 4.0 * spacing.sigma_D_m)
     most_m = max(*radii_m, widest_m, 6.5 * spacing.r_F_m)
     return max(0.5, math.floor(500.0 * spacing.r_F_m)), math.ceil(1000.0 * most_m)
+
+
+def picked(
+    shown: viser.GuiDropdownHandle[str],
+    on_shown: Callable[[], None],
+    coloring: viser.GuiDropdownHandle[str],
+    on_coloring: Callable[[], None],
+) -> dict[str, InAddress]:
+    """Return the screen's lists, each with its callback, by their keys in the address."""
+    colors: dict[str, str] = {key: label for label, key in COLORINGS.items()}
+    return {"surface": Picked(shown, PLACES, on_shown), "color": Picked(coloring, colors, on_coloring)}

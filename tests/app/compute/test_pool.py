@@ -263,9 +263,8 @@ def test_a_warm_up_that_fails_leaves_a_process_that_works():
 
 def test_computing_processes_import_nothing_slow_that_they_do_not_need():
     slow = ("viser", "dash", "scipy.stats", "torch", "matplotlib", "pandas")
-    script = (
-        f"import sys; from app.jobs import warm_up; list(warm_up()); print(set({slow}) & set(sys.modules))"
-    )
+    script = "import sys; from app.compute.jobs import warm_up; list(warm_up()); "
+    script += f"print(set({slow}) & set(sys.modules))"
     told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == "set()"
 

@@ -52,7 +52,7 @@ def test_a_result_is_computed_once_and_others_beside_it(tmp_path):
 def test_another_process_finds_it(tmp_path):
     counted(Store(str(tmp_path)), ("stage", "key"), [1, 2, 3])
     script = (
-        "import sys; from app.store import Store; from packetmesh.progress import drain\n"
+        "import sys; from app.compute.store import Store; from packetmesh.progress import drain\n"
         "def refuse():\n    raise SystemExit('computed again')\n    yield\n"
         "print(drain(Store(sys.argv[1]).remember(('stage', 'key'), refuse)))"
     )

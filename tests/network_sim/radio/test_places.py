@@ -33,7 +33,7 @@ def test_a_grid_that_is_full_has_a_node_on_every_corner_but_the_sinks() -> None:
 
 
 def test_random_nodes_fill_a_square_with_one_spacing_squared_each() -> None:
-    placed, side = places(3999, "random")[:-1], np.sqrt(4000)
+    placed, side = places(899, "random")[:-1], 30.0
     assert np.abs(placed).max() <= 0.5 * side
-    np.testing.assert_allclose(placed.mean(axis=0), 0.0, atol=0.02 * side)
-    np.testing.assert_allclose(placed.std(axis=0), side / np.sqrt(12.0), rtol=0.03)
+    np.testing.assert_allclose(placed.mean(axis=0), 0.0, atol=0.04 * side)
+    np.testing.assert_allclose(placed.std(axis=0), side / np.sqrt(12.0), rtol=0.06)

@@ -13,6 +13,7 @@ from pipeline.surface.normals import estimate_normals
 from pipeline.surface.pivoting import Roller, iterate_roll, roll
 from pipeline.surface.pivoting.ball import is_empty
 from pipeline.surface.pivoting.grid import build_grid
+from pipeline.surface.pivoting.roll import pivot
 from pipeline.surface.radii import spacing
 from pipeline.surface.voxel import voxel_average
 from pipeline.types import PointCloud
@@ -96,6 +97,25 @@ def test_a_balls_own_three_points_leave_it_empty_and_any_other_does_not(corners)
     for ids, empty in (([0, 1, 2], True), ([0, 1, 2, 3], False)):
         grid = build_grid(points_m, np.array(ids), 2.0)
         assert is_empty(grid, found, *corners, 0.0, 0.0, 0.0, 1.0) == empty
+
+
+def test_a_ball_stops_at_what_it_meets_first_though_something_just_behind_it_is_nearer():
+    """Its centre goes around the z axis; it meets a far point after 90 degrees, and a near one after 352."""
+    size_m = np.sqrt(1.0 - 0.1**2)
+
+    def met_at(angle_deg, axis_m):
+        """A point so far from the axis that the ball comes onto it there."""
+        ahead = np.arccos((size_m**2 + axis_m**2 - 1.0) / (2.0 * size_m * axis_m))
+        angle = np.radians(angle_deg) + ahead
+        return axis_m * np.array([np.cos(angle), np.sin(angle), 0.0])
+
+    points_m = np.array([[0.0, 0.0, -0.1], [0.0, 0.0, 0.1], met_at(352.0, 1.993), met_at(90.0, 1.0)])
+    grid, found = build_grid(points_m, np.arange(4), 2.0), np.empty(5, np.int32)
+    hit, *center_m = pivot(points_m, grid, found, 0, 1, np.array([size_m, 0.0, 0.0]), 1.0)
+    assert hit == 3
+    np.testing.assert_allclose(center_m, (0.0, size_m, 0.0), atol=1e-9)
+    without = build_grid(points_m, np.arange(3), 2.0)
+    assert pivot(points_m, without, found, 0, 1, np.array([size_m, 0.0, 0.0]), 1.0)[0] == 2
 
 
 def test_the_first_triangle_is_the_one_whose_farther_corner_is_nearest():
@@ -222,6 +242,16 @@ def test_batches_show_the_front_and_can_be_cancelled():
     cancelled.close()
     assert len(roller.rolled.triangles) == 100
     assert len(roller.roll(0.1).triangles) == 2 * 39 * 39
+
+
+def test_progress_is_the_share_of_points_with_a_triangle_though_a_smaller_ball_gave_them_up():
+    points_m, normals = flat_grid(10, 10)
+    roller = Roller(points_m, normals)
+    assert len(roller.roll(0.04).triangles) == 0
+    steps = roller.iterate(0.075, batch=20)
+    told = [(step.progress, len(np.unique(roller.rolled.triangles)) / 100) for step in steps]
+    assert len(told) > 5
+    assert [progress for progress, _ in told] == pytest.approx([share for _, share in told])
 
 
 @pytest.mark.parametrize(

@@ -3,16 +3,8 @@
 import numpy as np
 import pytest
 
-from app.screens.depth.brush import (
-    REACH_DEG,
-    clicked_disc,
-    covered,
-    disc_at,
-    disc_px,
-    painted,
-    picked_point,
-    window_around,
-)
+from app.screens.depth.brush import REACH_DEG, clicked_disc, painted, picked_point
+from app.screens.depth.discs import covered, disc_at, disc_px, window_around
 from app.screens.depth.view import Disc, SeenSample
 
 WIDTH_PX, HEIGHT_PX, FOCAL_PX = 160, 120, 150.0

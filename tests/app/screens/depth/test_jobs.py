@@ -9,7 +9,7 @@ import pytest
 from app.compute.state import Spec
 from app.drawing.colors import HOLE
 from app.drawing.pictures import UNKNOWN, confidence_colors
-from app.screens.depth.brush import window_around
+from app.screens.depth.discs import window_around
 from app.screens.depth.hide_job import LEAST_HIDDEN_PX, believed, fill_row, hidden_pixels, hide_job
 from app.screens.depth.job import depth_job, judged_view, residual_view
 from app.screens.depth.labels import AS_IT_SAYS, FILLS, NETWORK_PRESETS, PICTURES
