@@ -83,6 +83,8 @@ def _test(copy: Path, mutation: Mutation) -> bool:
         return any(_fails(copy, paths) for paths in (own, everything) if paths)
     finally:
         module.write_text(code, encoding="utf-8")
+        for compiled in (copy / ".numba").glob(f"{module.parent.name}_*"):
+            shutil.rmtree(compiled)  # numba notices changes of a function, but not of those that it calls
 
 
 def _fails(copy: Path, paths: list[str]) -> bool:
