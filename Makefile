@@ -8,7 +8,7 @@ ARGS   ?=
 # Where no bytecode is kept, every process compiles all that it imports: two seconds each.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test test-fast mutants check audit bench reproduce results results-record lock scenes clean
+.PHONY: run test test-fast mutants check docs audit bench reproduce results results-record lock scenes clean
 
 run: $(VENV)/.core  ## the app in the browser, with a scene reconstructed
 	$(BIN)/packetmesh serve --scene $(SCENE) --open $(ARGS)
@@ -22,11 +22,14 @@ test-fast: $(VENV)/.dev  ## the quick tests, without a browser
 mutants: $(VENV)/.dev  ## plant faults one at a time; docs/mutants.md says which no test sees
 	$(BIN)/python -m lab.mutants $(ARGS)
 
-check: $(VENV)/.dev  ## style, types, import rules
+check: $(VENV)/.dev docs  ## style, types, import rules, documentation
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: $(VENV)/.dev  ## the documentation site, in runs/site; a dead link is an error
+	$(BIN)/python -m sphinx -W --keep-going -q -E -b html docs runs/site
 
 audit: $(VENV)/.uv  ## the pinned packages beside the known vulnerabilities; fails if one cannot be looked up
 	$(BIN)/uv run -q --no-project --isolated --with-requirements requirements-audit.lock \

@@ -3,6 +3,7 @@
 import ast
 import doctest
 import importlib
+import re
 import subprocess
 import sys
 import types
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import packetmesh as pm
+from tests.paths import ROOT
 
 FUNCTIONS = [name for name in pm.__all__ if isinstance(getattr(pm, name), types.FunctionType)]
 
@@ -69,3 +71,11 @@ def examples_of(name: str) -> list[doctest.DocTest]:
     """The examples in the docstring of a public function; they know no name but what they import."""
     found = doctest.DocTestFinder(recurse=False).find(getattr(pm, name), name, globs={})
     return [example for example in found if example.examples]
+
+
+def test_the_site_has_every_public_name_once():
+    text = (ROOT / "docs" / "interface.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^### pm\.(\w+)$", text, re.MULTILINE)) == sorted(pm.__all__)
+    for name in pm.__all__:
+        module, attribute = pm._PLACES[name]
+        assert f":: {module}.{attribute}\n" in text

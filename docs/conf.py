@@ -1,0 +1,44 @@
+"""Settings of the documentation site, which ``make docs`` builds with Sphinx."""
+
+import re
+from pathlib import Path
+
+from sphinx.errors import ExtensionError
+
+project = "PacketMesh"
+copyright = "The PacketMesh authors"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["examples/*", "results/*"]
+html_theme = "furo"
+html_title = "PacketMesh"
+myst_heading_anchors = 4
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+autodoc_type_aliases = {
+    name: name for name in ("FloatArray", "IntArray", "BoolArray", "ByteArray", "AnyPath")
+}
+python_use_unqualified_type_names = True
+
+DOCS = Path(__file__).parent
+LINK = re.compile(r"\[([^\]]*)\]\(((?:\.\./|results|examples)[^)#\s]*)(#[^)\s]*)?\)")
+"""Links to files of the repository that are no pages of the site."""
+
+
+def setup(app):
+    """Have links that leave the site written as plain text."""
+    app.connect("source-read", without_links_out)
+
+
+def without_links_out(app, page, source):
+    """Replace each link to a file that is no page by its text.
+
+    Raises:
+        ExtensionError: the file is not there.
+    """
+
+    def text_of(link):
+        if not (DOCS / link[2]).exists():
+            raise ExtensionError(f"docs/{page}.md links to {link[2]}, which is not there")
+        return link[1]
+
+    source[0] = LINK.sub(text_of, source[0])
