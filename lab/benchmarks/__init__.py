@@ -1,4 +1,4 @@
-"""Speed and memory beside peers, in one run; each case in a fresh process, so that its memory is its own."""
+"""Speed and memory compared with other programs in one run, each case in a fresh process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from packetmesh.errors import InputError
 
 
 def _measure(module: str, **options: Any) -> Benchmark:
-    """``benchmark`` of a module of this package, imported here: what other cases import would count."""
+    """Call ``benchmark`` of a module of this package, imported here: other cases' imports would count."""
     result: Benchmark = import_module(f"lab.benchmarks.{module}").benchmark(**options)
     return result
 
@@ -30,16 +30,16 @@ CASES: dict[str, Callable[[], Benchmark]] = {
     "depth": partial(_measure, "depth"),
     "network": partial(_measure, "network"),
 }
-"""What comes before a colon names several cases at once."""
+"""Cases by name; the part before a colon names several cases at once."""
 
 
 def run_benchmarks(
     only: Iterable[str] = (), cases: Mapping[str, Callable[[], Benchmark]] = CASES
 ) -> Iterator[tuple[str, Benchmark]]:
-    """Measure the cases or groups of cases named, or all, one after the other.
+    """Measure the named cases or groups of cases, or all, one after the other.
 
     Raises:
-        InputError: a name is none of them.
+        InputError: a name is neither a case nor a group.
     """
     wanted = set(only)
     named = {case: {case, case.partition(":")[0]} for case in cases}

@@ -1,4 +1,4 @@
-"""What one case of the benchmarks gives, and a process of its own to measure it in."""
+"""The result of a benchmark case, and a separate process to measure it in."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ Answer = TypeVar("Answer")
 
 @dataclass(frozen=True, slots=True)
 class Benchmark:
-    """One case measured, beside its peers in the same run."""
+    """One measured case, with its peers in the same run."""
 
     ours_s: float
     """Median of the rounds, seconds."""
     peers: dict[str, float]
     """Median seconds of other programs on the same input."""
     peak_memory_bytes: int
-    """Most memory of the measuring process, its libraries included."""
+    """Peak memory of the measuring process, including its libraries."""
     peer_memory_bytes: dict[str, int] = field(default_factory=dict)
-    """The same of the peers, where each has a process of its own."""
+    """Peak memory of the peers, if each has its own process."""
     errors_m: dict[str, float] = field(default_factory=dict)
-    """How wrong the answers are, ours and the peers', where the truth is known."""
+    """Errors of the answers, ours and the peers', if the truth is known."""
     runs: tuple[dict[str, Any], ...] = ()
-    """Every single measurement, with what the case alone measures."""
+    """Every single measurement, with values that only this case measures."""
     notes: tuple[str, ...] = ()
-    """Lines to be printed below the times."""
+    """Lines printed below the times."""
 
     def record(self) -> dict[str, Any]:
-        """Plain values; ``ratio`` is our time over the fastest peer's, ``ratios`` over every one's."""
+        """Return plain values; ``ratio`` is our time over the fastest peer's, ``ratios`` over each peer's."""
         ratios = {name: self.ours_s / peer_s for name, peer_s in self.peers.items()}
         return asdict(self) | {"ratio": max(ratios.values(), default=None), "ratios": ratios}
 
 
 def run_alone(function: Callable[..., Answer], *arguments: Any, timeout_s: float | None = None) -> Answer:
-    """What a function gives in a fresh process that does nothing else.
+    """Run a function in a fresh process that does nothing else, and return its result.
 
     Raises:
         TimeoutError: it took longer than ``timeout_s`` and was stopped.

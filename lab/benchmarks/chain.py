@@ -19,7 +19,7 @@ def benchmark(nodes: int) -> Benchmark:
     """Reconstruct the first ``nodes`` nodes of the living room."""
     rig = load_demo("living-room")
     part = Rig(rig.name, rig.frames[:nodes])
-    reconstruct(part, PRESETS["packetmesh"])  # what is loaded and compiled at the first time
+    reconstruct(part, PRESETS["packetmesh"])  # loads and compiles what is only done at first use
     seconds, stages = [], []
     for _ in range(ROUNDS):
         started = time.perf_counter()

@@ -1,4 +1,4 @@
-"""The shipped depth network: its time and size, what its 8 bits cost, and how it fills holes beside peers."""
+"""The shipped depth network: time, size, cost of its 8 bits, and its hole filling compared with peers."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class NetworkSpeed:
     """The shipped network on one image."""
 
     elapsed_s: float
-    """Median for a frame of 640 x 480, its resizing included."""
+    """Median for a frame of 640 x 480, including its resizing."""
     slowest_s: float
     rounds: int
     provider: str
-    """What really ran it."""
+    """Execution provider that really ran it."""
     file_bytes: int
     abs_rel: float | None
     """From the file's metadata: AbsRel of the quantised network on held-out rooms."""
@@ -36,10 +36,10 @@ class NetworkSpeed:
 
 
 def benchmark() -> Benchmark:
-    """The shipped network, and hidden holes filled by us and by the obvious peers.
+    """Measure the shipped network, and the filling of hidden holes by us and by the usual peers.
 
-    The times are those of filling one frame, the errors medians in the real frames' hidden pixels, or in
-    the demo scenes' where there are no real frames.
+    The times are those of filling one frame; the errors are medians over the real frames' hidden pixels, or
+    over the demo scenes' if there are no real frames.
     """
     network = DepthNetwork()
     speed = network_speed(network, load_demo("living-room").frames[0].rgb)
@@ -60,14 +60,14 @@ def benchmark() -> Benchmark:
 
 
 def error_lines(runs: Sequence[Filling]) -> Iterator[str]:
-    """A line for every group of holes: the relative error of everyone over all of its pixels, least first."""
+    """Yield a line per group of holes: every program's relative error over all its pixels, lowest first."""
     for group in dict.fromkeys(run.group for run in runs):
         ranked = sorted((run for run in runs if run.group == group), key=lambda run: run.abs_rel)
         yield f"{group}: {', '.join(f'{run.program} {run.abs_rel:.4f}' for run in ranked)}"
 
 
 def network_speed(network: DepthNetwork, rgb: ByteArray, rounds: int = ROUNDS) -> NetworkSpeed:
-    """Infer one (H, W, 3) image over and over, warm."""
+    """Infer one (H, W, 3) image repeatedly, after warm-up."""
     seconds = []
     for _ in range(WARM_UP + rounds):
         started = time.perf_counter()

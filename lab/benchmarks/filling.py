@@ -1,4 +1,4 @@
-"""Filling holes: sensor depth is hidden, filled by us and by the obvious peers, and all of it compared."""
+"""Hole filling: sensor depth is hidden, filled by us and by the usual peers, and compared."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ HIDDEN_SHARE = 0.15
 ROOMS, VIEWS = 5, 3
 """Rooms of each held-out scene, and views of each room."""
 REAL_DRAWS = 10
-"""How often another part of each real frame is hidden: there are few of them."""
+"""Number of times that different parts of each real frame are hidden, as there are few frames."""
 RADII_PX = (10, 20, 40, 75, 120)
-"""Of the discs that are hidden, in images ``RADII_WIDTH_PX`` wide; in others in proportion."""
+"""Radii of the hidden discs in images ``RADII_WIDTH_PX`` wide; scaled in others."""
 RADII_WIDTH_PX = 640
 CLOSE = 0.05
 Filler = Callable[[DepthMap, ByteArray], DepthMap]
@@ -36,58 +36,58 @@ Filler = Callable[[DepthMap, ByteArray], DepthMap]
 
 @dataclass(frozen=True, slots=True)
 class HoleCase:
-    """One image whose holes can be judged."""
+    """One image with holes whose depth is known."""
 
     place: str
-    """The room, demo scene or draw that it belongs to: what intervals resample."""
+    """Its room, demo scene or draw: the unit that intervals resample."""
     group: str
     rgb: ByteArray
     """(H, W, 3)."""
     sensor: DepthMap
-    """(H, W) what is left to fill from."""
+    """(H, W) depth to fill from."""
     hole: BoolArray
-    """(H, W) pixels to be filled and judged."""
+    """(H, W) pixels to be filled and evaluated."""
     truth_m: FloatArray
-    """(H, W) what judges there."""
+    """(H, W) reference depth in the hole."""
     measured: bool = True
-    """Whether the sensor had measured the hole; else it is one of its own."""
+    """Whether the sensor had measured the hole; otherwise it is one of its own holes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Filling:
-    """One program's fillings of a group of images."""
+    """Results of one program on a group of images."""
 
     program: str
     group: str
     images: int
     abs_rel: float
-    """Of all hole pixels, all images pooled; those it leaves empty take the nearest measured depth."""
+    """AbsRel over all hole pixels of all images; empty ones take the nearest measured depth."""
     abs_rel_ci95: tuple[float, float]
-    """Of ``abs_rel``, by resampling rooms, demo scenes, or draws of the real frames."""
+    """95 % interval of ``abs_rel``, by resampling rooms, demo scenes, or draws of the real frames."""
     excess_ci95: tuple[float, float]
-    """Of ``abs_rel`` less that of the first program, ours, on the same pixels: who is above 0 errs more."""
+    """95 % interval of ``abs_rel`` minus that of our program on the same pixels; above 0 is worse."""
     abs_rel_filled: float
-    """Of the hole pixels it filled; NaN if it filled none."""
+    """AbsRel over the filled hole pixels; NaN if none is filled."""
     close_share: float
-    """Of all hole pixels: filled within 5 % of what judges."""
+    """Share of all hole pixels filled within 5 % of the reference."""
     filled_share: float
-    """Of all hole pixels."""
+    """Share of all hole pixels that are filled."""
     median_error_m: float
-    """Of all hole pixels, as ``abs_rel``."""
+    """Median over all hole pixels, with empty ones as in ``abs_rel``."""
     elapsed_s: float
-    """Median for an image; ours infers, aligns and judges."""
+    """Median time for an image; ours includes inference, alignment and judgement."""
 
 
 def sites() -> tuple[Site, ...]:
-    """Where holes are hidden: held-out rooms, the demo scenes and the real frames there are."""
+    """Return the sites of the test: held-out rooms, the demo scenes and the available real frames."""
     return (*held_out_scenes(ROOMS, VIEWS), *demo_scenes(), *real_frames())
 
 
 def hidden_cases(site: Site, seed: int = 0) -> Iterator[HoleCase]:
-    """Every image of a site with a part of the sensor's depth hidden, real frames several times.
+    """Yield every image of a site with a part of the sensor's depth hidden, real frames several times.
 
-    That very depth judges. Where the truth is known the images come a second time with nothing hidden: their
-    sensor's own holes, judged by the truth.
+    The hidden depth is the reference. If the truth is known the images come a second time with nothing
+    hidden: the sensor's own holes, with the truth as reference.
     """
     for place, rng, example in _drawn(site, seed):
         yield hidden_case(place, f"{site.group}, hidden", example.rgb, example.sensor, rng)
@@ -99,13 +99,13 @@ def hidden_cases(site: Site, seed: int = 0) -> Iterator[HoleCase]:
 
 
 def disc_cases(site: Site, seed: int = 0) -> Iterator[HoleCase]:
-    """The same images with one disc hidden, of every size that finds a place; that very depth judges."""
+    """Yield the images with one hidden disc of every size that fits; the hidden depth is the reference."""
     for place, rng, example in _drawn(site, seed):
         yield from discs(place, site.group, example.rgb, example.sensor, rng)
 
 
 def _drawn(site: Site, seed: int) -> Iterator[tuple[str, np.random.Generator, Example]]:
-    """Every image with its place and with what draws its holes; views of one room are one place."""
+    """Yield every image with its place and the generator of its holes; views of one room are one place."""
     for number, example in enumerate(site.examples()):
         for draw in range(1 if site.truth else REAL_DRAWS):
             room = {HELD_OUT: f"/{number // VIEWS}", REAL: f"/{draw}"}.get(site.group, "")
@@ -116,14 +116,14 @@ def _drawn(site: Site, seed: int) -> Iterator[tuple[str, np.random.Generator, Ex
 def hidden_case(
     place: str, group: str, rgb: ByteArray, depth: DepthMap, rng: np.random.Generator
 ) -> HoleCase:
-    """An image without a part of its sensor depth."""
+    """Return an image without a part of its sensor depth."""
     return without(hide(depth, rng, HIDDEN_SHARE), place, group, rgb, depth)
 
 
 def discs(
     place: str, group: str, rgb: ByteArray, depth: DepthMap, rng: np.random.Generator
 ) -> Iterator[HoleCase]:
-    """An image without the depth in a disc, for every radius of ``RADII_PX`` that finds a place."""
+    """Yield an image without the depth in a disc, for every radius of ``RADII_PX`` that fits."""
     for radius_px in RADII_PX:
         hole = disc(depth, radius_px * depth.z_m.shape[1] / RADII_WIDTH_PX, rng)
         if hole is not None:
@@ -131,13 +131,13 @@ def discs(
 
 
 def without(hole: BoolArray, place: str, group: str, rgb: ByteArray, depth: DepthMap) -> HoleCase:
-    """An image whose depth in (H, W) ``hole`` is hidden and judges."""
+    """Return an image whose depth in (H, W) ``hole`` is hidden and is the reference."""
     left = DepthMap(np.where(hole, np.float32(np.nan), depth.z_m))
     return HoleCase(place, group, rgb, left, hole, depth.z_m)
 
 
 def chain_filling(infer: Callable[[ByteArray], DepthMap], completes: bool) -> Filler:
-    """Depth as the chain fills it with what ``infer`` makes of the colours, with or without completion."""
+    """Fill depth as the chain does with the depth that ``infer`` returns, with or without completion."""
     config = DepthConfig(least_confidence=0.0)  # every hidden pixel counts
 
     def fill(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
@@ -149,17 +149,17 @@ def chain_filling(infer: Callable[[ByteArray], DepthMap], completes: bool) -> Fi
 
 
 def flat(rgb: ByteArray) -> DepthMap:
-    """One depth everywhere: what alignment and judgement alone make of nothing."""
+    """Return one depth everywhere: shows what alignment and judgement alone achieve."""
     return DepthMap(np.ones(rgb.shape[:2], np.float32))
 
 
 def pixel_filling(network: DepthNetwork) -> Filler:
-    """Inferred depth along a robust line through the pixels that both have (SPEC 4.6), and no more."""
+    """Fit inferred depth by a robust line through the pixels that both have (SPEC 4.6), and nothing else."""
     return lambda sensor, rgb: align_depth(network.infer(rgb), sensor, "affine_depth").depth
 
 
 def programs(network: DepthNetwork) -> dict[str, Filler]:
-    """Everyone who is compared; another is one line more."""
+    """Return all compared programs; a new one is one line more."""
     return {
         OURS: chain_filling(network.infer, completes=True),
         NETWORK: chain_filling(network.infer, completes=False),
@@ -170,7 +170,7 @@ def programs(network: DepthNetwork) -> dict[str, Filler]:
 
 
 def compare_fillings(cases: Iterable[HoleCase], programs: dict[str, Filler]) -> tuple[Filling, ...]:
-    """Every program over every case, summed up by group; the programs are warmed up on the first."""
+    """Run every program on every case, and sum up by group; the first case warms the programs up."""
     judged: dict[str, list[tuple[str, FloatArray]]] = {}
     seconds: dict[tuple[str, str], list[float]] = {}
     for number, case in enumerate(cases):
@@ -193,13 +193,13 @@ def compare_fillings(cases: Iterable[HoleCase], programs: dict[str, Filler]) -> 
 def group_fillings(
     group: str, images: list[tuple[str, FloatArray]], seconds: dict[str, list[float]]
 ) -> Iterator[Filling]:
-    """Each program's measures over the hole pixels of a group.
+    """Yield each program's measures over the hole pixels of a group.
 
     Args:
-        group: its name.
+        group: name of the group.
         images: the place of every image, and (2 + programs, N) true depth, nearest measured depth and
             fillings, metres, NaN where not filled.
-        seconds: of every program, in the order of the rows, one for each image.
+        seconds: times of every program, in the order of the rows, one per image.
     """
     _, numbers = np.unique([place for place, _ in images], return_inverse=True)
     places = np.repeat(numbers, [columns.shape[1] for _, columns in images])
@@ -224,12 +224,12 @@ def group_fillings(
 
 
 def mean_ci95(values: FloatArray, places: IntArray) -> tuple[float, float]:
-    """95 % bootstrap interval of the mean of (N,) values, resampling whole places, numbered from 0."""
+    """Return the 95 % bootstrap interval of the mean of (N,) values over whole places, numbered from 0."""
     sums = np.stack([np.bincount(places, values), np.bincount(places).astype(float)], axis=1)
     return bootstrap_ci95(sums, statistic=lambda sums, axis: np.divide(*sums.sum(axis=axis).T))
 
 
 def fillings(network: DepthNetwork) -> tuple[Filling, ...]:
-    """Everyone on all there is, in one run."""
+    """Run all programs on all cases."""
     cases = (make(site) for make in (hidden_cases, disc_cases) for site in sites())
     return compare_fillings(chain.from_iterable(cases), programs(network))

@@ -12,7 +12,7 @@ from pipeline.types import BoolArray, DepthMap, IntArray
 
 MIN_HOLE_PX = 4
 LARGEST_HOLE = 0.05
-"""Holes that take a larger share of the image are what the sensor did not see, not shapes to move."""
+"""Larger holes (share of the image) are outside the sensor's view, not shapes to move."""
 EDGE_STEP = 1.08
 """Ratio of the depths within 5 x 5 pixels that makes a depth edge."""
 BLOB_RADII = (0.015, 0.05)
@@ -24,18 +24,17 @@ MOST_MISSES = 100
 
 
 def hide(sensor: DepthMap, rng: np.random.Generator, share: float) -> BoolArray:
-    """Pixels with sensor depth to hide, so that what fills them can be measured.
+    """Return pixels with sensor depth to hide, so that their filling can be measured.
 
-    Half of what is hidden takes the shapes of the frame's own holes, all of them equally often, turned
-    over and moved anywhere; the other half are elliptic blobs on depth edges, where structured light
-    fails most and filling is hard. A frame without holes gets blobs only, one without depth edges
-    shapes only, and one with neither, or with too few edges for the share, gets blobs anywhere.
+    Half of the hidden pixels have the shapes of the frame's own holes, all equally often, mirrored at random
+    and moved anywhere; the other half are elliptic blobs on depth edges, where structured light fails most
+    and filling is hard. A frame without holes gets blobs only, one without depth edges shapes only, and one
+    with neither, or with too few edges for the share, gets blobs anywhere.
 
     Args:
         sensor: (H, W) depth with its own holes.
         rng: draws shapes and places.
-        share: of the pixels with depth that are to be hidden, above 0 and at most 0.9; the last shape
-            may go beyond it.
+        share: share of the pixels with depth to hide, above 0 and at most 0.9; the last shape may exceed it.
 
     Returns:
         (H, W) True for hidden pixels, all of which have depth.
@@ -61,15 +60,16 @@ def hide(sensor: DepthMap, rng: np.random.Generator, share: float) -> BoolArray:
 
 
 def disc(sensor: DepthMap, radius_px: float, rng: np.random.Generator) -> BoolArray | None:
-    """The pixels with depth in a disc that lies in the image and has depth in four fifths of its pixels.
+    """Return the pixels with depth in a random disc inside the image that has depth in four fifths of its
+    pixels.
 
     Args:
         sensor: (H, W) depth with its own holes.
-        radius_px: of the disc.
-        rng: draws its place among all that there are.
+        radius_px: radius of the disc.
+        rng: draws its place among all possible ones.
 
     Returns:
-        (H, W) True for what is to be hidden; None where there is no place.
+        (H, W) True for pixels to hide; None if there is no place.
     """
     reach_px = int(radius_px)
     across = np.arange(-reach_px, reach_px + 1)
@@ -88,7 +88,7 @@ def disc(sensor: DepthMap, radius_px: float, rng: np.random.Generator) -> BoolAr
 
 
 def hole_shapes(valid: BoolArray) -> list[BoolArray]:
-    """The holes of 4 pixels to 5 % of the image, each cut out, without the margin the sensor lacks."""
+    """Return the holes of 4 pixels to 5 % of the image, each cut out, without the sensor's blind margin."""
     field = cv2.boundingRect(valid.astype(np.uint8))
     inside = valid[field[1] : field[1] + field[3], field[0] : field[0] + field[2]]
     count, labels, boxes, _ = cv2.connectedComponentsWithStats((~inside).astype(np.uint8), connectivity=8)
@@ -101,7 +101,7 @@ def hole_shapes(valid: BoolArray) -> list[BoolArray]:
 
 
 def depth_edges(sensor: DepthMap) -> BoolArray:
-    """(H, W) pixels with depth whose 5 x 5 neighbours' depths differ by more than 8 %."""
+    """Return (H, W) pixels with depth whose 5 x 5 neighbours' depths differ by more than 8 %."""
     window = np.ones((5, 5), np.uint8)
     nearest_m = cv2.erode(np.where(sensor.valid, sensor.z_m, np.inf).astype(np.float32), window)
     farthest_m = cv2.dilate(np.where(sensor.valid, sensor.z_m, 0.0).astype(np.float32), window)
@@ -116,15 +116,15 @@ def stamp(
     wanted_px: int,
     rng: np.random.Generator,
 ) -> None:
-    """Press drawn shapes into ``hidden`` (changed in place) until it has ``wanted_px`` pixels.
+    """Add drawn shapes to ``hidden`` (in place) until it has ``wanted_px`` pixels.
 
-    Gives up when a hundred shapes one after the other have found nothing left to hide.
+    Stops early after a hundred consecutive shapes that hide nothing new.
 
     Args:
-        hidden: (H, W) what is hidden so far.
-        valid: (H, W) what can be hidden.
+        hidden: (H, W) pixels hidden so far.
+        valid: (H, W) pixels that can be hidden.
         places: (N, 2) row and column of the pixels on which shapes may be centred.
-        draw: gives a shape, True where it hides.
+        draw: returns a shape, True where it hides.
         wanted_px: number of hidden pixels to reach.
         rng: draws the places.
     """
@@ -142,13 +142,13 @@ def stamp(
 
 
 def moved(shapes: list[BoolArray], rng: np.random.Generator) -> BoolArray:
-    """One of the shapes, perhaps mirrored across and upside down."""
+    """Return one of the shapes, perhaps mirrored across and upside down."""
     flips = rng.choice([-1, 1], 2)
     return shapes[rng.integers(len(shapes))][:: flips[0], :: flips[1]]
 
 
 def blob(size_px: tuple[int, int], rng: np.random.Generator) -> BoolArray:
-    """A turned ellipse with half axes of 1.5 to 5 % of the diagonal of an image of (H, W) pixels."""
+    """Return a rotated ellipse with half axes of 1.5 to 5 % of the diagonal of an image of (H, W) pixels."""
     axes_px = np.hypot(*size_px) * rng.uniform(*BLOB_RADII, 2)
     reach_px = int(np.ceil(axes_px.max()))
     y, x = np.mgrid[-reach_px : reach_px + 1, -reach_px : reach_px + 1]

@@ -1,4 +1,4 @@
-"""Speed of the simulator: the whole study of SPEC 6.2, on every core, and saturated nodes beside ns-3's."""
+"""Speed of the simulator: the study of SPEC 6.2 on all cores, and saturated nodes compared with ns-3."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from packetmesh.errors import PacketMeshError
 
 OBJECTS = 60
 LONGEST_FIRST: tuple[SchemeName, ...] = ("baseline", "pdc", "greedy")
-"""So that the cores end together."""
+"""Schemes from the longest run to the shortest, so that all cores finish at about the same time."""
 SATURATED: Counts = {"ieee802154": (1, 2, 5, 20, 50), "ieee80211b": (1, 5, 20, 50)}
 SATURATED_S: dict[MacKind, float] = {"ieee802154": 60.0, "ieee80211b": 10.0}
-"""Simulated time. That of IEEE 802.15.4, where so little happens, is long beside what a run takes to set up,
-which ns-3's clock leaves out."""
+"""Simulated time. In IEEE 802.15.4 little happens, so the time is long compared with a run's set-up, which
+ns-3's clock excludes."""
 
 
 def benchmark(
@@ -31,10 +31,10 @@ def benchmark(
     runs: int = RUNS,
     saturated_s: Mapping[MacKind, float] = SATURATED_S,
 ) -> Benchmark:
-    """Every scheme with ``objects`` vehicles: five runs of five hours each; saturated nodes, too.
+    """Measure every scheme with ``objects`` vehicles, five runs of five hours each, and saturated nodes.
 
-    The time is that of the study, the start of the processes included; the memory that of its process which
-    held most. ns-3 has no such study, so it is a peer of the saturated nodes alone.
+    The time is that of the study, including the start of the processes; the memory is that of its largest
+    process. ns-3 has no such study, so it is a peer of the saturated nodes only.
     """
     tasks = [
         run for scheme in LONGEST_FIRST for run in replications(Case(scheme, objects).config(horizon_s), runs)
@@ -72,7 +72,7 @@ def benchmark(
 
 
 def _record(row: Row) -> dict[str, Any]:
-    """Rates of both programs, and wall time and throughput of network_sim over ns-3's; None without ns-3."""
+    """Return rates of both programs, and our wall time and throughput over ns-3's; None without ns-3."""
     return {
         "mac": row.mac,
         "nodes": row.nodes,

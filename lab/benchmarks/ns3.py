@@ -1,6 +1,6 @@
-"""Saturated nodes around one sink in network_sim and in ns-3: what they carry, and what it costs.
+"""Saturated nodes around one sink in network_sim and in ns-3: throughput and computing time.
 
-ns-3 runs ``ns3_runs.py`` in an interpreter of its own, IEEE 802.11b twice: as ns-3 comes, and strict, which
+ns-3 runs ``ns3_runs.py`` in its own interpreter, IEEE 802.11b twice: with ns-3's defaults, and strict, which
 means that a receiver notices every frame.
 """
 
@@ -25,15 +25,15 @@ TOLERANCE = 0.05
 RADIUS_M = 10.0
 SEED = 1
 ROUNDS = 5
-"""Of which the median time counts, in both programs."""
+"""Rounds, of which the median time counts, in both programs."""
 UDP_IP_BYTES = 28
 RUNS = Path(__file__).with_name("ns3_runs.py")
 IMPORTS_NS3 = "import importlib.util, sys; sys.exit(importlib.util.find_spec('ns') is None)"
 PYTHON_VARIABLE = "PACKETMESH_NS3_PYTHON"
-"""Names an interpreter that has ns-3's bindings."""
+"""Variable with the path of an interpreter that has ns-3's bindings."""
 
 Counts = Mapping[MacKind, tuple[int, ...]]
-"""With how many nodes each medium access runs."""
+"""Numbers of nodes by medium access."""
 
 NODES: Counts = {"ieee802154": (1, 2, 3, 4, 5), "ieee80211b": (1, 2, 3, 5, 10, 20, 50)}
 CONFIGS: dict[MacKind, NetworkConfig] = {
@@ -69,27 +69,27 @@ CONSTANTS: dict[MacKind, dict[str, float]] = {
         "attempts": dcf.ATTEMPTS,
     },
 }
-"""Of network_sim, times in microseconds, by the names that ``ns3_runs.py`` gives to ns-3's."""
+"""Constants of network_sim, times in microseconds, by the names that ``ns3_runs.py`` uses for ns-3's."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What saturated nodes got in one program, and what it cost."""
+    """Throughput and cost of saturated nodes in one program."""
 
     throughput_bps: float
     """Payload at the sink."""
     delivery_ratio: float
-    """Share of packets that reached it before they were given up."""
+    """Share of packets that reached the sink before they were given up."""
     attempts: float
-    """Frames sent for each packet that reached it."""
+    """Frames sent per packet that reached the sink."""
     wall_per_s: float
-    """Wall seconds for a simulated second."""
+    """Wall seconds per simulated second."""
     events_per_s: float
-    """Events of the program's own kernel in a wall second; ns-3 has more of them for a frame."""
+    """Events of the program's own kernel per wall second; ns-3 has more of them per frame."""
 
     @property
     def simulated_s_per_s(self) -> float:
-        """Simulated seconds in a wall second."""
+        """Simulated seconds per wall second."""
         return 1.0 / self.wall_per_s
 
 
@@ -101,21 +101,21 @@ class Row:
     nodes: int
     network_sim: Run
     ns3: Run | None
-    """None if it did not run, and so are the ratios."""
+    """None if it did not run; then the ratios are None, too."""
     ns3_strict: Run | None
     ratio: float | None
-    """Throughput of network_sim over ns-3's as it comes."""
+    """Throughput of network_sim over ns-3's with its defaults."""
     ratio_strict: float | None
-    """The same over that of the strict ns-3."""
+    """Throughput of network_sim over that of the strict ns-3."""
 
     @property
     def time_ratio(self) -> float | None:
-        """Wall time of network_sim over ns-3's as it comes."""
+        """Wall time of network_sim over ns-3's with its defaults."""
         return self.network_sim.wall_per_s / self.ns3.wall_per_s if self.ns3 else None
 
     @property
     def verdict(self) -> str:
-        """How well they agree."""
+        """Agreement of the two programs."""
         if self.ratio is None:
             return "ns-3 did not run"
         if abs(self.ratio - 1.0) <= TOLERANCE:
@@ -126,11 +126,11 @@ class Row:
 
 
 Theirs = dict[tuple[MacKind, int, bool], Run]
-"""Runs in ns-3 by medium access, nodes and whether it was strict."""
+"""Runs in ns-3 by medium access, number of nodes and whether it was strict."""
 
 
 def run_ours(mac: MacKind, nodes: int, seconds: float) -> Run:
-    """A run in network_sim, and the median time of ``ROUNDS``: the first is slow, short ones vary."""
+    """Return a run in network_sim with the median time of ``ROUNDS``: the first is slow, short ones vary."""
     walls_s = []
     for _ in range(ROUNDS):
         started = time.perf_counter()
@@ -148,7 +148,7 @@ def run_ours(mac: MacKind, nodes: int, seconds: float) -> Run:
 
 
 def run_ns3(python: str, counts: Counts, seconds: float) -> tuple[Theirs, dict[str, dict[str, float]]]:
-    """All runs in ns-3, in an interpreter of its own.
+    """Do all runs in ns-3, in its own interpreter.
 
     Returns:
         The runs; ns-3's constants like ``CONSTANTS``.
@@ -174,7 +174,7 @@ def run_ns3(python: str, counts: Counts, seconds: float) -> tuple[Theirs, dict[s
         }
         for mac, nodes, strict in keys
     ]
-    environment = {**os.environ, "PYTHONSAFEPATH": "1"}  # else ``import ns3`` finds this very module
+    environment = {**os.environ, "PYTHONSAFEPATH": "1"}  # else ``import ns3`` would find this module
     done = subprocess.run(
         [python, str(RUNS), json.dumps(scenarios)], capture_output=True, text=True, env=environment
     )
@@ -186,7 +186,7 @@ def run_ns3(python: str, counts: Counts, seconds: float) -> tuple[Theirs, dict[s
 
 
 def ns3_run(mac: MacKind, got: dict[str, float], seconds: float) -> Run:
-    """A run from what ``ns3_runs.py`` counted."""
+    """Return a run from the counts of ``ns3_runs.py``."""
     nodes = CONFIGS[mac].nodes
     data_bits = 8 * (nodes.payload_bytes - nodes.header_bytes)
     return Run(
@@ -199,7 +199,7 @@ def ns3_run(mac: MacKind, got: dict[str, float], seconds: float) -> Run:
 
 
 def compare(counts: Counts, theirs: Theirs, seconds: float) -> list[Row]:
-    """The same scenarios in network_sim, beside ns-3's runs where there are any."""
+    """Run the same scenarios in network_sim, and pair them with ns-3's runs if there are any."""
     rows = []
     for mac, node_counts in counts.items():
         for nodes in node_counts:
@@ -214,7 +214,7 @@ def _ratio(ours: Run, theirs: Run | None) -> float | None:
 
 
 def find_python(given: str | None = None) -> str:
-    """An interpreter that has ns-3: the one given, or the one that the environment names, or this one.
+    """Return an interpreter with ns-3: ``given``, the one in the environment variable, or this one.
 
     Raises:
         PacketMeshError: it cannot import ns-3.

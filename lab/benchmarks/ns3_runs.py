@@ -1,7 +1,7 @@
-"""Saturated nodes around one sink in ns-3: what ``ns3.py`` sets beside network_sim.
+"""Saturated nodes around one sink in ns-3, for comparison with network_sim by ``ns3.py``.
 
 ``python ns3_runs.py '[{"mac": "ieee802154", "nodes": 3, "payload_bytes": 116, "radius_m": 10, "seconds": 10,
-"seed": 1, "strict": false}]'`` prints JSON: what came of each run, and ns-3's own constants. It needs ns-3's
+"seed": 1, "strict": false}]'`` prints JSON: the result of each run, and ns-3's own constants. It needs ns-3's
 Python bindings (``pip install ns3``) and nothing else. Frames are counted in C++, so that Python does not
 slow ns-3 down.
 """
@@ -17,13 +17,13 @@ from ns import ns
 
 ROUNDS = 5
 START_S = 0.2
-"""Until then stations associate; neither counted nor timed."""
+"""End of the stations' association, which is neither counted nor timed."""
 SPREAD_S = 0.02
-"""The first packets of the nodes come at random within this time."""
+"""Time within which the nodes' first packets come, at random."""
 WARM_UP = 0.05
-"""Share of the rest that is not counted, as in network_sim."""
+"""Share of the time after the start that is not counted, as in network_sim."""
 MAX_DELAY_S = 3600.0
-"""ns-3 throws packets away after half a second in a buffer, which is short with 20 stations."""
+"""Longest time in a buffer; ns-3's default of half a second is short with 20 stations."""
 PAN = 5
 
 NODES = r"""
@@ -109,7 +109,7 @@ void wifi(Ptr<NetDevice> device, Ptr<NetDevice> sink, double start_s) {
 
 
 def place(count: int, radius_m: float) -> ns.NodeContainer:
-    """A sink and ``count`` nodes on a circle around it."""
+    """Return a sink and ``count`` nodes on a circle around it."""
     nodes, places = ns.NodeContainer(), ns.CreateObject[ns.ListPositionAllocator]()
     nodes.Create(count + 1)
     places.Add(ns.Vector(0.0, 0.0, 0.0))
@@ -126,10 +126,10 @@ def place(count: int, radius_m: float) -> ns.NodeContainer:
 def install_802154(
     nodes: ns.NodeContainer, starts_s: list[float], strict: bool
 ) -> tuple[ns.NetDeviceContainer, ns.LrWpanHelper]:
-    """Unslotted IEEE 802.15.4 with short addresses; nothing can be stricter here.
+    """Install unslotted IEEE 802.15.4 with short addresses; ``strict`` has no effect here.
 
     Returns:
-        The devices, and what takes their channel along when it goes: keep it until the end.
+        The devices, and the helper, which owns their channel and must be kept until the end.
     """
     helper = ns.LrWpanHelper()
     devices = helper.Install(nodes)
@@ -142,7 +142,8 @@ def install_802154(
 def install_80211b(
     nodes: ns.NodeContainer, starts_s: list[float], strict: bool
 ) -> tuple[ns.NetDeviceContainer, ns.WifiHelper]:
-    """IEEE 802.11b at 11 Mb/s; ``strict`` makes a receiver notice every frame, also one among equals.
+    """Install IEEE 802.11b at 11 Mb/s; with ``strict`` a receiver notices every frame, even among equally
+    strong ones.
 
     The sink is an access point, because stations of an ad hoc network answer at 11 Mb/s; it beacons once.
     """
@@ -171,7 +172,7 @@ def install_80211b(
 def run(
     mac: str, nodes: int, payload_bytes: int, radius_m: float, seconds: float, seed: int, strict: bool
 ) -> dict:
-    """One run; counts of packets after the warm-up, and what it cost."""
+    """Do one run; return counts of packets after the warm-up, and its cost."""
     ns.RngSeedManager.SetSeed(seed)
     ns.cppyy.gbl.saturated.tally = ns.cppyy.gbl.saturated.Tally()
     tally = ns.cppyy.gbl.saturated.tally
@@ -195,12 +196,12 @@ def run(
 
 
 def median(runs: list[dict]) -> dict:
-    """The run that took the median time."""
+    """Return the run with the median time."""
     return sorted(runs, key=lambda one: one["wall_s"])[len(runs) // 2]
 
 
 def constants_802154() -> dict[str, float]:
-    """Times in microseconds and limits."""
+    """Return times in microseconds, and limits."""
     devices, helper = install_802154(place(1, 10.0), [0.0], False)
     mac, csma, symbol_us = devices.Get(1).GetMac(), devices.Get(1).GetCsmaCa(), 16
     limits = csma.GetMacMinBE(), csma.GetMacMaxBE(), csma.GetMacMaxCSMABackoffs(), mac.GetMacMaxFrameRetries()
@@ -221,7 +222,7 @@ def constants_802154() -> dict[str, float]:
 
 
 def constants_80211b() -> dict[str, float]:
-    """Times in microseconds and limits; a data frame carries 1000 bytes over UDP."""
+    """Return times in microseconds, and limits; a data frame carries 1000 bytes over UDP."""
     devices, _ = install_80211b(place(1, 10.0), [0.0], False)
     phy, mac = devices.Get(1).GetPhy(), devices.Get(1).GetMac()
     slot_us, sifs_us = (time_.GetNanoSeconds() / 1e3 for time_ in (phy.GetSlot(), phy.GetSifs()))
@@ -253,7 +254,7 @@ def constants_80211b() -> dict[str, float]:
 
 
 def main() -> None:
-    """Run what the argument lists and print what came of it."""
+    """Run the scenarios in the argument and print the results."""
     ns.cppyy.cppdef(NODES)
     ns.Config.SetDefault("ns3::WifiMacQueue::MaxDelay", ns.TimeValue(ns.Seconds(MAX_DELAY_S)))
     runs = [median([run(**scenario) for _ in range(ROUNDS)]) for scenario in json.loads(sys.argv[1])]

@@ -1,8 +1,8 @@
 """``python -m lab.benchmarks.problem_lists FOLDER``: lists of problems of our rooms and of a LiDAR pair.
 
-The rooms are box rooms that no claim uses, seen by two cameras. The LiDAR pair is the one in the source
-archive of small_gicp (``data/source.ply``, ``target.ply``, ``T_target_source.txt``), which nobody here made.
-Each source is turned by up to 45 degrees about its middle and shifted by up to a fifth of its size.
+The rooms are box rooms that no claim uses, seen by two cameras. The LiDAR pair is from the source archive of
+small_gicp (``data/source.ply``, ``target.ply``, ``T_target_source.txt``), an independent recording. Each
+source is rotated by up to 45 degrees about its middle and shifted by up to a fifth of its size.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ ROOMS = range(300, 305)
 CONDITION = "nodes-sensor"
 ROOM_POINTS = 20_000
 TURN_DEG, SHIFT_OF_EXTENT = 45.0, 0.2
-"""Largest ones."""
+"""Largest rotation, and largest shift over the cloud's extent."""
 
 
 def motions(cloud: PointCloud, count: int, seed: int) -> list[FloatArray]:
-    """(4, 4) motions about the middle of a cloud, with turns and shifts evenly up to the largest."""
+    """Return (4, 4) motions about a cloud's middle, with rotations and shifts uniform up to the largest."""
     rng = np.random.default_rng(seed)
     center_m, extent_m = cloud.points_m.mean(axis=0), middle_extent_m(cloud.points_m)
     result = []

@@ -1,8 +1,8 @@
 """Registration problems in the lists of a public benchmark, solved by our method and the peers.
 
-The form is that of Fontana et al., "A benchmark for point clouds registration algorithms" (arXiv 2003.12841):
-a folder with clouds that already lie on each other, and lists ``*_local.txt`` and ``*_global.txt`` whose
-lines name a source, a target and the motion that the source is moved by before it is registered back.
+The format is that of Fontana et al., "A benchmark for point clouds registration algorithms" (arXiv
+2003.12841): a folder with clouds that are already aligned, and lists ``*_local.txt`` and ``*_global.txt``
+whose lines name a source, a target and the motion by which the source is moved before it is registered back.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ COLUMNS = ("id", "source", "target", "overlap", *(f"t{k}" for k in range(1, 13))
 OURS = "ceicp-a"
 PEERS = ("open3d-plane", "open3d-gicp", "small-gicp", "small-gicp-staged")
 SOLVED = 0.05
-"""A problem is solved if its points are off by less than this share of their distances to the centroid."""
+"""A problem is solved if its error is less than this share of the points' distances to the centroid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Problem:
     list_name: str
     id: str
     source: str
-    """A file."""
+    """File of the source cloud."""
     target: str
     overlap: float
     """0 to 1."""
@@ -51,16 +51,16 @@ class Problem:
 
     @property
     def T_moved(self) -> FloatArray:
-        """(4, 4) of the motion."""
+        """(4, 4) matrix of the motion."""
         return np.vstack([np.reshape(self.motion, (3, 4)), [0.0, 0.0, 0.0, 1.0]])
 
 
 def scaled_displacement(T_left: FloatArray, points_m: FloatArray) -> float:
-    """The benchmark's error: the mean over points of how far each is moved over its distance to the centroid.
+    """Return the benchmark's error: the mean over points of displacement over distance to the centroid.
 
     Args:
-        T_left: (4, 4) the motion that is left: identity where the problem is solved.
-        points_m: (N, 3) the source where it belongs.
+        T_left: (4, 4) the remaining motion: identity if the problem is solved.
+        points_m: (N, 3) the source at its true pose.
 
     Source: Fontana et al. 2020, eq. 3.
     """
@@ -71,10 +71,10 @@ def scaled_displacement(T_left: FloatArray, points_m: FloatArray) -> float:
 
 
 def read_problems(folder: Path) -> list[Problem]:
-    """Every line of every list below a folder; clouds lie beside their list.
+    """Return every line of every list below a folder; clouds are next to their list.
 
     Raises:
-        InputError: no list, or a line that is not one; the sentence names file and line.
+        InputError: no list, or an invalid line; the sentence names file and line.
     """
     paths = sorted(path for pattern in LISTS for path in folder.rglob(pattern))
     if not paths:
@@ -104,7 +104,7 @@ def _list(path: Path) -> Iterator[Problem]:
 def iterate_problems(
     folder: Path, store: Path, scheduler: str | None = None
 ) -> Generator[Progress, None, list[dict[str, Any]]]:
-    """Solve every problem below ``folder``; what ``store`` holds already is not solved again.
+    """Solve every problem below ``folder``; those in ``store`` are not solved again.
 
     Returns:
         A row for each problem and method: list, id, overlap, gate, error before and after, seconds, reason.
@@ -119,7 +119,7 @@ def iterate_problems(
 
 
 def solve(problem: Problem) -> list[dict[str, Any]]:
-    """One problem by every method, from the same start with the same gate.
+    """Solve one problem by every method, from the same start with the same gate.
 
     The gate is the one that `packetmesh register` finds from the data; its search counts in our time only.
     """
@@ -153,9 +153,9 @@ def solve(problem: Problem) -> list[dict[str, Any]]:
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """For each list and method: problems, median and upper quartile of the error, share solved, seconds.
+    """Return, per list and method: problems, median and upper quartile of the error, share solved, seconds.
 
-    A problem without an answer counts as not solved and keeps the error that it began with.
+    A problem without an answer counts as not solved and keeps its start error.
     """
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in rows:
@@ -185,14 +185,14 @@ def write_problems(
     motions: Sequence[Sequence[FloatArray]],
     overlaps: Sequence[float],
 ) -> Path:
-    """A list of problems with its clouds, as ``read_problems`` takes it.
+    """Write a list of problems with its clouds, in the form that ``read_problems`` takes.
 
     Args:
-        folder: gets the clouds as PLY and ``NAME_local.txt``.
-        name: of the list.
-        pairs: clouds with their ``T_true``, by which the source is laid on the target.
-        motions: for each pair the (4, 4) motions that its source is moved by.
-        overlaps: of each pair, 0 to 1.
+        folder: folder for the clouds as PLY and ``NAME_local.txt``.
+        name: name of the list.
+        pairs: clouds with their ``T_true``, which aligns the source with the target.
+        motions: for each pair the (4, 4) motions by which its source is moved.
+        overlaps: overlap of each pair, 0 to 1.
     """
     folder.mkdir(parents=True, exist_ok=True)
     lines = [" ".join(COLUMNS)]

@@ -1,8 +1,8 @@
-"""What the chain keeps of measured depth, and what it closes, on real frames that have no truth.
+"""Shares of kept measurements and closed rays in the chain, on real frames without ground truth.
 
-``python -m lab.benchmarks.real_frames`` reconstructs every real frame beside the repository, and every
-picture of the sets that ``PACKETMESH_DEPTH_SETS`` names and whose camera is known: ``sr300``, as Debian's
-visp-images-data has it, and ``middlebury``. No network was trained on any of these frames.
+``python -m lab.benchmarks.real_frames`` reconstructs every real frame next to the repository, and every image
+with a known camera of the sets in ``PACKETMESH_DEPTH_SETS``: ``sr300``, from Debian's visp-images-data, and
+``middlebury``. No network was trained on any of these frames.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ MEASURES = (
 
 
 def frames_of(spec: str) -> Iterator[RgbdFrame]:
-    """The pictures of a set such as ``sr300=FOLDER``, their depth as it was measured.
+    """Yield the images of a set such as ``sr300=FOLDER``, with their measured depth.
 
     Raises:
-        InputError: a set whose camera is not known.
+        InputError: the camera of the set is not known.
     """
     for pair in open_set(spec):
         if pair.camera is None:
@@ -43,7 +43,7 @@ def frames_of(spec: str) -> Iterator[RgbdFrame]:
 
 
 def measured(frame: RgbdFrame) -> tuple[float, ...]:
-    """``MEASURES`` of one frame."""
+    """Return ``MEASURES`` of one frame."""
     result = reconstruct(Rig(frame.name, (frame,)), PRESETS["packetmesh"])
     kept = result.kept
     return (
@@ -56,7 +56,7 @@ def measured(frame: RgbdFrame) -> tuple[float, ...]:
 
 
 def summary(frames: Iterable[RgbdFrame]) -> dict[str, Any]:
-    """Means of ``MEASURES``, and in how many frames fusion made a share near the measurement smaller."""
+    """Return means of ``MEASURES``, and the number of frames whose share near the measurement fell."""
     shares = np.array([measured(frame) for frame in frames])
     lower = (shares[:, 2] < shares[:, 1]) | (shares[:, 4] < shares[:, 3])
     means = dict(zip(MEASURES, shares.mean(axis=0).tolist(), strict=True))
@@ -64,7 +64,7 @@ def summary(frames: Iterable[RgbdFrame]) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Print one JSON object, a summary for each set."""
+    """Print one JSON object with a summary for each set."""
     found = {}
     for folder in real_folders():
         found[folder.name] = summary((load_real(folder),))

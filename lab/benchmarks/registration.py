@@ -1,4 +1,4 @@
-"""How long it takes to register two clouds, ours and the peers' programs side by side."""
+"""Time of registering two clouds, by us and by the peers' programs in the same run."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from pipeline.types import FloatArray, PointCloud, RgbdFrame
 POINTS = 100_000
 GATE_M = 0.25
 MOTION = rigid(rotation_exp(np.radians(6.0) * np.array([0.36, 0.8, -0.48])), np.array([0.10, -0.03, 0.08]))
-"""Of the second camera in the frame of the first: 6 degrees and 13 cm."""
+"""Pose of the second camera in the frame of the first: 6 degrees and 13 cm."""
 OURS = "ceicp-a"
 RIVALS = ("open3d-point", "open3d-plane", "open3d-gicp", "small-gicp", "small-vgicp", "small-gicp-staged")
-"""CPD is left out: it takes part in comparisons of accuracy, on few points."""
+"""Compared programs. CPD is left out: it takes part in comparisons of accuracy, on few points."""
 MAX_ITERATIONS = 300
-"""More than any of them needs."""
+"""Iteration limit, which none of them reaches."""
 ROUNDS = 15
 Drawn: TypeAlias = Literal["ours", "both", "none"]
-"""Who registers no more than the points that ours draws by default: only ours, all programs, or nobody."""
+"""Programs that register only the points that ours draws by default: only ours, all, or none."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpeedPair:
-    """Two views of a room by the model of the Kinect, and the truth about them."""
+    """Two views of a room by the Kinect model, and their true pose."""
 
     source: PointCloud
     target: PointCloud
@@ -44,7 +44,7 @@ class SpeedPair:
 
 
 def speed_pair(points: int = POINTS, seed: int = 0) -> SpeedPair:
-    """The living room from its first camera and from ``MOTION`` beside it, ``points`` each."""
+    """Return the living room from its first camera and from ``MOTION`` next to it, ``points`` each."""
     scene = build_demo("living-room")
     renderer = Renderer(scene)
     clouds = []
@@ -62,7 +62,7 @@ def speed_pair(points: int = POINTS, seed: int = 0) -> SpeedPair:
 
 
 def thinned(pair: SpeedPair) -> SpeedPair:
-    """The random subsets that our method takes of the clouds, so that the peers have no more to do."""
+    """Return the random subsets that our method takes, so that the peers register equally many points."""
     config = RegistrationConfig()
     clouds = [
         draw(cloud, config.max_points, config.seed, "speed").cloud for cloud in (pair.source, pair.target)
@@ -71,15 +71,15 @@ def thinned(pair: SpeedPair) -> SpeedPair:
 
 
 def benchmark(points: int, drawn: Drawn) -> Benchmark:
-    """Ours and every rival in turn, round by round, each right after a run of its own that does not count.
+    """Run ours and every rival in turn, round by round, each after a warm-up run of its own.
 
-    Without that, what counts depends on whose turn was before: another's threads go on spinning for a while
-    after its end, and its data are in the caches. Each program's memory is that of a process that does
-    nothing else, libraries and clouds included.
+    Without the warm-up the time depends on the program before: its threads continue to spin for a while after
+    its end, and its data are in the caches. Each program's memory is that of a process that does nothing
+    else, including libraries and clouds.
 
     Args:
-        points: of each cloud.
-        drawn: who registers only what ours draws of them.
+        points: number of points of each cloud.
+        drawn: programs that register only the points that ours draws.
     """
     pair = speed_pair(points)
     few = thinned(pair) if drawn == "both" else pair
@@ -98,28 +98,28 @@ def benchmark(points: int, drawn: Drawn) -> Benchmark:
 
 
 def _late(values: list[float]) -> float:
-    """Their 95th percentile."""
+    """Return the 95th percentile."""
     return float(np.percentile(values, 95.0))
 
 
 @dataclass(frozen=True, slots=True)
 class _Registered:
-    """One registration."""
+    """Time and error of one registration."""
 
     elapsed_s: float
-    """From points to pose."""
+    """Time from points to pose."""
     error_m: float
-    """The point error."""
+    """Point error."""
 
 
 def _run_again(name: str, pair: SpeedPair, most: int) -> _Registered:
-    """The second of two registrations."""
+    """Return the second of two registrations."""
     _run(name, pair, most)
     return _run(name, pair, most)
 
 
 def _run(name: str, pair: SpeedPair, most: int) -> _Registered:
-    """Register copies of the clouds, for which nothing is prepared; ours draws ``most`` points at most."""
+    """Register copies of the clouds, for which nothing is prepared; ours draws at most ``most`` points."""
     source, target = (PointCloud(cloud.points_m.copy()) for cloud in (pair.source, pair.target))
     if name == OURS:
         config = RegistrationConfig(gate_m=GATE_M, max_iterations=MAX_ITERATIONS, max_points=most)

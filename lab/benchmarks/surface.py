@@ -1,4 +1,4 @@
-"""How long balls take to roll, and how much memory: ours and the peers', each in a process of its own."""
+"""Time and memory of ball pivoting, ours and the peers', each in its own process."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ ROUGH_BALLS = ("1.5 r_F", "4 r_F")
 MANY_POINTS_BALLS = ("1.5 r_F", HEADLINE)
 ROUNDS = 3
 SLOW_S = 20.0
-"""A first round longer than this is the only one."""
+"""A first round longer than this is the only one, seconds."""
 MOST_S = 150.0
-"""A program that takes longer for all its rounds is stopped and left out."""
+"""A program that takes longer for all its rounds is stopped and left out, seconds."""
 CLOSE_SHARE = 0.5
-"""A point with the mesh within this share of r_F counts as covered."""
+"""A point is covered if the mesh is within this share of r_F."""
 
 Ball = Callable[[FloatArray, FloatArray, Sequence[float]], tuple[FloatArray, IntArray]]
 
@@ -76,11 +76,11 @@ class SurfaceRun:
     """Median of the rounds."""
     rounds: int
     first_use_s: float
-    """The first surface of the process, of 100 points: compiled code comes from its cache."""
+    """Time of the process's first surface, of 100 points; compiled code comes from its cache."""
     peak_memory_bytes: int
-    """Of a process that does nothing but this, libraries and cloud included."""
+    """Peak memory of a process that does nothing else, including libraries and cloud."""
     added_memory_bytes: int
-    """The peak less what the process held before it began."""
+    """The peak minus the memory before the start."""
     triangles: int
     used_share: float
     """Share of the points that are corners of a triangle."""
@@ -93,14 +93,14 @@ class SurfaceRun:
 def roll_ours(
     points_m: FloatArray, normals: FloatArray, radii_m: Sequence[float]
 ) -> tuple[FloatArray, IntArray]:
-    """Our own ball: vertices and triangles."""
+    """Roll our own ball; return vertices and triangles."""
     return points_m, roll(points_m, normals, radii_m).triangles
 
 
 def roll_open3d(
     points_m: FloatArray, normals: FloatArray, radii_m: Sequence[float]
 ) -> tuple[FloatArray, IntArray]:
-    """Open3D's."""
+    """Roll Open3D's ball."""
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
     cloud.normals = o3d.utility.Vector3dVector(normals)
     mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(
@@ -112,7 +112,7 @@ def roll_open3d(
 def roll_meshlab(
     points_m: FloatArray, normals: FloatArray, radii_m: Sequence[float]
 ) -> tuple[FloatArray, IntArray]:
-    """MeshLab's with its own defaults, once for each radius on what the smaller ones made."""
+    """Roll MeshLab's ball with its defaults, once per radius, each on the mesh of the smaller ones."""
     import pymeshlab
 
     meshes = pymeshlab.MeshSet()
@@ -127,14 +127,15 @@ PROGRAMS: dict[str, Ball] = {OURS: roll_ours, "open3d": roll_open3d, "meshlab": 
 
 
 def available_programs() -> tuple[str, ...]:
-    """Ours first, and the peers that are installed."""
+    """Return our program first, then the installed peers."""
     return tuple(
         name for name in PROGRAMS if name != "meshlab" or importlib.util.find_spec("pymeshlab") is not None
     )
 
 
 def room_cloud(points: int, smoothed: bool = True) -> PointCloud:
-    """About ``points`` of the living room's fused cloud, thinned by voxels and smoothed as the chain does.
+    """Return about ``points`` of the living room's fused cloud, thinned by voxels and smoothed as in the
+    chain.
 
     Rendered depth with the sensor's noise, filled by the network's; three nodes at their true poses.
     """
@@ -153,7 +154,7 @@ def room_cloud(points: int, smoothed: bool = True) -> PointCloud:
 
 
 def terrain(points: int, seed: int = 0, point_distance_m: float = 0.01, noise_m: float = 0.001) -> PointCloud:
-    """Exactly ``points`` on rolling ground whose area grows with their number, with its true normals.
+    """Return exactly ``points`` on rolling ground, whose area grows with their number, with true normals.
 
     Waves of 1 m length and 10 cm height; a jittered grid, and noise along z.
     """
@@ -173,15 +174,15 @@ def terrain(points: int, seed: int = 0, point_distance_m: float = 0.01, noise_m:
 def time_alone(
     program: str, cloud: PointCloud, name: str, balls: str, multiples: Sequence[float], rounds: int = ROUNDS
 ) -> SurfaceRun:
-    """One program over one cloud, in a fresh process.
+    """Run one program over one cloud, in a fresh process.
 
     Args:
         program: a name of ``PROGRAMS``.
         cloud: points with normals.
-        name: of the cloud, for the record.
-        balls: what the radii are called.
+        name: name of the cloud, for the record.
+        balls: name of the radii.
         multiples: the radii as multiples of the cloud's r_F, ascending.
-        rounds: how often; once if that takes long.
+        rounds: number of rounds; only one if the first is slow.
 
     Raises:
         TimeoutError: it took longer than ``MOST_S`` and was stopped.
@@ -194,7 +195,7 @@ def time_alone(
 
 
 def measure(program: str, path: Path, multiples: Sequence[float], rounds: int) -> SurfaceRun:
-    """Time, memory and quality in this process."""
+    """Measure time, memory and quality in this process."""
     points_m, normals = np.load(path)
     r_F_m, _ = spacing(points_m)
     radii_m = tuple(factor * r_F_m for factor in multiples)
@@ -245,7 +246,7 @@ def _covered_share(points_m: FloatArray, vertices_m: FloatArray, triangles: IntA
 
 
 def benchmark() -> Benchmark:
-    """Ball pivoting of about 50,000 points; the times are those of all four balls together."""
+    """Measure ball pivoting of about 50,000 points; the times are those of all four balls together."""
     runs = tuple(measure_speed())
     chosen = {run.program: run for run in runs if run.cloud == ROOM and run.balls == HEADLINE}
     seconds = {name: run.elapsed_s for name, run in chosen.items()}
@@ -256,7 +257,7 @@ def benchmark() -> Benchmark:
 
 
 def measure_speed() -> Iterator[SurfaceRun]:
-    """Every ball by every available program on the room, and ours on a terrain of many points."""
+    """Yield every ball by every available program on the room, and ours on a terrain of many points."""
     programs = available_programs()
     room = room_cloud(POINTS)
     cases = [(room, ROOM, balls, programs) for balls in BALLS]

@@ -1,1 +1,1 @@
-"""The thesis's claims beside our own numbers: the value in print, a tolerance, and a computation of ours."""
+"""The thesis's claims tested by our own computations: the printed value, a tolerance, and our result."""

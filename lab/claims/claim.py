@@ -1,4 +1,4 @@
-"""A claim, the thesis's or ours, and the verdict on it."""
+"""A claim, of the thesis or ours, and its verdict."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ VERDICTS = (
     *("reproduced", "not reproduced", "true by definition", "cannot be tested"),
     *("holds", "does not hold"),
 )
-"""The last two are of claims of ours."""
+"""Verdicts; the last two are for our own claims."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What our own computation of a claim gave."""
+    """The result of our computation of a claim."""
 
     ours: dict[str, float]
     """Measured values by name; shares from 0 to 1, lengths in metres."""
     ci95: dict[str, tuple[float, float]]
-    """95 % intervals of those values that vary from case to case."""
+    """95 % intervals of the values that vary between cases."""
     reproduced: bool | None
-    """Of ours: whether it holds. None: nothing that we have can test it."""
+    """Whether the thesis's claim is reproduced, or ours holds; None if our data cannot test it."""
     why: str
-    """One sentence that a reader can check against ``ours``."""
+    """One sentence that can be checked against ``ours``."""
     exhibits: tuple[Exhibit, ...] = ()
     """Tables and pictures for the report."""
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """A claim beside its outcome."""
+    """A claim with its outcome."""
 
     id: str
     claim: str
@@ -53,39 +53,39 @@ class Verdict:
 
     @property
     def beyond(self) -> bool:
-        """Whether it is ours, and the thesis does not say it."""
+        """Whether the claim is ours and not the thesis's."""
         return is_beyond(self.id)
 
     def record(self) -> dict[str, Any]:
-        """The verdict as plain values."""
+        """Return the verdict as plain values."""
         exhibits = [exhibit_record(exhibit) for exhibit in self.exhibits]
         return asdict(replace(self, exhibits=())) | {"exhibits": exhibits}
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """Something that can be computed."""
+    """A statement that can be tested by a computation."""
 
     id: str
-    """Its number in SPEC 8: C and two digits for what the thesis says, D for ours beyond it."""
+    """Its number in SPEC 8: C and two digits for the thesis's claims, D for our own."""
     claim: str
     thesis: str
-    """The thesis's own value, or that it has none."""
+    """The thesis's own value, or a note that it has none."""
     tolerance: str
-    """What counts as reproduced."""
+    """Condition for the verdict *reproduced*."""
     experiment: Callable[..., Outcome]
-    """Called with what ``prepare`` returned, if there is one, else with nothing."""
+    """Called with the result of ``prepare``, if there is one, else without arguments."""
     prepare: Callable[[Path, str | None], Generator[Progress, None, Any]] | None = None
-    """Its trials, by the folder that keeps them and the address of a Dask scheduler; claims with the same
-    function share one call of it."""
+    """Runs the trials; takes their folder and a Dask scheduler's address. Claims with the same function share
+    one call of it."""
     prepare_full: Callable[[Path, str | None], Generator[Progress, None, Any]] | None = None
-    """Where ``prepare`` runs a subset of the trials: all of them."""
+    """Runs all trials, if ``prepare`` runs only a subset."""
     by_definition: bool = False
-    """Whether a check of it cannot tell anything of the world: settings, file formats, sums of what is
-    printed. It is no finding if it comes out, but one if it does not."""
+    """Whether a test cannot say anything about the world: settings, file formats, sums of printed numbers.
+    Only a failed test of it is a finding."""
 
     def judge(self, *prepared: Any) -> Verdict:
-        """Run the experiment and compare."""
+        """Run the experiment and compare its result with the claim."""
         outcome = self.experiment(*prepared)
         return Verdict(
             self.id,
@@ -110,14 +110,14 @@ class Claim:
 
 
 def is_beyond(name: str) -> bool:
-    """Whether a claim of that name is ours, and the thesis does not say it."""
+    """Whether a claim of that name is ours and not the thesis's."""
     return name.startswith("D")
 
 
 def bootstrap_ci95(
     values: FloatArray, seed: int = 0, resamples: int = 2000, statistic: Callable[..., Any] = np.mean
 ) -> tuple[float, float]:
-    """95 % percentile interval of the mean, or of another statistic, of (N, ...) ``values``, N cases."""
+    """Return the 95 % percentile interval of a statistic of (N, ...) ``values`` over N cases."""
     values = np.asarray(values, float)
     rows = np.random.default_rng(seed).integers(0, len(values), (resamples, len(values)))
     low, high = np.percentile(statistic(values[rows], axis=1), (2.5, 97.5))
@@ -125,7 +125,7 @@ def bootstrap_ci95(
 
 
 def mean_curve(label: str, x: Iterable[float], columns: Iterable[FloatArray], resamples: int = 2000) -> Curve:
-    """The means of (N,) values at each ``x``, with their bootstrap intervals as a band."""
+    """Return the means of (N,) values at each ``x``, with their bootstrap intervals as a band."""
     points = [(float(column.mean()), *bootstrap_ci95(column, resamples=resamples)) for column in columns]
     means, low, high = zip(*points, strict=True)
     return Curve(label, tuple(float(value) for value in x), means, low, high)

@@ -1,4 +1,4 @@
-"""Tables and pictures that belong to a verdict, as data."""
+"""Tables and pictures of a verdict, as data."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipeline.types import ByteArray
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of a name and values; None where there is no value."""
+    """Rows of a name and values; None for a missing value."""
 
     title: str
     header: tuple[str, ...]
@@ -21,18 +21,18 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One line of a chart, all sequences equally long."""
+    """One line of a chart; all sequences have the same length."""
 
     label: str
     x: tuple[float, ...]
     y: tuple[float, ...]
     low: tuple[float, ...]
-    """Lower edge of its band."""
+    """Lower edge of the band."""
     high: tuple[float, ...]
 
 
 def plain_curve(label: str, x: Iterable[float], y: Iterable[float]) -> Curve:
-    """A line without a band."""
+    """Return a line without a band."""
     values = tuple(float(value) for value in y)
     return Curve(label, tuple(float(value) for value in x), values, values, values)
 
@@ -47,7 +47,7 @@ class Chart:
     curves: tuple[Curve, ...]
     note: str = ""
     logarithmic: bool = False
-    """Both axes; all values are positive then."""
+    """Whether both axes are logarithmic; then all values are positive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class HeatMap:
     y_label: str
     y: tuple[float, ...]
     shares: tuple[tuple[float, ...], ...]
-    """One row for each ``y``."""
+    """One row per ``y``."""
     note: str = ""
 
 
@@ -70,7 +70,7 @@ class Picture:
 
     title: str
     images: tuple[tuple[str, ByteArray], ...]
-    """Each a caption and (H, W, 3) RGB."""
+    """Captions and (H, W, 3) RGB images."""
     note: str = ""
 
 
@@ -78,7 +78,7 @@ Exhibit = Table | Chart | HeatMap | Picture
 
 
 def exhibit_record(exhibit: Exhibit) -> dict[str, Any]:
-    """An exhibit as plain values; of images only their captions and sizes."""
+    """Return an exhibit as plain values; for images only their captions and sizes."""
     if not isinstance(exhibit, Picture):
         return asdict(exhibit)
     images = [

@@ -1,6 +1,6 @@
-"""All claims, the thesis's and ours beyond it, and how to compute them.
+"""All claims, the thesis's and ours, and their computation.
 
-A claim that does not come out is reported as not reproduced; that is a result, not an error.
+A claim that fails is reported as not reproduced; that is a result, not an error.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ _ALL: tuple[Claim, ...] = (
     D10,
 )
 CLAIMS = {claim.id: claim for claim in sorted(_ALL, key=lambda claim: claim.id)}
-"""By number in SPEC 8, in its order."""
+"""Claims by number in SPEC 8, in its order."""
 
 
 def run_claims(
     only: Iterable[str] = (), folder: Path | None = None, scheduler: str | None = None, full: bool = False
 ) -> Iterator[Progress | Verdict]:
-    """Compute the claims named, or all of them, with progress in between.
+    """Compute the named claims, or all, and yield progress in between.
 
     Args:
         only: names of claims; empty for all.
-        folder: keeps the trials, so that an interrupted run resumes; None keeps nothing.
+        folder: folder of the trials, so that an interrupted run resumes; None stores nothing.
         scheduler: address of a Dask scheduler for the trials; None takes this machine's cores.
-        full: also the trials that claims leave out by default, for hours.
+        full: also the trials that claims leave out by default; takes hours.
 
     Raises:
         InputError: a name is not a claim, the folder cannot be written, or there is no such scheduler.

@@ -1,4 +1,4 @@
-"""C09, C11, C15 and C37 to C39: settings of the thesis, and what nothing that we have can test (SPEC 8)."""
+"""C09, C11, C15 and C37 to C39: settings of the thesis, and claims that our data cannot test (SPEC 8)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Public sets of pictures with depth, read one pair at a time: ``open_set("nyu=/data/nyu")``."""
+"""Public data sets of images with depth, read one pair after the other: ``open_set("nyu=/data/nyu")``."""
 
 from lab.datasets.opening import SETS, open_set
 from lab.datasets.pair import Pair

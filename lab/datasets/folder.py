@@ -1,4 +1,4 @@
-"""Anybody's pictures with depth, paired by name; depth in 16-bit millimetres."""
+"""Pairs of images and 16-bit depth in millimetres in any folder, matched by name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COLOR_FOLDERS = ("color", "rgb", "image")
 
 
 def find(root: Path) -> list[Load]:
-    """The pairs in ``root`` and in all folders below it.
+    """Return the pairs in ``root`` and in all folders below it.
 
     ``color/NAME`` (or rgb/, image/) with ``depth/NAME.png``, ``NAME_rgb`` (or _color) with
     ``NAME_depth.png``, and ``color.png`` with ``depth.png``.
@@ -25,7 +25,7 @@ def find(root: Path) -> list[Load]:
 
 
 def _pairs(folder: Path) -> list[tuple[Path, Path]]:
-    """Picture and depth of each pair that lies in this folder."""
+    """Return image and depth of each pair in this folder."""
     wanted = []
     for picture in _pictures(folder):
         stem, _, ending = picture.stem.rpartition("_")

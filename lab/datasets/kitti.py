@@ -24,7 +24,7 @@ from pipeline.types import BoolArray, FloatArray
 log = logging.getLogger(__name__)
 
 LIST = "test_files.txt"
-"""Eigen's test split, as monodepth2 and its successors carry it, in the set's folder."""
+"""File in the set's folder with Eigen's test split, as in monodepth2 and later projects."""
 UNITS_PER_METRE = 256.0
 GARG = (0.40810811, 0.99189189, 0.03594771, 0.96405229)
 """Top, bottom, left and right of the crop of Garg et al., ECCV 2016, as shares of height and width."""
@@ -36,7 +36,7 @@ _LINE = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """One picture of one drive."""
+    """One image of one drive."""
 
     root: Path
     drive: str
@@ -52,14 +52,14 @@ class _Place:
 
     @property
     def improved(self) -> Path | None:
-        """Ground truth in the raw tree or in the depth benchmark's own."""
+        """Ground truth in the raw data's folders or in the depth benchmark's."""
         below = f"proj_depth/groundtruth/image_0{self.camera}/{self.number:010d}.png"
         drives = (self.drive, *(f"{part}/{Path(self.drive).name}" for part in ("train", "val")))
         return _first(self.root / drive / below for drive in drives)
 
     @property
     def cameras(self) -> Path:
-        """Calibration of the cameras, one a day."""
+        """Calibration of the cameras, one per day."""
         return self.root / Path(self.drive).parent / "calib_cam_to_cam.txt"
 
     @property
@@ -68,13 +68,13 @@ class _Place:
 
 
 def find(root: Path) -> list[Load]:
-    """The frames of the list of Eigen's test split in ``root``, else of every drive below it.
+    """Return the frames in the list of Eigen's test split in ``root``, or of every drive below it.
 
-    Where one frame has the improved ground truth, only those that have it count, as in published tables
-    (652 of the 697 test frames); else the truth is what the laser saw.
+    If any frame has the improved ground truth, only those that have it are returned, as in published tables
+    (652 of the 697 test frames); otherwise the truth is the laser's points.
 
     Raises:
-        InputError: the list has a line that names no frame.
+        InputError: a line of the list names no frame.
     """
     places = _listed(root / LIST) if (root / LIST).is_file() else _found(root)
     there = [place for place in places if place.picture]
@@ -121,7 +121,7 @@ def _load(place: _Place) -> Pair:
 
 
 def judged(shape: tuple[int, ...]) -> BoolArray:
-    """(H, W) True inside the crop of Garg et al."""
+    """Return (H, W) True inside the crop of Garg et al."""
     top, bottom, left, right = GARG
     height, width = shape[:2]
     rows = slice(int(top * height), int(bottom * height))
@@ -129,7 +129,7 @@ def judged(shape: tuple[int, ...]) -> BoolArray:
 
 
 def _laser_depth(place: _Place, shape: tuple[int, int]) -> FloatArray:
-    """(H, W) depth along the camera's axis of the laser points that it sees.
+    """Return (H, W) depth along the camera's axis of the laser points that it sees.
 
     monodepth's tables take the laser's forward axis for the depth, which adds about 27 cm.
     """
@@ -150,7 +150,7 @@ def _laser_depth(place: _Place, shape: tuple[int, int]) -> FloatArray:
 
 
 def _matrix(file: Path, key: str, shape: tuple[int, ...]) -> FloatArray:
-    """The numbers of the line ``key: numbers``."""
+    """Return the numbers of the line ``key: numbers``."""
     for line in read_text(file, "KITTI calibration").splitlines():
         if line.startswith(f"{key}:"):
             try:

@@ -1,4 +1,4 @@
-"""Middlebury 2014 stereo scenes, also the motorcycle that scikit-image carries.
+"""Middlebury 2014 stereo scenes, and the motorcycle scene that is part of scikit-image.
 
 Scharstein et al., "High-resolution stereo datasets with subpixel-accurate ground truth", GCPR 2014.
 """
@@ -24,13 +24,13 @@ _NUMBER = r"(-?[\d.]+(?:e[-+]?\d+)?)"
 
 ARCHIVE, ARCHIVE_PICTURE = "motorcycle_disp.npz", "motorcycle_left.png"
 MOTORCYCLE = (994.978, 0.193001, 31.086)
-"""Focal length, baseline and offset of the quarter-size pictures in scikit-image (data.stereo_motorcycle)."""
+"""Focal length, baseline and offset of the quarter-size images in scikit-image (data.stereo_motorcycle)."""
 MOTORCYCLE_CENTER_PX = (311.193, 254.877)
-"""The left camera's principal point, from the same place."""
+"""The left camera's principal point, from the same source."""
 
 
 def find(root: Path) -> list[Load]:
-    """The left views in ``root`` and all folders below it, each folder a scene."""
+    """Return the left views in ``root`` and all folders below it; each folder is a scene."""
     scenes = [file.parent for file in sorted(root.rglob("disp0.pfm"))]
     archives = sorted(root.rglob(ARCHIVE))
     return [
@@ -63,7 +63,7 @@ def _load_motorcycle(file: Path) -> Pair:
 
 
 def depth_m(disparity_px: FloatArray, focal_px: float, baseline_m: float, doffs_px: float) -> FloatArray:
-    """(H, W) float32 metres; NaN where the disparity is not finite or nothing lies in front.
+    """Return (H, W) float32 metres; NaN where the disparity is not finite or gives no positive depth.
 
     Z = focal baseline / (disparity + doffs), where doffs is the difference of the two principal points.
     """
@@ -73,10 +73,10 @@ def depth_m(disparity_px: FloatArray, focal_px: float, baseline_m: float, doffs_
 
 
 def read_calibration(file: Path) -> tuple[float, float, float]:
-    """Focal length in pixels, baseline in metres and offset in pixels of a ``calib.txt``.
+    """Return focal length in pixels, baseline in metres and offset in pixels of a ``calib.txt``.
 
     Raises:
-        InputError: missing, or without cam0, baseline and doffs.
+        InputError: the file is missing, or lacks cam0, baseline or doffs.
     """
     text = read_text(file, "Middlebury calibration")
     patterns = (r"cam0\s*=\s*\[", r"baseline\s*=\s*", r"doffs\s*=\s*")

@@ -14,10 +14,10 @@ _HEADER = re.compile(rb"(P5|Pf)\s+(\d+)\s+(\d+)\s+(255|-?\d+(?:\.\d*)?)\s")
 
 
 def read_netpbm(file: Path) -> np.ndarray:
-    """(H, W) uint8 of a PGM file, or float32 of a PFM file, whose rows run from the bottom up.
+    """Return (H, W) uint8 of a PGM file, or float32 of a PFM file, whose rows are stored from the bottom up.
 
     Raises:
-        InputError: missing, truncated, too large, or neither of the two.
+        InputError: the file is missing, truncated, too large, or neither PGM nor PFM.
     """
     data = read_bytes(file, MAX_IMAGE_BYTES, "grey image")
     header = _HEADER.match(data)

@@ -1,4 +1,4 @@
-"""NYU Depth v2: the labelled file, and the folders of pictures that people make of it.
+"""NYU Depth v2: the labelled file, or folders of images that were made from it.
 
 Silberman et al., "Indoor Segmentation and Support Inference from RGBD Images", ECCV 2012.
 """
@@ -22,15 +22,15 @@ from pipeline.types import BoolArray
 LABELLED = "nyu_depth_v2_labeled.mat"
 WIDTH_PX, HEIGHT_PX = 640, 480
 CROP = np.s_[45:471, 41:601]
-"""Rows and columns that evaluations compare since Eigen et al., NIPS 2014: without the white border."""
+"""Rows and columns that evaluations use since Eigen et al., NIPS 2014: without the white border."""
 PARTNERS = [(r"rgb_(\d+)", r"sync_depth_\1"), (r"(.+)_colors", r"\1_depth"), (r"(.+)", r"\1")]
-"""Stems of pictures and of the depth that belongs to them, the first that fits."""
+"""Patterns of image names and of their depth files; the first match counts."""
 
 
 def find(root: Path) -> list[Load]:
-    """The frames of the labelled .mat file at or in ``root``, else of a tree of pictures.
+    """Return the frames of the labelled .mat file at or in ``root``, or of image folders below it.
 
-    A ``splits.mat`` beside them leaves the standard 654 test pictures of the labelled 1449.
+    With a ``splits.mat`` next to it, only the standard 654 test images of the labelled 1449 are returned.
 
     Raises:
         InputError: h5py is missing, or a .mat file is damaged.
@@ -51,7 +51,7 @@ def find(root: Path) -> list[Load]:
 
 
 def _tested(file: Path) -> set[int] | None:
-    """Numbers of the labelled set's pictures that are for tests, counted from one; None without the file."""
+    """Return the numbers of the labelled test images, from one; None without the file."""
     if not file.is_file():
         return None
     try:
@@ -61,7 +61,7 @@ def _tested(file: Path) -> set[int] | None:
 
 
 def _partner(picture: Path) -> Path | None:
-    """The depth file of a picture; None if it has none, or is depth itself."""
+    """Return the depth file of an image; None if it has none, or is depth itself."""
     for of_picture, of_depth in PARTNERS:
         match = re.fullmatch(of_picture, picture.stem)
         if match:
@@ -76,7 +76,7 @@ def _from_files(picture: Path, depth: Path) -> Pair:
 
 
 def _from_mat(mat: Path, row: int) -> Pair:
-    """Raw depth where the file has it: the other was in-painted, which is no measurement."""
+    """Return a pair with raw depth, if the file has it: the other depth was in-painted, not measured."""
     try:
         with _h5py().File(mat, "r") as file:
             z_m = np.transpose(file["rawDepths" if "rawDepths" in file else "depths"][row]).astype(np.float32)
@@ -88,12 +88,12 @@ def _from_mat(mat: Path, row: int) -> Pair:
 
 
 def judged(shape: tuple[int, ...]) -> BoolArray | None:
-    """(480, 640) True inside the crop of Eigen et al.; None for pictures of another size."""
+    """Return (480, 640) True inside the crop of Eigen et al.; None for images of another size."""
     return window(shape, *CROP) if shape[:2] == (HEIGHT_PX, WIDTH_PX) else None
 
 
 def _count(mat: Path) -> int:
-    """Number of pictures in the file."""
+    """Return the number of images in the file."""
     try:
         with _h5py().File(mat, "r") as file:
             if "rawDepths" not in file and "depths" not in file:

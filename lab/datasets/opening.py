@@ -1,4 +1,4 @@
-"""One door to all sets."""
+"""Access to all data sets by kind and folder."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SETS: dict[str, Callable[[Path], list[Load]]] = {
     "middlebury": middlebury.find,
     "sr300": sr300.find,
 }
-"""What finds the pairs of each kind of set in a folder."""
+"""The function that finds the pairs of each kind of set in a folder."""
 EXPECTED = {
     "nyu": "nyu_depth_v2_labeled.mat, or pictures *.jpg beside 16-bit depth *.png",
     "kitti": "DATE/DATE_drive_NUMBER_sync/image_02/data with ground-truth PNG or velodyne files",
@@ -29,17 +29,17 @@ EXPECTED = {
     "middlebury": "im0.png, disp0.pfm and calib.txt, or motorcycle_left.png and motorcycle_disp.npz",
     "sr300": "depth_M_color.txt beside chateau.xml, and castel/image_0000.pgm with its depth_image_0000.bin",
 }
-"""What a folder of each kind holds, for the message when it does not."""
+"""The files of each kind of set, for the error message if they are missing."""
 
 
 def open_set(spec: str) -> Iterator[Pair]:
-    """The pairs of a set, read one by one; of a set with a split of its own, the test pairs.
+    """Read the pairs of a set one by one; only the test pairs, if the set has a split.
 
     Args:
         spec: ``kind=path`` with a kind of ``SETS`` and the set's folder (or NYU's .mat file).
 
     Raises:
-        InputError: no such kind or folder, no pair there, or while reading, a file that cannot be used.
+        InputError: unknown kind or folder, no pair there, or, while reading, an unusable file.
     """
     kind, _, path = spec.partition("=")
     kind = kind.strip().lower()

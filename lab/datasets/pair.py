@@ -1,4 +1,4 @@
-"""A picture with its depth, and the promise of one that is read when it is needed."""
+"""An image with its depth, and the type of functions that read one."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from pipeline.types import BoolArray, ByteArray, CameraIntrinsics, FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """One picture and its true depth, on the same pixel grid."""
+    """One image and its true depth, on the same pixel grid."""
 
     picture: Path
-    """The file, and for one of many in a file its number below that."""
+    """The file; for one of many images in a file, its number is appended."""
     rgb: ByteArray
-    """(H, W, 3) RGB; grey pictures have three equal channels."""
+    """(H, W, 3) RGB; grey images have three equal channels."""
     truth_m: FloatArray
     """(H, W) float32, metres along the optical axis, NaN where unknown."""
     judged: BoolArray | None = None
-    """(H, W) the pixels that this set's evaluations compare; None when all of them."""
+    """(H, W) the pixels that this set's evaluations use; None for all pixels."""
     camera: CameraIntrinsics | None = None
-    """Of the picture, where the set's reader knows it."""
+    """Camera of the image, if the set's reader knows it."""
 
     def __post_init__(self) -> None:
         """Raise InputError for depth of another size than the picture's."""
@@ -39,11 +39,11 @@ class Pair:
 
 
 Load = Callable[[], Pair]
-"""Reads the files of a pair that lies on disk."""
+"""Reads the files of a pair."""
 
 
 def load_pair(picture: Path, depth: Path, units_per_metre: float = 1000.0) -> Pair:
-    """A picture with its 16-bit depth image, whose value 0 means unknown.
+    """Return an image with its 16-bit depth image, whose value 0 means unknown.
 
     Raises:
         InputError: one cannot be read, or they differ in size.
@@ -52,7 +52,7 @@ def load_pair(picture: Path, depth: Path, units_per_metre: float = 1000.0) -> Pa
 
 
 def window(shape: tuple[int, ...], rows: slice, columns: slice) -> BoolArray:
-    """(H, W) True inside the rows and columns."""
+    """Return (H, W) True inside the rows and columns."""
     mask = np.zeros(shape[:2], dtype=bool)
     mask[rows, columns] = True
     return mask

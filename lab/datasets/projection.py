@@ -1,4 +1,4 @@
-"""Points that fall on pixels: the nearest one wins."""
+"""Projection of points to a depth image; the nearest point per pixel wins."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pipeline.types import FloatArray, IntArray
 
 
 def nearest_per_pixel(pixels: IntArray, z_m: FloatArray, shape: tuple[int, int]) -> FloatArray:
-    """(H, W) float32 depth of the nearest point on each pixel, NaN where none falls.
+    """Return (H, W) float32 depth of the nearest point on each pixel, NaN without a point.
 
     Args:
-        pixels: (N, 2) column and row, also outside of the image.
+        pixels: (N, 2) column and row; may be outside the image.
         z_m: (N,) depths, metres.
         shape: height and width, pixels.
     """

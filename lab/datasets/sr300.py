@@ -1,4 +1,4 @@
-"""The castle that an Intel RealSense SR300 filmed for ViSP: grey pictures and depth of a second camera.
+"""ViSP's castle recorded by an Intel RealSense SR300: grey images, and depth from a second camera.
 
 ViSP's mbt-depth/castel (Debian visp-images-data), read as its tutorial-mb-generic-tracker-rgbd does.
 """
@@ -20,14 +20,14 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 METRES_PER_UNIT = 0.000124986647
 NEAREST_M = 0.1
-"""Nearer values are noise: the camera measures from 0.2 m."""
+"""Least valid depth; lower values are noise: the camera measures from 0.2 m."""
 INVERSE_DISTORTION = (0.165056542, -0.0508309528, 0.00435937941, 0.00541406544, 0.250085592)
-"""k1, k2, p1, p2, k3 of the depth camera, which lead from its pixels to rays, not back (librealsense's
-inverse Brown-Conrady); the tutorial has them, the set's own files do not."""
+"""k1, k2, p1, p2, k3 of the depth camera, which map pixels to rays, not back (librealsense's inverse
+Brown-Conrady); from the tutorial, as the set's own files lack them."""
 
 
 def find(root: Path) -> list[Load]:
-    """The frames beside every ``depth_M_color.txt`` at or below ``root``."""
+    """Return the frames next to every ``depth_M_color.txt`` at or below ``root``."""
     pairs: list[Load] = []
     for extrinsics in sorted(root.rglob("depth_M_color.txt")):
         for picture in sorted(extrinsics.parent.glob("*/image_*.pgm")):
@@ -48,12 +48,12 @@ def _load(extrinsics: Path, picture: Path, depth: Path) -> Pair:
 def registered(
     z_m: FloatArray, depth_camera: CameraIntrinsics, color_camera: CameraIntrinsics, T_color_depth: FloatArray
 ) -> FloatArray:
-    """(H, W) depth as the colour camera sees it, NaN where it sees no depth pixel."""
+    """Return (H, W) depth in the colour camera, NaN where it sees no depth pixel."""
     return carried(z_m, lambda pixels: rays(depth_camera, pixels), color_camera, T_color_depth)
 
 
 def rays(camera: CameraIntrinsics, pixels: FloatArray) -> FloatArray:
-    """(N, 3) directions with z = 1 of (N, 2) positions in the depth image."""
+    """Return (N, 3) directions with z = 1 of (N, 2) positions in the depth image."""
     k1, k2, p1, p2, k3 = INVERSE_DISTORTION
     x, y = ((pixels - (camera.cx_px, camera.cy_px)) / (camera.fx_px, camera.fy_px)).T
     r2 = x * x + y * y
@@ -69,10 +69,10 @@ def rays(camera: CameraIntrinsics, pixels: FloatArray) -> FloatArray:
 
 
 def read_depth_bin(file: Path) -> FloatArray:
-    """(H, W) float32 metres: height and width in 32 bits, then 16-bit units of about an eighth of a mm.
+    """Return (H, W) float32 metres; the file has 32-bit height and width, then 16-bit units of about 1/8 mm.
 
     Raises:
-        InputError: missing, or not as long as its size says.
+        InputError: the file is missing, or its length does not fit its size.
     """
     data = read_bytes(file, MAX_IMAGE_BYTES, "SR300 depth")
     height, width = np.frombuffer(data[:8].ljust(8, b"\0"), "<u4").tolist()
@@ -94,7 +94,7 @@ def _camera(file: Path, shape: tuple[int, ...]) -> CameraIntrinsics:
 
 
 def _pose(file: Path) -> FloatArray:
-    """(4, 4) T_depth_color."""
+    """Return (4, 4) T_depth_color."""
     try:
         return np.array(read_text(file, "extrinsics").split(), dtype=np.float64).reshape(4, 4)
     except ValueError:

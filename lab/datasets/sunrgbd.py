@@ -1,4 +1,4 @@
-"""SUN RGB-D: one folder a frame, depth with its bits rotated by three.
+"""SUN RGB-D: one folder per frame, depth with its bits rotated by three.
 
 Song et al., "SUN RGB-D: A RGB-D Scene Understanding Benchmark Suite", CVPR 2015.
 """
@@ -17,11 +17,11 @@ from pipeline.io.images import read_color, read_depth_units
 FARTHEST_M = 8.0
 """The set's toolbox (read3dPoints.m) caps depth here."""
 DEPTH_FOLDERS = ("depth_bfx", "depth")
-"""Depth merged from several frames where it is there, else the sensor's."""
+"""Folders of depth: merged from several frames if available, else the sensor's."""
 
 
 def find(root: Path) -> list[Load]:
-    """The frames in folders with image/ and depth_bfx/ or depth/, at any level below ``root``."""
+    """Return the frames in folders with image/ and depth_bfx/ or depth/, at any level below ``root``."""
     pairs: list[Load] = []
     for image in [root / "image", *sorted(root.rglob("*/image"))]:
         picture = next(iter(sorted(image.glob("*.jpg")) + sorted(image.glob("*.png"))), None)

@@ -1,4 +1,4 @@
-"""TUM RGB-D sequences: pictures and depth with their own clocks.
+"""TUM RGB-D sequences: images and depth with separate time stamps.
 
 Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012.
 """
@@ -13,10 +13,10 @@ from pipeline.importing.tum import UNITS_PER_METRE, associate, listed
 
 
 def find(root: Path) -> list[Load]:
-    """The frames of the sequence ``root``, or of all sequences below it.
+    """Return the frames of the sequence ``root``, or of all sequences below it.
 
     Raises:
-        InputError: a list with a line that is no time and file.
+        InputError: a line of a list is no time and file.
     """
     pairs: list[Load] = []
     for listing in sorted(root.rglob("rgb.txt")):

@@ -1,1 +1,1 @@
-"""The project's own numbers: records of commands that were run, and the pages that are written from them."""
+"""The project's own numbers: records of commands that were run, and the pages written from them."""

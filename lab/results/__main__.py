@@ -12,7 +12,7 @@ from packetmesh.errors import PacketMeshError
 
 
 def main() -> None:
-    """Record results or write what is read of them."""
+    """Record results, or write the pages that show them."""
     parser = argparse.ArgumentParser(prog="python -m lab.results", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     record = commands.add_parser("record", help="run commands and write docs/results/NAME.json")

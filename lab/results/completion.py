@@ -1,4 +1,4 @@
-"""What completion and its confidence are worth, in plain words, from their records."""
+"""Text on the benefit of completion and its confidence, from their records."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from pipeline.depth.completion import SHIPPED_COMPLETION
 from pipeline.depth.slopes import GRID_WIDTH_PX
 
 TARGET, TARGET_PX = 0.75, 40
-"""Times the error of the best of the others, at discs of so many pixels and more."""
+"""Target: error over that of the best other program, at discs of at least this many pixels."""
 SAID = "80% to 90%"
-"""The bin of confidence that is told of."""
+"""The bin of confidence that the text reports."""
 SAID_SHARES = (80.0, 90.0)
 TUNING = (
     "Which sets had a part in tuning: the validation rooms had; held-out rooms, demo scenes and real frames "
@@ -24,7 +24,7 @@ TUNING = (
 
 
 def standing(records: Records) -> list[str]:
-    """All there is to say, a paragraph each; none without the records."""
+    """Return all paragraphs; none without the records."""
     found = []
     if "bench_depth" in records:
         runs = [run for run in records["bench_depth"].numbers["depth"]["runs"] if "group" in run]
@@ -35,23 +35,23 @@ def standing(records: Records) -> list[str]:
 
 
 def filling(numbers: Row) -> str:
-    """The tables of hidden holes, what they come to, and what had a part in tuning."""
+    """Return the tables of hidden holes, their summary, and the images used for tuning."""
     runs = [run for run in numbers["depth"]["runs"] if "group" in run]
     return "\n\n".join((tables.filling(numbers), target(runs), whole_holes(runs), reasons(), TUNING))
 
 
 def fill_claims(numbers: Row) -> str:
-    """D10 with what it comes to."""
+    """Return D10 with its summary."""
     return "\n\n".join((tables.our_claims(numbers), trust(numbers["D10"]), TUNING))
 
 
 def depth_claims(numbers: Row) -> str:
-    """C12 to C14, and what had a part in tuning."""
+    """Return C12 to C14, and the images used for tuning."""
     return tables.claims(numbers, TUNING)
 
 
 def target(runs: Sequence[Row]) -> str:
-    """Where the target is reached, and what is reached elsewhere."""
+    """Return where the target is reached, and the results elsewhere."""
     ratios = {}
     for group in _groups(runs, ", disc of "):
         kind, _, size = group.partition(", disc of ")
@@ -68,7 +68,7 @@ def target(runs: Sequence[Row]) -> str:
 
 
 def whole_holes(runs: Sequence[Row]) -> str:
-    """Hidden shapes of real holes, and the sensors' own holes."""
+    """Return a paragraph on hidden shapes of real holes, and on the sensors' own holes."""
     hidden, own = [], []
     for group in _groups(runs, ", hidden"):
         ours, other = (_run(runs, group, name) for name in (OURS, NETWORK))
@@ -90,7 +90,7 @@ def whole_holes(runs: Sequence[Row]) -> str:
 
 
 def reasons() -> str:
-    """Why it is no better, with the numbers of its training."""
+    """Return the reasons for the remaining error, with the numbers of the training."""
     images, minutes = _training()
     return (
         f"**Why no better.** It was trained on {images:,} frames in {minutes} minutes of two cores, and "
@@ -101,7 +101,7 @@ def reasons() -> str:
 
 
 def trust(claim: Row) -> str:
-    """Said against true, of the pixels said to be right with 80 to 90 %."""
+    """Return the true share of the pixels whose confidence is 80 to 90 %."""
     (bins,) = (found for found in claim["tables"] if found["title"] == "Confidence in bins")
     rows = [row for row in bins["rows"] if row[1] == SAID]
     shares = {group: true for group, _, _, _, true in rows}
@@ -130,7 +130,7 @@ def _run(runs: Sequence[Row], group: str, program: str) -> Row:
 
 
 def _best(runs: Sequence[Row], group: str) -> tuple[float, str, float]:
-    """Our error, and the best of the others with its own."""
+    """Return our error, and the best other program with its error."""
     others = [run for run in runs if run["group"] == group and run["program"] != OURS]
     best = min(others, key=lambda run: run["abs_rel"])
     return _run(runs, group, OURS)["abs_rel"], best["program"], best["abs_rel"]
@@ -142,7 +142,7 @@ def _share(cell: str) -> float:
 
 @cache
 def _training() -> tuple[int, int]:
-    """Frames and minutes, as the network's file says."""
+    """Return the training's frames and minutes, from the network's file."""
     import onnxruntime
 
     session = onnxruntime.InferenceSession(SHIPPED_COMPLETION, providers=["CPUExecutionProvider"])

@@ -1,4 +1,4 @@
-"""Markdown from numbers."""
+"""Markdown tables and text from numbers."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ Row = dict[str, Any]
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
-    """A table; cells that are not text yet are written by ``text``."""
+    """Return a table; cells that are not text yet are formatted by ``text``."""
     lines = [header, ["---"] * len(header), *([text(cell) for cell in row] for row in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def text(value: Cell) -> str:
-    """A value of unknown kind: three significant digits, or all of a large or whole number."""
+    """Return a value as text: three significant digits, or all digits of a large or whole number."""
     if value is None:
         return "–"
     if isinstance(value, str):
@@ -27,22 +27,22 @@ def text(value: Cell) -> str:
 
 
 def percent(share: float | None, digits: int = 1) -> str:
-    """A share from 0 to 1."""
+    """Return a share from 0 to 1 in per cent."""
     return "–" if share is None else f"{100.0 * share:.{digits}f} %"
 
 
 def change(before: float | None, after: float | None) -> str:
-    """How a share from 0 to 1 changed."""
+    """Return the change of a share from 0 to 1."""
     return "–" if before is None or after is None else f"{100.0 * before:.1f} → {percent(after)}"
 
 
 def listed(words: Sequence[str]) -> str:
-    """Words as in a sentence."""
+    """Return words listed as in a sentence."""
     return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:]))) or "none"
 
 
 def pivot(runs: Sequence[Row], row: str, columns: Sequence[str], write: Callable[[Row], str]) -> str:
-    """One row for each value of ``row``, one column for each combination of values of ``columns``."""
+    """Return a table with a row per value of ``row`` and a column per combination of ``columns``."""
     names = list(dict.fromkeys(run[row] for run in runs))
     groups = list(dict.fromkeys(tuple(run[column] for column in columns) for run in runs))
     found = {(run[row], tuple(run[column] for column in columns)): write(run) for run in runs}
@@ -53,7 +53,7 @@ def pivot(runs: Sequence[Row], row: str, columns: Sequence[str], write: Callable
 
 
 def exhibit(claim: Row, title: str) -> str:
-    """A claim's table whose title begins with ``title``, with its note."""
+    """Return a claim's table whose title begins with ``title``, with its note."""
     found = next(table for table in claim["tables"] if table["title"].startswith(title))
     parts = (f"**{found['title']}**", table(found["header"], found["rows"]), found["note"])
     return "\n\n".join(filter(None, parts))

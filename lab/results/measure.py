@@ -1,4 +1,4 @@
-"""The commands behind the records, and what is kept of their answers."""
+"""The commands behind the records, and the parts of their results that are stored."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "real_frames": ("python", "-m", "lab.benchmarks.real_frames"),
     "ns3_saturation": ("python", "tests/benchmarks/ns3_saturation.py"),
 }
-"""What is run for a record; ``bench_problems`` needs lists in runs/problems, written there by
-``python -m lab.benchmarks.problem_lists runs/problems --lidar DATA``, and the last one ns-3."""
+"""Command of each record; ``bench_problems`` needs lists in runs/problems, written there by ``python -m
+lab.benchmarks.problem_lists runs/problems --lidar DATA``, and the last one needs ns-3."""
 RECONSTRUCT = "reconstruct"
 RECORDS = (RECONSTRUCT, *COMMANDS)
 PROGRAMS = {"packetmesh": (sys.executable, "-m", "app.cli"), "python": (sys.executable,)}
@@ -53,11 +53,11 @@ VERDICT_KEYS = ("claim", "thesis", "tolerance", "verdict", "why", "ours", "ci95"
 
 
 def measure(name: str, runs: Path = Path("runs/results")) -> Record:
-    """Run what is behind a record, which takes seconds to an hour.
+    """Run the command of a record, which takes seconds to an hour.
 
     Args:
-        name: of ``RECORDS``.
-        runs: folder for what the commands write; claims keep their trials there, so that an interrupted run
+        name: a name of ``RECORDS``.
+        runs: folder for the commands' output; claims store their trials there, so that an interrupted run
             resumes.
 
     Raises:
@@ -85,7 +85,7 @@ def measure(name: str, runs: Path = Path("runs/results")) -> Record:
 
 
 def _reconstructions(runs: Path) -> dict[str, Any]:
-    """Every demo scene and every real frame there is, by both presets."""
+    """Reconstruct every demo scene and every real frame on this machine, by both presets."""
     sources = {scene: ["--scene", scene] for scene in CALIBRATED_SCENES}
     for folder in real_folders():
         files = {"color": "color.png", "depth": "depth.png", "intrinsics": "intrinsics.json"}
@@ -106,13 +106,13 @@ def _reconstruction(source: list[str], preset: str, out: Path) -> dict[str, Any]
 
 
 def _verdict(verdict: dict[str, Any]) -> dict[str, Any]:
-    """A verdict with its tables, but without its curves and pictures."""
+    """Return a verdict with its tables, without its curves and pictures."""
     tables = [exhibit for exhibit in verdict["exhibits"] if "header" in exhibit]
     return {key: verdict[key] for key in VERDICT_KEYS} | {"tables": tables}
 
 
 def _run(words: tuple[str, ...]) -> dict[str, Any]:
-    """The JSON that a command prints; its progress is seen on standard error."""
+    """Run a command and return the JSON that it prints; its progress goes to standard error."""
     data = os.environ.get(DATA_VARIABLE, str(DATA))
     program, *arguments = (word.replace(f"${DATA_VARIABLE}", data) for word in words)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -17,9 +17,9 @@ RESULTS = ROOT / "docs" / "results.md"
 README = ROOT / "README.md"
 DEPTH_README = ROOT / "assets" / "depth" / "README.md"
 WORTH = ROOT / "assets" / "depth" / "worth.md"
-"""What the Depth screen says of filling."""
+"""The text on filling in the Depth screen."""
 BEGIN, END = "<!-- results: written by `make results` -->", "<!-- end of results -->"
-"""Around the lines of a page that state results."""
+"""Marks around the results in a page."""
 
 SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "reconstruct": ("What comes out", tables.reconstructions),
@@ -67,7 +67,7 @@ def write_pages() -> None:
 
 
 def results_page(records: Records) -> str:
-    """The whole of docs/results.md."""
+    """Return the whole of docs/results.md."""
     parts = [INTRODUCTION]
     for name, (heading, body) in SECTIONS.items():
         if name in records:
@@ -83,17 +83,17 @@ def _origin(record: Record) -> str:
 
 
 def readme(page: str, records: Records) -> str:
-    """The README with the lines between its marks replaced."""
+    """Return the README with the lines between its marks replaced."""
     return marked(page, "\n".join(f"- {line}" for line in readme_results(records)))
 
 
 def worth(records: Records) -> str:
-    """What completion is worth, for the networks' README and the Depth screen."""
+    """Return the text on the benefit of completion, for the networks' README and the Depth screen."""
     return "\n\n".join(completion.standing(records))
 
 
 def marked(page: str, lines: str) -> str:
-    """A page with other lines between its marks."""
+    """Return a page with other lines between its marks."""
     pattern = f"({re.escape(BEGIN)}\n).*?({re.escape(END)})"
     return re.sub(pattern, lambda marks: f"{marks[1]}{lines}\n{marks[2]}", page, flags=re.DOTALL)
 

@@ -1,4 +1,4 @@
-"""A record: what a command measured, by which code, on what kind of machine, and when."""
+"""Records: a command's numbers, the code that computed them, the kind of machine, and the date."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ WRITTEN = (
     *("docs/results", "docs/results.md", "README.md"),
     *("assets/depth/README.md", "assets/depth/worth.md"),
 )
-"""What records and pages are written to: changes there are no changes of the code."""
+"""Files written from records: their changes are no changes of the code."""
 DIGITS = 6
-"""Significant digits that a record keeps of a number."""
+"""Significant digits of a stored number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,30 +33,30 @@ class Record:
 
     name: str
     command: str
-    """A line that anybody can run."""
+    """Command line that gives the numbers."""
     commit: str
     """Short hash of the code that ran."""
     date: str
     """ISO 8601."""
     versions: dict[str, str]
-    """Of Python and of the libraries that are installed."""
+    """Versions of Python and of the installed libraries."""
     machine: str
-    """Its class: cores and memory."""
+    """Kind of machine: cores and memory."""
     numbers: dict[str, Any]
 
 
 Records = Mapping[str, Record]
-"""By name."""
+"""Records by name."""
 
 
 def new_record(name: str, command: str, commit: str, numbers: dict[str, Any]) -> Record:
-    """What was measured today on this machine."""
+    """Return a record of today's measurement on this machine."""
     versions = library_versions((*LIBRARIES, "viser", "pymeshlab"))
     return Record(name, command, commit, date.today().isoformat(), versions, machine(), rounded(numbers))
 
 
 def read_records(folder: Path = FOLDER) -> dict[str, Record]:
-    """All records of a folder, by name.
+    """Return all records of a folder, by name.
 
     Raises:
         InputError: a file is no record.
@@ -71,7 +71,7 @@ def read_records(folder: Path = FOLDER) -> dict[str, Record]:
 
 
 def write_record(record: Record, folder: Path = FOLDER) -> Path:
-    """Write ``NAME.json`` and give its path."""
+    """Write ``NAME.json`` and return its path."""
     values = asdict(record)
     path = folder / f"{values.pop('name')}.json"
     write_json(path, values)
@@ -79,10 +79,10 @@ def write_record(record: Record, folder: Path = FOLDER) -> Path:
 
 
 def committed_code(root: Path = ROOT) -> str:
-    """The commit of the code in ``root``.
+    """Return the commit of the code in ``root``.
 
     Raises:
-        InputError: files differ from it, so that it would not say what ran.
+        InputError: files differ from the commit, so it would not identify the code.
     """
     unlike = _git(root, "status", "--porcelain", "--", ".", *(f":!{path}" for path in WRITTEN))
     if unlike:
@@ -100,14 +100,14 @@ def _git(root: Path, *words: str) -> str:
 
 
 def machine() -> str:
-    """Cores, memory and graphics of this machine, without its name."""
+    """Return the cores, memory and graphics of this machine, without its name."""
     graphics = "an NVIDIA GPU" if any(Path("/dev").glob("nvidia[0-9]*")) else "no GPU"
     memory_gib = psutil.virtual_memory().total / 2**30
     return f"{psutil.cpu_count()} {platform.machine()} cores, {memory_gib:.0f} GiB of memory, {graphics}"
 
 
 def rounded(value: Any) -> Any:
-    """Plain values with every float to six significant digits."""
+    """Return plain values with every float rounded to six significant digits."""
     if isinstance(value, dict):
         return {key: rounded(item) for key, item in value.items()}
     if isinstance(value, list):

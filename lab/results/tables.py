@@ -1,4 +1,4 @@
-"""The tables of docs/results.md, one function a record: from its numbers to Markdown."""
+"""The tables of docs/results.md, one function per record: from its numbers to Markdown."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ METHODS = (
     *("icp", "picp", "ricp", "mricp", "ficp", "hicp", "icp-gated", "icp-gated plane", "pixel-pairs"),
     *("ceicp-n", "ceicp-a", "ceicp-a plane", "fast-robust-icp plane", "open3d-gicp", "small-gicp-staged"),
 )
-"""The thesis's rivals, ICP with a gate, pixel pairs, CEICP and those that come nearest to it; the report of
-`reproduce` has all."""
+"""The thesis's rivals, ICP with a gate, pixel pairs, CEICP and its closest competitors; the report of
+`reproduce` has all methods."""
 _FRAME_SHARES = ("within_2pct", "within_5pct", "no_hit")
 DIRECTIONS = {"q2p": "source to target (q2p)", "p2q": "target to source (p2q)"}
 OURS = "ceicp-a"
@@ -39,11 +39,11 @@ SHOWN = (
     ("D08", "F-score of some"),
     ("D10", "Confidence in bins"),
 )
-"""Claims, and how the titles begin of those of their tables that the page shows."""
+"""Claims, and title beginnings of their tables that the page shows."""
 
 
 def reconstructions(numbers: Row) -> str:
-    """What the chain makes of every scene, before and after fusion."""
+    """Return the chain's results on every scene, before and after fusion."""
     rows = []
     for scene, presets in numbers.items():
         for preset, run in presets.items():
@@ -74,7 +74,7 @@ falls in {_falls(numbers)}."""
 
 
 def real_frames(numbers: Row) -> str:
-    """Real frames that had no part in training or tuning, before and after fusion."""
+    """Return results on real frames not used for training or tuning, before and after fusion."""
     header = (
         *("frames", "number", "measured pixels the filter keeps", "within 2 % of the measurement"),
         *("within 5 %", "rays without a surface", "rays that guesses close", "frames where a share fell"),
@@ -100,13 +100,13 @@ A share fell in {lower} of {frames} frames."""
 
 
 def f_scores(run: Row) -> tuple[float, float] | None:
-    """F-score at 5 cm before and after fusion; None without a truth."""
+    """Return the F-score at 5 cm before and after fusion; None without ground truth."""
     truth = run["truth"]
     return truth and (truth["surface_before"]["f_score_5cm"], truth["surface_after"]["f_score_5cm"])
 
 
 def _falls(numbers: Row) -> str:
-    """In how many scenes the F-score falls, by preset."""
+    """Return the number of scenes in which the F-score falls, by preset."""
     parts = []
     for preset in next(iter(numbers.values())):
         judged = [pair for scene in numbers.values() if (pair := f_scores(scene[preset]))]
@@ -116,7 +116,7 @@ def _falls(numbers: Row) -> str:
 
 
 def claims(numbers: Row, *between: str) -> str:
-    """Every claim with its verdict, what comes ``between``, and the claims' tables in ``SHOWN``."""
+    """Return every claim with its verdict, the texts ``between``, and the claims' tables in ``SHOWN``."""
     rows = [
         (name, claim["claim"], claim["thesis"], claim["verdict"], claim["why"])
         for name, claim in numbers.items()
@@ -126,7 +126,7 @@ def claims(numbers: Row, *between: str) -> str:
 
 
 def our_claims(numbers: Row) -> str:
-    """As ``claims``, of what the thesis does not say."""
+    """Return our own claims, in the form of ``claims``."""
     rows = [
         (name, claim["claim"], claim["tolerance"], claim["verdict"], claim["why"])
         for name, claim in numbers.items()
@@ -136,12 +136,12 @@ def our_claims(numbers: Row) -> str:
 
 
 def _shown(numbers: Row) -> list[str]:
-    """The claims' tables in ``SHOWN``."""
+    """Return the claims' tables in ``SHOWN``."""
     return [exhibit(numbers[name], title) for name, title in SHOWN if name in numbers]
 
 
 def filling(numbers: Row) -> str:
-    """Hidden holes filled by us and by the peers."""
+    """Return the results on hidden holes, filled by us and by the peers."""
     speed, *runs = numbers["depth"]["runs"]
     seconds = {"packetmesh": numbers["depth"]["ours_s"], **numbers["depth"]["peers"]}
     times = table(("program", "ms a frame"), ((name, 1000.0 * value) for name, value in seconds.items()))
@@ -184,7 +184,7 @@ The depth network alone takes {1000.0 * speed["elapsed_s"]:.0f} ms a frame (medi
 
 
 def error(run: Row) -> str:
-    """AbsRel over all hole pixels and its interval."""
+    """Return AbsRel over all hole pixels and its interval as text."""
     low, high = run["abs_rel_ci95"]
     return f"{run['abs_rel']:.4f} [{low:.4f}, {high:.4f}]"
 
@@ -195,7 +195,7 @@ def _excess(run: Row) -> str:
 
 
 def _sized(run: Row) -> Row:
-    """A run with the size of its discs as its group."""
+    """Return a run with the size of its discs as its group."""
     return {**run, "group": run["group"].partition(", disc of ")[2]}
 
 
@@ -204,7 +204,7 @@ def _best(runs: Sequence[Row], group: str, measure: str, sign: float) -> str:
 
 
 def registration_claims(numbers: Row) -> str:
-    """C16 to C20."""
+    """Return C16 to C20."""
     return claims(
         numbers,
         "Median point error in centimetres and, in brackets, the share of rooms that end within 2 cm; "
@@ -215,7 +215,7 @@ def registration_claims(numbers: Row) -> str:
 
 
 def _point_error_table(numbers: Row, direction: str) -> tuple[str, str, str]:
-    """Its heading, the table, and where ICP without and with a gate beats CEICP-A."""
+    """Return a heading, the table, and where ICP without and with a gate beats CEICP-A."""
     medians = point_errors(numbers, direction)
     methods = [method for method in METHODS if method in medians]
     conditions = dict.fromkeys(label for method in methods for label in medians[method])
@@ -232,7 +232,7 @@ def _point_error_table(numbers: Row, direction: str) -> tuple[str, str, str]:
 
 
 def point_errors(numbers: Row, direction: str = "q2p") -> dict[str, dict[str, str]]:
-    """Median point error, cm, and share of rooms within 2 cm, as text, by method and condition."""
+    """Return median point error, cm, and share of rooms within 2 cm, as text, by method and condition."""
     title = f"Point error by condition, matched {DIRECTIONS[direction]}"
     found = next(table for table in numbers["C16"]["tables"] if table["title"] == title)
     labels = found["header"][1:]
@@ -247,7 +247,7 @@ def point_errors(numbers: Row, direction: str = "q2p") -> dict[str, dict[str, st
 
 
 def losses(medians: dict[str, dict[str, str]], rival: str, ours: str = OURS) -> list[str]:
-    """Conditions in which a rival's median error is below ours."""
+    """Return the conditions in which a rival's median error is below ours."""
     both = [
         (label, cell, medians[ours][label])
         for label, cell in medians[rival].items()
@@ -261,7 +261,7 @@ def losses(medians: dict[str, dict[str, str]], rival: str, ours: str = OURS) -> 
 
 
 def registration_speed(numbers: Row) -> str:
-    """Two views of a room, ours and the peers' programs."""
+    """Return the speed of registering two views of a room, by us and the peers' programs."""
     header = ("program", "seconds", "95th percentile", "point error, mm", "peak memory, MB")
     parts = []
     for case, result in numbers.items():
@@ -288,7 +288,7 @@ def registration_speed(numbers: Row) -> str:
 
 
 def rolling_speed(numbers: Row) -> str:
-    """Balls of every program over the same clouds."""
+    """Return the speed of every program's balls over the same clouds."""
     runs = numbers["surface"]["runs"]
     columns = ("cloud", "balls")
     points = listed(list(dict.fromkeys(f"{run['cloud']} {run['points']:,}" for run in runs)))
@@ -306,7 +306,7 @@ Memory on top of the cloud, MB:
 
 
 def network_speed(numbers: Row) -> str:
-    """The study of the street, and saturated nodes beside ns-3's."""
+    """Return the speed of the street study, and of saturated nodes compared with ns-3."""
     result = numbers["network"]
     total, *runs = result["runs"]
     street, saturated = ([run for run in runs if key in run] for key in ("scheme", "mac"))
@@ -332,7 +332,7 @@ at most {result["peak_memory_bytes"] / 1e9:.2f} GB in a process. Saturated nodes
 
 
 def ns3_throughput(numbers: Row) -> str:
-    """Saturated nodes around one sink in both programs, 10 simulated seconds, one seed."""
+    """Return both programs' throughput of saturated nodes around one sink: 10 simulated seconds, one seed."""
     rows = [
         (
             *(run["mac"], run["nodes"], run["network_sim"]["throughput_bps"] / 1e3),
@@ -347,7 +347,7 @@ def ns3_throughput(numbers: Row) -> str:
 
 
 def problems(numbers: Row) -> str:
-    """Lists of registration problems, of our rooms and a LiDAR pair of others."""
+    """Return results on lists of registration problems, of our rooms and a published LiDAR pair."""
     rows = [
         (
             *(group["list"].removesuffix("_local"), group["method"], group["problems"]),
@@ -367,11 +367,11 @@ def problems(numbers: Row) -> str:
 
 
 def chain_speed(numbers: Row) -> str:
-    """The whole chain, warm."""
+    """Return time and memory of the whole chain, after warm-up."""
     rows = [(case, result["ours_s"], result["peak_memory_bytes"] / 1e6) for case, result in numbers.items()]
     whole = table(("case", "seconds, warm", "peak memory, MB"), rows)
     stages = [run["stage"] for run in next(iter(numbers.values()))["runs"]]
-    if not stages:  # of an older record
+    if not stages:  # an older record
         return whole
     by_stage = [(case, *(run["elapsed_s"] for run in result["runs"])) for case, result in numbers.items()]
     said = "Seconds of each stage; after and before are computed side by side:"

@@ -1,1 +1,1 @@
-"""Training of the depth network; the only part that needs torch, which running PacketMesh does not."""
+"""Training of the depth networks; the only part that needs torch, which PacketMesh itself does not."""

@@ -1,4 +1,4 @@
-"""``python -m lab.training``: rooms rendered or traced, networks trained, exported and evaluated."""
+"""``python -m lab.training``: render or trace rooms; train, export and evaluate networks."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Rooms:
     """Folder for furniture made ready; kept between runs."""
 
     def catalogue(self) -> Catalogue | None:
-        """What furnishes the rooms of the split; None for procedural pieces."""
+        """Return the catalogue that furnishes the rooms of the split; None for procedural pieces."""
         from lab.training.furniture import Catalogue
 
         if self.furniture is None:

@@ -1,4 +1,4 @@
-"""Opening what furniture catalogues come in: Debian packages, and the zip files inside them."""
+"""Furniture catalogues' archives: Debian packages, and the zip files inside them."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ _AR_HEADER_BYTES = 60
 
 
 def zip_files(source: Path, cache: Path) -> list[Path]:
-    """The zip files of a folder (with everything below), of a package, or ``source`` itself, sorted by name.
+    """Return the zip files of a folder (with all below it), of a package, or ``source`` itself, sorted by
+    name.
 
     Args:
-        source: a folder, a ``.deb`` or a zip file; packages inside a folder are opened as well.
-        cache: folder for what packages hold; unpacked once.
+        source: a folder, a ``.deb`` or a zip file; packages inside a folder are opened too.
+        cache: folder for the packages' content; unpacked once.
 
     Raises:
-        InputError: nothing of the kind is there, or a package cannot be read.
+        InputError: there is no zip file, or a package cannot be read.
     """
     if not source.exists():
         raise InputError(f"There is no furniture at '{source}'; name a folder, a .deb or a .sh3f file.")
@@ -39,7 +40,7 @@ def zip_files(source: Path, cache: Path) -> list[Path]:
 
 
 def _unpacked(package: Path, folder: Path) -> list[Path]:
-    """The zip files of a Debian package, written to ``folder`` if they are not there yet."""
+    """Return the zip files of a Debian package, written to ``folder`` if they are not there yet."""
     done = folder / "unpacked"
     if not done.exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -56,7 +57,7 @@ def _unpacked(package: Path, folder: Path) -> list[Path]:
 
 
 def _data_of(package: Path) -> tarfile.TarFile:
-    """The archive of files inside a Debian package, which is an ``ar`` archive of three members."""
+    """Return the archive of files inside a Debian package, an ``ar`` archive of three members."""
     with package.open("rb") as stream:
         if stream.read(len(_AR_MAGIC)) != _AR_MAGIC:
             raise InputError(f"'{package}' is no Debian package; download it again.")
@@ -75,7 +76,7 @@ def _data_of(package: Path) -> tarfile.TarFile:
 
 
 def numbered_records(file: Path, suffix: str) -> Iterator[dict[str, str]]:
-    """The numbered records of the catalogues in a zip file.
+    """Yield the numbered records of the catalogues in a zip file.
 
     Args:
         file: zip file with Java properties whose names end in ``suffix``, in lines like ``width#3=60``.

@@ -1,7 +1,7 @@
-"""Path-traced pictures of scenes: a Blender of its own renders, our ray caster gives the exact depth.
+"""Path-traced images of scenes: Blender renders the light, our ray caster gives the exact depth.
 
-Blender's Python module ``bpy`` needs other versions of things than we do, so it lives in an environment
-of its own; a room goes there as one ``.npz`` file, and its light comes back as one ``.npy`` file.
+Blender's Python module ``bpy`` needs other library versions than we do, so it has its own environment. A room
+is sent to it as one ``.npz`` file, and its light comes back as one ``.npy`` file.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ from pipeline.types import ByteArray, CameraIntrinsics, FloatArray, IntArray
 Camera = tuple[CameraIntrinsics, FloatArray]
 """Undistorted intrinsics, and T_world_camera (4, 4)."""
 FIRST_TRACED = 500_000
-"""Traced rooms count up from here within their split, away from the ray-cast ones."""
+"""First seed of traced rooms within their split, away from the ray-cast ones."""
 _SCRIPT = Path(__file__).with_name("blender_script.py")
 _FILM = Film(0.7, 0.08, noise=(0.0, 0.02), blur_px=(0.25, 0.6), vignette=(0.0, 0.25))
 _ATLAS_WIDTH = 4096
 _GUTTER = 2
-"""Texels around each chart, so that filtering never meets its neighbour."""
+"""Border of each chart in texels, so that texture filtering never reaches its neighbour."""
 _CHART_TEXELS = 700_000
 _FINEST_M, _COARSEST_M = 0.002, 0.03
-"""Range of the texels' size; between them, less than a pixel where a chart is nearest to a camera."""
+"""Range of the texels' size; within it, a texel is smaller than a pixel of the nearest camera."""
 _TEXELS_A_PIXEL = 1.4
 _RAISED_M = 3e-4
 _GOLDEN = 0.6180339887498949
-"""Multiples of it, without their whole part, spread evenly over 0 to 1."""
+"""Golden ratio; the fractional parts of its multiples are spread evenly over 0 to 1."""
 
 
 def render_traced(
@@ -57,9 +57,9 @@ def render_traced(
     threads: int = 1,
     catalogue: Catalogue | None = None,
 ) -> Iterator[Path]:
-    """Path-trace shards [first, last) of ten rooms each; ready ones are kept. Yields each one's RGB file.
+    """Path-trace shards [first, last) of ten rooms each and yield their RGB files; existing ones are kept.
 
-    A shard is like those of ``dataset.render_shards``, under the name ``<split>_traced_<number>_rgb.npy``.
+    A shard is like those of ``dataset.render_shards``, named ``<split>_traced_<number>_rgb.npy``.
 
     Args:
         data: folder of the shards.
@@ -67,9 +67,9 @@ def render_traced(
         first: first shard.
         last: one past the last shard.
         blender: a Python that has ``bpy``.
-        samples: light paths a pixel, before denoising.
+        samples: light paths per pixel, before denoising.
         threads: threads that render.
-        catalogue: furnishes the rooms; without it, procedural pieces do.
+        catalogue: furniture of the rooms; None takes procedural pieces.
 
     Raises:
         InputError: that Python cannot render.
@@ -83,7 +83,7 @@ def render_traced(
 def traced_views(
     seed: int, blender: Path, samples: int, threads: int, catalogue: Catalogue | None = None
 ) -> Iterator[tuple[ByteArray, FloatArray]]:
-    """Photographs (H, W, 3) uint8 of one room and their depth (H, W) float16 as in ``room_views``."""
+    """Yield photographs (H, W, 3) uint8 of one room with depth (H, W) float16 as in ``room_views``."""
     room = dataset.viewed_room(seed, catalogue, threads)
     light = trace(room.scene, room.cameras, blender, samples, threads)
     for camera, view in zip(room.cameras, light, strict=True):
@@ -93,7 +93,7 @@ def traced_views(
 def trace(
     scene: Scene, cameras: Sequence[Camera], blender: Path, samples: int = 16, threads: int = 1
 ) -> FloatArray:
-    """(N, H, W, 3) float32 linear light of N views of a scene, path-traced by a Python that has ``bpy``.
+    """Return (N, H, W, 3) float32 linear light of N views, path-traced by a Python that has ``bpy``.
 
     Raises:
         InputError: a camera is distorted or has another size than the first, or that Python cannot render.
@@ -166,19 +166,19 @@ def _check(cameras: Sequence[Camera]) -> None:
 
 
 def _apart(corners_m: FloatArray) -> FloatArray:
-    """(F, 3, 3) triangles raised by up to 0.3 mm, each by another height: light paths stick between twins."""
+    """Return (F, 3, 3) triangles raised by different heights up to 0.3 mm: light sticks between twins."""
     raised_m = _RAISED_M * (np.arange(len(corners_m)) * _GOLDEN % 1.0)
     return corners_m + (raised_m[:, None] * _face_normals(corners_m))[:, None]
 
 
 def _face_normals(corners_m: FloatArray) -> FloatArray:
-    """(F, 3) of (F, 3, 3) triangles."""
+    """Return (F, 3) normals of (F, 3, 3) triangles."""
     normals = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
 
 
 def _nearest_m(vertices: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> FloatArray:
-    """(F,) what a pixel covers of each triangle, metres, from the camera that is nearest; inf if unseen."""
+    """Return (F,) a pixel's size on each triangle, metres, in the nearest camera; inf if unseen."""
     caster = triangle_scene(vertices, triangles)
     covered_m = np.full(len(triangles), np.inf)
     for intrinsics, pose in cameras:
@@ -190,7 +190,7 @@ def _nearest_m(vertices: FloatArray, triangles: IntArray, cameras: Sequence[Came
 
 
 def _world_normals(scene: Scene) -> FloatArray:
-    """(F, 3, 3) shading normals at the corners, as our own renderer has them."""
+    """Return (F, 3, 3) shading normals at the corners, as in our own renderer."""
     return np.concatenate(
         [
             shading.corner_normals(part.vertices_m, np.ascontiguousarray(part.triangles), part.smooth)
@@ -204,9 +204,8 @@ def unwrap(scene: Scene, covered_m: FloatArray) -> tuple[FloatArray, ByteArray]:
     """Bake the parts' solid textures into one image.
 
     Args:
-        scene: its parts' triangles, one after the other, are the F triangles.
-        covered_m: (F,) how much of each triangle a pixel covers, which is how large its texels may be;
-            infinite where nobody looks.
+        scene: the triangles of its parts, in order, are the F triangles.
+        covered_m: (F,) a pixel's size on each triangle, the largest allowed texel; infinite if unseen.
 
     Returns:
         (F, 3, 2) float32 coordinates of the corners, 0 to 1 from the lower left, and the
@@ -237,12 +236,12 @@ def unwrap(scene: Scene, covered_m: FloatArray) -> tuple[FloatArray, ByteArray]:
 def _lay_out(
     points: FloatArray, normals: FloatArray, part: IntArray, covered_m: FloatArray
 ) -> tuple[FloatArray, int]:
-    """Lay charts, connected triangles that face the same way along x, y or z, flat in one image.
+    """Lay charts (connected triangles that face the same way along x, y or z) flat in one image.
 
     They are packed on shelves, the tallest first.
 
     Returns:
-        (F, 3, 2) places of the triangles' corners in the image, pixels, and its height.
+        (F, 3, 2) positions of the triangles' corners in the image, pixels, and its height.
     """
     axis = np.argmax(np.abs(normals), axis=1)
     facing = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0.0)
@@ -265,7 +264,7 @@ def _lay_out(
 def _extent(
     flat_m: FloatArray, chart: IntArray, covered_m: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(C, 2) low and high corners of the charts, and (C,) sizes of their texels."""
+    """Return (C, 2) low and high corners of the charts, and (C,) sizes of their texels."""
     count = int(chart.max()) + 1
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     covered = np.full(count, np.inf)
@@ -279,7 +278,7 @@ def _extent(
 
 
 def _connected(points: FloatArray, group: IntArray) -> IntArray:
-    """(F,) number of the patch of each triangle: those of one group that share corners belong together."""
+    """Return (F,) patch number of each triangle: triangles of a group that share corners are one patch."""
     count = len(points)
     corners = np.concatenate(
         [np.repeat(group, 3)[:, None], np.round(points.reshape(-1, 3) * 1e5).astype(np.int64)], axis=1
@@ -294,9 +293,10 @@ def _connected(points: FloatArray, group: IntArray) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)
 def _rasterise(corners_px, points, height, width):  # type: ignore[no-untyped-def]
-    """(height, width) index of the triangle over each texel's centre or near it, -1 for none, and its place.
+    """Return (height, width) index of the triangle at or near each texel's centre, -1 for none, and its
+    place.
 
-    Triangles reach a texel and a half beyond their edges, where nothing else is nearer.
+    Triangles extend a texel and a half beyond their edges, unless another one is nearer.
     """
     owner = np.full((height, width), -1, np.int32)
     miss = np.full((height, width), 1.5, np.float32)
@@ -325,7 +325,7 @@ def _rasterise(corners_px, points, height, width):  # type: ignore[no-untyped-de
 
 
 def _srgb(albedo: FloatArray) -> ByteArray:
-    """8-bit sRGB of linear colours."""
+    """Return 8-bit sRGB of linear colours."""
     linear = np.clip(albedo, 0.0, 1.0)
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
     return np.round(255.0 * encoded).astype(np.uint8)

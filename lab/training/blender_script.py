@@ -1,7 +1,7 @@
-"""Path-trace the views of an exchange file (see blend.py); runs where ``bpy`` is installed, by itself.
+"""Path-trace the views of an exchange file (see blend.py); runs alone in an environment with ``bpy``.
 
-``python blender_script.py room.npz light.npy --samples 16 --threads 1`` writes the light of all views as
-(N, H, W, 3) float16, linear Rec. 709.
+``python blender_script.py room.npz light.npy --samples 16 --threads 1`` writes the light of all views as (N,
+H, W, 3) float16, linear Rec. 709.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mathutils import Matrix
 
 _SENSOR_MM = 36.0
 _BRIGHTEST = 6e4
-"""Half floats end there."""
+"""Largest value of a half float, roughly."""
 
 
 def main() -> None:
@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def _set_up(scene: Any, samples: int, threads: int) -> None:
-    """Cycles on the CPU, few samples, denoised; no caustics and no fireflies."""
+    """Set up Cycles on the CPU: few samples, denoised; no caustics and no fireflies."""
     scene.render.engine = "CYCLES"
     scene.render.threads_mode, scene.render.threads = "FIXED", threads
     scene.render.use_persistent_data = True
@@ -58,7 +58,7 @@ def _set_up(scene: Any, samples: int, threads: int) -> None:
 
 
 def _materials(room: dict[str, np.ndarray], folder: Path) -> list[Any]:
-    """One Principled shader for each pair of gloss and emission, all coloured by the one texture image."""
+    """Return one Principled shader per pair of gloss and emission, all coloured by one texture image."""
     file = folder / "atlas.png"
     file.write_bytes(room["atlas_png"].tobytes())
     image = bpy.data.images.load(str(file))
@@ -69,7 +69,7 @@ def _materials(room: dict[str, np.ndarray], folder: Path) -> list[Any]:
 
 
 def _material(image: Any, gloss: float, emission: float) -> Any:
-    """From chalk (gloss 0) over varnish to a tinted mirror (gloss 1), as in our own renderer's shading."""
+    """Return a material: chalk (gloss 0) over varnish to tinted mirror (gloss 1), as in our renderer."""
     material = bpy.data.materials.new("surface")
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
@@ -93,7 +93,7 @@ def _material(image: Any, gloss: float, emission: float) -> Any:
 
 
 def _mesh(name: str, room: dict[str, np.ndarray], materials: list[Any], chosen: np.ndarray) -> Any:
-    """An object of the chosen triangles, with their own corners' normals."""
+    """Return an object of the chosen triangles, with their own corners' normals."""
     corners_m = room["corners_m"][chosen]
     count = len(corners_m)
     mesh = bpy.data.meshes.new(name)
@@ -116,13 +116,13 @@ def _mesh(name: str, room: dict[str, np.ndarray], materials: list[Any], chosen: 
 
 
 def _lights(room: dict[str, np.ndarray]) -> None:
-    """Glowing balls that light things and shine in them, but are not seen themselves."""
+    """Add glowing balls that light objects and are reflected by them, but are invisible themselves."""
     values = zip(room["light_position_m"], room["light_color"], room["light_size_m"], strict=True)
     for position_m, color, size_m in values:
         strongest = max(float(color.max()), 1e-9)
         light = bpy.data.lights.new("lamp", "POINT")
         light.color = color / strongest
-        # White at 1 m sends back W / (4 pi^2), and should send back its intensity.
+        # White at 1 m reflects W / (4 pi^2), and should reflect the light's intensity.
         light.energy = 4.0 * np.pi**2 * strongest
         light.shadow_soft_size = float(size_m)
         thing = bpy.data.objects.new("lamp", light)
@@ -132,10 +132,10 @@ def _lights(room: dict[str, np.ndarray]) -> None:
 
 
 def _ambient(color: np.ndarray) -> None:
-    """The sky outside, and the same light, without its colour, from all around in closed rooms.
+    """Add the sky outside and, in closed rooms, the same light without its colour from all directions.
 
-    Blender adds it at every bounce to what has nothing within 1.2 m above it; where things send back half
-    of the light, that sums up to twice what our own renderer adds once.
+    Blender adds it at every bounce to points with nothing within 1.2 m above them; if surfaces reflect half
+    of the light, the sum is twice the light that our own renderer adds once.
     """
     scene = bpy.context.scene
     scene.world = world = bpy.data.worlds.new("ambient")
@@ -149,7 +149,7 @@ def _ambient(color: np.ndarray) -> None:
 
 
 def _pictures(room: dict[str, np.ndarray], folder: Path) -> list[np.ndarray]:
-    """(H, W, 3) float16 light for each camera."""
+    """Return (H, W, 3) float16 light for each camera."""
     scene = bpy.context.scene
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     bpy.context.collection.objects.link(camera)
@@ -168,12 +168,12 @@ def _pictures(room: dict[str, np.ndarray], folder: Path) -> list[np.ndarray]:
 def _point(
     scene: Any, camera: Any, matrix: np.ndarray, T_world_camera: np.ndarray, size_px: np.ndarray
 ) -> None:
-    """Blender's camera looks along -z with y up, and measures its shift in widths of the image."""
+    """Set Blender's camera, which looks along -z with y up and has its shift in widths of the image."""
     width, height = (int(n) for n in size_px)
     fx, fy, cx, cy = matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]
     scene.render.resolution_x, scene.render.resolution_y = width, height
     scene.render.resolution_percentage = 100
-    # Pixels are not square where fx and fy differ; Blender wants both aspects at least 1.
+    # Pixels are not square if fx and fy differ; Blender requires both aspects to be at least 1.
     scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = max(1.0, fy / fx), max(1.0, fx / fy)
     optics = camera.data
     optics.sensor_fit, optics.sensor_width = "HORIZONTAL", _SENSOR_MM
@@ -185,7 +185,7 @@ def _point(
 
 
 def _light(file: Path) -> np.ndarray:
-    """(H, W, 3) float16 of a rendered file; Blender's rows run upwards."""
+    """Return (H, W, 3) float16 of a rendered file; Blender stores rows from the bottom up."""
     image = bpy.data.images.load(str(file))
     width, height = image.size
     values = np.empty(width * height * 4, np.float32)

@@ -1,4 +1,4 @@
-"""How a network is trained; needs no torch, so that the command line starts at once."""
+"""Settings of the depth network's training; without torch, so that the command line starts at once."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from pathlib import Path
 from typing import Literal
 
 Width = Literal["full", "half", "lite0"]
-"""Of the encoder: the ResNet-50 at full or half width, or EfficientNet-Lite0, which has one."""
+"""Width of the encoder: the ResNet-50 at full or half width, or EfficientNet-Lite0, which has one width."""
 Initial = Literal["random", "open-nsfw", "efficientnet-lite0"]
 Loss = Literal["scale-invariant", "berhu"]
 Precision = Literal["bf16", "fp32"]
 
 WIDTHS: dict[Initial, Width] = {"random": "full", "open-nsfw": "half", "efficientnet-lite0": "lite0"}
-"""The encoder that is taken if none is asked for; weights that are not random fit no other."""
+"""Default encoder for each kind of initial weights; weights that are not random fit no other."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrainingConfig:
-    """How a network is trained; recorded in every checkpoint."""
+    """Settings of a training; recorded in every checkpoint."""
 
     data: Path
     """Folder of rendered shards."""

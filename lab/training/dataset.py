@@ -24,18 +24,18 @@ WIDTH_PX, HEIGHT_PX = 320, 240
 ROOMS_PER_SHARD = 10
 VIEWS_PER_ROOM = 5
 FOCAL_PX = 262.5
-"""Focal length of the images in shards, a Kinect's at half size."""
+"""Focal length of the images in shards: a Kinect's at half size."""
 FIRST_SEED = {"train": 0, "validation": 1_000_000, "test": 2_000_000}
-"""Room seeds count up from here; no room is in two splits."""
+"""First room seed of each split; no room is in two splits."""
 
 
 def render_shards(
     folder: Path, split: str, first_shard: int, last_shard: int, catalogue: Catalogue | None = None
 ) -> Iterator[Path]:
-    """Render shards [first, last) of ten rooms each; ready ones are kept. Yields each one's RGB file.
+    """Render shards [first, last) of ten rooms each and yield their RGB files; existing ones are kept.
 
-    A shard is ``<split>_<number>_rgb.npy`` (N, 240, 320, 3) uint8 and ``..._depth.npy`` (N, 240, 320)
-    float16 metres, NaN where the ray hits nothing; the RGB file appears last.
+    A shard is ``<split>_<number>_rgb.npy`` (N, 240, 320, 3) uint8 and ``..._depth.npy`` (N, 240, 320) float16
+    metres, NaN where the ray hits nothing; the RGB file appears last.
     """
     shards = range(first_shard, last_shard)
     return write_shards(folder, split, shards, FIRST_SEED[split], partial(room_views, catalogue=catalogue))
@@ -48,7 +48,7 @@ def write_shards(
     first_seed: int,
     room: Callable[[int], Iterable[tuple[ByteArray, FloatArray]]],
 ) -> Iterator[Path]:
-    """Write the shards that are missing: the views that ``room`` gives for each of ten seeds."""
+    """Write the missing shards: the views that ``room`` gives for each of ten seeds."""
     folder.mkdir(parents=True, exist_ok=True)
     for shard in shards:
         rgb_file = folder / f"{name}_{shard:04d}_rgb.npy"
@@ -72,26 +72,26 @@ class ViewedRoom:
     cameras: list[tuple[CameraIntrinsics, FloatArray]]
     """Intrinsics and T_world_camera."""
     rng: np.random.Generator
-    """For what is random in the images."""
+    """Random generator of the images."""
     focal_px: float
-    """That of the camera whose depth is learned."""
+    """Focal length of the camera whose depth is learned."""
 
     def canonical_m(self, z_m: FloatArray, intrinsics: CameraIntrinsics) -> FloatArray:
-        """(H, W) float16 depth that the learned camera would measure for the same image."""
+        """Return (H, W) float16 depth that the learned camera would measure for the same image."""
         return (z_m * (self.focal_px / intrinsics.fx_px)).astype(np.float16)
 
 
 def viewed_room(
     seed: int, catalogue: Catalogue | None, threads: int = 1, views: int | None = None
 ) -> ViewedRoom:
-    """The room of a seed with five cameras, or as many as asked for.
+    """Return the room of a seed with five cameras, or ``views`` of them.
 
     Args:
-        seed: of the room and its views.
-        catalogue: furnishes the room; without it, procedural pieces do. Its views differ in focal length;
-            as in ``zoom``, their depth is then what the training camera would measure for the same image:
+        seed: seed of the room and its views.
+        catalogue: furniture of the room; None takes procedural pieces. With it, views differ in focal length;
+            as in ``zoom``, their depth is that which the training camera would measure for the same image:
             true depth times 262.5 px / focal length (canonical cameras, Yin et al. 2023).
-        threads: of the renderer; 0 takes all cores.
+        threads: threads of the renderer; 0 takes all cores.
         views: number of cameras.
     """
     from lab.training.varied_rooms import varied_room
@@ -114,7 +114,7 @@ def viewed_room(
 
 
 def room_views(seed: int, catalogue: Catalogue | None = None) -> Iterator[tuple[ByteArray, FloatArray]]:
-    """Colours and depth, float16 metres, of the views of one room."""
+    """Yield colours and depth, float16 metres, of the views of one room."""
     room = viewed_room(seed, catalogue)
     for intrinsics, T_world_camera in room.cameras:
         view = room.renderer.view(intrinsics, T_world_camera, "fast", room.rng)
@@ -145,19 +145,19 @@ class Shards:
         return len(self.index)
 
     def __getitem__(self, item: int) -> tuple[ByteArray, FloatArray]:
-        """(240, 320, 3) uint8 RGB and (240, 320) float32 metres."""
+        """Return (240, 320, 3) uint8 RGB and (240, 320) float32 metres."""
         shard, row = self.index[item]
         rgb, depth = self.arrays[shard]
         return np.asarray(rgb[row]), np.asarray(depth[row], dtype=np.float32)
 
     def evenly(self, count: int) -> Iterator[tuple[ByteArray, FloatArray]]:
-        """``count`` images, evenly spread over all."""
+        """Yield ``count`` images, evenly spread over all."""
         for item in np.linspace(0, len(self) - 1, count).astype(int):
             yield self[item]
 
 
 def augment(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> tuple[ByteArray, FloatArray]:
-    """A plausible other photograph of the same place, with the depth that belongs to it."""
+    """Return a plausible other photograph of the same place, with its depth."""
     if rng.random() < 0.5:
         rgb, depth_m = rgb[:, ::-1], depth_m[:, ::-1]
     if rng.random() < 0.3:
@@ -168,7 +168,7 @@ def augment(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> tu
 def zoom(
     rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator, largest: float = 1.6
 ) -> tuple[ByteArray, FloatArray]:
-    """A random crop enlarged to the full size; as the focal length is kept, depth shrinks with it."""
+    """Return a random crop enlarged to full size; the focal length is kept, so depth shrinks with it."""
     factor = rng.uniform(1.0, largest)
     width, height = round(WIDTH_PX / factor), round(HEIGHT_PX / factor)
     left, top = rng.integers(WIDTH_PX - width + 1), rng.integers(HEIGHT_PX - height + 1)
@@ -181,7 +181,7 @@ def zoom(
 
 
 def recolor(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
-    """Random exposure, contrast, gamma and white balance, and sometimes saturation."""
+    """Change exposure, contrast, gamma and white balance at random, and sometimes saturation."""
     level = np.linspace(0.0, 1.0, 256)
     gamma, contrast, brightness = np.exp(rng.normal(0.0, (0.25, 0.2, 0.15)))
     balance = np.exp(rng.normal(0.0, 0.08, 3))
@@ -197,7 +197,7 @@ def recolor(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
 
 
 def degrade(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
-    """What a cheap camera does: defocus, sensor noise, JPEG blocks, each only sometimes."""
+    """Add a cheap camera's errors, each only sometimes: defocus, sensor noise, JPEG blocks."""
     if rng.random() < 0.3:
         rgb = cv2.GaussianBlur(rgb, (0, 0), rng.uniform(0.3, 1.5))
     if rng.random() < 0.4:

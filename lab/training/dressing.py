@@ -1,4 +1,4 @@
-"""Catalogue models as parts of a room: their materials, other colours, cloth, darkness, lamps that shine."""
+"""Catalogue models as parts of a room: materials, recolouring, cloth, black objects, lit lamps."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _OPENING_DEPTH_M = 0.06
 def dressed(
     entry: Entry, model: Model, T: FloatArray, rng: np.random.Generator, daylight: float
 ) -> list[Part]:
-    """The parts of a model at ``T``.
+    """Return the parts of a model at ``T``.
 
     Args:
-        entry: what it is.
+        entry: the model's catalogue entry.
         model: its surfaces.
         T: (4, 4) pose of its foot in the world.
         rng: draws colours and cloth.
-        daylight: how bright window panes are; 0 at night, when they are dark and shiny.
+        daylight: brightness of window panes; 0 at night, when they are dark and shiny.
     """
     share = placed_size_m(entry)[1] / entry.size_m[1]
     parts = [_part(surface, entry, T, rng, daylight, share) for surface in model.surfaces]
@@ -43,7 +43,7 @@ def dressed(
 
 
 def placed_size_m(entry: Entry) -> FloatArray:
-    """(3,) width, depth and height in the room; doors and windows only stand out of the wall a little."""
+    """Return (3,) width, depth and height in the room; doors and windows protrude only a little."""
     if entry.role != "opening":
         return entry.size_m
     return np.array([entry.size_m[0], min(entry.size_m[1], _OPENING_DEPTH_M), entry.size_m[2]])
@@ -52,7 +52,7 @@ def placed_size_m(entry: Entry) -> FloatArray:
 def _part(
     surface: Surface, entry: Entry, T: FloatArray, rng: np.random.Generator, daylight: float, share: float
 ) -> Part:
-    """One surface with the material of its kind, its depth scaled by ``share``."""
+    """Return one surface with the material of its kind, its depth scaled by ``share``."""
     texture: Texture = surface.colors if share == 1.0 else _stretched(surface.colors, share)
     gloss = float(rng.uniform(0.15, 0.45))
     material = {
@@ -77,7 +77,7 @@ def _stretched(texture: Texture, share: float) -> Texture:
 
 
 def _darkened(part: Part) -> Part:
-    """The part in black, also to infrared light: a depth sensor loses it."""
+    """Return the part in black, in infrared too, so that a depth sensor loses it."""
     texture = part.material.texture
     black = replace(part.material, texture=lambda p, n: 0.01 + 0.05 * texture(p, n), infrared=0.05)
     return part if part.material.emission > 0.0 else replace(part, material=black)

@@ -16,7 +16,7 @@ NORM_EPSILON = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Repeat:
-    """Equal blocks in a row; the stride and the change of channels are the first one's."""
+    """Equal blocks in a row; the first one has the stride and the change of channels."""
 
     blocks: int
     kernel_px: int
@@ -32,11 +32,11 @@ LEVELS = (
     (Repeat(3, 3, 2, 6, 80), Repeat(3, 5, 1, 6, 112)),
     (Repeat(4, 5, 2, 6, 192), Repeat(1, 3, 1, 6, 320)),
 )
-"""What ends in the features of strides 2, 4, 8, 16 and 32."""
+"""Blocks that end in the features of strides 2, 4, 8, 16 and 32."""
 
 
 class InvertedBottleneck(nn.Module):
-    """1x1 to more channels, depthwise convolution, 1x1 to fewer; added to the input where it fits it."""
+    """1x1 to more channels, depthwise convolution, 1x1 to fewer; added to the input if the shapes agree."""
 
     def __init__(self, channels_in: int, repeat: Repeat, stride: int) -> None:
         super().__init__()
@@ -54,7 +54,7 @@ class EfficientNetLite0(nn.Module):
     """The encoder without its classifier; returns the features at strides 2, 4, 8, 16 and 32."""
 
     channels = tuple(level[-1].channels for level in LEVELS)
-    """Of the features."""
+    """Channels of the features."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -71,9 +71,9 @@ class EfficientNetLite0(nn.Module):
             self.stages.append(nn.Sequential(*blocks))
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        """Features of a normalised image (N, 3, H, W), finest first; H and W are multiples of 32.
+        """Return features of a normalised image (N, 3, H, W), finest first; H and W are multiples of 32.
 
-        ``offset`` is what the first convolution's zero padding means, as in the ResNet-50.
+        ``offset`` is the value of the first convolution's zero padding, as in the ResNet-50.
         """
         x = self.stem(x - self.offset)
         features = []
@@ -86,9 +86,9 @@ class EfficientNetLite0(nn.Module):
 def conv_norm(
     channels_in: int, channels_out: int, kernel_px: int, stride: int = 1, groups: int = 1
 ) -> list[nn.Module]:
-    """A convolution padded as TensorFlow does ("SAME") and its norm.
+    """Return a convolution padded as in TensorFlow ("SAME") and its norm.
 
-    Where it halves an even size, TensorFlow's odd pixel of padding is at the right and at the bottom.
+    If it halves an even size, TensorFlow's odd padding pixel is at the right and at the bottom.
     """
     before = (kernel_px - stride) // 2
     after = kernel_px - stride - before

@@ -19,7 +19,7 @@ from pipeline.io.rigs import load_frame
 from pipeline.types import ByteArray, DepthMap, FloatArray
 
 FIRST_TEST_ROOM = FIRST_SEED["test"]
-"""Seed from which on no room is trained on."""
+"""First seed of rooms that are never trained on."""
 MODES: tuple[AlignmentMode, ...] = ("none", "median", "affine_depth", "affine_inverse", "local")
 BLOCK_PX = 32
 SHOWN = ("abs_rel", "rmse_m", "rmse_log", "delta_1", "silog")
@@ -27,17 +27,17 @@ SHOWN = ("abs_rel", "rmse_m", "rmse_log", "delta_1", "silog")
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """One image with what aligns its inferred depth and what judges it."""
+    """One image with the depth for its alignment and the depth for its evaluation."""
 
     rgb: ByteArray
     sensor: DepthMap
-    """(H, W) sees what the alignment may see."""
+    """(H, W) depth that the alignment may use."""
     truth_m: FloatArray
-    """(H, W) judges; NaN where not."""
+    """(H, W) depth for the evaluation; NaN elsewhere."""
 
 
 def evaluate(model: Path | None, real: Path | None, rooms: int) -> Iterator[str]:
-    """Lines of a Markdown table: every set of images, every alignment mode, mean errors.
+    """Yield lines of a Markdown table: every set of images, every alignment mode, mean errors.
 
     Args:
         model: ONNX file; None takes the one that ships.
@@ -58,7 +58,7 @@ def evaluate(model: Path | None, real: Path | None, rooms: int) -> Iterator[str]
 
 
 def rows(title: str, examples: list[Example], network: DepthNetwork) -> Iterator[str]:
-    """Two lines for a constant depth, which only the sensor's depth shapes, and one a mode."""
+    """Yield two lines for a constant depth, shaped by the sensor's depth only, and one per mode."""
     flat = [DepthMap(np.ones_like(example.truth_m)) for example in examples]
     for mode in ("median", "local"):
         yield row(f"| {title} | constant | {mode} |", examples, flat, mode)
@@ -68,7 +68,7 @@ def rows(title: str, examples: list[Example], network: DepthNetwork) -> Iterator
 
 
 def row(start: str, examples: list[Example], inferred: list[DepthMap], mode: AlignmentMode) -> str:
-    """One table line: errors averaged over images, AbsRel also where the sensor has no depth."""
+    """Return one table line: errors averaged over images, AbsRel also where the sensor has no depth."""
     errors, in_holes = [], []
     for example, depth in zip(examples, inferred, strict=True):
         aligned_m = align_depth(depth, example.sensor, mode).depth.z_m
@@ -81,11 +81,11 @@ def row(start: str, examples: list[Example], inferred: list[DepthMap], mode: Ali
 
 
 def held_out_rooms(seeds: range, views: int) -> Iterator[Example]:
-    """``views`` views at the network's size of each room, with simulated sensor depth.
+    """Yield ``views`` views at the network's size of each room, with simulated sensor depth.
 
     Args:
-        seeds: the rooms; those of the test split count up from ``FIRST_TEST_ROOM``.
-        views: of each room, one after the other.
+        seeds: the rooms; those of the test split start at ``FIRST_TEST_ROOM``.
+        views: views per room, one after the other.
     """
     for seed in seeds:
         room = viewed_room(seed, None, threads=0, views=views)
@@ -95,7 +95,7 @@ def held_out_rooms(seeds: range, views: int) -> Iterator[Example]:
 
 
 def demo(name: str) -> Iterator[Example]:
-    """The nodes of a demo scene, judged by its true depth."""
+    """Yield the nodes of a demo scene, evaluated against its true depth."""
     rig = load_demo(name)
     if rig.truth is not None:
         for frame, truth in zip(rig.frames, rig.truth.depth, strict=True):
@@ -103,7 +103,7 @@ def demo(name: str) -> Iterator[Example]:
 
 
 def real_frame(folder: Path) -> Example:
-    """A real frame without truth: half of its 32-pixel blocks align, the other half judge."""
+    """Return a real frame without truth: half of its 32-pixel blocks align, the other half evaluate."""
     frame = load_frame(folder / "color.png", folder / "depth.png", folder / "intrinsics.json")
     v, u = np.indices(frame.depth.z_m.shape) // BLOCK_PX
     seen = (u + v) % 2 == 0

@@ -1,4 +1,4 @@
-"""A trained checkpoint to the ONNX file that ships: full-resolution head, static 8-bit integers."""
+"""Export of a trained checkpoint to the ONNX file that ships: full-resolution head, static 8-bit integers."""
 
 from __future__ import annotations
 
@@ -50,18 +50,18 @@ CONVENTION = Convention(
     resize="fit",
     fit_px=(WIDTH_PX, HEIGHT_PX),
 )
-"""What an exported file takes and gives: 8-bit values as they are, and metres that hold only up to a scale,
-which a picture does not tell."""
+"""Input and output of an exported file: unscaled 8-bit values, and metres up to an unknown scale, which an
+image does not determine."""
 INTEGER_LAYERS = ("/encoder/pool/", "/encoder/stages.", "/decoder/")
 FLOAT_LAYERS = ("/decoder/reduce.4/", "/decoder/join.4/", "/decoder/heads.3/")
-"""All else stays in floating point too: the input and the first convolution, and from the head's logit on to
-depth, which 8 bits would cut into 256 steps."""
+"""Layers in floating point, with the input, the first convolution and all from the head's logit to depth,
+which 8 bits would quantise into 256 steps."""
 FACTS = ("seed", "width", "initial", "loss", "step", "images_seen", "elapsed_s", "learning_rate")
-"""What a file repeats of its training."""
+"""Facts about the training that a file repeats."""
 
 
 class Normalise(nn.Module):
-    """RGB in 0 to 255 to what the encoder takes."""
+    """Maps RGB in 0 to 255 to the encoder's input."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -75,8 +75,8 @@ class Normalise(nn.Module):
 class Mirrored(nn.Module):
     """The network with its finest head only, for RGB (N, 3, H, W) in 0 to 255.
 
-    It looks at each image and at its mirror image and gives the geometric mean of both depths, which errs
-    less than either (Godard et al. 2017, post-processing).
+    It infers each image and its mirror image and returns the geometric mean of both depths, which has lower
+    errors than either (Godard et al. 2017, post-processing).
     """
 
     def __init__(self, network: DepthNet) -> None:
@@ -91,7 +91,7 @@ class Mirrored(nn.Module):
 
 
 class CalibrationImages(CalibrationDataReader):
-    """Training images, one at a time, to find the range of every activation."""
+    """Training images, one after the other, to find the range of every activation."""
 
     def __init__(self, shards: Shards, count: int) -> None:
         self.images = (network_input(rgb) for rgb, _ in shards.evenly(count))
@@ -102,13 +102,13 @@ class CalibrationImages(CalibrationDataReader):
 
 
 def network_input(rgb: ByteArray) -> FloatArray:
-    """(240, 320, 3) uint8 to (1, 3, 256, 320) float32, 0 to 255."""
+    """Return (240, 320, 3) uint8 as (1, 3, 256, 320) float32, 0 to 255."""
     image = padded(rgb, WIDTH_PX, PADDED_HEIGHT_PX).astype(np.float32)
     return np.ascontiguousarray(image.transpose(2, 0, 1)[None])
 
 
 def export(checkpoint: Path, data: Path, out: Path) -> dict[str, float]:
-    """Write ``out`` (8 bit) and ``out`` with suffix ``.float.onnx``; returns errors on validation rooms.
+    """Write ``out`` (8 bit) and ``out`` with suffix ``.float.onnx``; return errors on validation rooms.
 
     Args:
         checkpoint: ``best.pt`` or ``last.pt`` of a training run.
@@ -139,7 +139,7 @@ def export(checkpoint: Path, data: Path, out: Path) -> dict[str, float]:
 
 
 def write_float(network: DepthNet, file: Path) -> None:
-    """The network as ONNX in 32-bit floating point."""
+    """Write the network as ONNX in 32-bit floating point."""
     torch.onnx.export(
         Mirrored(network).eval(),
         (torch.zeros(1, 3, PADDED_HEIGHT_PX, WIDTH_PX),),
@@ -152,7 +152,7 @@ def write_float(network: DepthNet, file: Path) -> None:
 
 
 def quantise(float_file: Path, out: Path, training: Shards) -> None:
-    """The same network with 8-bit weights and activations, ranges from training images."""
+    """Write the network with 8-bit weights and activations, ranges from training images."""
     prepared = out.with_suffix(".prepared.onnx")
     quant_pre_process(str(float_file), str(prepared), skip_symbolic_shape=True)
     nodes = [node.name for node in onnx.load(prepared).graph.node]
@@ -171,7 +171,7 @@ def quantise(float_file: Path, out: Path, training: Shards) -> None:
 
 
 def mean_errors(file: Path, shards: Shards) -> dict[str, float]:
-    """Mean errors of an ONNX file over evenly chosen images, as it is and scaled by the median."""
+    """Return mean errors of an ONNX file over evenly chosen images, unscaled and scaled by the median."""
     session = onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
     rows: list[dict[str, float]] = []
     for rgb, truth_m in shards.evenly(COMPARED_IMAGES):
@@ -188,13 +188,13 @@ def mean_errors(file: Path, shards: Shards) -> dict[str, float]:
 
 
 def described_data(training: Shards) -> str:
-    """What the network learned from, by the names of the shards."""
+    """Describe the training data by the names of the shards."""
     kinds = sorted({re.sub(r"_\d+_rgb\.npy$", "", file.name) for file in training.files})
     return f"{len(training)} images in {len(training.files)} shards ({', '.join(kinds)})"
 
 
 def describe(file: Path, facts: dict[str, Any], errors: dict[str, float], data: str) -> None:
-    """Write into the file its input and output, how it was made, and its errors on validation rooms."""
+    """Write into the file its input and output, its training, and its errors on validation rooms."""
     model = onnx.load(file)
     properties = {
         **metadata_of(CONVENTION),

@@ -24,9 +24,9 @@ from packetmesh.errors import InputError
 from pipeline.types import ByteArray, FloatArray
 
 Role = Literal["opening", "ceiling", "wall", "against", "table", "chair", "free", "small", "unused"]
-"""Where a thing belongs: in, under, on or against something, or free on the floor."""
+"""Place of an object: in, under, on or against another part, or free on the floor."""
 _FORMAT = 2
-"""Changes when cached models must be made again."""
+"""Version of the cached models; a change makes them again."""
 _OUTDOORS = re.compile(
     r"\b(sedan|elevator|garage|shutter|blind|screen door|street|lamppost|fences?|railing|hedge|goal|horse|"
     r"hut|chimney|swimming|diving|snowman|motorbike|swing|sandpit|light source|hydrant|fountain|fitness|net|"
@@ -35,7 +35,7 @@ _OUTDOORS = re.compile(
 _TABLES = ("table", "desk", "nightstand", "commode", "chest of drawers", "sideboard", "counter", "workbench")
 _CHAIRS = ("chair", "stool", "pouf", "ottoman")
 OTHER_AUTHORS = {"validation": ("katorlegaz",), "test": ("blendswap-cc-by",)}
-"""Folders of a catalogue's archives, one an author or two, that these splits alone are furnished from."""
+"""Folders of a catalogue's archives, one per author or two, used by these splits only."""
 _HUNG = ("picture", "painting", "poster", "frame", "mirror", "clock", "board")
 
 
@@ -50,16 +50,16 @@ class Entry:
     elevation_m: float
     """Height of its lowest point above the floor."""
     rotation: FloatArray
-    """(3, 3) turn of the model in its own frame."""
+    """(3, 3) rotation of the model in its own frame."""
     light_m: FloatArray | None
-    """(3,) where a lamp shines, in the frame of the piece: Z up, from the middle of its foot."""
+    """(3,) position of a lamp's light in the frame of the piece: Z up, from the middle of its foot."""
     file: Path
     model: str
     role: Role
 
     @property
     def author(self) -> str:
-        """The archive's folder that the model lies in: a contributor, or a collection of a licence."""
+        """The archive's folder of the model: a contributor, or a collection of a licence."""
         return self.model.partition("/")[0]
 
     @property
@@ -71,7 +71,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceImage:
-    """A photograph that covers floors or walls by repetition."""
+    """A photograph that is repeated over floors or walls."""
 
     category: str
     size_m: tuple[float, float]
@@ -81,7 +81,7 @@ class SurfaceImage:
 
 @dataclass(frozen=True, slots=True)
 class Catalogue:
-    """Everything that rooms are furnished from; models are read when wanted and kept in ``cache``."""
+    """The furniture of rooms; models are read when needed and kept in ``cache``."""
 
     entries: tuple[Entry, ...]
     images: tuple[SurfaceImage, ...]
@@ -89,11 +89,11 @@ class Catalogue:
 
     @classmethod
     def open(cls, source: Path | str, cache: Path | str | None = None) -> Catalogue:
-        """Lists what a folder, a Debian package or a ``.sh3f`` file holds.
+        """List the content of a folder, a Debian package or a ``.sh3f`` file.
 
         Args:
             source: for example ``/usr/share/sweethome3d``, or a folder with both packages.
-            cache: folder for models made ready; without it, one in the system's temporary folder.
+            cache: folder for prepared models; None takes one in the system's temporary folder.
 
         Raises:
             InputError: ``source`` holds no furniture.
@@ -113,7 +113,7 @@ class Catalogue:
         return cls(tuple(entries), tuple(images), folder)
 
     def of_split(self, split: str) -> Catalogue:
-        """The part that rooms of a split are furnished from: no author's models are in two splits.
+        """Return the part for rooms of a split: no author's models are in two splits.
 
         Raises:
             InputError: the catalogue has no model for the split.
@@ -129,14 +129,14 @@ class Catalogue:
         return replace(self, entries=entries)
 
     def of_role(self, role: Role) -> tuple[Entry, ...]:
-        """The entries that belong in one kind of place."""
+        """Return the entries for one kind of place."""
         return tuple(entry for entry in self.entries if entry.role == role)
 
     def model(self, entry: Entry) -> Model:
-        """The model of an entry, from memory, from the cache, or made now.
+        """Return the model of an entry, from memory, from the cache, or made now.
 
         Raises:
-            InputError: its file lacks it, or it has no triangles.
+            InputError: the file lacks it, or it has no triangles.
         """
         file = self.cache / "models" / f"{entry.key}.npz"
         if not file.exists():
@@ -147,11 +147,11 @@ class Catalogue:
 
 
 _kept = lru_cache(maxsize=400)(load_model)
-"""Models that were read lately stay in memory."""
+"""Keeps recently read models in memory."""
 
 
 def _entry(record: dict[str, str], file: Path) -> Entry:
-    """The entry that a catalogue's record describes; lengths there are centimetres."""
+    """Return the entry of a catalogue's record, whose lengths are in centimetres."""
     try:
         size_m = np.array([float(record[key]) for key in ("width", "depth", "height")]) / 100.0
         elevation_m = float(record.get("elevation", 0.0)) / 100.0
@@ -177,7 +177,7 @@ def _entry(record: dict[str, str], file: Path) -> Entry:
 
 
 def _light(record: dict[str, str], size_m: FloatArray) -> FloatArray | None:
-    """Where the first lamp of a record shines; the catalogue counts x and y from the back left corner."""
+    """Return a record's first light position; the catalogue's x and y are from the back left corner."""
     if "lightSourceX" not in record:
         return None
     x, y, z = (float(record[f"lightSource{axis}"].split()[0]) / 100.0 for axis in "XYZ")
@@ -185,7 +185,7 @@ def _light(record: dict[str, str], size_m: FloatArray) -> FloatArray | None:
 
 
 def _role(name: str, category: str, size_m: FloatArray, elevation_m: float, opening: bool) -> Role:
-    """Where a thing belongs, from its names and its size."""
+    """Return the place of an object, from its names and its size."""
     width, depth, height = size_m
     longest = float(size_m.max())
     if category in ("Vehicles", "Staircases") or _OUTDOORS.search(name):
@@ -213,7 +213,7 @@ _ROOMS = ("Living room", "Bedroom", "Kitchen", "Bathroom", "Office")
 
 
 def _images(file: Path) -> list[SurfaceImage]:
-    """The photographs of floors and walls in a zip file."""
+    """Return the photographs of floors and walls in a zip file."""
     images = []
     with zipfile.ZipFile(file) as archive:
         for record in numbered_records(file, "TexturesCatalog.properties"):

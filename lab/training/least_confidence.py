@@ -1,9 +1,9 @@
-"""What a surface gains and loses with the confidence below which nothing is filled.
+"""Effect of the least confidence for filled depth on the surface.
 
 ``python -m lab.training.least_confidence [ROOMS]`` reconstructs one view of each of 24 rooms of the
-validation split with ``depth.least_confidence`` from 0 to 0.8 and prints medians over them: rays without
-a surface, the F-score at 5 cm, and the share of the area more than 5 cm off the truth, much of which
-are skirts from objects to what stands behind them. Test rooms, demo scenes and real frames take no part.
+validation split with ``depth.least_confidence`` from 0 to 0.8 and prints medians over them: rays without a
+surface, the F-score at 5 cm, and the share of the area more than 5 cm off the truth, much of which is skirts
+from objects to their background. Test rooms, demo scenes and real frames are not used.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ WIDTH_PX = 640
 
 
 def rig_of(seed: int) -> Rig:
-    """One view of a room, sensed, with its truth."""
+    """Return one view of a room, with sensor depth and truth."""
     room = viewed_room(seed, None, threads=0, views=1)
     ((small, T_world_camera),) = room.cameras
     camera = scaled(small, WIDTH_PX / small.width_px)
@@ -37,7 +37,7 @@ def rig_of(seed: int) -> Rig:
 
 
 def measured(rig: Rig, level: float) -> tuple[float, ...]:
-    """Rays without a surface, F-score and share of the area that is off, at a least confidence."""
+    """Return rays without a surface, F-score and share of the area that is off, at a least confidence."""
     preset = PRESETS["packetmesh"]
     result = reconstruct(rig, replace(preset, depth=replace(preset.depth, least_confidence=level)))
     truth = result.truth_after
@@ -46,7 +46,7 @@ def measured(rig: Rig, level: float) -> tuple[float, ...]:
 
 
 def main() -> None:
-    """Print a table, a line for each level."""
+    """Print a table with a line per level."""
     rooms = int(sys.argv[1]) if len(sys.argv) > 1 else 24
     shares = np.array(
         [

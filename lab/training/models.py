@@ -1,4 +1,4 @@
-"""Furniture models made ready for rooms: true size, few triangles, colours by place; kept in a cache."""
+"""Furniture models prepared for rooms: true size, few triangles, colours by position; kept in a cache."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _CUBES = 40_000
 _TRIANGLES_PER_M, _FEWEST, _MOST = 2000, 300, 3500
 _KEPT_AREA = 0.75
 _FRAME = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""From the catalogue's frame (Y up, front towards +Z) to a piece's (Z up, front towards -Y)."""
+"""Rotation from the catalogue's frame (Y up, front towards +Z) to a piece's (Z up, front towards -Y)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """The part of a model that treats light in one way."""
+    """The part of a model with one kind of material."""
 
     kind: Kind
     vertices_m: FloatArray
@@ -41,19 +41,19 @@ class Model:
 
     surfaces: tuple[Surface, ...]
     top_m: FloatArray
-    """(24, 24) highest point above each cell of the footprint, along x then y; NaN where nothing is."""
+    """(24, 24) highest point above each cell of the footprint, along x then y; NaN for empty cells."""
 
 
 def make_model(
     mesh: Wavefront, rotation: FloatArray, size_m: FloatArray, light_m: FloatArray | None
 ) -> Model:
-    """Turn, scale, thin out and colour a model.
+    """Rotate, scale, thin and colour a model.
 
     Args:
-        mesh: as read.
-        rotation: (3, 3) the catalogue's turn of the model.
-        size_m: (3,) true width, depth and height, which the model's bounding box is scaled to.
-        light_m: (3,) where its lamp shines, in the piece's frame; what surrounds it glows.
+        mesh: the model as read.
+        rotation: (3, 3) the catalogue's rotation of the model.
+        size_m: (3,) true width, depth and height, to which the bounding box is scaled.
+        light_m: (3,) position of its light, in the piece's frame; the surfaces around it glow.
     """
     vertices = _standing(mesh.vertices @ (_FRAME @ rotation).T, mesh.triangles, size_m)
     corners = vertices[mesh.triangles]
@@ -110,7 +110,7 @@ def load_model(file: Path) -> Model:
 
 
 def _standing(vertices: FloatArray, triangles: IntArray, size_m: FloatArray) -> FloatArray:
-    """Vertices scaled and moved so that the triangles' bounding box has the size and stands on z = 0."""
+    """Scale and move vertices so that the triangles' bounding box has this size and stands on z = 0."""
     used = vertices[np.unique(triangles)]
     low, extent = used.min(axis=0), np.ptp(used, axis=0)
     scaled = (vertices - low) / np.where(extent > 0.0, extent, 1.0) * size_m
@@ -118,7 +118,7 @@ def _standing(vertices: FloatArray, triangles: IntArray, size_m: FloatArray) -> 
 
 
 def _kind(finish: Finish) -> Kind:
-    """How a material treats light; Blender writes Ks 0.5 and Ns 96 for whatever was left alone."""
+    """Return a material's kind; Blender writes Ks 0.5 and Ns 96 for unchanged materials."""
     name = finish.name.lower()
     if "mirror" in name or "espejo" in name:
         return "mirror"
@@ -131,7 +131,7 @@ def _kind(finish: Finish) -> Kind:
 def _sampled(
     corners: FloatArray, area: FloatArray, count: int, rng: np.random.Generator
 ) -> tuple[IntArray, FloatArray]:
-    """Triangles, by area and each at least once, and (N, 3) random places on them."""
+    """Return triangles, by area and each at least once, and (N, 3) random positions on them."""
     face = np.searchsorted(np.cumsum(area), rng.random(count) * area.sum())
     face = np.concatenate([np.minimum(face, len(area) - 1), np.arange(len(area))])
     u, v = np.sqrt(rng.random(len(face))), rng.random(len(face))
@@ -142,7 +142,7 @@ def _sampled(
 def _colors(
     mesh: Wavefront, face: IntArray, points_m: FloatArray, corners: FloatArray
 ) -> tuple[FloatArray, np.ndarray]:
-    """(N, 3) linear colours and (N,) whether there is anything, of places on triangles."""
+    """Return (N, 3) linear colours, and (N,) whether the surface exists, of positions on triangles."""
     rgb, opaque = np.zeros((len(face), 3)), np.ones(len(face), np.bool_)
     for k, finish in enumerate(mesh.finishes):
         rows = np.flatnonzero(mesh.finish[face] == k)
@@ -161,7 +161,7 @@ def _colors(
 
 
 def _barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """(N, 3) weights of the corners of (N, 3, 3) triangles at places on them."""
+    """Return (N, 3) weights of the corners of (N, 3, 3) triangles at positions on them."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = points - corners[:, 0]
     aa, ab, bb = (np.einsum("nd,nd->n", x, y) for x, y in ((a, a), (a, b), (b, b)))
@@ -173,7 +173,7 @@ def _barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:
 
 
 def _thinned(vertices: FloatArray, triangles: IntArray, budget: int) -> tuple[FloatArray, IntArray]:
-    """A mesh of these triangles with about ``budget`` of them, by quadric errors (Garland, Heckbert 1997)."""
+    """Return a mesh of about ``budget`` of these triangles, by quadric errors (Garland, Heckbert 1997)."""
     from pipeline.kernels.open3d_runtime import o3d
 
     rounded = np.round(vertices[triangles].reshape(-1, 3), 5)
@@ -198,7 +198,7 @@ def _thinned(vertices: FloatArray, triangles: IntArray, budget: int) -> tuple[Fl
 
 
 def _top(points_m: FloatArray, size_m: FloatArray) -> FloatArray:
-    """(24, 24) map of the highest places over the footprint."""
+    """Return a (24, 24) map of the highest points over the footprint."""
     top = np.full((GRID, GRID), -np.inf)
     cell = np.clip(((points_m[:, :2] / size_m[:2] + 0.5) * GRID).astype(int), 0, GRID - 1)
     np.maximum.at(top, (cell[:, 0], cell[:, 1]), points_m[:, 2])

@@ -57,8 +57,9 @@ class Bottleneck(nn.Module):
 class ResNet50(nn.Module):
     """The encoder without its classifier; returns the features at strides 2, 4, 8, 16 and 32.
 
-    At full width it is the usual one. At half width it is the ResNet-50-thin of Yahoo's Open-NSFW (2016):
-    half the channels, strides in the first 1x1, and pooling windows that start at the image's first pixel.
+    At full width it is the usual ResNet-50. At half width it is the ResNet-50-thin of Yahoo's Open-NSFW
+    (2016): half the channels, strides in the first 1x1, and pooling windows that start at the image's first
+    pixel.
     """
 
     def __init__(self, width: Literal["full", "half"] = "full") -> None:
@@ -81,9 +82,9 @@ class ResNet50(nn.Module):
             self.stages.append(nn.Sequential(*stage))
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        """Features of a normalised image (N, 3, H, W), finest first.
+        """Return features of a normalised image (N, 3, H, W), finest first.
 
-        ``offset`` is what the first convolution's zero padding means; subtracting it instead of folding it
+        ``offset`` is the value of the first convolution's zero padding; subtracting it instead of folding it
         into a bias keeps the borders exact for weights that were made with another mean.
         """
         features = [self.stem(x - self.offset)]
@@ -95,12 +96,12 @@ class ResNet50(nn.Module):
 
 
 def encoder_of(width: Width) -> ResNet50 | EfficientNetLite0:
-    """The encoder of this name; its ``channels`` are those of the features at strides 2, 4, 8, 16 and 32."""
+    """Return the encoder of this name; its ``channels`` are of the features at strides 2, 4, 8, 16 and 32."""
     return EfficientNetLite0() if width == "lite0" else ResNet50(width)
 
 
 class ReflectPadFunction(torch.autograd.Function):
-    """One reflected pixel on every side, several times faster than torch's on channels-last memory."""
+    """Pads one reflected pixel on every side, several times faster than torch's on channels-last memory."""
 
     @staticmethod
     def forward(ctx: Any, x: Tensor) -> Tensor:
@@ -123,7 +124,7 @@ class ReflectPadFunction(torch.autograd.Function):
 
 
 class ReflectPad(nn.Module):
-    """One reflected pixel on every side."""
+    """Pads one reflected pixel on every side."""
 
     def forward(self, x: Tensor) -> Tensor:
         if self.training:
@@ -154,7 +155,7 @@ class Decoder(nn.Module):
         self.reduce, self.join, self.heads = map(nn.ModuleList, (reduce, join, heads))
 
     def forward(self, features: list[Tensor]) -> list[Tensor]:
-        """Logits of the heads, coarsest (stride 8) first."""
+        """Return logits of the heads, coarsest (stride 8) first."""
         x, logits = features[-1], []
         for step, level in enumerate((4, 3, 2, 1, 0)):
             x = nn.functional.interpolate(self.reduce[step](x), scale_factor=2.0, mode="nearest")
@@ -167,7 +168,7 @@ class Decoder(nn.Module):
 
 
 class DepthNet(nn.Module):
-    """Normalised RGB (N, 3, H, W) to depth in metres; H and W are multiples of 32."""
+    """Maps normalised RGB (N, 3, H, W) to depth in metres; H and W are multiples of 32."""
 
     def __init__(self, width: Width = "full") -> None:
         super().__init__()
@@ -176,7 +177,7 @@ class DepthNet(nn.Module):
         self.reset()
 
     def reset(self) -> None:
-        """He initialisation; under ELU the variance stays; the heads start near a room's depth."""
+        """Apply He initialisation, which keeps the variance under ELU; heads start near a room's depth."""
         for module in self.encoder.modules():
             if isinstance(module, nn.Conv2d):
                 fan_out = module.out_channels * module.weight[0, 0].numel() / module.groups
@@ -191,11 +192,11 @@ class DepthNet(nn.Module):
             nn.init.constant_(head[-1].bias, float(torch.logit(torch.tensor(share))))
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        """Depths in metres at strides 1, 2, 4 and 8, each (N, 1, H/s, W/s) float32."""
+        """Return depths in metres at strides 1, 2, 4 and 8, each (N, 1, H/s, W/s) float32."""
         return [depth_from_logit(logit) for logit in reversed(self.decoder(self.encoder(x)))]
 
 
 def depth_from_logit(logit: Tensor) -> Tensor:
-    """depth = 1 / (1/dmax + (1/dmin - 1/dmax) sigmoid(logit)), in float32."""
+    """Return depth = 1 / (1/dmax + (1/dmin - 1/dmax) sigmoid(logit)), in float32."""
     share = torch.sigmoid(logit.float())
     return 1.0 / (1 / DEPTH_MAX_M + (1 / DEPTH_MIN_M - 1 / DEPTH_MAX_M) * share)

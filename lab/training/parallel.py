@@ -1,6 +1,6 @@
-"""Two or more training processes that act as one: they average their gradients every step.
+"""Data-parallel training: several processes average their gradients after every step.
 
-On shared cores this loses far less than torch's threads, which wait for each other after every layer.
+On shared cores this loses far less time than torch's threads, which wait for each other after every layer.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from torch import Tensor, nn
 
 @dataclass(slots=True)
 class Team:
-    """One process's place among its equals, and the memory they share."""
+    """One process's rank among its equals, and the memory that they share."""
 
     rank: int
     size: int
     gradients: Tensor
-    """(2, size, parameters): two slots, so that one step can be written while the last is read."""
+    """(2, size, parameters): two slots, so that one step can be written while the previous is read."""
     clock_s: Tensor
     """(2,) float64, the leader's time."""
     barrier: Any
@@ -33,7 +33,7 @@ class Team:
         return self.rank == 0
 
     def average_gradients(self, parameters: Iterable[nn.Parameter], step: int, now_s: float) -> float:
-        """Replace every gradient by the team's mean; returns the leader's time, the same for all."""
+        """Replace every gradient by the team's mean. Returns the leader's time, equal in all processes."""
         slot = step % 2
         grads = [p.grad for p in parameters if p.grad is not None]
         torch.cat([grad.reshape(-1) for grad in grads], out=self.gradients[slot, self.rank])
@@ -61,7 +61,7 @@ def run_team(size: int, parameters: int, work: Callable[..., None], *arguments: 
 
 
 def _member(team: Team, work: Callable[..., None], arguments: tuple[object, ...]) -> None:
-    os.setsid()  # a scheduling group of its own, where the kernel shares time by session
+    os.setsid()  # a scheduling group of its own, if the kernel divides time by session
     torch.set_num_threads(1)
     try:
         work(team, *arguments)

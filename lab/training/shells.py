@@ -1,4 +1,4 @@
-"""The shell of a room and what hangs flat on its walls, with photographs of real floors and walls."""
+"""A room's shell and flat objects on its walls, with photographs of real floors and walls."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from pipeline.types import FloatArray
 
 _TEXEL_M = 0.004
 _PHOTOGRAPHED = 0.4
-"""Share of floors and walls that wear a photograph, where there are any."""
+"""Share of floors and walls covered by a photograph, if there are any."""
 
 
 def photographed_shell(
     rng: np.random.Generator, size_m: FloatArray, images: tuple[SurfaceImage, ...]
 ) -> list[Part]:
-    """The shell of a room of ``size_m``, some floors and walls covered with photographs."""
+    """Return the shell of a room of ``size_m``, some floors and walls covered with photographs."""
     return shell(
         rng,
         size_m,
@@ -33,7 +33,7 @@ def photographed_shell(
 
 
 def skirting(rng: np.random.Generator, size_m: FloatArray) -> list[Part]:
-    """Boards along the feet of the walls, 12 mm thick."""
+    """Return boards along the feet of the walls, 12 mm thick."""
     material, height_m = Material(paint(muted(rng, 1, 0.1, 0.8)[0], 2)), rng.uniform(0.05, 0.12)
     boards = []
     for wall in range(4):
@@ -43,7 +43,7 @@ def skirting(rng: np.random.Generator, size_m: FloatArray) -> list[Part]:
 
 
 def mirror(rng: np.random.Generator) -> tuple[list[Part], FloatArray]:
-    """A framed mirror, its foot on z = 0 and its front towards -y, and its (3,) size."""
+    """Return a framed mirror, its foot on z = 0 and its front towards -y, and its (3,) size."""
     size_m = np.array([rng.uniform(0.4, 1.2), 0.03, rng.uniform(0.5, 1.6)])
     glass = Material(paint((0.8, 0.82, 0.8), 3, 0.0), gloss=0.95, infrared=0.02)
     pane = size_m - np.array([0.06, 0.01, 0.06])
@@ -53,11 +53,11 @@ def mirror(rng: np.random.Generator) -> tuple[list[Part], FloatArray]:
 
 
 def tiled(image: SurfaceImage, scale: float, gain: FloatArray) -> Texture:
-    """A photograph repeated over a part's faces.
+    """Return a photograph repeated over a part's faces.
 
     Args:
         image: the photograph, of known true size.
-        scale: how much larger than true it is laid.
+        scale: scale over its true size.
         gain: (3,) tint.
     """
     width_m, height_m = scale * image.size_m[0], scale * image.size_m[1]
@@ -78,7 +78,7 @@ def tiled(image: SurfaceImage, scale: float, gain: FloatArray) -> Texture:
 
 
 def _covered(category: str, rng: np.random.Generator, images: tuple[SurfaceImage, ...]) -> Material | None:
-    """A photographed surface, or None where none is to be had or wanted."""
+    """Return a photographed surface, or None if there is none or the draw decides against it."""
     fitting = [image for image in images if image.category == category]
     if not fitting or rng.random() >= _PHOTOGRAPHED:
         return None

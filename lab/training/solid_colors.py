@@ -1,4 +1,4 @@
-"""The colours of a surface by place: small cubes in space, so that a mesh needs no texture coordinates."""
+"""The colours of a surface in small cubes of space, so that a mesh needs no texture coordinates."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 _SIDE = 1024
-"""Cubes along one axis that an index can name."""
+"""Number of cubes along one axis that an index can address."""
 _NEIGHBOURS = np.array(
     sorted(
         ((x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)), key=lambda d: np.dot(d, d)
@@ -21,7 +21,7 @@ _NEIGHBOURS = np.array(
 
 @dataclass(frozen=True, slots=True)
 class SolidColors:
-    """A texture (as in ``lab.worlds.scene``): the mean colour of a surface in each cube it meets."""
+    """A texture (as in ``lab.worlds.scene``): the mean colour of a surface in each cube that it passes."""
 
     low_m: FloatArray
     """(3,) corner of the first cube."""
@@ -33,7 +33,7 @@ class SolidColors:
 
     @classmethod
     def sampled(cls, points_m: FloatArray, rgb: FloatArray, cube_m: float) -> SolidColors:
-        """Collects (N, 3) linear colours at (N, 3) places."""
+        """Collect (N, 3) linear colours at (N, 3) positions."""
         low_m = points_m.min(axis=0) - cube_m
         cube_m = max(cube_m, float(np.ptp(points_m, axis=0).max()) / (_SIDE - 4))
         cells = ((points_m - low_m) / cube_m).astype(np.int64)
@@ -46,7 +46,7 @@ class SolidColors:
         )
 
     def __call__(self, points_m: FloatArray, normals: FloatArray) -> FloatArray:
-        """(N, 3) linear albedo at (N, 3) places; the mean colour where nothing was sampled."""
+        """Return (N, 3) linear albedo at (N, 3) positions; the mean colour where nothing was sampled."""
         places = (points_m - self.low_m.astype(np.float32)) * np.float32(1.0 / self.cube_m)
         row = _rows(places, self.keys, _NEIGHBOURS)
         albedo = _LINEAR[self.colors[row]]
@@ -58,7 +58,7 @@ class SolidColors:
 
 @numba.njit(cache=True, nogil=True)
 def _rows(places, keys, neighbours):  # type: ignore[no-untyped-def]
-    """(N,) row of the cube at each place, or of a cube that touches it; -1 where there is none."""
+    """Return (N,) row of the cube at each position, or of a cube that touches it; -1 for none."""
     rows = np.full(len(places), -1, np.int64)
     for n in range(len(places)):
         x, y, z = np.int64(places[n, 0]), np.int64(places[n, 1]), np.int64(places[n, 2])

@@ -40,10 +40,10 @@ MEASURED_BATCHES = 8
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """A part of the training with inputs of one size."""
+    """A part of the training with one input size."""
 
     until: float
-    """Share of the time budget at which it ends."""
+    """Share of the time budget at which the stage ends."""
     size_px: tuple[int, int]
     """Height and width of the input."""
     batch: int
@@ -53,7 +53,7 @@ STAGES = {
     "cpu": (Stage(0.3, (64, 96), 16), Stage(0.65, (128, 160), 8), Stage(math.inf, (256, 320), 8)),
     "cuda": (Stage(0.25, (128, 160), 64), Stage(math.inf, (256, 320), 32)),
 }
-"""Small images first: the layout of rooms is learned from many of them, the detail from fewer large ones."""
+"""Small images first: room layouts are learned from many of them, detail from fewer large ones."""
 
 
 ALONE = Team(0, 1, torch.empty(0), torch.empty(0), None)
@@ -62,7 +62,7 @@ ALONE = Team(0, 1, torch.empty(0), torch.empty(0), None)
 
 @dataclass(frozen=True, slots=True)
 class TrainingState:
-    """Where a run stands."""
+    """Progress of a run."""
 
     step: int = 0
     images_seen: int = 0
@@ -70,12 +70,12 @@ class TrainingState:
 
 
 def train(config: TrainingConfig) -> None:
-    """Train until the time budget is spent; continues from ``out/last.pt`` when there is one.
+    """Train until the time budget is spent; continue from ``out/last.pt`` if there is one.
 
-    The network with the least validation error at the final input size stays in ``out/best.pt``.
+    The network with the least validation error at the final input size is in ``out/best.pt``.
 
     Raises:
-        InputError: there are no shards, no GPU where one is asked for, or another network in ``out``.
+        InputError: there are no shards, no GPU although one is configured, or another network in ``out``.
     """
     for split in ("train", "validation"):
         if not Shards(config.data, split).index:
@@ -95,7 +95,7 @@ def train(config: TrainingConfig) -> None:
 
 @contextmanager
 def stop_on_signals() -> Iterator[Tensor]:
-    """A shared flag (1,) that turns true at the first SIGINT or SIGTERM; the second one acts as usual."""
+    """Yield a shared flag (1,), set by the first SIGINT or SIGTERM; the second one acts as usual."""
     stop = torch.zeros(1, dtype=torch.bool).share_memory_()
     usual = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
@@ -113,14 +113,14 @@ def stop_on_signals() -> Iterator[Tensor]:
 
 
 def device_of(config: TrainingConfig) -> torch.device:
-    """Where the network is trained."""
+    """Return the device of the training."""
     if config.device == "cuda" and not torch.cuda.is_available():
         raise InputError("Device cuda was asked for, but torch finds no GPU here: use cpu or auto.")
     return torch.device("cuda" if config.device != "cpu" and torch.cuda.is_available() else "cpu")
 
 
 def start(config: TrainingConfig) -> None:
-    """Write the first checkpoint, of a network that has seen nothing.
+    """Write the first checkpoint, of an untrained network.
 
     Raises:
         InputError: ``out`` holds the best network of another training.
@@ -136,7 +136,7 @@ def start(config: TrainingConfig) -> None:
 
 
 def train_member(team: Team, config: TrainingConfig, stop: Tensor) -> None:
-    """What every process of the team does with its share of each batch, until the leader sees ``stop``."""
+    """Train on one process's share of each batch, until the leader sees ``stop``."""
     device = device_of(config)
     model = DepthNet(config.width).to(device, memory_format=torch.channels_last)
     optimizer = optimizer_of(model, config)
@@ -159,7 +159,7 @@ def train_member(team: Team, config: TrainingConfig, stop: Tensor) -> None:
         losses.append(backward(model, image, target_m, config))
         now_s = time.monotonic() - clock
         if stop:
-            now_s = -now_s  # so the leader tells the team, in the same step, that it was the last one
+            now_s = -now_s  # the leader's negative time tells the team that this was the last step
         if team.size > 1:
             now_s = team.average_gradients(model.parameters(), state.step, now_s)
         stopping, now_s = now_s < 0.0, abs(now_s)
@@ -179,7 +179,7 @@ def train_member(team: Team, config: TrainingConfig, stop: Tensor) -> None:
 def judge(
     config: TrainingConfig, model: DepthNet, validation: Shards, stage: Stage, state: TrainingState
 ) -> None:
-    """Log the validation errors; in the last stage, whose errors alone compare, keep the best network."""
+    """Log the validation errors; in the last stage, whose errors are comparable, keep the best network."""
     errors = validate(model, validation, stage, config.precision)
     log(config.out, state, **errors)
     if math.isinf(stage.until):
@@ -187,12 +187,12 @@ def judge(
 
 
 def optimizer_of(model: DepthNet, config: TrainingConfig) -> torch.optim.Optimizer:
-    """Adam over the whole network."""
+    """Return Adam over the whole network."""
     return torch.optim.Adam(model.parameters(), lr=config.learning_rate, fused=True)
 
 
 def backward(model: DepthNet, image: Tensor, target_m: Tensor, config: TrainingConfig) -> Tensor:
-    """Leave the gradients of one batch in the model; returns the loss, apart from its graph."""
+    """Compute the gradients of one batch in the model; return the loss, detached."""
     model.train()
     with torch.autocast(image.device.type, torch.bfloat16, enabled=config.precision == "bf16"):
         depths_m = model(image)
@@ -203,7 +203,7 @@ def backward(model: DepthNet, image: Tensor, target_m: Tensor, config: TrainingC
 
 
 def update(model: DepthNet, optimizer: torch.optim.Optimizer, rate: float) -> None:
-    """One step along the clipped gradients; none if they are not finite."""
+    """Take one step along the clipped gradients; none if they are not finite."""
     for group in optimizer.param_groups:
         group["lr"] = rate
     norm = torch.nn.utils.clip_grad_norm_(model.parameters(), GRADIENT_CLIP)
@@ -212,7 +212,7 @@ def update(model: DepthNet, optimizer: torch.optim.Optimizer, rate: float) -> No
 
 
 def scheduled_rate(peak: float, spent: float) -> float:
-    """One-cycle learning rate when the share ``spent`` (0 to 1) of the budget is gone."""
+    """Return the one-cycle learning rate after the share ``spent`` (0 to 1) of the budget."""
     if spent < RISE:
         return peak * (0.05 + 0.95 * spent / RISE)
     return peak * 0.5 * (1.0 + math.cos(math.pi * min(1.0, (spent - RISE) / (1.0 - RISE))))
@@ -220,7 +220,7 @@ def scheduled_rate(peak: float, spent: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Batches(IterableDataset):
-    """Endless augmented batches of one stage; every worker process has others."""
+    """Endless augmented batches of one stage, different in every worker process."""
 
     data: Path
     stage: Stage
@@ -236,7 +236,7 @@ class Batches(IterableDataset):
 
 
 def loader(config: TrainingConfig, stage: Stage, team: Team, step: int, device: torch.device) -> DataLoader:
-    """This process's share of the batches of a stage, from worker processes if a GPU waits for them."""
+    """Return a loader of this process's share of a stage's batches; on a GPU, worker processes load them."""
     on_gpu = device.type == "cuda"
     batches = Batches(config.data, stage, stage.batch // team.size, (config.seed, step, team.rank))
     workers = max(1, len(os.sched_getaffinity(0)) - 2) if on_gpu else 0
@@ -244,7 +244,7 @@ def loader(config: TrainingConfig, stage: Stage, team: Team, step: int, device: 
 
 
 def endless_samples(data: Path, rng: np.random.Generator) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Augmented training images, every one once an epoch; newly rendered shards join at the next."""
+    """Yield augmented training images, each once per epoch; new shards are used from the next epoch on."""
     cv2.setNumThreads(0)
     shards = Shards(data, "train")
     while True:
@@ -254,7 +254,7 @@ def endless_samples(data: Path, rng: np.random.Generator) -> Iterator[tuple[np.n
 
 
 def collate(samples: list[tuple[np.ndarray, np.ndarray]], stage: Stage) -> tuple[Tensor, Tensor]:
-    """Images (N, 3, h, w) and targets (N, 1, h, w) of a stage's size, padded; the padding has no target."""
+    """Return images (N, 3, h, w) and targets (N, 1, h, w) of a stage's size; the padding has no target."""
     images = np.concatenate([normalised_input(rgb) for rgb, _ in samples])
     depth_m = np.stack([depth_m for _, depth_m in samples])
     rows = (images.shape[2] - depth_m.shape[1]) // 2
@@ -269,7 +269,7 @@ def collate(samples: list[tuple[np.ndarray, np.ndarray]], stage: Stage) -> tuple
 def validate(
     model: DepthNet, shards: Shards, stage: Stage, precision: Precision = "bf16"
 ) -> dict[str, float]:
-    """Mean errors over evenly chosen validation images, at the stage's size."""
+    """Return mean errors over evenly chosen validation images, at the stage's size."""
     model.eval()
     device = next(model.parameters()).device
     errors = []
@@ -295,7 +295,7 @@ def log(folder: Path, state: TrainingState, **values: float) -> None:
 def keep_best(
     config: TrainingConfig, model: DepthNet, state: TrainingState, errors: dict[str, float]
 ) -> None:
-    """Replace ``out/best.pt`` if this network's AbsRel is less than that one's."""
+    """Replace ``out/best.pt`` if this network's AbsRel is lower."""
     file, best = config.out / "best.pt", math.inf
     if file.exists():
         best = torch.load(file, weights_only=True, map_location="cpu")["validation"]["val_abs_rel"]
@@ -304,7 +304,7 @@ def keep_best(
 
 
 def write(config: TrainingConfig, name: str, model: DepthNet, state: TrainingState, **more: object) -> None:
-    """Replace a checkpoint in ``out`` in one move."""
+    """Replace a checkpoint in ``out`` atomically."""
     plain = asdict(replace(config, data=str(config.data), out=str(config.out)))  # type: ignore[arg-type]
     with atomic_path(config.out / f"{name}.pt") as temporary:
         torch.save({"model": model.state_dict(), "state": asdict(state), "config": plain, **more}, temporary)

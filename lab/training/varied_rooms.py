@@ -1,4 +1,4 @@
-"""Rooms furnished from a catalogue: real models at true sizes, much clutter, light from noon to night."""
+"""Rooms furnished from a catalogue: real models at true size, much clutter, light from noon to night."""
 
 from __future__ import annotations
 
@@ -22,50 +22,50 @@ CAMERA = CameraIntrinsics.pinhole(262.5, 262.5, 159.5, 119.5, 320, 240)
 _THEMES = ("Living room", "Living room", "Bedroom", "Kitchen", "Bathroom", "Office")
 _MOST_LIGHTS = 3
 _FLAT_M = 0.012
-"""A thing stands where the support's heights under it differ by less."""
+"""Largest height difference of a support under an object that stands on it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """A thing in a room, with its bounding box."""
+    """An object in a room, with its bounding box."""
 
     low_m: FloatArray
     """(3,) corner."""
     high_m: FloatArray
     entry: Entry | None = None
-    """None for what is not from the catalogue."""
+    """Catalogue entry; None for other objects."""
     T: FloatArray | None = None
     """(4, 4) pose of the middle of its foot."""
     support: Placed | None = None
-    """What it stands on, None for floor and walls."""
+    """The object below it; None for floor and walls."""
 
 
 @dataclass(slots=True)
 class RoomPlan:
-    """A room while it is being furnished; parts[0] is the floor slab, parts[:6] the shell."""
+    """A room that is being furnished; parts[0] is the floor slab, parts[:6] the shell."""
 
     seed: int
     size_m: FloatArray
     """(3,) inner width (x), depth (y) and height."""
     theme: str
     daylight: float
-    """How bright windows are; 0 at night."""
+    """Brightness of windows; 0 at night."""
     catalogue: Catalogue
     rng: np.random.Generator
     parts: list[Part]
     placed: list[Placed] = field(default_factory=list)
     windows: list[FloatArray] = field(default_factory=list)
-    """(3,) places in front of windows."""
+    """(3,) positions before windows."""
 
     def pick(self, role: Role) -> Entry | None:
-        """A random entry of a role, rather of the room's theme."""
+        """Return a random entry of a role, preferably of the room's theme."""
         entries = self.catalogue.of_role(role)
         themed = [entry for entry in entries if entry.category == self.theme]
         choice = themed if themed and self.rng.random() < 0.7 else entries
         return choice[self.rng.integers(len(choice))] if choice else None
 
     def fits(self, low_m: FloatArray, high_m: FloatArray, support: Placed | None = None) -> bool:
-        """Whether a box lies inside the room and meets nothing but what it stands on."""
+        """Whether a box is inside the room and overlaps only its support."""
         half = 0.5 * self.size_m[:2] + 1e-6
         if np.any(low_m[:2] < -half) or np.any(high_m[:2] > half) or high_m[2] > self.size_m[2] + 1e-6:
             return False
@@ -77,7 +77,7 @@ class RoomPlan:
         return not np.any(np.all((low_m < highs - 1e-6) & (high_m > lows + 1e-6), axis=1))
 
     def add(self, entry: Entry, T: FloatArray, support: Placed | None = None) -> Placed | None:
-        """Puts a thing at ``T`` if it fits there."""
+        """Put an object at ``T`` if it fits there."""
         low, high = box_at(placed_size_m(entry), T)
         if not self.fits(low, high, support):
             return None
@@ -88,14 +88,14 @@ class RoomPlan:
 
 
 def varied_room(seed: int, catalogue: Catalogue) -> Scene:
-    """A closed, furnished, lit room without cameras (see ``varied_views``); the same for the same seed."""
+    """Return a closed, furnished, lit room without cameras (see ``varied_views``); equal for equal seeds."""
     plan = plan_room(seed, catalogue)
     lights, ambient = _lights(plan)
     return Scene(f"varied-room-{seed}", tuple(plan.parts), lights, ambient, (), CAMERA)
 
 
 def plan_room(seed: int, catalogue: Catalogue) -> RoomPlan:
-    """Everything that stands and hangs in the room of a seed."""
+    """Return all furniture of the room of a seed."""
     rng = np.random.default_rng([seed, 8117])
     size_m = np.array([rng.uniform(2.6, 6.0), rng.uniform(2.6, 6.0), rng.uniform(2.4, 3.2)])
     if rng.random() < 0.12:
@@ -115,14 +115,14 @@ def plan_room(seed: int, catalogue: Catalogue) -> RoomPlan:
 
 
 def box_at(size_m: FloatArray, T: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Low and high corner of the upright box around a thing of ``size_m`` whose foot's middle is at ``T``."""
+    """Return the corners of the upright box around an object of ``size_m`` with foot pose ``T``."""
     half = np.abs(T[:3, :3]) @ (0.5 * size_m)
     middle = T[:3, 3] + T[:3, 2] * 0.5 * size_m[2]
     return middle - half, middle + half
 
 
 def _dress_walls(plan: RoomPlan) -> None:
-    """Windows, doors, mirrors, pictures, shelves and what else hangs, from left to right on each wall."""
+    """Hang windows, doors, mirrors, pictures, shelves and others, from left to right on each wall."""
     rng = plan.rng
     for wall in range(4):
         length = wall_length(plan.size_m, wall)
@@ -141,7 +141,7 @@ def _dress_walls(plan: RoomPlan) -> None:
 
 
 def _hang_made(plan: RoomPlan, wall: int, along_m: float) -> float:
-    """Hangs a procedural window, door, picture or shelf; returns its width, little if it does not fit."""
+    """Hang a procedural window, door, picture or shelf; return its width, little if it does not fit."""
     piece = pieces.from_stock(pieces.random_wall_piece, plan.seed, plan.rng)
     T = wall_pose(plan.size_m, wall, along_m + 0.5 * piece.width_m, 0.0, piece.height_m)
     if not _add_made(plan, pieces.moved(piece.parts, T)):
@@ -152,7 +152,7 @@ def _hang_made(plan: RoomPlan, wall: int, along_m: float) -> float:
 
 
 def _add_made(plan: RoomPlan, parts: list[Part]) -> bool:
-    """Adds procedural parts on a wall; what is behind the wall's face does not count."""
+    """Add procedural parts on a wall; parts behind the wall's face do not count."""
     half = 0.5 * plan.size_m[:2]
     low, high = pieces.bounds(parts)
     behind = 0.2
@@ -168,7 +168,7 @@ def _add_made(plan: RoomPlan, parts: list[Part]) -> bool:
 
 
 def _hang_entry(plan: RoomPlan, wall: int, along_m: float) -> float:
-    """Hangs something of the catalogue; returns its width, little if it does not fit."""
+    """Hang an object of the catalogue; return its width, little if it does not fit."""
     entry = plan.pick("opening" if plan.rng.random() < 0.25 else "wall")
     if entry is None:
         return 0.5
@@ -187,7 +187,7 @@ def _hang_entry(plan: RoomPlan, wall: int, along_m: float) -> float:
 
 
 def _furnish_walls(plan: RoomPlan) -> None:
-    """Beds, sofas, cupboards, desks and appliances with their backs to the walls."""
+    """Add beds, sofas, cupboards, desks and appliances with their backs to the walls."""
     rng = plan.rng
     for _ in range(int(rng.integers(3, 6) + plan.size_m[:2].prod() / 6.0)):
         entry = plan.pick("against" if rng.random() < 0.8 else "table")
@@ -207,7 +207,7 @@ def _furnish_walls(plan: RoomPlan) -> None:
 
 
 def _furnish_middle(plan: RoomPlan) -> None:
-    """A rug, tables with chairs, and things that stand about, also procedural ones."""
+    """Add a rug, tables with chairs, and single objects, some of them procedural."""
     rng = plan.rng
     if rng.random() < 0.35:
         x, y = rng.uniform(-0.2, 0.2, 2) * plan.size_m[:2]
@@ -230,7 +230,7 @@ def _furnish_middle(plan: RoomPlan) -> None:
 
 
 def _drop(plan: RoomPlan, entry: Entry) -> Placed | None:
-    """Puts a thing somewhere on the floor, rather square to the walls."""
+    """Put an object somewhere on the floor, mostly parallel to the walls."""
     for _ in range(8):
         x, y = plan.rng.uniform(-0.48, 0.48, 2) * plan.size_m[:2]
         square = plan.rng.integers(4) * np.pi / 2.0
@@ -242,7 +242,7 @@ def _drop(plan: RoomPlan, entry: Entry) -> Placed | None:
 
 
 def _seat(plan: RoomPlan, table: Placed) -> None:
-    """Chairs of one kind around a table, each turned to it."""
+    """Add chairs of one kind around a table, each turned to it."""
     chair = plan.pick("chair")
     if chair is None or table.entry is None or table.T is None:
         return
@@ -260,7 +260,7 @@ def _seat(plan: RoomPlan, table: Placed) -> None:
 
 
 def _hang_lamps(plan: RoomPlan) -> None:
-    """Up to two lamps that hang from the ceiling."""
+    """Add up to two lamps that hang from the ceiling."""
     for _ in range(int(plan.rng.integers(0, 3))):
         entry = plan.pick("ceiling")
         if entry is not None and entry.size_m[2] < plan.size_m[2] - 1.2:
@@ -269,7 +269,7 @@ def _hang_lamps(plan: RoomPlan) -> None:
 
 
 def _clutter(plan: RoomPlan) -> None:
-    """Small things on whatever has a flat top."""
+    """Add small objects on flat tops."""
     rng = plan.rng
     supports = [thing for thing in plan.placed if thing.entry is not None and _is_support(thing.entry)]
     for support in supports:
@@ -285,7 +285,7 @@ def _is_support(entry: Entry) -> bool:
 
 
 def _resting(plan: RoomPlan, support: Placed, entry: Entry) -> FloatArray | None:
-    """Pose of a thing on a flat place of its support, or None if a few tries find none."""
+    """Return the pose of an object on a flat place of its support, or None after a few tries."""
     assert support.entry is not None
     assert support.T is not None
     size, top = support.entry.size_m, plan.catalogue.model(support.entry).top_m
@@ -305,7 +305,7 @@ def _resting(plan: RoomPlan, support: Placed, entry: Entry) -> FloatArray | None
 
 
 def _lights(plan: RoomPlan) -> tuple[tuple[Light, ...], FloatArray]:
-    """One to three area lights and the ambient light: bright noon, a grey day, an evening with one lamp."""
+    """Return one to three area lights and ambient light: noon, a grey day, an evening with one lamp."""
     rng = plan.rng
     lights = []
     for place in plan.windows[:2] if plan.daylight > 0.0 else ():
@@ -325,7 +325,7 @@ def _lights(plan: RoomPlan) -> tuple[tuple[Light, ...], FloatArray]:
 
 
 def _shining(lamp: Placed) -> FloatArray:
-    """(3,) place of a lamp's light in the world."""
+    """Return the (3,) position of a lamp's light in the world."""
     assert lamp.entry is not None
     assert lamp.entry.light_m is not None
     assert lamp.T is not None
@@ -333,6 +333,6 @@ def _shining(lamp: Placed) -> FloatArray:
 
 
 def _white(rng: np.random.Generator) -> FloatArray:
-    """(3,) light of a colour temperature from about 2700 to 8000 K, sometimes of a coloured lamp."""
+    """Return (3,) light of a colour temperature from about 2700 to 8000 K, sometimes of a coloured lamp."""
     white = lamp_white(rng)
     return white * rng.uniform(0.3, 1.3, 3) if rng.random() < 0.08 else white

@@ -1,4 +1,4 @@
-"""Reading OBJ models and MTL materials from a zip file."""
+"""Reader of OBJ models and MTL materials in a zip file."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class Wavefront:
     vertices: FloatArray
     """(V, 3)."""
     triangles: IntArray
-    """(F, 3) into ``vertices``."""
+    """(F, 3) indices into ``vertices``."""
     uv: FloatArray
-    """(F, 3, 2) texture coordinates of each triangle's corners; 0 where it has none."""
+    """(F, 3, 2) texture coordinates of each triangle's corners; 0 without any."""
     finish: IntArray
-    """(F,) into ``finishes``."""
+    """(F,) indices into ``finishes``."""
     finishes: tuple[Finish, ...]
 
 
@@ -49,8 +49,8 @@ def read_wavefront(archive: zipfile.ZipFile, path: str) -> Wavefront:
     """Read a model with its materials and textures; polygons become fans.
 
     Args:
-        archive: holds the model and, beside it, what it names.
-        path: of the ``.obj`` inside the archive.
+        archive: holds the model and the files that it names.
+        path: path of the ``.obj`` inside the archive.
 
     Raises:
         InputError: the model is missing or has no triangles.
@@ -91,7 +91,7 @@ def read_wavefront(archive: zipfile.ZipFile, path: str) -> Wavefront:
 
 
 def _fan(words: list[str], vertices: int, places: int) -> Iterator[tuple[int, int]]:
-    """Vertex and texture indices (-1 for none) of the corners of a polygon's triangles."""
+    """Yield vertex and texture indices (-1 for none) of the corners of a polygon's triangles."""
     polygon = []
     for word in words:
         parts = word.split("/")
@@ -102,7 +102,7 @@ def _fan(words: list[str], vertices: int, places: int) -> Iterator[tuple[int, in
 
 
 def _read_library(archive: zipfile.ZipFile, path: str) -> dict[str, Finish]:
-    """The materials of an MTL file by name; none if the file is missing."""
+    """Return the materials of an MTL file by name; none if the file is missing."""
     if path not in archive.namelist():
         return {}
     library: dict[str, Finish] = {}
@@ -127,7 +127,7 @@ def _read_library(archive: zipfile.ZipFile, path: str) -> dict[str, Finish]:
 
 
 def decode_image(content: bytes) -> ByteArray | None:
-    """(H, W, 4) RGBA of an image file's bytes, at most 512 pixels wide and high; None if unreadable."""
+    """Return (H, W, 4) RGBA of an image file's bytes, at most 512 x 512 pixels; None if unreadable."""
     image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
     if image is None or image.dtype != np.uint8:
         return None

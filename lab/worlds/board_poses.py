@@ -106,8 +106,7 @@ def sees(
 
 
 def _tilt_rad(T_camera_board: FloatArray) -> float:
-    """Return the angle between the board's normal and the view direction; over 90 degrees it is seen from
-    behind."""
+    """Return the angle between the board's normal and the line of sight; over 90 degrees shows the back."""
     way = T_camera_board[:3, 3] / np.linalg.norm(T_camera_board[:3, 3])
     return float(np.arccos(np.clip(T_camera_board[:3, 2] @ way, -1.0, 1.0)))
 

@@ -85,8 +85,7 @@ def render_demo_boards(name: str) -> BoardViews | None:
 
 
 def disturbed(T_world_camera: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return the (4, 4) pose turned by ``POSE_ERROR_RAD`` and shifted by ``POSE_ERROR_M``, in random
-    directions."""
+    """Return the (4, 4) pose with random turn ``POSE_ERROR_RAD`` and random shift ``POSE_ERROR_M``."""
     axis, way = (v / np.linalg.norm(v) for v in rng.standard_normal((2, 3)))
     T = T_world_camera.copy()
     T[:3, :3] = T[:3, :3] @ rotation_exp(POSE_ERROR_RAD * axis)

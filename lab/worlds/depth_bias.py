@@ -18,8 +18,8 @@ class DepthBias:
     c_per_m: float = 0.0
     waves: FloatArray = field(default_factory=lambda: np.zeros((1, 1)))
     """(K, L) cosine coefficients of s, a share of the depth: s = sum of w_kl cos(k pi v') cos(l pi u'), u'
-    and v' from 0 to 1 across the image. With w_00 = 0, s has mean zero; s is not a spline, so a calibration
-    has to fit it."""
+    and v' from 0 to 1 across the image. With w_00 = 0, s has mean zero; s is not a spline, which a
+    calibration may fit."""
 
     def share(self, shape: tuple[int, int]) -> FloatArray:
         """(H, W) s at every pixel."""

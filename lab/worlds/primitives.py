@@ -225,8 +225,7 @@ def _cube_triangles(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
 
 
 def _bevelled(profile: FloatArray, bevel_m: float, ring: bool) -> FloatArray:
-    """Return the profile with each corner replaced by two points, a bevel (or a third of an edge) away from
-    it."""
+    """Return the profile with two points per corner, a bevel (or a third of the edge) away from it."""
     corners = profile if ring else profile[1:-1]
     before = np.roll(profile, 1, axis=0) if ring else profile[:-2]
     after = np.roll(profile, -1, axis=0) if ring else profile[2:]

@@ -96,9 +96,7 @@ class Renderer:
         self._gloss = np.array([m.gloss for m in materials] + [0.0], np.float32)
         self._infrared = np.array([m.infrared for m in materials] + [0.0], np.float32)
         self._emission = np.array([m.emission for m in materials] + [0.0], np.float32)
-        self._mirror = np.where(
-            self._emission > 0.0, np.float32(0.0), self._gloss
-        )  # the part's own light outshines it
+        self._mirror = np.where(self._emission > 0.0, np.float32(0.0), self._gloss)  # own light outshines it
         self._ambient = np.asarray(scene.ambient, np.float32)
 
     @cached_property
@@ -152,8 +150,7 @@ class Renderer:
     def parts_seen(
         self, intrinsics: CameraIntrinsics, T_world_camera: FloatArray
     ) -> tuple[FloatArray, IntArray]:
-        """Return (H, W) depth as in ``depth``, and the (H, W) index of the part at each pixel, -1 for
-        none."""
+        """Return (H, W) depth as in ``depth``, and the (H, W) part index at each pixel, -1 for none."""
         hits = self._caster.cast(camera_rays(intrinsics, T_world_camera))
         shape = (intrinsics.height_px, intrinsics.width_px)
         z_m = np.where(hits.part >= 0, hits.t, np.float32(np.nan))
@@ -245,8 +242,7 @@ class Renderer:
             shading.add_light(*lamp, hits.view, hits.normals, gloss, irradiance, shine)
 
     def _sky(self, hits: Hits, random: FloatArray, bounce: bool) -> FloatArray:
-        """Return (N, 3) ambient irradiance by one ray over the hemisphere, with the surfaces that it
-        meets."""
+        """Return (N, 3) ambient irradiance by one ray over the hemisphere, with the surface it meets."""
         rays = np.empty((len(hits.t), 6), np.float32)
         shading.hemisphere_rays(hits.positions, hits.normals, random, rays)
         if bounce:
@@ -255,8 +251,7 @@ class Renderer:
         return np.where(blocked[:, None], 0.35 * self._ambient, self._ambient).astype(np.float32)
 
     def _met(self, rays: FloatArray, random: FloatArray, shadows: bool) -> FloatArray:
-        """Return (N, 3) light of the surfaces that rays meet: their mean colour, lit by lamps and ambient
-        light."""
+        """Return (N, 3) light of the surfaces that rays meet: mean colour, lamps and ambient light."""
         hits = self._caster.cast(rays)
         light = np.zeros((len(rays), 3), np.float32)
         self._add_lights(hits, np.zeros(len(rays), np.float32), random, light, light, shadows)

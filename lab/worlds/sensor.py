@@ -98,8 +98,7 @@ def projector_shadow(z_m: FloatArray, focal_baseline: float, jump_px: float) -> 
 
 @numba.njit(cache=True, nogil=True)
 def _cast_shadow(disparity, jump_px, shadow):  # type: ignore[no-untyped-def]
-    """Fill the z-buffer of each row as the projector sees it, two bins a pixel: column u appears at u -
-    disparity."""
+    """Fill each row's z-buffer in the projector's view, two bins a pixel: column u is at u - disparity."""
     height, width = disparity.shape
     for y in range(height):
         margin = int(np.max(disparity[y])) + 2
@@ -129,8 +128,7 @@ def _distance_to_edges(disparity_px: FloatArray, jump_px: float) -> FloatArray:
 def _jittered(
     true_m: FloatArray, edge_distance_px: FloatArray, rng: np.random.Generator, config: SensorConfig
 ) -> FloatArray:
-    """Return depth whose edges are ragged by about a pixel, with a few flying pixels between front and
-    back."""
+    """Return depth with edges ragged by about a pixel and a few flying pixels between front and back."""
     height, width = true_m.shape
     y, x = np.mgrid[:height, :width]
     dy, dx = np.rint(rng.normal(0.0, 0.7, (2, height, width))).astype(int)
@@ -164,8 +162,7 @@ def _loss_probability(
 
 
 def _field(shape: tuple[int, int], sizes_px: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return (H, W) uniform random numbers, 0 to 1, correlated over about the (K,) sizes, weighted
-    equally."""
+    """Return (H, W) uniform random numbers, 0 to 1, correlated over the equally weighted (K,) sizes."""
     total = np.zeros(shape)
     for size_px in sizes_px:
         blurred = cv2.GaussianBlur(rng.standard_normal(shape), (0, 0), size_px, borderType=cv2.BORDER_REFLECT)

@@ -22,8 +22,7 @@ def shell(
     wall: Finish = random_wall,
     floor: Finish = random_floor,
 ) -> list[Part]:
-    """Return floor, ceiling and four walls as slabs outside ``size_m``; one wall in five has another
-    finish."""
+    """Return floor, ceiling and walls as slabs outside ``size_m``; one wall in five has another finish."""
     x, y, z = size_m
     white = muted(rng, 1, darkest_ceiling, 0.85)[0]
     ceiling = Material(paint(white, 1, 0.04)) if rng.random() < 0.85 else random_wall(rng)

@@ -20,8 +20,7 @@ WEST, EAST, SOUTH, NORTH = np.pi / 2.0, -np.pi / 2.0, np.pi, 0.0
 WALL_M = 0.22
 
 Opening = tuple[float, float, float, float]
-"""A window's hole: position along the wall from its middle (to the right), lower edge, width, height;
-metres."""
+"""A window's hole in metres: place along the wall, right of its middle; lower edge; width; height."""
 
 
 def shell(
@@ -87,8 +86,7 @@ def sun(through_m: Sequence[float], onto_m: Sequence[float], irradiance: float) 
 def arc(
     target_m: Sequence[float], distance_m: float, height_m: float, azimuths_deg: Sequence[float]
 ) -> tuple[FloatArray, ...]:
-    """Return T_world_camera of nodes around a place, at a horizontal distance and a height above the
-    floor."""
+    """Return T_world_camera of nodes around a place, at a horizontal distance and a height."""
     poses = []
     for azimuth in np.radians(azimuths_deg):
         x = target_m[0] + distance_m * np.cos(azimuth)

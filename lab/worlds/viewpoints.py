@@ -109,8 +109,7 @@ def _found(scene: Scene, count: int, tries: int, candidate: Callable[[], _View |
 
 
 def _inside(scene: Scene, face: Callable[[FloatArray], float]) -> tuple[FloatArray, FloatArray]:
-    """Return the lowest and highest corner of a room's air, up to the ceiling slab's face that ``face``
-    selects."""
+    """Return the corners of a room's air, up to the face of the ceiling slab that ``face`` selects."""
     floor, ceiling = scene.parts[:2]
     places = floor.vertices_m + floor.T_world_part[:3, 3]
     top = float(face(ceiling.vertices_m[:, 2] + ceiling.T_world_part[2, 3]))

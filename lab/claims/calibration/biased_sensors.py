@@ -36,25 +36,25 @@ from pipeline.registration import point_error_m
 from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, FloatArray, PointCloud, RgbdFrame
 
 BOARD = Board()
-"""The thesis's."""
+"""The thesis's board."""
 ROOMS = range(260, 290)
-"""Seeds of ``box_room``: no room that anything was tuned or tried in."""
+"""Seeds of ``box_room`` that were never used for tuning or trials."""
 SCALE, OFFSET_M = 0.01, 0.03
-"""Off by so much are the one node's sensor and the other's; which way is drawn for each room."""
+"""Bias of the first node's sensor and of the second's; the signs are drawn for each room."""
 ANGLE_DEG, START_DEG, START_M, GATE_M = 25.0, 3.0, 0.06, 0.3
 VIEWS, CORNER_PX, AWAY_M = 24, 0.1, (0.5, 1.7)
-"""Of the board before each node, and the error of either coordinate of its circles' centres: more than C01
-finds in photographs."""
+"""Views of the board before each node, error of each coordinate of its circles' centres (more than C01 finds
+in photographs), and distances."""
 BEHIND_M, WALL = 0.7, 0.6
-"""How far behind the board's middle there is a wall, and what share of infrared it gives back."""
+"""Distance of the wall behind the board's middle, and its infrared albedo."""
 METHOD = tuned(Entrant("ceicp-a", "plane"))
 DRAWS = 8
-"""Random subsets of the points that are registered in each room: which ones are drawn moves the error of a
-room from a quarter of a centimetre to more than one, whatever the sensors."""
+"""Random subsets of the points that are registered in each room: the choice of points alone moves a room's
+error from a quarter of a centimetre to more than one."""
 CASES = ("unbiased", "unbiased, calibrated", "biased", "biased, calibrated")
 MOST_RATIO = 1.2
 RANGES_M = (1.0, 2.0, 3.0, 4.0)
-"""Where the depth that is left wrong is looked at."""
+"""Distances at which the remaining depth error is evaluated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,30 +71,30 @@ class Node:
     camera: CameraIntrinsics
     T_world_camera: FloatArray
     sensed: DepthMap
-    """(H, W) of the room, by an unbiased sensor."""
+    """(H, W) depth of the room from an unbiased sensor."""
     bias: DepthBias
 
     @property
     def measured(self) -> DepthMap:
-        """(H, W) of the room, by its own sensor."""
+        """(H, W) depth of the room from its own sensor."""
         return self.bias.measured(self.sensed)
 
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Views of the board before a node, and the lens that they tell."""
+    """Views of the board before a node, and the lens estimated from them."""
 
     lens: Calibration
     sensed: tuple[DepthMap, ...]
-    """By an unbiased sensor."""
+    """Depth from an unbiased sensor."""
 
     @property
     def camera(self) -> CameraIntrinsics:
-        """As the chain takes it."""
+        """The lens as the chain's camera."""
         return CameraIntrinsics(self.lens.matrix, self.lens.distortion[:5], *self.lens.size_px)
 
     def calibrated(self, bias: DepthBias) -> Found:
-        """What they tell of a sensor with a bias."""
+        """Calibrate a sensor with this bias from the views."""
         depths = [bias.measured(one) for one in self.sensed]
         fit = fit_depth(board_depth_samples(self.lens, depths, BOARD))
         return Found(self.camera, fit.correction, fit.terms)
@@ -102,7 +102,7 @@ class Session:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A calibrated node: nothing of it is given."""
+    """A calibrated node; all its parameters are estimated."""
 
     camera: CameraIntrinsics
     correction: DepthCorrection
@@ -110,7 +110,7 @@ class Found:
 
 
 def sensors_trial(task: SensorsTask) -> dict[str, float | str]:
-    """Mean point error of the registrations by case, in cm, and the depth that calibration leaves wrong."""
+    """Return the mean point error of the registrations by case, cm, and the remaining depth error."""
     rng = np.random.default_rng([task.room, 15])
     nodes = [_node(task.room, index, bias, rng) for index, bias in enumerate(_biases(rng))]
     boards = [_board_session(node, rng) for node in nodes]
@@ -155,7 +155,7 @@ def _biases(rng: np.random.Generator) -> tuple[DepthBias, DepthBias]:
 
 
 def _node(room: int, index: int, bias: DepthBias, rng: np.random.Generator) -> Node:
-    """One of two nodes of a room, as the registration benchmark has them but with a Kinect's 640 pixels."""
+    """Return one of two nodes of a room, as in the registration benchmark but with a Kinect's 640 pixels."""
     chord_m = 2.0 * NODE_REACH_M * float(np.sin(np.radians(ANGLE_DEG) / 2.0))
     scene = box_room(room, 2, ANGLE_DEG, chord_m)
     camera = scaled(scene.intrinsics, 2.0)
@@ -166,18 +166,18 @@ def _node(room: int, index: int, bias: DepthBias, rng: np.random.Generator) -> N
 def _cloud(
     node: Node, depth: DepthMap, camera: CameraIntrinsics, noise: DepthNoise | None = None
 ) -> PointCloud:
-    """Sensor points as the chain takes them."""
+    """Return sensor points as the chain takes them."""
     rgb = np.zeros((*depth.z_m.shape, 3), np.uint8)
     return back_project(RgbdFrame("node", rgb, depth, camera, node.T_world_camera, noise=noise))
 
 
 def _corrected(node: Node, depth: DepthMap, found: Found) -> PointCloud:
-    """The same with a calibration laid over the node."""
+    """Return the points with a calibration applied to the node."""
     return _cloud(node, found.correction.apply(depth), found.camera, found.correction.noise)
 
 
 def _board_session(node: Node, rng: np.random.Generator) -> Session:
-    """Poses that cover image and distances, circles' centres with noise, depth by the sensor's model."""
+    """Return views over image and distances, with noisy circle centres and the sensor model's depth."""
     alone, seed = BoardCamera(node.camera, np.eye(4)), int(rng.integers(1 << 31))
     poses = propose_poses(BOARD, [alone], VIEWS, seed, distances_m=AWAY_M)
     views = []
@@ -190,7 +190,7 @@ def _board_session(node: Node, rng: np.random.Generator) -> Session:
 
 
 def _board_view(T_camera_board: FloatArray, camera: CameraIntrinsics) -> Render:
-    """The printed board before a wall, as far as the depth sensor looks at it."""
+    """Render the printed board before a wall, as the depth sensor sees it."""
     rays = pixel_rays(camera)
     normal = T_camera_board[:3, 2]
     z_m = (normal @ T_camera_board[:3, 3]) / (rays @ normal)
@@ -212,20 +212,20 @@ def _board_view(T_camera_board: FloatArray, camera: CameraIntrinsics) -> Render:
 
 
 def _left_m(node: Node, correction: DepthCorrection, away_m: float) -> float:
-    """RMS over the image of the corrected depth less the true one."""
+    """Return the RMS over the image of the corrected minus the true depth."""
     flat = DepthMap(np.full((node.camera.height_px, node.camera.width_px), away_m, np.float32))
     left_m = correction.apply(node.bias.measured(flat)).z_m - away_m
     return float(np.sqrt(np.mean(left_m**2)))
 
 
 def sensors_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, list[dict[str, Any]]]:
-    """A trial in every room."""
+    """Run a trial in every room."""
     tasks = [SensorsTask(room) for room in ROOMS]
     return (yield from iterate_trials("D09, biased sensors", sensors_trial, tasks, folder, scheduler))
 
 
 def judge(trials: Sequence[dict[str, Any]]) -> Outcome:
-    """D09's numbers and verdict."""
+    """Return D09's numbers and verdict."""
     errors_cm = {name: np.array([one[name] for one in trials]) for name in CASES}
     ours: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}
@@ -255,7 +255,7 @@ def judge(trials: Sequence[dict[str, Any]]) -> Outcome:
 
 
 def _ratio(both: FloatArray, axis: int = 0) -> FloatArray:
-    """Of the medians over rooms: the first column's over the second's."""
+    """Return the ratio of the medians over rooms: the first column's over the second's."""
     medians = np.median(both, axis=axis)
     return medians[..., 0] / medians[..., 1]
 

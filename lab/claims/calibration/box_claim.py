@@ -20,26 +20,26 @@ MOST_M = 0.01
 RAW, LENS, CALIBRATED, EXACT = STATES
 DIMENSIONS = ("length", "width", "height")
 TABLE_4_5_CM = ((0.63, 0.59, 0.65), (0.57, 0.61, 0.62), (0.81, 0.78, 0.82))
-"""Thesis: at 0, 45 and 90 degrees."""
+"""Table 4.5 of the thesis: errors at 0, 45 and 90 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
 class BoxStudy:
-    """All trials."""
+    """All trials of C25."""
 
     errors_m: dict[str, FloatArray]
-    """(TRIALS, sizes, positions, 3) measured less true, by what was known of the camera."""
+    """(TRIALS, sizes, positions, 3) measured minus true size, by the knowledge of the camera."""
 
 
 def box_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, BoxStudy]:
-    """Twenty cameras, each calibrated by itself, before three boxes at three positions."""
+    """Run twenty cameras, each calibrated alone, before three boxes at three positions."""
     tasks = [BoxTask(seed) for seed in range(TRIALS)]
     found = yield from iterate_trials("C25, boxes", box_trial, tasks, folder, scheduler)
     return BoxStudy({state: np.array([one[state] for one in found]) for state in STATES})
 
 
 def table_4_5(study: BoxStudy) -> Table:
-    """The thesis's table beside ours."""
+    """Return the thesis's table with our results."""
     rows: list[tuple[str | float, ...]] = []
     for index, degrees in enumerate(POSITIONS_DEG):
         rows.append((f"{degrees:g}°", "thesis", *TABLE_4_5_CM[index]))
@@ -57,7 +57,7 @@ def table_4_5(study: BoxStudy) -> Table:
 
 
 def judge(study: BoxStudy) -> Outcome:
-    """C25's numbers and verdict."""
+    """Return C25's numbers and verdict."""
     absolute = {state: np.abs(errors_m).mean(axis=(1, 3)) for state, errors_m in study.errors_m.items()}
     gain = (absolute[RAW] - absolute[CALIBRATED]).mean(axis=1)
     by_lens = (absolute[RAW] - absolute[LENS]).mean(axis=1)

@@ -1,4 +1,4 @@
-"""The length, width and height of a box in a cloud of one view of it on a plane (SPEC 7)."""
+"""Measure length, width and height of a box in a point cloud of one view of it on a plane (SPEC 7)."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from pipeline.types import FloatArray
 ON_PLANE_M = 0.005
 DRAWS = 400
 SOME = 4000
-"""Points on which planes are tried."""
+"""Number of points on which planes are tried."""
 ABOVE_M = 0.015
-"""What lies so far above the ground is not the ground."""
+"""Height above which points do not belong to the ground."""
 CELL_M = 0.025
-"""Things with so much between them are two."""
+"""Least distance between two separate objects."""
 LEAST_FACE = 0.1
-"""Share of the box's points without which a plane is no face."""
+"""Least share of the box's points on a face."""
 ON_FACE_M = 0.008
 FLAT, UPRIGHT = 0.95, 0.3
-"""Cosine of the angle between a face and the ground: of a top face at least, of an upright one at most."""
+"""Cosine of the angle between a face and the ground: least for a top face, most for an upright one."""
 WITHIN = (0.01, 0.99)
 
 
@@ -36,29 +36,29 @@ class Plane:
     offset_m: float
 
     def heights_m(self, points_m: FloatArray) -> FloatArray:
-        """(N,) signed distances."""
+        """Return (N,) signed distances."""
         return points_m @ self.normal - self.offset_m
 
 
 def box_size_m(points_m: FloatArray, seed: int = 0) -> FloatArray:
-    """(3,) length, width and height, the length being the longer of the horizontal ones.
+    """Return (3,) length, width and height; the length is the longer horizontal one.
 
-    The ground is the plane with most points (RANSAC, 5 mm, then least squares), the box the largest thing on
+    The ground is the plane with most points (RANSAC, 5 mm, then least squares), the box the largest object on
     it, and its faces are the planes in that. The height is that of the top face above the ground. The sides
-    go along the largest upright face, or along the smallest rectangle around the top where none is seen; the
-    extents are those of the top face along them, from the 1st to the 99th percentile of its area, which is
-    98 % of it.
+    go along the largest upright face or, if none is visible, along the smallest rectangle around the top; the
+    extents are those of the top face along them, from the 1st to the 99th percentile of its area, which is 98
+    % of it.
 
     Args:
-        points_m: (N, 3) of one view from above, in the camera's frame, one a pixel.
-        seed: draws the planes that are tried.
+        points_m: (N, 3) points of one view from above, in the camera's frame, one per pixel.
+        seed: seed of the planes that are tried.
 
     Raises:
         ReconstructionError: there is no plane, or no box on it.
     """
     rng = np.random.default_rng(seed)
     ground = _plane(points_m, rng)
-    if ground.offset_m > 0.0:  # the camera, at the origin, is above
+    if ground.offset_m > 0.0:  # the camera, at the origin, is above the ground
         ground = Plane(-ground.normal, -ground.offset_m)
     box_m = _largest(points_m[ground.heights_m(points_m) > ABOVE_M])
     faces = _faces(box_m, rng)
@@ -68,13 +68,13 @@ def box_size_m(points_m: FloatArray, seed: int = 0) -> FloatArray:
         raise ReconstructionError("Nothing on the plane has a flat top; is the object a box seen from above?")
     top_m = box_m[np.abs(tops[0].heights_m(box_m)) < ON_FACE_M]
     axes = _axes(ground.normal, upright[0].normal if upright else None, top_m)
-    area = top_m[:, 2] ** 3  # of a pixel on a plane
+    area = top_m[:, 2] ** 3  # area of a pixel on a plane
     width_m, length_m = sorted(_extent_m(top_m @ axis, area) for axis in axes)
     return np.array([length_m, width_m, ground.heights_m(top_m).mean()])
 
 
 def _extent_m(along_m: FloatArray, area: FloatArray) -> float:
-    """Of a face along one of its sides."""
+    """Return the extent of a face along one of its sides."""
     order = np.argsort(along_m)
     share = np.cumsum(area[order]) / area.sum()
     low_m, high_m = np.interp(WITHIN, share, along_m[order])
@@ -82,7 +82,7 @@ def _extent_m(along_m: FloatArray, area: FloatArray) -> float:
 
 
 def _plane(points_m: FloatArray, rng: np.random.Generator) -> Plane:
-    """That with most points, fitted to them."""
+    """Return the plane with most points, fitted to them."""
     if len(points_m) < 3:
         raise ReconstructionError("There are too few points for a plane; is the object in the picture?")
     some = points_m[rng.choice(len(points_m), min(SOME, len(points_m)), replace=False)]
@@ -102,7 +102,7 @@ def _plane(points_m: FloatArray, rng: np.random.Generator) -> Plane:
 
 
 def _largest(points_m: FloatArray) -> FloatArray:
-    """The points of the largest connected thing."""
+    """Return the points of the largest connected object."""
     if not len(points_m):
         raise ReconstructionError("Nothing stands on the plane; is the object in the picture?")
     cells = np.floor((points_m - points_m.min(axis=0)) / CELL_M).astype(int)
@@ -114,7 +114,7 @@ def _largest(points_m: FloatArray) -> FloatArray:
 
 
 def _faces(box_m: FloatArray, rng: np.random.Generator) -> list[Plane]:
-    """The planes that are seen of the box, the largest first."""
+    """Return the visible faces of the box, the largest first."""
     faces: list[Plane] = []
     left_m = box_m
     while len(faces) < 3 and len(left_m) > LEAST_FACE * len(box_m):
@@ -128,7 +128,7 @@ def _faces(box_m: FloatArray, rng: np.random.Generator) -> list[Plane]:
 
 
 def _axes(up: FloatArray, upright: FloatArray | None, top_m: FloatArray) -> FloatArray:
-    """(2, 3) horizontal directions of the box's sides."""
+    """Return (2, 3) horizontal directions of the box's sides."""
     if upright is not None:
         side = upright - (upright @ up) * up
         side /= np.linalg.norm(side)

@@ -1,4 +1,4 @@
-"""A box of known size before a camera that nobody has calibrated, and the boards by which it is (SPEC 7)."""
+"""A box of known size before an uncalibrated camera, and the board views that calibrate it (SPEC 7)."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ SIZES_M = ((0.30, 0.20, 0.15), (0.40, 0.30, 0.25), (0.20, 0.15, 0.10))
 POSITIONS_DEG = (0.0, 45.0, 90.0)
 ELEVATION_DEG, AWAY_M = 25.0, (0.8, 1.2)
 GROUND_M = 1.6
-"""Side of the table."""
+"""Side length of the table."""
 STATES = ("as bought", "lens calibrated", "lens and depth calibrated", "known exactly")
 BOARD, MOMENTS = Board("circles", 11, 9, 0.05), 12
 FOCAL_SHARE, CENTER_PX = 0.02, 8.0
-"""How far the camera is from what its maker says: focal length, either way, and principal point, at most."""
+"""Largest deviation of the camera from its data sheet: focal lengths, and principal point."""
 SCALE, OFFSET_M, WAVE = 0.01, 0.03, 0.002
-"""Of the depth sensor, at most; people measured such sizes on an Astra and on Kinects (SPEC 1.5)."""
+"""Largest biases of the depth sensor; such sizes were measured on an Astra and on Kinects (SPEC 1.5)."""
 
 
 @dataclass(frozen=True, slots=True)
 class BoxTask:
-    """One camera, its calibration, and all boxes from all positions."""
+    """One camera, its calibration, and all boxes at all positions."""
 
     seed: int
 
 
 def bought(rng: np.random.Generator) -> BoardCamera:
-    """A camera as it truly is; all that is known of it is that it is much like ``VGA``."""
+    """Return a camera with its true parameters; known is only that it is similar to ``VGA``."""
     focal_px = VGA.fx_px * (1.0 + FOCAL_SHARE * rng.choice([-1.0, 1.0])) * (1.0 + 0.002 * rng.normal(size=2))
     center_px = np.array([VGA.cx_px, VGA.cy_px]) + rng.uniform(-CENTER_PX, CENTER_PX, 2)
     k1 = rng.uniform(0.05, 0.15) * rng.choice([-1.0, 1.0])
@@ -63,7 +63,7 @@ def bought(rng: np.random.Generator) -> BoardCamera:
 
 
 def calibrated(camera: BoardCamera, seed: int) -> tuple[CameraIntrinsics, DepthCorrection]:
-    """Lens and depth as the program's own calibration finds them from rendered images in a folder."""
+    """Return lens and depth correction from the program's own calibration of rendered images in a folder."""
     poses = propose_poses(BOARD, [camera], MOMENTS, seed)
     views = render_board_views(BOARD, [camera], poses, seed)
     with tempfile.TemporaryDirectory() as folder:
@@ -75,7 +75,7 @@ def calibrated(camera: BoardCamera, seed: int) -> tuple[CameraIntrinsics, DepthC
 
 
 def box_scene(size_m: Sequence[float], seed: int) -> Scene:
-    """A carton on a table, its length along x."""
+    """Return a box on a table, its length along x."""
     table = board((GROUND_M, GROUND_M, 0.04), Material(plaster("#c9c2b4", seed)), ORIGIN, (0.0, 0.0, -0.02))
     box = board(
         size_m, Material(cardboard(seed=seed, size_m=max(size_m))), ORIGIN, (0.0, 0.0, size_m[2] / 2.0)
@@ -87,7 +87,7 @@ def box_scene(size_m: Sequence[float], seed: int) -> Scene:
 def box_depth(
     size_m: Sequence[float], position_deg: float, camera: BoardCamera, rng: np.random.Generator
 ) -> tuple[DepthMap, DepthMap]:
-    """What the camera's own sensor has of a box, and what one without bias would have."""
+    """Return the depth of a box from the camera's own sensor, and from one without bias."""
     scene = box_scene(size_m, int(rng.integers(1 << 30)))
     azimuth, elevation = np.radians(position_deg - 90.0), np.radians(ELEVATION_DEG)
     flat, up = np.cos(elevation), np.sin(elevation)
@@ -100,14 +100,14 @@ def box_depth(
 
 
 def measured_m(depth: DepthMap, lens: CameraIntrinsics) -> FloatArray:
-    """(3,) of the box by the sensor's points, with outliers left out as the chain does."""
+    """Return the (3,) size from the sensor's points, without outliers as in the chain."""
     rgb = np.zeros((*depth.z_m.shape, 3), np.uint8)
     frame = RgbdFrame("box", rgb, depth, lens, np.eye(4))
     return box_size_m(acquire(frame, PRESETS["packetmesh"].acquisition).cloud(frame).kept.points_m)
 
 
 def box_trial(task: BoxTask) -> dict[str, list[list[list[float]]]]:
-    """(sizes, positions, 3) errors of length, width and height in metres, for each of ``STATES``."""
+    """Return (sizes, positions, 3) errors of length, width and height in metres, for each of ``STATES``."""
     rng = np.random.default_rng((25, task.seed))
     camera = bought(rng)
     lens, correction = calibrated(camera, task.seed)

@@ -1,4 +1,4 @@
-"""C01 to C08: what the thesis says of its calibration, beside the experiments of SPEC 1.4."""
+"""C01 to C08: the thesis's claims about its calibration, tested by the experiments of SPEC 1.4."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ TABLE_4_2 = (
     (60.126, -10.169, 17.973, 30.002, 21.67, 17.999),
 )
 LAST_ROW = (0.3535, 0.3422, 0.5001, 0.0035, 40794.0, 0.0071)
-"""Of Table 4.2, which reads as if it were a noise of 1.0."""
+"""Last row of Table 4.2, which reads like a noise of 1.0."""
 MISPRINT = 4
-"""The column, ty, of 21.67 and 40794."""
+"""Column (ty) of 21.67 and 40794."""
 
 
 def rmse(values: FloatArray) -> float:
-    """Root mean square."""
+    """Return the root mean square."""
     return float(np.sqrt((values**2).mean()))
 
 
 def within_share(cell: dict[str, FloatArray]) -> FloatArray:
-    """(TRIALS,) 1 where all of fx, fy, cx and cy are within 0.5 %."""
+    """Return (TRIALS,) 1 where all of fx, fy, cx and cy are within 0.5 %."""
     relative = np.array([np.abs(cell[name]) / TRUTH[name] for name in PLACES])
     return (relative <= WITHIN).all(axis=0).astype(float)
 
 
 def cells_table(study: CalibrationStudy) -> Table:
-    """Every cell of E1."""
+    """Return a table of every cell of E1."""
     rows = []
     for (views, sigma), cell in study.joint.items():
         errors = [rmse(cell[name]) for name in TRUTH]

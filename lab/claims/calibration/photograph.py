@@ -1,4 +1,4 @@
-"""What a camera that is known to the last digit takes of a printed board."""
+"""Photographs of a printed board by an exactly known camera."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from pipeline.calibration.board import Board
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
 OVER = 3
-"""Rays along either side of a pixel, which is their mean."""
+"""Rays along each side of a pixel, whose value is their mean."""
 DESK = 205
-"""Grey beside the sheet."""
+"""Grey of the desk around the sheet."""
 
 
 def seen_px(board: Board, T_camera_board: FloatArray, camera: CameraIntrinsics) -> FloatArray:
-    """(N, 2) where the camera has the board's points."""
+    """Return (N, 2) image positions of the board's points."""
     turn = cv2.Rodrigues(T_camera_board[:3, :3])[0]
     points_px, _ = cv2.projectPoints(
         board.points_m, turn, T_camera_board[:3, 3], camera.matrix, camera.distortion
@@ -27,7 +27,7 @@ def seen_px(board: Board, T_camera_board: FloatArray, camera: CameraIntrinsics) 
 
 
 def photograph(board: Board, T_camera_board: FloatArray, camera: CameraIntrinsics) -> ByteArray:
-    """(H, W) grey picture of the printed sheet on a desk."""
+    """Return the (H, W) grey picture of the printed sheet on a desk."""
     T = T_camera_board
     plane = np.column_stack([T[:3, 0], T[:3, 1], T[:3, 3]])
     lens = (*camera.matrix.ravel().tolist(), *camera.distortion.tolist())
@@ -41,7 +41,7 @@ def photograph(board: Board, T_camera_board: FloatArray, camera: CameraIntrinsic
 
 @lru_cache(2)
 def _rays(lens: tuple[float, ...], width_px: int, height_px: int) -> FloatArray:
-    """(3, N) directions of all rays, those through a pixel beside each other."""
+    """Return (3, N) directions of all rays; those through a pixel are neighbours."""
     v, u = np.mgrid[0 : OVER * height_px, 0 : OVER * width_px].astype(np.float64)
     pixels = (np.stack([u, v], axis=-1).reshape(-1, 1, 2) + 0.5) / OVER - 0.5
     until = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-9)

@@ -34,20 +34,20 @@ HELD_OUT = 4
 TILT_DEG, TURN_DEG = (15.0, 45.0), 20.0
 AWAY_M, MARGIN_PX = (0.4, 0.8), 5.0
 EULER_DEG, MOVE_M = (60.0, -10.0, 18.0), (0.03, 0.02, 0.6)
-"""E2's pose: about x, then y, then z; the thesis's own translation is out of view."""
+"""E2's pose: about x, then y, then z; with the thesis's own translation the board is out of view."""
 LARGE = CameraIntrinsics(
     np.array([[1150.0, 0.0, 690.0], [0.0, 1150.0, 515.0], [0.0, 0.0, 1.0]]),
     np.array([0.05, 0.1, 0.0, 0.0, 0.0]),
     1380,
     1030,
 )
-"""A camera with the thesis's images."""
+"""A camera with the thesis's image size."""
 PHOTOGRAPHS, MOST_TILT_DEG, GREY_SD, AWAY_LARGE_M = 40, 50.0, 3.0, 0.65
 
 
 @dataclass(frozen=True, slots=True)
 class JointTask:
-    """E1: lens and poses together, some of the trials of a cell."""
+    """E1: lens and poses together, a part of the trials of a cell."""
 
     views: int
     sigma_px: float
@@ -71,7 +71,7 @@ class PhotographTask:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationStudy:
-    """All trials."""
+    """All trials of C01 to C08."""
 
     joint: dict[tuple[int, float], dict[str, FloatArray]]
     """(TRIALS,) of each measure, by number of views and noise."""
@@ -81,7 +81,7 @@ class CalibrationStudy:
 
 
 def random_pose(rng: np.random.Generator) -> FloatArray:
-    """(4, 4) of a board that is wholly in the picture."""
+    """Return the (4, 4) pose of a board that is completely in the picture."""
     while True:
         axis, turn = rng.uniform(0.0, 2.0 * np.pi), np.radians(rng.uniform(-TURN_DEG, TURN_DEG))
         tilt = np.radians(rng.uniform(*TILT_DEG))
@@ -96,13 +96,13 @@ def random_pose(rng: np.random.Generator) -> FloatArray:
 
 
 def noisy_view(T: FloatArray, sigma_px: float, rng: np.random.Generator) -> View:
-    """The board's points with noise."""
+    """Return the board's points with noise."""
     points_px = seen_px(BOARD, T, CAMERA)
     return View("", points_px + sigma_px * rng.standard_normal(points_px.shape), BOARD.points_m)
 
 
 def joint_trials(task: JointTask) -> dict[str, list[float]]:
-    """Errors of the parameters, their predicted standard errors, and errors in pixels, of each trial."""
+    """Return, for each trial, parameter errors, their predicted standard errors, and errors in pixels."""
     found: dict[str, list[float]] = {}
     for seed in range(task.first, task.first + CHUNK):
         rng = np.random.default_rng((task.views, seed))
@@ -126,7 +126,7 @@ def joint_trials(task: JointTask) -> dict[str, list[float]]:
 
 
 def pose_trials(task: PoseTask) -> list[list[float]]:
-    """(CHUNK, 6) errors of the pose."""
+    """Return (CHUNK, 6) errors of the pose."""
     rx, ry, rz = np.radians(EULER_DEG)
     R = rotation_exp(np.array([0.0, 0.0, rz])) @ rotation_exp(np.array([0.0, ry, 0.0]))
     true = rigid(R @ rotation_exp(np.array([rx, 0.0, 0.0])), np.array(MOVE_M))
@@ -140,7 +140,7 @@ def pose_trials(task: PoseTask) -> list[list[float]]:
 
 
 def euler_deg(T: FloatArray) -> tuple[float, float, float]:
-    """Angles about x, y, z of R = Rz Ry Rx."""
+    """Return the angles about x, y, z of R = Rz Ry Rx."""
     R = T[:3, :3]
     angles = (np.arctan2(R[2, 1], R[2, 2]), -np.arcsin(R[2, 0]), np.arctan2(R[1, 0], R[0, 0]))
     rx, ry, rz = np.degrees(angles).tolist()
@@ -148,7 +148,7 @@ def euler_deg(T: FloatArray) -> tuple[float, float, float]:
 
 
 def photograph_trial(task: PhotographTask) -> dict[str, float]:
-    """Whether the board is found in a noisy photograph, the right way up, and how far its centres are off."""
+    """Return whether the board is found the right way up in a noisy photograph, and its centres' error."""
     rng = np.random.default_rng((3, task.index))
     axis, turn = rng.uniform(0.0, 2.0 * np.pi), np.radians(rng.uniform(-180.0, 180.0))
     tilt = np.radians(MOST_TILT_DEG * task.index / max(PHOTOGRAPHS - 1, 1))
@@ -167,7 +167,7 @@ def photograph_trial(task: PhotographTask) -> dict[str, float]:
 
 
 def calibration_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, CalibrationStudy]:
-    """All trials of C01 to C08."""
+    """Run all trials of C01 to C08."""
     run = partial(iterate_trials, folder=folder, scheduler=scheduler)
     chunks = range(0, TRIALS, CHUNK)
     joint = [JointTask(n, sigma, first) for n in VIEWS for sigma in SIGMAS_PX for first in chunks]

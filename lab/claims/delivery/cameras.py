@@ -1,4 +1,4 @@
-"""D08: which M of a rig's N cameras to hear when the budget does not pay for all."""
+"""D08: the choice of M of a rig's N cameras if the budget does not suffice for all."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ from pipeline.io.demos import load_demo
 from pipeline.types import Rig
 
 CODING = "layered"
-"""Whose bytes the cameras cost."""
+"""Coding that gives the cameras' costs."""
 PROGRAMS = ("greedy", "greedy by sight", "greedy by bytes", "nearest", "random", "best")
 Scores = dict[tuple[int, ...], float]
-"""F-score of the fused surface by the cameras that were heard."""
+"""F-score of the fused surface by the set of received cameras."""
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A rig's cameras as a program sees them that chooses before anything is sent."""
+    """A rig's cameras as known to a program that chooses before anything is sent."""
 
     q: FloatArray
-    """(N, V) how well each camera sees each voxel."""
+    """(N, V) quality with which each camera sees each voxel."""
     distances_m: FloatArray
-    """(N,) to the sink."""
+    """(N,) distances to the sink."""
     costs: FloatArray
-    """(N,) bytes of the images."""
+    """(N,) sizes of the images, bytes."""
 
 
 Found = dict[str, tuple[Choice, Scores]]
-"""By rig."""
+"""Choice and scores by rig."""
 
 
 def choice(rig: Rig) -> Choice:
-    """What is known of a rig's cameras before they send."""
+    """Return what is known of a rig's cameras before they send."""
     places_m = np.array(places_of(rig, PRESETS["office"].nodes.spacing_m)).reshape(-1, 2)
     coding = coding_named(CODING)
     costs = [float(len(coding.encode(images_of(frame), LARGE))) for frame in rig.frames]
@@ -62,7 +62,7 @@ def choice(rig: Rig) -> Choice:
 
 
 def subset_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Found]:
-    """Every subset of every rig's cameras."""
+    """Run every subset of every rig's cameras."""
     rigs = {name: load_demo(name) for name in RIGS}
     tasks = [SubsetTask(name, nodes) for name, rig in rigs.items() for nodes in _subsets(len(rig.frames))]
     found: list[Values] = yield from iterate_trials(
@@ -79,10 +79,10 @@ def _subsets(count: int) -> list[tuple[int, ...]]:
 
 
 def chosen(cameras: Choice, scores: Scores, m: int) -> dict[str, float]:
-    """F-score of ``m`` cameras by program; at random is the mean of all sets of so many.
+    """Return the F-score of ``m`` cameras by program; *at random* is the mean of all sets of this size.
 
-    Greedy takes quality as SPEC 6.3 has it; by sight, what has been seen once counts fully. Greedy by bytes
-    may spend ``m`` mean images instead, on however many cameras.
+    Greedy takes quality as in SPEC 6.3; greedy by sight counts a voxel fully once it has been seen. Greedy by
+    bytes may spend ``m`` mean images, on any number of cameras.
     """
     budget = m * float(cameras.costs.mean())
     sets = {
@@ -99,7 +99,7 @@ def chosen(cameras: Choice, scores: Scores, m: int) -> dict[str, float]:
 
 
 def judge(found: Found) -> Outcome:
-    """D08's numbers and verdict."""
+    """Return D08's numbers and verdict."""
     ours: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}
     rows: list[tuple[str | float, ...]] = []

@@ -1,4 +1,4 @@
-"""What a rig's images cost on the air: bytes, seconds and joules of each coding (SPEC 6.5)."""
+"""The cost of a rig's images on the air: bytes, seconds and joules of each coding (SPEC 6.5)."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from pipeline.sources import Demo
 from pipeline.spec import Spec
 
 NETWORKS = {"thesis-link": "802.15.4", "office": "802.11b"}
-"""The presets, and their medium access."""
+"""The presets with their medium access."""
 LONGEST_S = 14_400.0
 
 
 @dataclass(frozen=True, slots=True)
 class SendTask:
-    """A rig's images, sent until all of them have arrived."""
+    """A rig's images, sent until all have arrived."""
 
     rig: str
     coding: str
     network: str
-    """A preset."""
+    """Name of a preset."""
 
 
 def patient(network: NetworkConfig) -> NetworkConfig:
-    """The same network without a deadline."""
+    """Return the network without a deadline."""
     nodes = replace(network.nodes, deadline_s=None)
     return replace(network, nodes=nodes, run=replace(network.run, horizon_s=LONGEST_S))
 
 
 def send_trial(task: SendTask) -> Values:
-    """What it takes until the sink has everything; nothing if it never has."""
+    """Return the cost until the sink has everything; no values if it never has."""
     network = patient(PRESETS[task.network])
     sending = send(DeliverySpec(Spec(Demo(task.rig)), network, task.coding, moments=1))
     image_bytes = sum(len(stream) for stream in sending.streams)

@@ -1,4 +1,4 @@
-"""D07: which of the sixteen pieces of a frame is worth its joule."""
+"""D07: the sixteen pieces of a frame that are worth their energy."""
 
 from __future__ import annotations
 
@@ -35,27 +35,27 @@ from pipeline.types import FloatArray, IntArray, Rig
 
 NETWORK = "office"
 CODING = "tiles"
-"""Whose joules a byte are a piece's."""
+"""Coding that gives the energy per byte of a piece."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """The sixteen pieces of one node's frame, row after row."""
+    """The sixteen pieces of one node's frame, row by row."""
 
     rig: str
     node: int
     worth: FloatArray
-    """(16,) points of F-score, fused, that the surface has less without the piece's depth."""
+    """(16,) points of F-score that the fused surface loses without the piece's depth."""
     worth_sensor: FloatArray
-    """(16,) the same of the surface of measured depth."""
+    """(16,) points that the surface of measured depth loses."""
     alone: FloatArray
-    """(16,) share of its pixels whose surface the node alone has measured."""
+    """(16,) share of its pixels whose surface only this node has measured."""
     joules: FloatArray
-    """(16,) radios' energy for its depth as RVL."""
+    """(16,) radios' energy for its depth in RVL coding."""
 
 
 def alone_shares(rig: Rig, node: int) -> FloatArray:
-    """(16,) of a frame's pixels, those whose surface no other camera has measured."""
+    """Return (16,) shares of a frame's pixels whose surface no other camera has measured."""
     cloud, shape = sparse_points(rig.frames[node]), rig.frames[node].depth.z_m.shape
     others = [frame for index, frame in enumerate(rig.frames) if index != node]
     alone = ~np.any([sees(other, cloud.points_m) for other in others], axis=0)
@@ -67,7 +67,7 @@ def alone_shares(rig: Rig, node: int) -> FloatArray:
 
 
 def piece_bytes(rig: Rig, node: int) -> FloatArray:
-    """(16,) of each piece's depth as RVL."""
+    """Return (16,) sizes of each piece's depth in RVL coding."""
     depth = images_of(rig.frames[node]).depth
     return np.array(
         [len(rvl.encode(depth[piece_area(depth.shape, piece)])) for piece in range(COUNT_OF_PIECES)], float
@@ -77,7 +77,7 @@ def piece_bytes(rig: Rig, node: int) -> FloatArray:
 def piece_study(
     folder: Path, scheduler: str | None, rigs: Sequence[str] = RIGS[:1]
 ) -> Generator[Progress, None, list[Pieces]]:
-    """The pieces of every node of some rigs."""
+    """Run the pieces of every node of some rigs."""
     run = partial(iterate_trials, folder=folder, scheduler=scheduler, data=DATA)
     loaded = {name: load_demo(name) for name in rigs}
     tasks = [
@@ -113,7 +113,7 @@ def piece_study(
 
 
 def full_piece_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, list[Pieces]]:
-    """The pieces of all rigs."""
+    """Run the pieces of all rigs."""
     return (yield from piece_study(folder, scheduler, RIGS))
 
 
@@ -122,7 +122,7 @@ def _worth(whole: Values, without: Sequence[Values], name: str) -> FloatArray:
 
 
 def judge(pieces: Sequence[Pieces]) -> Outcome:
-    """D07's numbers and verdict."""
+    """Return D07's numbers and verdict."""
     rigs = tuple(dict.fromkeys(one.rig for one in pieces))
     ours: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}

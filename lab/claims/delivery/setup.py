@@ -1,4 +1,4 @@
-"""Which trials there are: the stated subset that is run by default, and all of them."""
+"""The trials of the delivery claims: the default subset, and all of them."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from pipeline.io.demos import CALIBRATED_SCENES
 RIGS = CALIBRATED_SCENES
 CODINGS = ("raw", "raw-rows", "raw-tiles", "png", "jpeg", "tiles", "layered")
 EXACT = ("raw", "raw-rows", "raw-tiles", "png")
-"""Those that give the very images back: without losses all of them are one trial."""
+"""Lossless codings: without lost packets all of them are one trial."""
 HEADLINE = ("raw", "tiles", "layered")
-"""Whose exchange rates are compared."""
+"""Codings whose exchange rates are compared."""
 SHARES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 0.5)
 RATE_SHARE = 0.1
-"""Up to which share the exchange rate is the slope (SPEC 6.5)."""
+"""Largest loss share over which the slope is fitted (SPEC 6.5)."""
 LARGE, SMALL = (packet_bytes_of(PRESETS[name]) for name in ("office", "thesis-link"))
-"""Bytes of an image in a packet of 802.11b and of 802.15.4."""
+"""Image bytes in a packet of 802.11b and of 802.15.4."""
 SEEDS = 5
-"""Of all codings at a tenth lost in bursts, of the headline's at every share of its exchange rate, and of all
-that ``full`` adds; the default's other trials have one."""
+"""Seeds of all codings at a tenth lost in bursts, of the headline codings at every share of their exchange
+rate, and of all trials that ``full`` adds; other default trials have one seed."""
 UNCORRECTED: AlignmentMode = "affine_depth"
 """The best alignment without the local correction (SPEC 3.5)."""
 UNCORRECTED_SHARE = 0.25
 
 
 def lossless(rig: str, coding: str) -> LossTask:
-    """The trial in which nothing is lost, to which others of a rig and coding are compared."""
+    """Return the trial without losses with which others of a rig and coding are compared."""
     return LossTask(rig, "raw" if coding in EXACT else coding, LARGE, "random", 0.0, 0)
 
 
 def loss_tasks(full: bool = False, rigs: Sequence[str] = RIGS) -> list[LossTask]:
-    """Every trial once, the lossless ones first.
+    """Return every trial once, the lossless ones first.
 
     Args:
-        full: every coding with every share of every kind and five seeds, and small packets; hours.
+        full: every coding with every share of every kind and five seeds, and small packets; takes hours.
         rigs: demo scenes.
     """
     tasks = [lossless(rig, coding) for rig in rigs for coding in CODINGS]
@@ -52,7 +52,7 @@ def loss_tasks(full: bool = False, rigs: Sequence[str] = RIGS) -> list[LossTask]
 
 
 def send_tasks(rig: str = RIGS[0]) -> list[SendTask]:
-    """Every coding through each network."""
+    """Return every coding on each network."""
     return [SendTask(rig, coding, network) for network in NETWORKS for coding in CODINGS]
 
 
@@ -72,7 +72,7 @@ def _few(rig: str) -> Iterator[LossTask]:
 
 
 def _uncorrected(rig: str) -> Iterator[LossTask]:
-    """The chain without the local correction, without and with losses."""
+    """Yield the chain without the local correction, without and with losses."""
     yield replace(lossless(rig, "raw"), alignment=UNCORRECTED)
     yield LossTask(rig, "raw", LARGE, "burst", UNCORRECTED_SHARE, 0, UNCORRECTED)
 

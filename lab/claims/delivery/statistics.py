@@ -1,7 +1,7 @@
-"""Exchange rates, and intervals over rigs and what was repeated with each of them.
+"""Exchange rates, with intervals over rigs and their repetitions.
 
-Every statistic here is a mean over rigs of a ratio of sums, so that a repetition is known by what it adds to
-the sums: a row of terms.
+Every statistic here is a mean over rigs of a ratio of sums. A repetition is represented by its terms in these
+sums.
 """
 
 from __future__ import annotations
@@ -13,40 +13,40 @@ import numpy as np
 from pipeline.types import FloatArray
 
 Groups = Sequence[FloatArray]
-"""By rig, (S, K) terms of S repetitions."""
+"""By rig: (S, K) terms of S repetitions."""
 Estimate = tuple[float, tuple[float, float]]
 """A value with its 95 % interval."""
 RESAMPLES = 2000
 
 
 def slope_terms(lost: Iterable[float], cost: Iterable[float]) -> FloatArray:
-    """(2,) whose ratio is what a unit of ``lost`` costs: least squares through the origin.
+    """Return (2,) terms whose ratio is the cost of a unit of ``lost``: least squares through the origin.
 
-    Through the origin, as what nothing lost costs is known to be nothing.
+    The line goes through the origin because zero losses cost nothing.
     """
     x, y = np.array(list(lost), float), np.array(list(cost), float)
     return np.array([x @ y, x @ x])
 
 
 def mean_terms(values: Iterable[float]) -> FloatArray:
-    """(S, 2) whose ratio is the mean of the values."""
+    """Return (S, 2) terms whose ratio is the mean of the values."""
     column = np.array(list(values), float)
     return np.column_stack([column, np.ones_like(column)])
 
 
 def mean_ratio(sums: FloatArray) -> FloatArray:
-    """(...) means over the rigs of the ratios of (..., R, 2) sums; NaN where a rig has lost nothing."""
+    """Return (...) means over rigs of the ratios of (..., R, 2) sums; NaN if a rig has lost nothing."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.mean(sums[..., 0] / sums[..., 1], axis=-1)
 
 
 def difference(sums: FloatArray) -> FloatArray:
-    """(...) first less second mean ratio of (..., R, 4) sums of the same repetitions."""
+    """Return (...) first minus second mean ratio of (..., R, 4) sums of the same repetitions."""
     return mean_ratio(sums[..., :2]) - mean_ratio(sums[..., 2:])
 
 
 def estimate(groups: Groups, statistic: Callable[[FloatArray], FloatArray] = mean_ratio) -> Estimate:
-    """A statistic with its interval over rigs and repetitions."""
+    """Return a statistic with its interval over rigs and repetitions."""
     return float(statistic(np.stack([rig.sum(axis=0) for rig in groups]))), resampled_ci95(groups, statistic)
 
 
@@ -56,11 +56,11 @@ def resampled_ci95(
     seed: int = 0,
     resamples: int = RESAMPLES,
 ) -> tuple[float, float]:
-    """95 % percentile interval of a statistic of sums, from (resamples, R, K) to (resamples,).
+    """Return the 95 % percentile interval of a statistic of sums, from (resamples, R, K) to (resamples,).
 
-    Repetitions share their rig, so that rigs are drawn first, and then repetitions within each drawn rig,
-    both with replacement (Davison and Hinkley, Bootstrap Methods, 1997, 3.8). With four rigs there are only
-    35 different draws of rigs: such an interval is rather too narrow than too wide.
+    Repetitions share their rig, so rigs are drawn first, and then repetitions within each drawn rig, both
+    with replacement (Davison and Hinkley, Bootstrap Methods, 1997, 3.8). Four rigs have only 35 different
+    draws: such an interval is rather too narrow than too wide.
     """
     rng = np.random.default_rng(seed)
     slots = len(groups)

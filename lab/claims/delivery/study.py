@@ -1,4 +1,4 @@
-"""The trials of D01 to D06 and what is asked of them."""
+"""The trials of D01 to D06, and the values computed from them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pipeline.io.demos import SCENES
 from pipeline.types import FloatArray
 
 DATA = (SHIPPED_MODEL, SHIPPED_COMPLETION, SCENES)
-"""What every trial depends on beside the code."""
+"""Files that every trial depends on, besides the code."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,18 +30,18 @@ class Study:
 
     losses: dict[LossTask, Values]
     colorless: dict[str, Values]
-    """By rig: all depth has arrived, and no colour."""
+    """Values by rig if all depth has arrived, and no colour."""
     sent: dict[SendTask, Values]
 
     @property
     def rigs(self) -> tuple[str, ...]:
-        """In the order of the trials."""
+        """Rigs in the order of the trials."""
         return tuple(dict.fromkeys(task.rig for task in self.losses))
 
     def tasks(
         self, coding: str, loss: str = "burst", packet_bytes: int = LARGE, rigs: Iterable[str] = ()
     ) -> list[LossTask]:
-        """Those with losses of a coding by the usual chain."""
+        """Return the tasks with losses of a coding, by the default chain."""
         wanted = tuple(rigs) or self.rigs
         return [
             task
@@ -53,21 +53,21 @@ class Study:
         ]
 
     def value(self, task: LossTask, name: str) -> float:
-        """One value of a trial; NaN where it gave none."""
+        """Return one value of a trial; NaN without one."""
         value = self.losses[task][name]
         return float("nan") if value is None else float(value)
 
     def lost_percent(self, task: LossTask) -> float:
-        """Of the packets of all nodes, how many were really lost."""
+        """Return the share of all nodes' packets that were really lost, %."""
         return 100.0 * self.value(task, "packets_lost") / self.value(task, "packets")
 
     def cost(self, task: LossTask, when: str) -> float:
-        """Points of F-score that a trial has less than its rig and coding without losses."""
+        """Return the points of F-score that a trial loses against its rig and coding without losses."""
         name = f"f_{when}"
         return 100.0 * (self.value(lossless(task.rig, task.coding), name) - self.value(task, name))
 
     def rate_terms(self, coding: str, when: str) -> list[FloatArray]:
-        """By rig (S, 2), for each seed: points of F-score over packets lost in bursts, up to a tenth."""
+        """Return, by rig, (S, 2) terms per seed: F-score points over burst losses, up to a tenth."""
         groups = []
         for rig in self.rigs:
             by_seed: dict[int, list[LossTask]] = {}
@@ -85,7 +85,7 @@ class Study:
 def delivery_study(
     folder: Path, scheduler: str | None, full: bool = False
 ) -> Generator[Progress, None, Study]:
-    """The trials of D01 to D06: the stated subset, or all of them."""
+    """Run the trials of D01 to D06: the default subset, or all."""
     run = partial(iterate_trials, folder=folder, scheduler=scheduler, data=DATA)
     tasks, sending = loss_tasks(full), send_tasks()
     losses = yield from run("D01 to D06, lost packets", loss_trial, tasks)
@@ -99,5 +99,5 @@ def delivery_study(
 
 
 def full_delivery_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Study]:
-    """All trials of D01 to D06."""
+    """Run all trials of D01 to D06."""
     return (yield from delivery_study(folder, scheduler, full=True))

@@ -1,4 +1,4 @@
-"""Tables and the chart of the exchange rates."""
+"""Tables, and the chart of the exchange rates."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ WHEN = {"before": "sensor only", "after": "fused"}
 
 
 def title(coding: str) -> str:
-    """A coding in words."""
+    """Return a coding's title."""
     return ALL_CODINGS[coding].title
 
 
 def ranged(value: float, ci95: tuple[float, float], digits: int = 3) -> str:
-    """A value with its interval."""
+    """Return a value with its interval as text."""
     return f"{value:.{digits}f} [{ci95[0]:.{digits}f}, {ci95[1]:.{digits}f}]"
 
 
 def rate_table(study: Study) -> Table:
-    """What one per cent of lost packets costs, and what one per cent of the packets costs to send."""
+    """Return the costs of one per cent of lost packets, and of sending one per cent of the packets."""
     rows = []
     for coding in CODINGS:
         cells = [ranged(*estimate(study.rate_terms(coding, when))) for when in WHEN]
@@ -67,7 +67,7 @@ def _sending_cells(study: Study, coding: str) -> list[float | None]:
 
 
 def sending_table(study: Study) -> Table:
-    """Everything on the air, by coding and network."""
+    """Return everything on the air, by coding and network."""
     rows = tuple(
         (
             *(title(task.coding), NETWORKS[task.network]),
@@ -100,7 +100,7 @@ MEASURES = (
 
 
 def losses_table(study: Study) -> Table:
-    """Means over rigs and seeds by coding, packet size, kind and share of losses."""
+    """Return means over rigs and seeds by coding, packet size, kind and share of losses."""
     groups: dict[tuple[str, int, str, float], list[LossTask]] = {}
     for task in study.losses:
         if task.alignment == "local":
@@ -138,13 +138,13 @@ def _order(key: tuple[str, int, str, float]) -> tuple[int, int, str, float]:
 
 
 def _mean(study: Study, tasks: Sequence[LossTask], name: str, factor: float) -> float | None:
-    """Over the trials that have it."""
+    """Return the mean over the trials that have the value."""
     values = np.array([study.value(task, name) for task in tasks])
     return factor * float(np.nanmean(values)) if np.isfinite(values).any() else None
 
 
 def loss_chart(study: Study) -> Chart:
-    """F-score over the share that was asked for, in bursts."""
+    """Return a chart of the F-score over the configured loss share, in bursts."""
     curves = []
     for coding in HEADLINE:
         for when, words in WHEN.items():

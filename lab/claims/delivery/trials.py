@@ -1,4 +1,4 @@
-"""The trials: what a rig's surface is worth when some of its images' packets or pixels are missing."""
+"""The trials: the quality of a rig's surface if packets or pixels of its images are missing."""
 
 from __future__ import annotations
 
@@ -27,49 +27,49 @@ from pipeline.surface.truth import Yardstick
 from pipeline.types import BoolArray, DepthMap, RgbdFrame, Rig
 
 Loss = Literal["random", "burst", "deadline"]
-"""Single packets, bursts of them, or the last of each node's, which come too late."""
+"""Single packets, bursts of packets, or the last packets of each node, which come too late."""
 When = Literal["before", "after"]
-"""Fusion: of measured depth alone, or with what is inferred."""
+"""Before fusion: measured depth only; after it: with inferred depth."""
 WHENS: tuple[When, ...] = ("before", "after")
 BURST_PACKETS = 8.0
 """Mean length of a burst (SPEC 6.5)."""
 PIECES = 4
-"""Pieces along each side of a frame."""
+"""Number of pieces along each side of a frame."""
 COUNT_OF_PIECES = PIECES * PIECES
 
 Values = dict[str, float | None]
-"""What a trial gives, by name; None where it gives none."""
+"""Values of a trial by name; None for a missing value."""
 
 
 @dataclass(frozen=True, slots=True)
 class LossTask:
-    """A rig's images, coded and sent once, of whose packets a share is lost and none is sent again."""
+    """A rig's images, coded and sent once; a share of the packets is lost and not sent again."""
 
     rig: str
-    """A demo scene."""
+    """Name of a demo scene."""
     coding: str
     packet_bytes: int
-    """Bytes of the images in a packet."""
+    """Image bytes in a packet."""
     loss: Loss
     share: float
     seed: int
     alignment: AlignmentMode = "local"
-    """How inferred depth is made metric."""
+    """Method that makes inferred depth metric."""
 
 
 @dataclass(frozen=True, slots=True)
 class PieceTask:
-    """A rig of one node's depth image a piece is missing."""
+    """A rig in which a piece of one node's depth image is missing."""
 
     rig: str
     node: int
     piece: int
-    """Row after row."""
+    """Index of the piece, row by row."""
 
 
 @dataclass(frozen=True, slots=True)
 class SubsetTask:
-    """A rig of which only some nodes send."""
+    """A rig in which only some nodes send."""
 
     rig: str
     nodes: tuple[int, ...]
@@ -77,25 +77,25 @@ class SubsetTask:
 
 @cache
 def demo(name: str) -> Rig:
-    """A demo scene, read once in a process."""
+    """Return a demo scene, read once per process."""
     return load_demo(name)
 
 
 @cache
 def yardstick(name: str) -> Yardstick | None:
-    """What surfaces of a demo scene are compared with."""
+    """Return the reference for a demo scene's surfaces."""
     return yardstick_of_rig(demo(name))
 
 
 def loss_trial(task: LossTask) -> Values:
-    """Code, lose packets, decode what is left and run the chain on it once."""
+    """Code, lose packets, decode the others and run the chain on them once."""
     rig = demo(task.rig)
     frames, traffic = frames_left(rig, task)
     return rebuilt(rig, frames, task.alignment) | traffic
 
 
 def frames_left(rig: Rig, task: LossTask) -> tuple[list[RgbdFrame], Values]:
-    """The frames as the sink has them after the task's losses, and what was sent, delivered and lost."""
+    """Return the sink's frames after the task's losses, and the sent, delivered and lost packets."""
     coding = coding_named(task.coding)
     streams = [np.frombuffer(coding.encode(images_of(f), task.packet_bytes), np.uint8) for f in rig.frames]
     counts = [-(-stream.size // task.packet_bytes) for stream in streams]
@@ -120,12 +120,12 @@ def frames_left(rig: Rig, task: LossTask) -> tuple[list[RgbdFrame], Values]:
 
 
 def packets_lost(counts: Sequence[int], losses: LossConfig, seed: int) -> list[BoolArray]:
-    """Which packets of each node are lost on its own link to the sink, as ``network_sim`` loses them.
+    """Return which packets of each node are lost on its own link to the sink, by ``network_sim``'s model.
 
     Args:
-        counts: packets of each node.
+        counts: number of packets of each node.
         losses: share and length of bursts.
-        seed: of the links.
+        seed: seed of the links.
     """
     links, sink = LinkLosses(losses, seed), len(counts)
     return [
@@ -134,7 +134,7 @@ def packets_lost(counts: Sequence[int], losses: LossConfig, seed: int) -> list[B
 
 
 def colorless_trial(rig_name: str) -> Values:
-    """All depth of a rig arrives, and no colour."""
+    """Run the chain with all depth of a rig and no colour."""
     rig = demo(rig_name)
     depth_only = [
         replace(Received.nothing(frame.rgb.shape[:2]), depth=images_of(frame).depth) for frame in rig.frames
@@ -143,7 +143,7 @@ def colorless_trial(rig_name: str) -> Values:
 
 
 def piece_trial(task: PieceTask) -> Values:
-    """One piece of one node's depth is missing; its colour is there."""
+    """Run the chain without one piece of one node's depth, but with its colour."""
     rig = demo(task.rig)
     frames = list(rig.frames)
     z_m = frames[task.node].depth.z_m.copy()
@@ -153,14 +153,14 @@ def piece_trial(task: PieceTask) -> Values:
 
 
 def piece_area(shape: tuple[int, ...], piece: int) -> tuple[slice, slice]:
-    """Where a piece lies in an image of (H, W) pixels."""
+    """Return the rows and columns of a piece in an image of (H, W) pixels."""
     row, column = divmod(piece, PIECES)
     rows, columns = (np.linspace(0, size, PIECES + 1).astype(int) for size in shape)
     return slice(rows[row], rows[row + 1]), slice(columns[column], columns[column + 1])
 
 
 def subset_trial(task: SubsetTask) -> Values:
-    """Only some nodes' images are there."""
+    """Run the chain with only some nodes' images."""
     rig = demo(task.rig)
     nothing = [
         frame_at_sink(frame, Received.nothing(frame.rgb.shape[:2])) if i not in task.nodes else frame
@@ -170,18 +170,18 @@ def subset_trial(task: SubsetTask) -> Values:
 
 
 def rebuilt(rig: Rig, frames: Sequence[RgbdFrame], alignment: AlignmentMode = "local") -> Values:
-    """What the chain makes of the frames at the sink, compared with the rig's truth.
+    """Run the chain on the frames at the sink and compare the surface with the rig's truth.
 
     Args:
-        rig: a demo scene as it was taken, with its truth.
-        frames: of every node, as far as they have arrived.
-        alignment: how inferred depth is made metric.
+        rig: the complete demo scene with its truth.
+        frames: arrived data of every node.
+        alignment: method that makes inferred depth metric.
 
     Returns:
         For the surface ``before`` (of measured depth) and ``after`` fusion: ``f`` (F-score at 5 cm),
         ``no_hit`` (share of the rays of all cameras without a surface), ``hole_area_m2`` and
-        ``median_depth_error_m``; the number of nodes that were ``heard``; the seconds of a core that it took.
-        Where nothing can be rebuilt, F-scores are 0, all rays hit nothing, and the rest is None.
+        ``median_depth_error_m``; the number of nodes that were ``heard``; the computing time, core seconds.
+        If nothing can be rebuilt, F-scores are 0, all rays hit nothing, and other values are None.
     """
     started = time.process_time()
     present = [index for index, frame in enumerate(frames) if heard(frame)]

@@ -1,4 +1,4 @@
-"""Which camera of a rig sees which surface, from the depth and the poses that the nodes believe in."""
+"""Visibility of surfaces for a rig's cameras, from the depth and the believed poses of the nodes."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from pipeline.surface.normals import estimate_normals
 from pipeline.types import BoolArray, FloatArray, PointCloud, RgbdFrame, Rig
 
 STRIDE_PX = 8
-"""Every so many pixels one point, about as much as a base layer has (SPEC 6.5)."""
+"""Step between the pixels that give points, about as in a base layer (SPEC 6.5)."""
 VOXEL_M = 0.1
 REFERENCE_M = 2.0
-"""Distance up to which a camera resolves all there is to see at 5 cm."""
+"""Distance up to which a camera resolves all details at 5 cm."""
 SAME_SURFACE = 0.05
-"""Relative difference of depths below which two are of one surface."""
+"""Largest relative difference between depths of one surface."""
 
 
 def sees(frame: RgbdFrame, points_m: FloatArray) -> BoolArray:
-    """(N,) whether a camera has measured (N, 3) points of the world, by its believed pose."""
+    """Return (N,) whether a camera has measured (N, 3) world points, by its believed pose."""
     here_m = geometry.apply(geometry.inverse(frame.T_world_camera), points_m)
     seen = here_m[:, 2] > 0.1
     height, width = frame.depth.z_m.shape
@@ -33,7 +33,7 @@ def sees(frame: RgbdFrame, points_m: FloatArray) -> BoolArray:
 
 
 def sparse_points(frame: RgbdFrame) -> PointCloud:
-    """A node's points of every ``STRIDE_PX``-th row and column in the world, with normals and pixels."""
+    """Return world points of every ``STRIDE_PX``-th row and column of a node, with normals and pixels."""
     cloud = back_project(frame)
     assert cloud.pixels is not None
     few = cloud.select(np.all(cloud.pixels % STRIDE_PX == 0, axis=1))
@@ -41,7 +41,7 @@ def sparse_points(frame: RgbdFrame) -> PointCloud:
 
 
 def rig_quality(rig: Rig) -> FloatArray:
-    """(N, V) how well each camera sees each voxel of what all of them see: sight x resolution x incidence."""
+    """Return (N, V) how well each camera sees each voxel seen by any: sight x resolution x incidence."""
     clouds = [sparse_points(frame) for frame in rig.frames]
     points_m = np.concatenate([cloud.points_m for cloud in clouds])
     normals = np.concatenate([cloud.normals for cloud in clouds if cloud.normals is not None])

@@ -1,1 +1,1 @@
-"""What depth from one picture can do, measured (SPEC 3)."""
+"""Claims about depth from one image (SPEC 3)."""

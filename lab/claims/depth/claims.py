@@ -1,4 +1,4 @@
-"""C12 to C14: what the thesis says of its depth network, on images we have (SPEC 3.4 and 8)."""
+"""C12 to C14: the thesis's claims about its depth network, tested on our images (SPEC 3.4 and 8)."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ NOTES = {
 
 
 def infer_all(folder: Path, scheduler: str | None) -> Generator[Progress, None, tuple[SceneErrors, ...]]:
-    """Infer and compare all images that this machine has."""
+    """Infer and compare all images on this machine."""
     data = (SHIPPED_MODEL, SCENES, *real_folders())
     found = yield from iterate_trials("C12 and C14, depth", site_trial, sites(), folder, scheduler, data=data)
     return tuple(from_trial(site, result) for site, result in zip(sites(), found, strict=True))
 
 
 def judge_errors(measured: Sequence[SceneErrors]) -> Outcome:
-    """C12's numbers and verdict; the three held-out scenes decide, all others are reported beside them."""
+    """Return C12's numbers and verdict; the three held-out scenes decide, all others are only reported."""
     ours = {
         f"abs_rel_{alignment}_{scene.site.name}": scene.mean(alignment, "abs_rel")
         for scene in measured
@@ -73,12 +73,12 @@ def judge_errors(measured: Sequence[SceneErrors]) -> Outcome:
 
 
 def _ci95_of_rooms(scene: SceneErrors) -> tuple[float, float]:
-    """Views of one room are alike, so rooms are resampled."""
+    """Return the interval over rooms, which are resampled because views of one room are alike."""
     return bootstrap_ci95(scene.series(JUDGED, "abs_rel").reshape(-1, VIEWS_PER_ROOM).mean(axis=1))
 
 
 def error_tables(measured: Sequence[SceneErrors]) -> tuple[Table, ...]:
-    """One for each alignment, the thesis's Table 4.3 on top."""
+    """Return a table for each alignment, with the thesis's Table 4.3 at the top."""
     thesis = [
         (f"thesis, scene {number}", None, None, *row, None, None, None, None)
         for number, row in enumerate(TABLE_4_3, 1)
@@ -103,7 +103,7 @@ def _row(scene: SceneErrors, alignment: str) -> tuple[str | float, ...]:
 
 
 def distance_charts(measured: Sequence[SceneErrors]) -> tuple[Chart, ...]:
-    """AbsRel against true distance, indoors and outdoors apart."""
+    """Return charts of AbsRel over true distance, one for indoor and one for outdoor images."""
     return tuple(
         Chart(
             f"Error against distance, up to {cap_m:g} m",
@@ -125,7 +125,7 @@ def _curve(group: str, scenes: Sequence[SceneErrors]) -> Curve:
 
 
 def pictures(measured: Sequence[SceneErrors]) -> tuple[Picture, ...]:
-    """The first image of every scene."""
+    """Return the first image of every scene."""
     caption = "colour | true depth | inferred depth, median-scaled | relative error"
     return tuple(
         Picture(
@@ -139,7 +139,7 @@ def pictures(measured: Sequence[SceneErrors]) -> tuple[Picture, ...]:
 
 
 def arithmetic() -> Outcome:
-    """C13's numbers: means and both kinds of standard deviation of Table 4.3."""
+    """Return C13's numbers: means and both kinds of standard deviation of Table 4.3."""
     columns = np.array(TABLE_4_3)[:, [0, 2]]
     names = ("rmse_{}_m", "abs_rel_{}")
     ours = {
@@ -166,7 +166,7 @@ def arithmetic() -> Outcome:
 
 
 def judge_against_sensor(measured: Sequence[SceneErrors]) -> Outcome:
-    """C14's numbers and verdict, on the scenes whose truth is known."""
+    """Return C14's numbers and verdict, on the scenes with known truth."""
     known = [scene for scene in measured if scene.site.truth]
     names = (*ALIGNMENTS, CHAIN)
     sensor = {scene.site.name: scene.beside_sensor(SENSOR) for scene in known}

@@ -1,4 +1,4 @@
-"""D10: whether the confidence of what fills a hole is the share of it that is right (SPEC 3.5)."""
+"""D10: whether the confidence of filled depth equals the share of it that is correct (SPEC 3.5)."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from pipeline.io.demos import SCENES
 from pipeline.types import BoolArray, FloatArray
 
 EDGES = np.linspace(0.0, 1.0, 11)
-"""Of the bins of confidence."""
+"""Edges of the confidence bins."""
 LARGEST_GAP = 0.1
-"""Between said and true, in the mean over the pixels: a bin."""
+"""Largest accepted difference between confidence and correct share, averaged over pixels by bin."""
 NOTE = (
     "Pixels of hidden depth, and of the sensors' own holes where the truth is known, before any is left out "
     "for little confidence. Said: mean confidence in the bin. True: share within 5 % of what judges, and its "
@@ -35,11 +35,11 @@ NOTE = (
 
 @dataclass(frozen=True, slots=True)
 class Reliability:
-    """Confidence and truth of a group of images, bin by bin."""
+    """Confidence and correct share of a group of images, by bin."""
 
     group: str
     counts: FloatArray
-    """(places, 3, 10) of every place and bin: pixels, sum of their confidences, pixels that are right."""
+    """(places, 3, 10) for every place and bin: pixels, sum of their confidences, correct pixels."""
 
     @property
     def said(self) -> FloatArray:
@@ -48,12 +48,12 @@ class Reliability:
 
     @property
     def true(self) -> FloatArray:
-        """(10,) share that is right; NaN in an empty bin."""
+        """(10,) share that is correct; NaN in an empty bin."""
         return self._share(2)
 
     @property
     def pixels(self) -> FloatArray:
-        """(10,) how many there are."""
+        """(10,) number of pixels."""
         return self.counts.sum(axis=0)[0]
 
     @property
@@ -63,7 +63,7 @@ class Reliability:
 
     @property
     def gap(self) -> float:
-        """Mean over the pixels of the difference between said and true of their bin."""
+        """Mean over pixels of their bin's difference between confidence and correct share."""
         return gap_of(self.counts)
 
     @property
@@ -75,7 +75,7 @@ class Reliability:
         return float(low), float(high)
 
     def true_ci95(self, number: int) -> tuple[float, float]:
-        """95 % interval of the share that is right in a bin, by resampling places that have pixels there."""
+        """Return the 95 % interval of a bin's correct share, by resampling places that have pixels there."""
         counts = self.counts[:, [2, 0], number]
         return bootstrap_ci95(
             counts[counts[:, 1] > 0],
@@ -89,13 +89,13 @@ class Reliability:
 
 
 def gap_of(counts: FloatArray) -> float:
-    """The expected calibration error of (places, 3, bins) counts (Naeini, Cooper and Hauskrecht 2015)."""
+    """Return the expected calibration error of (places, 3, bins) counts (Naeini, Cooper, Hauskrecht 2015)."""
     pixels, said, right = counts.sum(axis=0)
     return float(np.abs(said - right).sum() / pixels.sum())
 
 
 def binned(confidence: FloatArray, right: BoolArray) -> FloatArray:
-    """(3, 10) pixels, sums of confidence and pixels that are right, of (N,) confidences and answers."""
+    """Return (3, 10) pixels, sums of confidence and correct pixels of (N,) confidences and answers."""
     confidence = confidence.astype(np.float64)
     return np.stack(
         [np.histogram(confidence, EDGES, weights=weights)[0] for weights in (None, confidence, right * 1.0)]
@@ -103,7 +103,7 @@ def binned(confidence: FloatArray, right: BoolArray) -> FloatArray:
 
 
 def confidence_trial(site: Site) -> list[dict[str, Any]]:
-    """The counts of every image of a site, with its group and place, as plain values."""
+    """Return the counts of every image of a site, with its group and place, as plain values."""
     network, config = DepthNetwork(), DepthConfig()
     found = []
     for case in hidden_cases(site):
@@ -122,7 +122,7 @@ def confidence_trial(site: Site) -> list[dict[str, Any]]:
 def all_confidences(
     folder: Path, scheduler: str | None
 ) -> Generator[Progress, None, tuple[Reliability, ...]]:
-    """Every group of images that this machine has."""
+    """Run every group of images on this machine."""
     data = (SHIPPED_MODEL, SHIPPED_COMPLETION, SCENES, *real_folders())
     trials = yield from iterate_trials(
         "D10, confidence", confidence_trial, sites(), folder, scheduler, data=data
@@ -131,7 +131,7 @@ def all_confidences(
 
 
 def reliabilities(images: Sequence[dict[str, Any]]) -> tuple[Reliability, ...]:
-    """The images' counts by group, summed up by place."""
+    """Return the images' counts by group, summed by place."""
     found: dict[str, dict[str, FloatArray]] = {}
     for image in images:
         places = found.setdefault(image["group"], {})
@@ -140,7 +140,7 @@ def reliabilities(images: Sequence[dict[str, Any]]) -> tuple[Reliability, ...]:
 
 
 def judge_confidence(measured: Sequence[Reliability]) -> Outcome:
-    """D10's numbers and verdict."""
+    """Return D10's numbers and verdict."""
     ours: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}
     for one in measured:
@@ -163,7 +163,7 @@ def judge_confidence(measured: Sequence[Reliability]) -> Outcome:
 
 
 def confidence_chart(measured: Sequence[Reliability]) -> Chart:
-    """Said against true, bin by bin."""
+    """Return a chart of the correct share over the confidence, by bin."""
     curves = []
     for one in measured:
         numbers = one.filled
@@ -180,7 +180,7 @@ def confidence_chart(measured: Sequence[Reliability]) -> Chart:
 
 
 def confidence_table(measured: Sequence[Reliability]) -> Table:
-    """The chart in numbers."""
+    """Return the chart's numbers as a table."""
     rows = []
     for one in measured:
         for number in one.filled:

@@ -22,29 +22,29 @@ ALIGNMENTS: dict[str, AlignmentMode] = {
     "median-scaled": "median",
     "affine-aligned": "affine_depth",
 }
-"""As the literature aligns: to the depth that judges. Raw takes the network's numbers as metres."""
+"""Alignments of the literature: to the reference depth. Raw takes the network's numbers as metres."""
 JUDGED = "median-scaled"
 SENSOR = "sensor"
 CHAIN = "aligned as in the chain"
-"""Locally, to what the sensor sees; only beside the sensor's own error."""
+"""Local alignment to the sensor's depth; only compared with the sensor's own error."""
 EDGES_M = (NEAREST_M, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 80.0)
-"""Of the bins of true depth."""
+"""Edges of the bins of true depth."""
 STRIP_HEIGHT_PX = 200
 WORST_SHOWN = 0.5
-"""Relative error that has the brightest colour."""
+"""Relative error at the end of the colour scale."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameErrors:
-    """One image."""
+    """Errors of one image."""
 
     aligned: dict[str, DepthErrors]
     """By the names of ``ALIGNMENTS``."""
     binned: dict[str, FloatArray]
-    """By alignment, as ``by_distance`` gives them."""
+    """Sums by alignment, from ``by_distance``."""
     beside_sensor: dict[str, float]
-    """AbsRel over the sensor's pixels, of its own depth (``SENSOR``), by alignment and for ``CHAIN``; empty
-    where the sensor is what judges."""
+    """AbsRel over the sensor's pixels: of its own depth (``SENSOR``), by alignment, and for ``CHAIN``; empty
+    if the sensor is the reference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,32 +57,32 @@ class SceneErrors:
     """(H, 4 W, 3) of the first: colour, truth, inferred median-scaled, relative error; black: unknown."""
 
     def series(self, alignment: str, measure: str) -> FloatArray:
-        """(frames,) one measure of ``DepthErrors``."""
+        """Return (frames,) one measure of ``DepthErrors``."""
         return np.array([getattr(frame.aligned[alignment], measure) for frame in self.frames])
 
     def mean(self, alignment: str, measure: str) -> float:
-        """Of the images, each counting the same."""
+        """Return the mean over images, with equal weights."""
         return float(self.series(alignment, measure).mean())
 
     def pooled_abs_rel(self, alignment: str) -> float:
-        """Of the pixels, each counting the same."""
+        """Return the mean over pixels, with equal weights."""
         total, pixels = (sum(frame.binned[alignment][row].sum() for frame in self.frames) for row in (0, 1))
         return float(total / pixels)
 
     def beside_sensor(self, name: str) -> float:
-        """AbsRel at the sensor's pixels, mean over the images; the site has a truth."""
+        """Return AbsRel at the sensor's pixels, averaged over images; the site must have a truth."""
         return float(np.mean([frame.beside_sensor[name] for frame in self.frames]))
 
 
 def site_trial(site: Site) -> dict[str, Any]:
-    """The errors of the shipped network on a site, as plain values."""
+    """Return the errors of the shipped network on a site, as plain values."""
     scene = scene_errors(site, DepthNetwork())
     png = cv2.imencode(".png", scene.strip)[1].tobytes()
     return {"frames": [asdict(frame) for frame in scene.frames], "strip": base64.b64encode(png).decode()}
 
 
 def from_trial(site: Site, result: dict[str, Any]) -> SceneErrors:
-    """What ``site_trial`` measured."""
+    """Return the result of ``site_trial`` as ``SceneErrors``."""
     frames = [
         FrameErrors(
             {name: DepthErrors(**errors) for name, errors in frame["aligned"].items()},
@@ -118,7 +118,7 @@ def scene_errors(site: Site, network: DepthNetwork) -> SceneErrors:
 
 
 def within(truth_m: FloatArray, cap_m: float) -> FloatArray:
-    """The depths that judge, NaN elsewhere."""
+    """Return the reference depths within the range, NaN elsewhere."""
     with np.errstate(invalid="ignore"):
         return np.where((truth_m > NEAREST_M) & (truth_m < cap_m), truth_m, np.nan)
 
@@ -126,14 +126,14 @@ def within(truth_m: FloatArray, cap_m: float) -> FloatArray:
 def frame_errors(
     example: Example, inferred: DepthMap, judging_m: FloatArray, aligned_m: dict[str, FloatArray], site: Site
 ) -> FrameErrors:
-    """Every measure of one image.
+    """Return all measures of one image.
 
     Args:
-        example: the image with its sensor.
+        example: the image with its sensor depth.
         inferred: (H, W) by the network.
-        judging_m: (H, W) the depths that count, NaN elsewhere.
+        judging_m: (H, W) reference depths, NaN elsewhere.
         aligned_m: (H, W) each, the inferred depth by alignment.
-        site: where it belongs.
+        site: site of the image.
     """
     beside = {}
     if site.truth:
@@ -151,7 +151,7 @@ def frame_errors(
 
 
 def by_distance(z_m: FloatArray, judging_m: FloatArray) -> FloatArray:
-    """(2, bins) sums of |p - g| / g and numbers of pixels whose true depth is between two ``EDGES_M``."""
+    """Return (2, bins) sums of |p - g| / g and pixel counts, for true depths between two ``EDGES_M``."""
     compared = np.isfinite(z_m) & np.isfinite(judging_m)
     g_m = judging_m[compared].astype(np.float64)
     relative = np.abs(z_m[compared] - g_m) / g_m
@@ -161,7 +161,7 @@ def by_distance(z_m: FloatArray, judging_m: FloatArray) -> FloatArray:
 
 
 def distance_curve(frames: Iterable[FrameErrors], alignment: str) -> tuple[FloatArray, list[FloatArray]]:
-    """The middles (metres) of the bins that have pixels, and in each the AbsRel of the images there."""
+    """Return the middles (metres) of the bins that have pixels, and for each the AbsRel of its images."""
     middles_m = 0.5 * (np.array(EDGES_M[1:]) + np.array(EDGES_M[:-1]))
     total, pixels = np.stack([frame.binned[alignment] for frame in frames], axis=1)
     filled = np.flatnonzero(pixels.any(axis=0))
@@ -171,11 +171,11 @@ def distance_curve(frames: Iterable[FrameErrors], alignment: str) -> tuple[Float
 
 
 def picture_strip(rgb: ByteArray, truth_m: FloatArray, inferred_m: FloatArray) -> ByteArray:
-    """Colour, true depth, inferred depth on the same scale, and relative error, side by side.
+    """Draw colour, true depth, inferred depth on the same scale, and relative error, side by side.
 
     Args:
         rgb: (H, W, 3).
-        truth_m: (H, W), NaN where unknown; nearest and farthest set the scale of both.
+        truth_m: (H, W), NaN where unknown; its extremes set the scale of both depths.
         inferred_m: (H, W), NaN where unknown.
     """
     near_m, far_m = np.nanpercentile(truth_m, (1.0, 99.0))
@@ -192,7 +192,7 @@ def picture_strip(rgb: ByteArray, truth_m: FloatArray, inferred_m: FloatArray) -
 
 
 def colored(values: FloatArray, low: float, high: float, colors: int) -> ByteArray:
-    """(H, W, 3) a colour map from ``low`` to ``high``, black where a value is unknown."""
+    """Return (H, W, 3) a colour map from ``low`` to ``high``, black where a value is unknown."""
     share = np.clip((np.nan_to_num(values) - low) / max(high - low, 1e-9), 0.0, 1.0)
     bgr = cv2.applyColorMap(np.round(255.0 * share).astype(np.uint8), colors)
     return np.where(np.isfinite(values)[..., None], bgr[..., ::-1], np.uint8(0))

@@ -1,4 +1,4 @@
-"""The images by which a depth network is judged: held-out rooms, demo scenes, real frames, a user's sets."""
+"""Images that evaluate a depth network: held-out rooms, demo scenes, real frames, a user's sets."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ REAL = "real frames"
 HELD_OUT_SCENES = 3
 ROOMS_PER_SCENE = 50
 VIEWS_PER_ROOM = 2
-"""A scene has 100 images, as the thesis's have."""
+"""Views per room: a scene has 100 images, as in the thesis."""
 INDOOR_CAP_M = 10.0
 OUTDOOR_CAP_M = 80.0
 OUTDOOR_SETS = ("kitti",)
 SETS_VARIABLE = "PACKETMESH_DEPTH_SETS"
-"""Names more sets as ``kind=path``, separated like the folders of PATH."""
+"""Variable that names more sets as ``kind=path``, separated like the folders of PATH."""
 DATA_VARIABLE = "PACKETMESH_SHARED_DATA"
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
-"""Where real frames lie if the variable does not say otherwise: beside the repository."""
+"""Default folder of real frames, next to the repository."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,20 +39,20 @@ class Site:
     group: str
     """``held-out rooms``, ``demo scenes``, ``real frames`` or a user's set."""
     examples: Callable[[], Iterator[Example]] = field(repr=False)
-    """Fixed by the name and the code."""
+    """Returns the images; they depend only on the name and the code."""
     truth: bool = True
-    """What judges is the truth; if not, it is the sensor's own depth, whose error nobody knows."""
+    """Whether the reference is the truth; otherwise it is the sensor's own depth, with unknown errors."""
     cap_m: float = INDOOR_CAP_M
-    """Farthest depth that counts."""
+    """Largest depth that is evaluated."""
 
 
 def sites() -> tuple[Site, ...]:
-    """All there are on this machine; the thesis's three scenes first."""
+    """Return all sites on this machine; the thesis's three scenes first."""
     return (*held_out_scenes(), *demo_scenes(), *real_frames(), *user_sets())
 
 
 def held_out_scenes(rooms: int = ROOMS_PER_SCENE, views: int = VIEWS_PER_ROOM) -> tuple[Site, ...]:
-    """Scene 1 to 3: rooms of the test split, which no training ever saw."""
+    """Return scenes 1 to 3: rooms of the test split, on which nothing was trained."""
     starts = range(FIRST_TEST_ROOM, FIRST_TEST_ROOM + HELD_OUT_SCENES * rooms, rooms)
     return tuple(
         Site(f"Scene {number}", HELD_OUT, partial(held_out_rooms, range(start, start + rooms), views))
@@ -61,37 +61,37 @@ def held_out_scenes(rooms: int = ROOMS_PER_SCENE, views: int = VIEWS_PER_ROOM) -
 
 
 def demo_scenes() -> tuple[Site, ...]:
-    """The nodes of every demo scene."""
+    """Return the nodes of every demo scene."""
     return tuple(Site(name, "demo scenes", partial(demo, name)) for name in CALIBRATED_SCENES)
 
 
 def real_frames() -> tuple[Site, ...]:
-    """Every registered RGB-D pair among the real data; none where there is no such folder."""
+    """Return every registered RGB-D pair of the real data; none without such a folder."""
     return tuple(
         Site(folder.name, REAL, partial(real_frame, folder), truth=False) for folder in real_folders()
     )
 
 
 def real_folders() -> tuple[Path, ...]:
-    """Folders with color.png, depth.png and intrinsics.json below ``PACKETMESH_SHARED_DATA``."""
+    """Return the folders with color.png, depth.png and intrinsics.json below ``PACKETMESH_SHARED_DATA``."""
     data = Path(os.environ.get(DATA_VARIABLE, DATA))
     return tuple(sorted(depth.parent for depth in data.glob("*/depth.png")))
 
 
 def load_real(folder: Path) -> RgbdFrame:
-    """The registered pair in a folder, named after it."""
+    """Return the registered pair in a folder, named after it."""
     color, depth, intrinsics = (folder / name for name in ("color.png", "depth.png", "intrinsics.json"))
     return load_frame(color, depth, intrinsics, name=folder.name)
 
 
 def real_frame(folder: Path) -> Iterator[Example]:
-    """One real image, judged where the sensor has depth."""
+    """Yield one real image, evaluated where the sensor has depth."""
     frame = load_real(folder)
     yield Example(frame.rgb, frame.depth, frame.depth.z_m)
 
 
 def user_sets() -> tuple[Site, ...]:
-    """The sets that ``PACKETMESH_DEPTH_SETS`` names, all their images."""
+    """Return the sets that ``PACKETMESH_DEPTH_SETS`` names, with all their images."""
     named = named_sets()
     kinds = [text.partition("=")[0].strip().lower() for text in named]
     return tuple(
@@ -107,12 +107,12 @@ def user_sets() -> tuple[Site, ...]:
 
 
 def named_sets() -> list[str]:
-    """``kind=path`` of each set that ``PACKETMESH_DEPTH_SETS`` names."""
+    """Return ``kind=path`` of each set that ``PACKETMESH_DEPTH_SETS`` names."""
     return [text for text in os.environ.get(SETS_VARIABLE, "").split(os.pathsep) if text]
 
 
 def pairs(text: str) -> Iterator[Example]:
-    """Images of one set, ``kind=path``, judged in the crop that is usual for it.
+    """Yield the images of one set, ``kind=path``, evaluated in its usual crop.
 
     Raises:
         InputError: the kind is unknown, or the files are missing or unusable.

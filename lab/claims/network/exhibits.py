@@ -32,13 +32,13 @@ COLUMNS = {
     "energy_per_image": "J per image",
 }
 UNLIMITED_AT = 40.0
-"""Where a chart over k has its point without a limit."""
+"""Abscissa of the unlimited case in a chart over k."""
 
 Row = tuple[str | float | int | None, ...]
 
 
 def figure_4_10(found: Found) -> tuple[Exhibit, ...]:
-    """Images a minute, coverage and requests over the vehicles, and the table behind them."""
+    """Return images per minute, coverage and requests over the number of vehicles, and their table."""
     rows = [(scheme, n, *_cells(found, Case(scheme, n))) for n in OBJECTS for scheme in SCHEMES]
     return (
         _over_objects(found, "images_per_minute", "Images received (Fig. 4.10)", "images/min"),
@@ -56,7 +56,7 @@ def figure_4_10(found: Found) -> tuple[Exhibit, ...]:
 
 
 def caps_exhibits(found: Found) -> tuple[Exhibit, ...]:
-    """What k does."""
+    """Return charts and table of the effect of k."""
     x = [UNLIMITED_AT if k is None else float(k) for k in CAPS]
     cases = [Case("greedy", CAPPED_OBJECTS, k) for k in CAPS]
     note = f"The point at {UNLIMITED_AT:g} has no cap. {ORIGIN}"
@@ -73,7 +73,7 @@ def caps_exhibits(found: Found) -> tuple[Exhibit, ...]:
 
 
 def sizes_table(found: Found, objects: int, horizon_s: float) -> Table:
-    """The schemes with small and with large images."""
+    """Return a table of the schemes with small and with large images."""
     rows = tuple((case.scheme, case.image_bytes, *_cells(found, case)) for case in found)
     note = (
         f"{objects} vehicles, means of {RUNS} runs of {horizon_s / 60.0:g} min, the first 30 left "
@@ -95,7 +95,7 @@ def _runs(found: Found, cases: list[Case], metric: str) -> list[list[float]]:
 
 
 def _cells(found: Found, case: Case) -> Row:
-    """Half the interval of images a minute, then the mean of every column."""
+    """Return half the interval of images per minute, then the mean of every column."""
     mean, _, high = interval(values(found, case, "images_per_minute"))
     runs = {metric: values(found, case, metric) for metric in COLUMNS}
     return (high - mean, *(interval(group)[0] if group else None for group in runs.values()))

@@ -1,4 +1,4 @@
-"""C26 to C29: images over a slow link, and what explains Table 4.6 (SPEC 6.1)."""
+"""C26 to C29: images over a slow link, and explanations of Table 4.6 (SPEC 6.1)."""
 
 from __future__ import annotations
 
@@ -40,23 +40,23 @@ class LinkRuns:
     radio_s: FloatArray
     """(rows, runs) Model A, by row of the table and seed."""
     serial_s: FloatArray
-    """(rows,) Model B, where nothing is left to chance."""
+    """(rows,) Model B, which is deterministic."""
 
 
 def model_a(images: int) -> NetworkConfig:
-    """Three nodes that share an unslotted IEEE 802.15.4 channel and always have something to send."""
+    """Return three nodes that share an unslotted IEEE 802.15.4 channel and always have data to send."""
     config = replace(LINK, nodes=replace(LINK.nodes, images=images))
     return replace(config, run=replace(config.run, horizon_s=400.0 * images, keep="images"))
 
 
 def model_b(images: int) -> NetworkConfig:
-    """The same images over a serial line for each node."""
+    """Return the same images over a serial line for each node."""
     config = model_a(images)
     return replace(config, mac=replace(config.mac, kind="serial", link_bps=SERIAL_BPS))
 
 
 def link_runs(folder: Path, scheduler: str | None) -> Generator[Progress, None, LinkRuns]:
-    """Both models for every row of the table."""
+    """Run both models for every row of the table."""
     radio = [run for images in IMAGES for run in replications(model_a(images), RUNS)]
     serial = [model_b(images) for images in IMAGES]
     found = yield from iterate_trials("C28, image transfer", transfer, [*radio, *serial], folder, scheduler)
@@ -65,19 +65,19 @@ def link_runs(folder: Path, scheduler: str | None) -> Generator[Progress, None, 
 
 
 def errors(model_s: FloatArray) -> FloatArray:
-    """(rows,) relative errors of a model's times against the table's."""
+    """Return (rows,) relative errors of a model's times against the table's."""
     return model_s / np.array(THESIS_S) - 1.0
 
 
 def mape(model_s: FloatArray) -> float:
-    """Mean absolute relative error against the table."""
+    """Return the mean absolute relative error against the table."""
     return float(np.mean(np.abs(errors(model_s))))
 
 
 def line_through_origin(best: Callable[[FloatArray], float] | None = None) -> float:
-    """Seconds an image: by least squares, or the slope with the least ``best``.
+    """Return seconds per image: by least squares, or the slope with the smallest ``best``.
 
-    The mean absolute relative error is piecewise linear in the slope, so that one of the rows has the best.
+    The mean absolute relative error is piecewise linear in the slope, so one of the rows gives the minimum.
     """
     n, seconds = np.array(IMAGES, float), np.array(THESIS_S)
     if best is None:
@@ -86,7 +86,7 @@ def line_through_origin(best: Callable[[FloatArray], float] | None = None) -> fl
 
 
 def slope_interval() -> tuple[float, float]:
-    """95 % interval of the least-squares slope through the origin: what the table itself leaves open."""
+    """Return the 95 % interval of the least-squares slope through the origin, from the table's scatter."""
     n, seconds = np.array(IMAGES, float), np.array(THESIS_S)
     slope = line_through_origin()
     deviation = np.sqrt(np.sum((seconds - slope * n) ** 2) / (len(n) - 1))
@@ -95,7 +95,7 @@ def slope_interval() -> tuple[float, float]:
 
 
 def fits(runs: LinkRuns) -> dict[str, FloatArray]:
-    """(rows,) seconds by every model: two without a free parameter, three that are fitted to the table."""
+    """Return (rows,) seconds by every model: two without a free parameter, three fitted to the table."""
     n = np.array(IMAGES, float)
     return {
         "A: 802.15.4, simulated": runs.radio_s.mean(axis=1),
@@ -174,7 +174,7 @@ def _c28(runs: LinkRuns) -> Outcome:
 
 
 def _undecided(radio_s: float, serial_s: float) -> str:
-    """What the table says about models that take so long for one image of each node."""
+    """Return a sentence on the table's evidence about models with these times for one image per node."""
     low, high = slope_interval()
     left = [name for name, one in (("A", radio_s), ("B", serial_s)) if low <= one <= high]
     verdict = (

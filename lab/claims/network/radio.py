@@ -1,4 +1,4 @@
-"""C32: radio and medium access of the street grid, against theory and ns-2's own numbers (SPEC 6.3)."""
+"""C32: radio and medium access of the street grid, compared with theory and ns-2's numbers (SPEC 6.3)."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ MOST_ERROR, MOST_ERROR_ALONE = 0.03, 0.01
 
 NS2_HZ, NS2_TX_W, NS2_HEIGHT_M = 914e6, 0.28183815, 1.5
 NS2_POWERS_W = {100.0: 1.42681e-8, 250.0: 3.65262e-10, 550.0: 1.55924e-11}
-"""By distance in metres; the latter two are ns-2's thresholds for receiving and for sensing."""
+"""Received power by distance in metres; the last two are ns-2's thresholds for receiving and sensing."""
 NS2_CROSSOVER_M = 86.14
 MOST_POWER_ERROR = 1e-4
 PLACES = 4
-"""Access points of the thesis."""
+"""Number of access points in the thesis."""
 
 
 @dataclass(frozen=True, slots=True)
 class Throughputs:
-    """Saturated throughput in bit/s, by number of stations and run, beside Bianchi's."""
+    """Saturated throughput in bit/s, by number of stations and run, and Bianchi's."""
 
     runs: tuple[tuple[float, ...], ...]
     theory: tuple[float, ...]
@@ -47,13 +47,13 @@ class Throughputs:
 
     @property
     def close(self) -> bool:
-        """Within 1 % for one station and 3 % for more."""
+        """Whether the errors are within 1 % for one station and 3 % for more."""
         limits = [MOST_ERROR_ALONE if n == 1 else MOST_ERROR for n in STATIONS]
         return all(abs(error) <= limit for error, limit in zip(self.errors, limits, strict=True))
 
 
 def crowd(stations: int, seed: int, wait_after_loss: bool, duration_s: float = DURATION_S) -> Crowd:
-    """Datagrams of 1000 bytes, with 28 bytes of UDP and IP headers, over the street grid's medium access."""
+    """Return stations that send 1000 bytes with 28 bytes of UDP and IP headers by the street grid's MAC."""
     headers_bytes = STREET.scheme.headers_bytes
     nodes = NodesConfig(
         payload_bytes=STREET.scheme.image_bytes + headers_bytes, header_bytes=headers_bytes, spacing_m=10.0
@@ -65,7 +65,7 @@ def crowd(stations: int, seed: int, wait_after_loss: bool, duration_s: float = D
 def crowd_runs(
     folder: Path, scheduler: str | None
 ) -> Generator[Progress, None, tuple[Throughputs, Throughputs]]:
-    """By the standard, with an EIFS after a collision, and as Bianchi assumes, without one."""
+    """Run by the standard, with an EIFS after a collision, and as Bianchi assumes, without one."""
     tasks = [crowd(n, seed, wait) for wait in (True, False) for n in STATIONS for seed in range(RUNS)]
     found = yield from iterate_trials("C32, saturated stations", saturated, tasks, folder, scheduler)
     bps = [float(values["throughput_bps"] or 0.0) for values in found]
@@ -108,7 +108,7 @@ def _c32(runs: tuple[Throughputs, Throughputs]) -> Outcome:
 
 
 def _setup_rows() -> list[tuple[str, str | float, str | float]]:
-    """The radio by the thesis and by the preset."""
+    """Return rows of the radio in the thesis and in the preset."""
     return [
         ("medium access", "ieee80211b", STREET.mac.kind),
         ("RTS/CTS", "no", "yes" if STREET.mac.rts else "no"),

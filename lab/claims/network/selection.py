@@ -1,8 +1,8 @@
-"""C36: M of N cameras, chosen so that together they see the most surface (SPEC 6.3).
+"""C36: the choice of M of N cameras that together see the most surface (SPEC 6.3).
 
-Each scene is a floor with spheres on it, as plants on a bench, and cameras around it that look at its
-middle. Who sees what is geometry: a voxel is seen if it is in the picture, faces the camera and no sphere is
-in between.
+Each scene is a floor with spheres on it, like plants on a bench, and cameras around it that look at its
+middle. Visibility is geometric: a voxel is seen if it is in the picture, faces the camera and no sphere is in
+between.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ VOXELS_EACH = 80
 COS_HALF_VIEW = np.cos(np.radians(30.0))
 REFERENCE_M = 1.5
 SIZES_BYTES = (200_000.0, 921_615.0)
-"""Least and largest size of a camera's image: coded, and as PPM."""
+"""Smallest and largest size of a camera's image: coded, and as PPM."""
 PROGRAMS = ("greedy", "greedy by cost", "nearest", "random")
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What the cameras of one scene see."""
+    """The cameras' views of one scene."""
 
     q: FloatArray
     """(N, V) visibility x resolution x incidence."""
@@ -49,7 +49,7 @@ class View:
 
 
 def make_view(seed: int) -> View:
-    """Spheres at random places, cameras at random places of a ring around them."""
+    """Return spheres at random places with cameras at random places of a ring around them."""
     rng = np.random.default_rng(seed)
     radii_m = rng.uniform(0.15, 0.4, SPHERES)
     centers_m = np.column_stack([rng.uniform(-1.2, 1.2, (SPHERES, 2)), radii_m])
@@ -81,7 +81,7 @@ def behind_a_sphere(
     centers_m: FloatArray,
     radii_m: FloatArray,
 ) -> BoolArray:
-    """(N, V) whether a sphere is passed before the voxel is reached."""
+    """Return (N, V) whether the line of sight meets a sphere before the voxel."""
     hidden = np.zeros(lengths_m.shape, bool)
     for center_m, radius_m in zip(centers_m, radii_m, strict=True):
         to_center_m = center_m - cameras_m
@@ -93,9 +93,9 @@ def behind_a_sphere(
 
 
 def shares(view: View, seed: int) -> FloatArray:
-    """(programs, N) what M cameras of each program are worth, M from 1 to N, as a share of all together.
+    """Return (programs, N) value of the M cameras of each program, M from 1 to N, over that of all.
 
-    The program that heeds the costs chooses no M: it may spend M times the mean cost of a camera.
+    The program with costs does not fix M: it may spend M times the mean cost of a camera.
     """
     whole = all_cameras(view.q).value
     rng = np.random.default_rng((seed, 1))
@@ -137,7 +137,7 @@ def _c36(seeds: int = SEEDS) -> Outcome:
 
 
 def _chart(found: FloatArray) -> Chart:
-    """Shares over M with their intervals."""
+    """Return a chart of the shares over M with their intervals."""
     m = range(1, found.shape[2] + 1)
     curves = tuple(
         curve(program, m, [found[:, row, column - 1] for column in m]) for row, program in enumerate(PROGRAMS)

@@ -1,8 +1,8 @@
 """C30, C31 and C33 to C35: images collected from vehicles on a street grid (Table 4.7, Figure 4.10).
 
 The schemes' formulas are our reconstruction (SPEC 6.2) of Bruno & Nurchis, "Efficient data collection in
-multimedia vehicular sensing platforms" (arXiv 1311.6013), of which only the abstract and the first lines
-could be read; every exhibit says so.
+multimedia vehicular sensing platforms" (arXiv 1311.6013), of which only the abstract and the first lines were
+available; every exhibit states this.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ CROWDED = tuple(objects for objects in OBJECTS if objects >= 20)
 
 
 def large_images(folder: Path, scheduler: str | None) -> Generator[Progress, None, Found]:
-    """All schemes with images of 1,000 and of 30,000 bytes, a quarter of an hour each after the warm-up."""
+    """Run all schemes with images of 1,000 and 30,000 bytes, a quarter of an hour each after the warm-up."""
     sizes = (STREET.scheme.image_bytes, LARGE_BYTES)
     cases = [Case(scheme, LARGE_OBJECTS, None, size) for size in sizes for scheme in SCHEMES]
     return (yield from run_cases("C30, larger images", cases, folder, scheduler, LARGE_HORIZON_S))
 
 
 def least_jpeg_bytes(width_px: int, height_px: int) -> int:
-    """The smallest JPEG file of that size: one colour, with the best tables for it."""
+    """Return the size of the smallest JPEG file of this image size: one colour, with optimal tables."""
     image = np.full((height_px, width_px, 3), 128, np.uint8)
     options = [cv2.IMWRITE_JPEG_QUALITY, 1, cv2.IMWRITE_JPEG_OPTIMIZE, 1]
     return len(cv2.imencode(".jpg", image, options)[1])

@@ -1,6 +1,6 @@
-"""The study behind Table 4.7 and Figure 4.10: schemes, numbers of vehicles and k (SPEC 6.2).
+"""The study of Table 4.7 and Figure 4.10: schemes, numbers of vehicles and k (SPEC 6.2).
 
-Five runs of five hours for each case, the first half hour left out. All cases share their seeds.
+Each case has five runs of five hours, without the first half hour. All cases use the same seeds.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ STREET = PRESETS["street-grid"]
 SCHEMES: tuple[SchemeName, ...] = ("baseline", "greedy", "pdc")
 OBJECTS = (10, 20, 40, 80, 120)
 CAPS = (3, 5, 10, 20, None)
-"""Values of k; None does not limit it."""
+"""Values of k; None is unlimited."""
 CAPPED_OBJECTS = 40
 RUNS = 5
 
@@ -32,13 +32,13 @@ class Case:
 
     scheme: SchemeName
     objects: int
-    """Vehicles."""
+    """Number of vehicles."""
     k: int | None = None
     """Most ids in a request of greedy."""
     image_bytes: int = STREET.scheme.image_bytes
 
     def config(self, horizon_s: float = STREET.run.horizon_s) -> NetworkConfig:
-        """What its runs are made from."""
+        """Return the config of its runs."""
         scheme = replace(STREET.scheme, name=self.scheme, k=self.k, image_bytes=self.image_bytes)
         street = replace(STREET.street, vehicles=self.objects)
         return replace(STREET, scheme=scheme, street=street, run=replace(STREET.run, horizon_s=horizon_s))
@@ -49,13 +49,13 @@ Found = dict[Case, list[Values]]
 
 
 def standard_cases() -> tuple[Case, ...]:
-    """Every scheme with every number of vehicles, and greedy with every k."""
+    """Return every scheme with every number of vehicles, and greedy with every k."""
     grid = [Case(scheme, objects) for objects in OBJECTS for scheme in SCHEMES]
     return tuple(dict.fromkeys([*grid, *(Case("greedy", CAPPED_OBJECTS, k) for k in CAPS)]))
 
 
 def street_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Found]:
-    """The whole study."""
+    """Run the whole study."""
     return (yield from run_cases("C33 to C35, street grid", standard_cases(), folder, scheduler))
 
 
@@ -67,7 +67,7 @@ def run_cases(
     horizon_s: float = STREET.run.horizon_s,
     runs: int = RUNS,
 ) -> Generator[Progress, None, Found]:
-    """Runs of every case; the long ones begin first, so that the cores end together."""
+    """Run every case; the long runs start first, so that all cores finish at about the same time."""
     order = sorted(cases, key=lambda case: case.objects * case.image_bytes, reverse=True)
     tasks = [run for case in order for run in replications(case.config(horizon_s), runs)]
     found = yield from iterate_trials(stage, street_values, tasks, folder, scheduler)
@@ -78,10 +78,10 @@ def run_cases(
 
 
 def values(found: Found, case: Case, metric: str) -> list[float]:
-    """One metric of a case's runs that have it."""
+    """Return one metric of a case's runs that have it."""
     return [float(value) for run in found[case] if (value := run[metric]) is not None]
 
 
 def mean(found: Found, case: Case, metric: str) -> float:
-    """Its mean over the runs."""
+    """Return the metric's mean over the runs."""
     return interval(values(found, case, metric))[0]

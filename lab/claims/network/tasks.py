@@ -1,6 +1,6 @@
-"""The trials of the network's claims: single runs, each a function of its config alone.
+"""The trials of the network's claims: single runs, each a function of its config only.
 
-Little is imported here, so that the processes that run them start quickly.
+This module imports little, so that the processes of the trials start quickly.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from network_sim.types import EventKind, to_s
 from packetmesh.memory import peak_memory_bytes
 
 Values = dict[str, float | None]
-"""What a run gives, by name; None where it gives none."""
+"""Values of a run by name; None for a missing value."""
 
 STREET_METRICS = (
     "images_per_minute",
@@ -40,12 +40,12 @@ class Crowd:
     duration_s: float
     seed: int
     wait_after_loss: bool
-    """After a collision stations wait for an EIFS, as the standard says; Bianchi's do not."""
+    """Whether stations wait for an EIFS after a collision, as in the standard; Bianchi's do not."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimedRun:
-    """One run and what it cost; rates are those of one core."""
+    """One run and its cost; rates are per core."""
 
     scheme: str
     seed: int
@@ -53,15 +53,15 @@ class TimedRun:
     elapsed_s: float
     simulated_s: float
     events: int
-    """Lines of the trace, kept or counted."""
+    """Lines of the trace, stored or only counted."""
     simulated_s_per_s: float
     events_per_s: float
     peak_memory_bytes: int
-    """Of its process so far."""
+    """Peak memory of its process so far."""
 
 
 def transfer(config: NetworkConfig) -> Values:
-    """When the last image was complete at the sink; None if the run ended before."""
+    """Return when the last image was complete at the sink; None if the run ended before."""
     trace = simulate(config)
     arrived_ns = trace.events.of(EventKind.ARRIVE).t_ns
     complete = len(arrived_ns) == config.nodes.count * config.nodes.images
@@ -69,19 +69,19 @@ def transfer(config: NetworkConfig) -> Values:
 
 
 def saturated(task: Crowd) -> Values:
-    """What a crowd gets through."""
+    """Return the throughput and delivery ratio of saturated stations."""
     got = saturation(task.config, task.stations, task.duration_s, task.seed, task.wait_after_loss)
     return {"throughput_bps": got.throughput_bps, "delivery_ratio": got.delivery_ratio}
 
 
 def street_values(config: NetworkConfig) -> Values:
-    """Those metrics of one run that the claims are about."""
+    """Return the metrics of one run that the claims use."""
     found = measured(config)
     return {name: found[name].value if name in found else None for name in STREET_METRICS}
 
 
 def timed_run(config: NetworkConfig) -> TimedRun:
-    """Simulate, with a clock."""
+    """Simulate and measure the time."""
     started = time.perf_counter()
     trace = simulate(config)
     elapsed_s = time.perf_counter() - started

@@ -1,1 +1,1 @@
-"""The benchmark of registration (SPEC 4.7): random rooms, the same start for all methods, and statistics."""
+"""The registration benchmark (SPEC 4.7): random rooms, equal starts for all methods, and statistics."""

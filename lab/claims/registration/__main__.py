@@ -1,4 +1,4 @@
-"""``python -m lab.claims.registration FOLDER``: choose the parameters again, on rooms of their own."""
+"""``python -m lab.claims.registration FOLDER``: tune the methods' parameters again, in separate rooms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ logger = logging.getLogger(__name__)
 
 
 def main() -> None:
-    """Tune and write the module ``tuned``."""
+    """Tune, and write the module ``tuned``."""
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     parser = argparse.ArgumentParser(prog="python -m lab.claims.registration")
     parser.add_argument("folder", type=Path, help="keeps the trials, so that an interrupted run resumes")

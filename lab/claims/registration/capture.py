@@ -1,4 +1,4 @@
-"""Capture range: from how far away a registration still converges to the truth (SPEC 4.7, 4.8)."""
+"""Capture range: the starts from which a registration still converges to the truth (SPEC 4.7, 4.8)."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ CAPTURED_M = 0.05
 
 @dataclass(frozen=True, slots=True)
 class CaptureTask:
-    """The map of one entrant in one room."""
+    """The capture map of one entrant in one room."""
 
     condition: Condition
-    """Its clouds."""
+    """Condition of the clouds."""
     room: int
-    """Chooses the axes and directions of the starts, too; the same ones for every entrant."""
+    """Room, which also selects the axes and directions of the starts, equal for every entrant."""
     entrant: Entrant
     gate_by_start: bool
-    """The gate is twice the translation, if that is wider than the entrant's (SPEC 4.4 sets T_d so); else it
-    is the entrant's."""
+    """Whether the gate is twice the translation, if that is wider than the entrant's (SPEC 4.4 sets T_d so);
+    otherwise it is the entrant's."""
     max_points: int
     rotations_deg: tuple[float, ...] = ROTATIONS_DEG
-    """How far to turn, any way about the source's centre."""
+    """Rotations of the starts, about any axis through the source's centre."""
     translations_m: tuple[float, ...] = TRANSLATIONS_M
-    """How far to move, for each rotation."""
+    """Translations of the starts, for each rotation."""
 
 
 def map_capture(task: CaptureTask) -> list[dict[str, Any]]:
-    """Register from one start for every rotation and translation: what became of each, as plain values.
+    """Register from one start for every rotation and translation; return the outcomes as plain values.
 
-    ``translation_error_m`` is that of the source's centre; captured is what ends within 1.5 degrees and 5 cm
+    ``translation_error_m`` is that of the source's centre; captured are results within 1.5 degrees and 5 cm
     of the truth.
     """
     case = make_case(task.condition, task.room).thinned(task.max_points)
@@ -55,7 +55,7 @@ def map_capture(task: CaptureTask) -> list[dict[str, Any]]:
             rng = np.random.default_rng([task.room, row, column])
             T = wrong_start(case.T_true, points_m, rotation_deg, translation_m, rng)
             gate_m = max(config.gate_m, 2.0 * translation_m) if task.gate_by_start else config.gate_m
-            with suppress(PacketMeshError):  # not one pair is near enough to begin: the start stays
+            with suppress(PacketMeshError):  # without any pair near enough the start stays
                 T = register(
                     case.source, case.target, replace(config, gate_m=gate_m), T, method=method
                 ).T_target_source

@@ -1,4 +1,4 @@
-"""The benchmark's conditions: two clouds of a random room, their true pose and a wrong one to start from."""
+"""Cases of the benchmark: two clouds of a random room, their true pose and a wrong start pose."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ from pipeline.types import DepthMap, FloatArray, PointCloud, PointSource, RgbdFr
 Clouds = Literal["inferred", "sensor", "fused"]
 
 NODE_REACH_M = 1.0 / (2.0 * np.sin(np.radians(12.5)))
-"""Cameras at this distance from the middle are 1 m apart at an angle of 25 degrees (SPEC 4.8)."""
+"""Distance from the middle at which cameras 25 degrees apart are 1 m from each other (SPEC 4.8)."""
 EDGE_BLUR_PX = 1.5
-"""A network's depth edges are not sharp; blurred is 1 / z, which leaves planes planes."""
+"""Blur of depth edges, as in a network's depth; 1 / z is blurred, which leaves planes planar."""
 PARTNER_M = 0.05
 """A point with another this near at the true pose belongs to the overlap."""
 
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """What is registered to what, and from how far away."""
+    """The two kinds of clouds, their degradation, and the start error."""
 
     name: str
     label: str
     clouds: Clouds
     """``inferred``: a node's complete cloud onto its sensor cloud; else one node onto its neighbour, with
-    their sensor clouds, or with the complete clouds filling the sensor's holes."""
+    sensor clouds, or with complete clouds that fill the sensor's holes."""
     bias: float = 0.0
     """Relative depth bias of the complete cloud."""
     holes: float = 1.0
-    """The sensor's holes are made this many times as large."""
+    """Factor by which the sensor's holes are enlarged."""
     outliers: float = 0.0
     """Share of the sensor cloud that is replaced by outliers."""
     start_deg: float = 3.0
     start_m: float = 0.06
     angle_deg: float = 25.0
-    """Between the directions of two nodes."""
+    """Angle between the directions of two nodes."""
     overlap: float | None = None
-    """Share of the source with a partner in the target; None leaves it as it comes, about 0.6."""
+    """Share of the source with a partner in the target; None leaves it unchanged, about 0.6."""
 
     @property
     def gate_m(self) -> float:
@@ -80,20 +80,20 @@ CONDITIONS: dict[str, Condition] = {
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One registration to be done, with its truth."""
+    """One registration problem with its truth."""
 
     source: PointCloud
-    """Moves; in its node's frame."""
+    """The cloud that moves, in its node's frame."""
     target: PointCloud
     T_true: FloatArray
     """(4, 4) T_target_source."""
     T_init: FloatArray
-    """(4, 4) where every method starts."""
+    """(4, 4) start of every method."""
     overlap: float
     """Share of the source's points with a partner within 5 cm at the true pose."""
 
     def thinned(self, max_points: int) -> Case:
-        """With random subsets of both clouds, so that every method gets the same points."""
+        """Return the case with random subsets of both clouds, so that every method gets the same points."""
         return replace(
             self,
             source=random_subset(self.source, max_points, 1),
@@ -102,7 +102,7 @@ class Case:
 
 
 def make_case(condition: Condition, room: int) -> Case:
-    """The condition's clouds, whole, in room number ``room``; the same arguments give the same case."""
+    """Return the condition's complete clouds in room number ``room``; equal arguments give equal cases."""
     rng = np.random.default_rng([room, 47])
     if condition.clouds == "inferred":
         sensor, inferred, _ = _node(box_room(room), 0, condition, room, rng)
@@ -123,7 +123,7 @@ def make_case(condition: Condition, room: int) -> Case:
 def wrong_start(
     T_true: FloatArray, points_m: FloatArray, angle_deg: float, distance_m: float, rng: np.random.Generator
 ) -> FloatArray:
-    """(4, 4) the true pose turned about the (N, 3) points' centre and moved, both any way."""
+    """Return the (4, 4) true pose, randomly rotated about the (N, 3) points' centre and shifted."""
     axis, shift_m = rng.normal(size=(2, 3))
     rotation = rotation_exp(np.radians(angle_deg) * axis / np.linalg.norm(axis))
     center_m = apply(T_true, points_m.mean(axis=0, keepdims=True))[0]
@@ -132,7 +132,7 @@ def wrong_start(
 
 
 def random_subset(cloud: PointCloud, count: int, seed: int) -> PointCloud:
-    """At most ``count`` points, in their order."""
+    """Return at most ``count`` points, in their order."""
     if len(cloud) <= count:
         return cloud
     chosen = np.random.default_rng([seed, 4000]).choice(len(cloud), count, replace=False)
@@ -142,7 +142,7 @@ def random_subset(cloud: PointCloud, count: int, seed: int) -> PointCloud:
 def _node_cloud(
     scene: Scene, index: int, condition: Condition, room: int, rng: np.random.Generator
 ) -> tuple[PointCloud, FloatArray]:
-    """What takes part of one of two nodes, and its true T_world_camera."""
+    """Return the cloud of one of two nodes that is registered, and its true T_world_camera."""
     sensor, inferred, T_world_camera = _node(scene, index, condition, room, rng)
     if condition.clouds == "sensor":
         return sensor, T_world_camera
@@ -152,7 +152,7 @@ def _node_cloud(
 def _node(
     scene: Scene, index: int, condition: Condition, room: int, rng: np.random.Generator
 ) -> tuple[PointCloud, PointCloud, FloatArray]:
-    """Sensor cloud and complete cloud of one node, degraded, and its true T_world_camera."""
+    """Return sensor cloud and complete cloud of one node, degraded, and its true T_world_camera."""
     T_world_camera = scene.cameras[index]
     view = render(scene, scene.intrinsics, T_world_camera, "fast", rng)
     depth = sense_depth(view, scene.intrinsics, rng)
@@ -167,7 +167,7 @@ def _node(
 
 
 def _blurred_edges(z_m: FloatArray) -> FloatArray:
-    """(H, W) depth whose edges run over a few pixels; unknown where the true depth is."""
+    """Return (H, W) depth whose edges extend over a few pixels; unknown where the true depth is."""
     known = np.isfinite(z_m)
     inverse_m = np.where(known, 1.0 / np.where(known, z_m, 1.0), 0.0).astype(np.float64)
     weight = cv2.GaussianBlur(known.astype(np.float64), (0, 0), EDGE_BLUR_PX)
@@ -176,7 +176,7 @@ def _blurred_edges(z_m: FloatArray) -> FloatArray:
 
 
 def partnered(source: PointCloud, target: PointCloud, T_true: FloatArray) -> np.ndarray:
-    """(N,) whether each source point has a target point near it at the true pose."""
+    """Return (N,) whether each source point has a target point near it at the true pose."""
     tree = cKDTree(target.points_m)
     return tree.query(apply(T_true, source.points_m), distance_upper_bound=PARTNER_M)[0] <= PARTNER_M
 
@@ -184,7 +184,7 @@ def partnered(source: PointCloud, target: PointCloud, T_true: FloatArray) -> np.
 def _with_overlap(
     source: PointCloud, target: PointCloud, T_true: FloatArray, overlap: float, seed: int
 ) -> tuple[PointCloud, PointCloud]:
-    """Both clouds with just that overlap: the target cropped at one side, or lone source points dropped."""
+    """Return both clouds with exactly this overlap: crop the target, or drop unpaired source points."""
     shared = partnered(source, target, T_true)
     if shared.mean() < overlap:
         lone = np.flatnonzero(~shared)

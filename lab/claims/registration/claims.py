@@ -1,4 +1,4 @@
-"""C16 to C20: what the thesis says of CEICP, on one benchmark that the five share (SPEC 8)."""
+"""C16 to C20: the thesis's claims about CEICP, tested on one common benchmark (SPEC 8)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from pipeline.types import FloatArray
 
 ONE_NODE = tuple(name for name, condition in CONDITIONS.items() if condition.clouds == "inferred")
 BEATEN = ("icp", "picp", "ricp", "mricp")
-"""Rivals that C16 says CEICP beats; the others are reported."""
+"""Rivals that CEICP beats according to C16; others are only reported."""
 REPORTED = (
     *("ficp", "hicp", "icp-gated", PIXEL_PAIRS, "ceicp-a plane"),
     *("open3d-gicp", "small-gicp", "small-gicp-staged", "fast-robust-icp"),
@@ -47,7 +47,7 @@ MEASURES = ("ratio", "p")
 
 
 def registration_results(folder: Path, scheduler: str | None) -> Generator[Progress, None, Results]:
-    """The whole benchmark."""
+    """Run the whole benchmark."""
     trials = yield from iterate_trials("C16 to C20, registration", run_case, case_tasks(), folder, scheduler)
     cells = yield from iterate_trials("C20, capture range", map_capture, capture_tasks(), folder, scheduler)
     return Results(chain(*trials), chain(*cells))
@@ -105,13 +105,13 @@ def _c16(results: Results) -> Outcome:
 
 
 def _backward(comparisons: Sequence[Comparison]) -> str:
-    """The rivals of the claim, and gated ICP, matched the other way round."""
+    """Return the claim's rivals, and gated ICP, matched in the reverse direction, as text."""
     shown = (*BEATEN, "icp-gated")
     return ", ".join(f"{c.rival} {c.ratio:.2f} ({c.outcome})" for c in comparisons if c.rival in shown)
 
 
 def _losses(results: Results) -> str:
-    """Where CEICP-A's median error is above that of ICP, of gated ICP and of pixel pairs, by metric."""
+    """Return where CEICP-A's median error is above that of ICP, gated ICP and pixel pairs, by metric."""
     parts = []
     for ours in ("ceicp-a", "ceicp-a plane"):
         by_rival = {
@@ -154,7 +154,7 @@ def _c17(results: Results) -> Outcome:
 
 
 def ratio_of_medians_ci95(a: FloatArray, b: FloatArray) -> tuple[float, float]:
-    """95 % bootstrap interval of median(a) / median(b) over paired cases."""
+    """Return the 95 % bootstrap interval of median(a) / median(b) over paired cases."""
     pairs = np.stack([a, b], axis=1)
     return bootstrap_ci95(pairs, statistic=lambda pairs, axis: np.divide(*np.median(pairs, axis=axis).T))
 
@@ -229,7 +229,7 @@ def _c20(results: Results) -> Outcome:
 
 
 def _numbers(name: str, comparisons: Sequence[Comparison]) -> dict[str, float]:
-    """Ratios and p values by name."""
+    """Return ratios and p values by name."""
     return {f"{measure}_{name}_{c.rival}": getattr(c, measure) for c in comparisons for measure in MEASURES}
 
 

@@ -1,4 +1,4 @@
-"""The benchmark's pictures: convergence (Fig. 4.9) and capture range."""
+"""The benchmark's charts: convergence (Fig. 4.9) and capture range."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SECONDS = np.linspace(0.0, 0.4, 21)
 
 
 def convergence_charts(results: Results, condition: str) -> tuple[Chart, ...]:
-    """Point error and average Hausdorff distance against iterations, and point error against seconds."""
+    """Chart point error and average Hausdorff distance over iterations, and point error over seconds."""
     label = CONDITIONS[condition].label
     iterations = np.arange(LAST_ITERATION + 1.0)
     sampled = np.array(CURVE_ITERATIONS, float)
@@ -58,18 +58,18 @@ def convergence_charts(results: Results, condition: str) -> tuple[Chart, ...]:
 
 
 def held(values: Sequence[float], length: int) -> FloatArray:
-    """(length,) the values, the last one repeated."""
+    """Return (length,) the values, the last one repeated."""
     return np.array(values)[np.minimum(np.arange(length), len(values) - 1)]
 
 
 def error_by_time(trial: dict) -> FloatArray:
-    """(T,) point error that a run has reached at each of ``SECONDS``."""
+    """Return (T,) point error that a run has reached at each of ``SECONDS``."""
     errors_cm = np.array(trial["curve_error_cm"])
     return errors_cm[np.searchsorted(trial["elapsed_s"], SECONDS, side="right")]
 
 
 def capture_maps(results: Results) -> tuple[HeatMap, ...]:
-    """For every entrant, the share of captured rooms, by the start's rotation and translation."""
+    """Return, for every entrant, the share of captured rooms by the start's rotation and translation."""
     maps = []
     for entrant in dict.fromkeys(cell["entrant"] for cell in results.cells):
         captured = captured_shares(results, entrant)
@@ -92,7 +92,7 @@ def capture_maps(results: Results) -> tuple[HeatMap, ...]:
 
 
 def captured_shares(results: Results, entrant: str) -> dict[tuple[float, float], float]:
-    """Share of the rooms captured from each start: (rotation in degrees, translation in metres)."""
+    """Return the share of rooms captured from each start: (rotation in degrees, translation in metres)."""
     found: dict[tuple[float, float], list[bool]] = {}
     for cell in results.cells:
         if cell["entrant"] == entrant:

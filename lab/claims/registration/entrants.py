@@ -1,4 +1,4 @@
-"""A method, a variant of one or another program, with its parameters."""
+"""Entrants of the benchmark: a method, a variant or another program, with its parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.registration.weighting import PairWeighting
 from pipeline.types import PointCloud
 
 PIXEL_PAIRS = "pixel-pairs"
-"""The baseline that matches nothing: SPEC 4.6."""
+"""The baseline without matching: SPEC 4.6."""
 GATE_SCALE = "gate_scale"
 """The parameter that multiplies the condition's gate."""
 _CONFIG_FIELDS = {part.name for part in fields(RegistrationConfig)}
@@ -20,21 +20,21 @@ _CONFIG_FIELDS = {part.name for part in fields(RegistrationConfig)}
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """One way to register: a method with a metric, a variant of one, another program, or pixel pairs."""
+    """A way to register: a method with a metric, a variant of one, another program, or pixel pairs."""
 
     method: str
     """Name in METHODS, VARIANTS or PEERS, or ``PIXEL_PAIRS``."""
     metric: Metric = "point"
-    """Other programs have their own."""
+    """Metric; other programs have their own."""
     label: str = ""
-    """What the tables call it, if not by method and metric."""
+    """Name in the tables, if not that of method and metric."""
     settings: tuple[tuple[str, float | str], ...] = ()
     """Parameters that differ from the defaults: fields of the config, of the method's first state, or
     ``gate_scale``."""
 
     @property
     def name(self) -> str:
-        """Unique in a benchmark."""
+        """Name, unique in a benchmark."""
         return self.label or (self.method if self.metric == "point" else f"{self.method} plane")
 
     @property
@@ -43,11 +43,11 @@ class Entrant:
         return self.method in PEERS
 
     def scaled_gate_m(self, gate_m: float) -> float:
-        """The condition's gate times the entrant's own factor."""
+        """Return the condition's gate times the entrant's own factor."""
         return gate_m * float(dict(self.settings).get(GATE_SCALE, 1.0))
 
     def config(self, direction: Direction, gate_m: float, max_points: int) -> RegistrationConfig:
-        """The settings for one case."""
+        """Return the settings for one case."""
         plain = RegistrationConfig(
             method=VARIANTS[self.method][0] if self.method in VARIANTS else self.method,
             metric=self.metric,
@@ -58,7 +58,7 @@ class Entrant:
         return replace(plain, **{k: v for k, v in self.settings if k in _CONFIG_FIELDS})  # type: ignore[arg-type]
 
     def start(self) -> MethodStart:
-        """What makes its first state, with the settings that belong to it."""
+        """Return the function that makes its first state, with the entrant's settings."""
         tuned_here = self.method in TUNABLE and bool(self.settings)
         begin = (
             TUNABLE[self.method]

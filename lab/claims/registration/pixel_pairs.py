@@ -1,4 +1,4 @@
-"""The baseline of one camera's two clouds: their pixels are known, so that nothing has to be matched."""
+"""The baseline for one camera's two clouds: points are paired by pixel, without matching."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pipeline.types import FloatArray, IntArray, PointCloud
 LEAST_PAIRS = 6
 MAX_ITERATIONS = 50
 TUKEY_WIDTH = 4.685 * 1.4826
-"""Of the median distance: beyond it a pair weighs nothing."""
+"""Cutoff over the median distance: pairs beyond it have no weight."""
 STILL = 1e-9
-"""Largest change of the pose's entries that ends it."""
+"""Largest change of the pose's entries at convergence."""
 
 
 def pixel_pair_poses(source: PointCloud, target: PointCloud) -> tuple[FloatArray, ...]:
-    """Robust Procrustes on the pairs of one pixel, by Tukey's biweight (SPEC 4.6).
+    """Robust Procrustes on pairs of equal pixels, by Tukey's biweight (SPEC 4.6).
 
     Args:
-        source: with the pixels that its points come from.
+        source: with the pixels of its points.
         target: of the same camera.
 
     Returns:
@@ -53,13 +53,13 @@ def pixel_pair_poses(source: PointCloud, target: PointCloud) -> tuple[FloatArray
 
 
 def shared_pixels(source: PointCloud, target: PointCloud) -> tuple[IntArray, IntArray]:
-    """(M,) rows of either cloud whose points come from the same pixel."""
+    """Return (M,) rows of both clouds whose points come from the same pixel."""
     _, source_rows, target_rows = np.intersect1d(_keys(source), _keys(target), return_indices=True)
     return source_rows, target_rows
 
 
 def _keys(cloud: PointCloud) -> IntArray:
-    """(N,) one number for each pixel."""
+    """Return (N,) one number for each pixel."""
     if cloud.pixels is None:
         raise ReconstructionError("Pixel pairs need clouds that know their pixels.")
     return cloud.pixels[:, 0].astype(np.int64) << 32 | cloud.pixels[:, 1].astype(np.int64)

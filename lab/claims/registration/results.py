@@ -12,11 +12,11 @@ from pipeline.types import FloatArray
 
 
 class Results:
-    """Every trial of a benchmark; values of different entrants come in the same order of cases.
+    """Every trial of a benchmark; values of different entrants are in the same order of cases.
 
     Args:
-        trials: as ``run_case`` gives them, case by case.
-        cells: of the capture ranges.
+        trials: trials from ``run_case``, case by case.
+        cells: cells of the capture ranges.
     """
 
     def __init__(self, trials: Iterable[dict[str, Any]], cells: Iterable[dict[str, Any]] = ()) -> None:
@@ -28,18 +28,18 @@ class Results:
 
     @property
     def conditions(self) -> tuple[str, ...]:
-        """Those that were run, in order."""
+        """Conditions that were run, in order."""
         return tuple(dict.fromkeys(condition for condition, _, _ in self._trials))
 
     def entrants(self, conditions: Sequence[str], direction: Direction = "q2p") -> tuple[str, ...]:
-        """Those who took part in all of the conditions."""
+        """Return the entrants that took part in all these conditions."""
         everyone = dict.fromkeys(entrant for _, _, entrant in self._trials)
         return tuple(e for e in everyone if all((c, direction, e) in self._trials for c in conditions))
 
     def trials(
         self, entrant: str, conditions: Sequence[str], direction: Direction = "q2p"
     ) -> list[dict[str, Any]]:
-        """An entrant's trials, condition by condition, room by room; empty if it did not take part."""
+        """Return an entrant's trials, condition by condition, room by room; empty if it did not take part."""
         return [t for c in conditions for t in self._trials.get((c, direction, entrant), [])]
 
     def values(
@@ -49,6 +49,6 @@ class Results:
         name: str = "point_error_cm",
         direction: Direction = "q2p",
     ) -> FloatArray:
-        """(N,) one number of every trial; NaN where there is none."""
+        """Return (N,) one number of every trial; NaN without one."""
         found = (trial[name] for trial in self.trials(entrant, conditions, direction))
         return np.array([np.nan if value is None else float(value) for value in found])

@@ -14,32 +14,32 @@ from pipeline.registration.methods import METHODS
 from pipeline.registration.peers import available_peers
 
 ROOMS = range(100, 130)
-"""Seeds of ``box_room``; rooms before them were looked at while the benchmark was made."""
+"""Seeds of ``box_room``; lower seeds were used while the benchmark was developed."""
 MAX_POINTS = 4000
 CAPTURE_ROOMS = 6
 CURVE_CONDITIONS = ("easy", "nodes-sensor")
-"""Where convergence curves are recorded (Fig. 4.9)."""
+"""Conditions with recorded convergence curves (Fig. 4.9)."""
 CURVED = ("icp", "picp", "ricp", "mricp", "ficp", "hicp", "ceicp-n", "ceicp-a", "icp plane", "ceicp-a plane")
-"""The entrants with curves: the methods of Table 4.4, and the plane metric."""
+"""Entrants with curves: the methods of Table 4.4, and the plane metric."""
 ABLATED = ("easy", "bias-3", "holes-x3", "outliers-20", "nodes-sensor", "nodes-fused")
-"""Where the ablations run."""
+"""Conditions of the ablations."""
 REVERSED = (
     *("icp", "icp-gated", "picp", "ricp", "mricp", "ficp", "hicp", "ceicp-literal", "ceicp-n", "ceicp-a"),
     *("icp plane", "icp-gated plane", "ceicp-n plane", "ceicp-a plane"),
 )
-"""The entrants that match target to source as well: Table 4.4, and the plane metric beside it. The overlap
-series has one direction."""
+"""Entrants that also match target to source: Table 4.4 and the plane metric. The overlap series has one
+direction."""
 OVERLAPPING = ("ficp", "ceicp-a")
-"""Methods that run point to point on the overlap series as well; those without a gate are lost there."""
+"""Methods that also run point to point on the overlap series; those without a gate fail there."""
 SLOW = {
     "kernel-correlation": ("easy", "nodes-sensor"),
     "ceicp-ml": ("easy", "holes-x3", "nodes-sensor"),
 }
-"""Methods that take several times as long as the rest, and the conditions that they take part in."""
+"""Methods that take several times as long as others, and their conditions."""
 PLANE = ("icp", "icp-gated", "picp", "ficp", "fast-robust-icp", "ceicp-n", "ceicp-a", "ceicp-r")
-"""Methods that run with the point-to-plane metric as well."""
+"""Methods that also run with the point-to-plane metric."""
 FAST_PEERS = ("open3d-plane", "open3d-gicp", "small-gicp", "small-gicp-staged", "small-vgicp-staged")
-"""Other programs that take well under a second; CPD takes minutes for a condition."""
+"""Other programs that take well under a second; CPD takes minutes per condition."""
 FIXED_GATE = "ceicp-n, T_d 0.3 m"
 CAPTURED = (
     (Entrant("icp"), True),
@@ -48,11 +48,11 @@ CAPTURED = (
     (Entrant("ceicp-n"), True),
     (Entrant("ceicp-a", "plane"), True),
 )
-"""The entrants whose capture range is mapped, and whether the gate grows with the start's distance."""
+"""Entrants with a capture map, and whether the gate grows with the start's distance."""
 
 
 def case_tasks() -> list[CaseTask]:
-    """A trial of each condition in each room, every entrant tuned."""
+    """Return a trial of each condition in each room, with tuned entrants."""
     lineups = {name: standard_lineup(condition) for name, condition in CONDITIONS.items()}
     return [
         CaseTask(CONDITIONS[name], room, lineup, MAX_POINTS, CURVED if name in CURVE_CONDITIONS else ())
@@ -62,7 +62,7 @@ def case_tasks() -> list[CaseTask]:
 
 
 def capture_tasks() -> list[CaptureTask]:
-    """The capture ranges in each of the first few rooms."""
+    """Return the capture ranges in each of the first few rooms."""
     return [
         CaptureTask(CONDITIONS["easy"], room, entrant, by_start, MAX_POINTS)
         for room in ROOMS[:CAPTURE_ROOMS]
@@ -71,10 +71,10 @@ def capture_tasks() -> list[CaptureTask]:
 
 
 def standard_lineup(condition: Condition) -> Lineup:
-    """The entrants of a condition.
+    """Return the entrants of a condition.
 
-    Both metrics everywhere, but on the overlap series, where few run point to point. A node's own two clouds
-    share their pixels, so that pixel pairs take part.
+    Both metrics run everywhere, except on the overlap series, where few run point to point. A node's own two
+    clouds share their pixels, so pixel pairs take part.
     """
     name, single = condition.name, condition.clouds == "inferred"
     everyone = [e for e in methods() if name in SLOW.get(e.method, CONDITIONS)]
@@ -91,7 +91,7 @@ def standard_lineup(condition: Condition) -> Lineup:
 
 
 def tuned(entrant: Entrant) -> Entrant:
-    """The entrant with the value that tuning chose for it, if it was tuned."""
+    """Return the entrant with its tuned value, if it was tuned."""
     if entrant.name not in TUNED:
         return entrant
     parameter, value, _ = TUNED[entrant.name]
@@ -99,18 +99,18 @@ def tuned(entrant: Entrant) -> Entrant:
 
 
 def methods(metric: Metric = "point") -> tuple[Entrant, ...]:
-    """Every method, and ICP with a gate, with one metric."""
+    """Return every method, and ICP with a gate, with one metric."""
     names = ("icp", "icp-gated", *(name for name in METHODS if name != "icp"))
     return tuple(Entrant(name, metric) for name in names if metric == "point" or name in PLANE)
 
 
 def peers() -> tuple[Entrant, ...]:
-    """The installed other programs that are fast enough."""
+    """Return the installed other programs that are fast enough."""
     return tuple(Entrant(name) for name in available_peers() if name in FAST_PEERS)
 
 
 def ablations(metric: Metric) -> tuple[Entrant, ...]:
-    """CEICP with a part taken out; the thesis's own formula only exists point to point."""
+    """Return CEICP variants without a part; the thesis's own formula only exists point to point."""
     name = "ceicp-a" if metric == "point" else "ceicp-a plane"
     shared = tuple(
         Entrant(f"ceicp-a-{part}", metric, f"{name}, {label}", _like(name))
@@ -132,5 +132,5 @@ def ablations(metric: Metric) -> tuple[Entrant, ...]:
 
 
 def _like(name: str) -> tuple[tuple[str, float | str], ...]:
-    """The tuned setting of another entrant."""
+    """Return the tuned setting of another entrant."""
     return ((TUNED[name][0], TUNED[name][1]),) if name in TUNED else ()

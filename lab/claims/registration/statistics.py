@@ -15,27 +15,27 @@ SIGNIFICANCE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One method against another, case by case."""
+    """One method compared with another, case by case."""
 
     rival: str
     ratio: float
-    """Median over the cases of our error over the rival's."""
+    """Median over cases of our error over the rival's."""
     win_rate: float
-    """Share of the cases with the smaller error; equal errors count half."""
+    """Share of cases with the smaller error; equal errors count half."""
     p: float
     """Two-sided Wilcoxon signed-rank test of the logarithms of the ratios, Holm-corrected by ``holm``."""
     cases: int
 
     @property
     def outcome(self) -> str:
-        """``better``, ``worse``, or ``tie`` when the test cannot tell them apart."""
+        """``better``, ``worse``, or ``tie`` if the test finds no significant difference."""
         if not self.p < SIGNIFICANCE:
             return "tie"
         return "better" if self.ratio < 1.0 else "worse"
 
 
 def compare(rival: str, ours: FloatArray, theirs: FloatArray) -> Comparison:
-    """Errors (N,) of two methods on the same cases; logarithms, so that no condition outweighs another."""
+    """Compare errors (N,) of two methods on the same cases, as logarithms: no condition outweighs another."""
     ours, theirs = np.asarray(ours, float), np.asarray(theirs, float)
     log_ratio = np.log(np.maximum(ours, 1e-12)) - np.log(np.maximum(theirs, 1e-12))
     p = float(wilcoxon(log_ratio).pvalue) if np.any(log_ratio) else 1.0
@@ -44,13 +44,13 @@ def compare(rival: str, ours: FloatArray, theirs: FloatArray) -> Comparison:
 
 
 def holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
-    """The same comparisons with p values corrected for their number (Holm 1979)."""
+    """Return the comparisons with p values corrected for their number (Holm 1979)."""
     adjusted = holm_p(np.array([comparison.p for comparison in comparisons])).tolist()
     return tuple(replace(comparison, p=p) for comparison, p in zip(comparisons, adjusted, strict=True))
 
 
 def holm_p(p: FloatArray) -> FloatArray:
-    """(m,) step-down adjusted p values: the k-th smallest times (m - k + 1), never decreasing, at most 1."""
+    """Return (m,) step-down adjusted p: the k-th smallest times (m - k + 1), never decreasing, at most 1."""
     order, adjusted = np.argsort(p, kind="stable"), np.empty(len(p))
     adjusted[order] = np.minimum(1.0, np.maximum.accumulate(np.arange(len(p), 0, -1) * p[order]))
     return adjusted

@@ -1,4 +1,4 @@
-"""The benchmark's tables: Table 4.4 filled in, the conditions, the comparisons, the ablations, the tuning."""
+"""The benchmark's tables: Table 4.4, the conditions, the comparisons, the ablations, the tuning."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ ABLATIONS: tuple[tuple[str, str, str], ...] = (
     ("scale held at T_d / 3, A plane", "ceicp-a plane, fixed sigma", "ceicp-a plane"),
     ("both directions, A plane", "ceicp-a plane, both directions", "ceicp-a plane"),
 )
-"""What is changed, the entrant with the change and the one without."""
+"""Description of the change, the entrant with it and the one without."""
 
 
 def table_4_4(results: Results) -> Table:
-    """The thesis's Table 4.4 beside the same seven methods here, and CEICP well posed."""
+    """Return the thesis's Table 4.4 with our results of the same seven methods and of well-posed CEICP."""
     conditions = ("easy", "bias-3", "holes-x3", "nodes-sensor")
     rows: list[tuple[str | float | None, ...]] = []
     for method in (*TABLE_4_4, *WELL_POSED):
@@ -70,7 +70,7 @@ def table_4_4(results: Results) -> Table:
 
 
 def conditions_table(results: Results, direction: Direction) -> Table:
-    """Median point error of every entrant in every condition that had this direction."""
+    """Return the median point error of every entrant in every condition with this direction."""
     conditions = [c for c in results.conditions if results.entrants((c,), direction)]
     rows = []
     for entrant in _plain(results, conditions, direction):
@@ -91,7 +91,7 @@ def conditions_table(results: Results, direction: Direction) -> Table:
 
 
 def comparison_table(title: str, ours: str, comparisons: Sequence[Comparison]) -> Table:
-    """Paired comparisons of one method with others."""
+    """Return paired comparisons of one method with others."""
     rows = tuple(
         (c.rival, c.ratio, f"{c.win_rate:.0%}", "< 1e-300" if c.p == 0.0 else f"{c.p:.2g}", c.outcome)
         for c in comparisons
@@ -114,7 +114,7 @@ def compared(
     quantity: str = "point_error_cm",
     direction: Direction = "q2p",
 ) -> tuple[Comparison, ...]:
-    """One method against each of the rivals that took part in all the conditions, Holm-corrected."""
+    """Compare one method with each rival that took part in all the conditions, Holm-corrected."""
     present = [rival for rival in rivals if rival in results.entrants(conditions, direction)]
     mine, *theirs = (results.values(who, conditions, quantity, direction) for who in (ours, *present))
     return holm([compare(rival, mine, errors) for rival, errors in zip(present, theirs, strict=True)])
@@ -123,7 +123,7 @@ def compared(
 def lost(
     results: Results, ours: str, rival: str, conditions: Sequence[str], direction: Direction = "q2p"
 ) -> list[str]:
-    """Labels of the conditions in which our median point error is above the rival's."""
+    """Return labels of the conditions in which our median point error is above the rival's."""
     return [
         CONDITIONS[condition].label
         for condition in conditions
@@ -133,7 +133,7 @@ def lost(
 
 
 def ablation_table(results: Results) -> Table:
-    """The error with a part changed over the error without, by condition."""
+    """Return the error with a changed part over the error without the change, by condition."""
     conditions = [c for c in results.conditions if any(results.trials(a, (c,)) for _, a, _ in ABLATIONS)]
     rows = []
     for change, changed, whole in ABLATIONS:
@@ -163,7 +163,7 @@ def ablation_table(results: Results) -> Table:
 
 
 def tuning_table() -> Table:
-    """What was tuned, on which values, and what was chosen."""
+    """Return the tuned parameters, the tried values and the choice."""
     rows = []
     for name, (parameter, value, scores) in TUNED.items():
         tried = "; ".join(f"{key:g}: {score:.3g}" for key, score in scores.items())
@@ -178,7 +178,7 @@ def tuning_table() -> Table:
 
 
 def _plain(results: Results, conditions: Sequence[str], direction: Direction) -> tuple[str, ...]:
-    """Entrants in any of the conditions, without the ablations."""
+    """Return the entrants in any of the conditions, without the ablations."""
     everyone = dict.fromkeys(e for c in conditions for e in results.entrants((c,), direction))
     return tuple(e for e in everyone if e not in {changed for _, changed, _ in ABLATIONS})
 
@@ -194,7 +194,7 @@ def _ratio(changed_cm: np.ndarray, whole_cm: np.ndarray) -> str:
 
 
 def _starts(results: Results, conditions: Sequence[str]) -> str:
-    """How wrong the starts are, and how far the node clouds overlap."""
+    """Return a sentence on the start errors and the overlap of node clouds."""
     parts = []
     for condition in conditions:
         trials = results.trials(results.entrants((condition,))[0], (condition,))

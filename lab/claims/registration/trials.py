@@ -21,14 +21,14 @@ from pipeline.surface.voxel import voxel_average
 from pipeline.types import FloatArray, PointCloud
 
 AHD_VOXEL_M = 0.01
-"""Both clouds are thinned to this spacing before their distance is taken (SPEC 4.7); at 8 cm the true pose
-has 4 to 5 cm already, and 2 cm of error add 0.6 (SPEC 4.10)."""
+"""Spacing to which both clouds are thinned before their distance is measured (SPEC 4.7); at 8 cm the true
+pose already has 4 to 5 cm, and 2 cm of error add 0.6 (SPEC 4.10)."""
 AHD_POINTS = 4000
-"""Most points of the overlap, on either side, over which the distance is averaged."""
+"""Most points of the overlap, in each cloud, over which the distance is averaged."""
 CURVE_ITERATIONS = (0, 1, 2, 3, 5, 8, 12, 20, 32, 50, 100)
-"""Where the convergence curves have the average Hausdorff distance; the point error they have everywhere."""
+"""Iterations at which curves have the average Hausdorff distance; the point error is at all iterations."""
 DIGITS = 6
-"""Decimals of a centimetre that are kept: far below any difference that matters."""
+"""Stored decimals of a centimetre, far below any relevant difference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +40,14 @@ class CaseTask:
     """Seed of ``box_room``."""
     lineup: Lineup
     max_points: int
-    """Both clouds are thinned to this many points for all entrants alike."""
+    """Number of points to which both clouds are thinned for all entrants."""
     curved: tuple[str, ...] = ()
-    """Names of the entrants whose error after every iteration is recorded as well."""
+    """Names of the entrants whose error after every iteration is also recorded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """An entrant's poses on a case, the start first."""
+    """An entrant's poses on a case, starting with the start pose."""
 
     poses: tuple[FloatArray, ...]
     iterations: int | None
@@ -68,31 +68,32 @@ class Ruler:
         self._source_tree, self._target_tree = cKDTree(source.points_m), cKDTree(target.points_m)
 
     def point_error_cm(self, T: FloatArray) -> float:
-        """As ``point_error_m``, by the second moments of all source points."""
+        """Return ``point_error_m`` in cm, from the second moments of all source points."""
         difference = (T - self._T_true)[:3]
         squared_m2 = np.trace(difference @ self._moments_m2 @ difference.T)
         return round(100.0 * float(np.sqrt(max(squared_m2, 0.0))), DIGITS)
 
     def ahd_cm(self, T: FloatArray) -> float:
-        """Average Hausdorff distance over what overlaps at the true pose: of points whose partners exist."""
+        """Return the average Hausdorff distance over points with a partner at the true pose."""
         onto_m = self._target_tree.query(apply(T, self._source_m))[0].mean()
         back_m = self._source_tree.query(apply(inverse(T), self._target_m))[0].mean()
         return round(50.0 * float(onto_m + back_m), DIGITS)
 
 
 def _overlapping_m(cloud: PointCloud, other: PointCloud, T_true: FloatArray) -> FloatArray:
-    """(N, 3) a random subset of the points that have a partner at the true pose."""
+    """Return (N, 3) a random subset of the points that have a partner at the true pose."""
     return random_subset(cloud.select(partnered(cloud, other, T_true)), AHD_POINTS, 0).points_m
 
 
 def run_case(task: CaseTask) -> list[dict[str, Any]]:
-    """How every entrant of the lineup did on the same points from the same start, as plain values.
+    """Return the results of every entrant of the lineup on the same points from the same start, as plain
+    values.
 
-    All but the times repeats bit for bit. ``k90`` is the number of iterations until 90 % of the error's drop,
-    None without a drop or for another program. The curves are empty where they are not asked for:
+    All but the times are reproducible bit by bit. ``k90`` is the number of iterations until 90 % of the
+    error's drop, None without a drop or for another program. Curves are empty unless requested:
     ``curve_error_cm`` is the point error after 0, 1, ... iterations, ``curve_ahd_cm`` the average Hausdorff
-    distance after each of ``CURVE_ITERATIONS``, the last one held, and ``elapsed_s`` the time from the clouds
-    to the end of each iteration, trees and normals included.
+    distance after each of ``CURVE_ITERATIONS``, the last one repeated, and ``elapsed_s`` the time from the
+    clouds to the end of each iteration, trees and normals included.
     """
     case = make_case(task.condition, task.room)
     ruler, thinned = Ruler(case), case.thinned(task.max_points)
@@ -123,7 +124,7 @@ def run_case(task: CaseTask) -> list[dict[str, Any]]:
 
 
 def run_entrant(entrant: Entrant, case: Case, direction: Direction, gate_m: float) -> Run:
-    """All poses of one entrant; who refuses or cannot begin stays at the start, and says why."""
+    """Return all poses of one entrant; one that cannot begin stays at the start, with the reason."""
     try:
         if entrant.is_peer:
             return _run_peer(entrant, case, direction, gate_m)
@@ -141,7 +142,7 @@ def run_entrant(entrant: Entrant, case: Case, direction: Direction, gate_m: floa
 
 
 def _run_peer(entrant: Entrant, case: Case, direction: Direction, gate_m: float) -> Run:
-    """Another program; asked the other way round, it registers the target to the source."""
+    """Run another program; in the reverse direction it registers the target to the source."""
     gate_m = entrant.scaled_gate_m(gate_m)
     if direction == "p2q":
         found = run_peer(entrant.method, case.target, case.source, gate_m, inverse(case.T_init))
@@ -153,7 +154,7 @@ def _run_peer(entrant: Entrant, case: Case, direction: Direction, gate_m: float)
 
 
 def k90(errors: Sequence[float]) -> int | None:
-    """Iterations until nine tenths of the way from the first error to the last; None if it did not fall."""
+    """Return the iterations until nine tenths of the drop from first to last error; None without a drop."""
     drop = errors[0] - errors[-1]
     if drop <= 0:
         return None

@@ -1,4 +1,4 @@
-"""Equal tuning: one parameter a method, as many values and the same rooms for each (SPEC 4.7)."""
+"""Equal tuning: one parameter per method, equally many values and the same rooms for each (SPEC 4.7)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from packetmesh.progress import Progress
 from pipeline.config import Direction
 
 ROOMS = range(1000, 1004)
-"""Rooms that nothing else sees."""
+"""Rooms that are used for nothing else."""
 TUNING_CONDITIONS = ("easy", "holes-x3", "large-start", "nodes-sensor")
 GATES = (0.25, 0.5, 1.0, 2.0)
 SMALLEST_M = (0.01, 0.02, 0.03, 0.04)
@@ -40,7 +40,7 @@ CANDIDATES: dict[str, tuple[str, tuple[float, ...]]] = {
     "kernel-correlation": (GATE_SCALE, GATES),
     "fast-robust-icp": ("nu_min_m", SMALLEST_M),
 }
-"""The parameter that matters most, and its values. Plain ICP has none; other programs get ``gate_scale``."""
+"""The most important parameter and its values. Plain ICP has none; other programs get ``gate_scale``."""
 
 HEADER = '''"""What tuning chose; written by ``python -m lab.claims.registration``."""
 
@@ -57,10 +57,10 @@ mean of the point error over the tuning cases, centimetres."""
 def tune(
     folder: Path, scheduler: str | None = None
 ) -> Generator[Progress, None, dict[str, tuple[str, float, dict[float, float]]]]:
-    """Try every value of every entrant on the tuning rooms.
+    """Try every value of every entrant in the tuning rooms.
 
     Returns:
-        By entrant: the parameter, the value with the least score, and all scores, centimetres.
+        By entrant: the parameter, the value with the lowest score, and all scores, centimetres.
     """
     lineup = tuning_lineup()
     tasks = [
@@ -81,7 +81,7 @@ def tune(
 
 
 def tuning_lineup() -> Lineup:
-    """Every entrant with each of its values."""
+    """Return every entrant with each of its values."""
     lineup: list[tuple[Direction, Entrant]] = []
     for entrant in (*methods(), *methods("plane"), *peers()):
         parameter, values = CANDIDATES.get(entrant.method, (GATE_SCALE, GATES))
@@ -94,7 +94,7 @@ def tuning_lineup() -> Lineup:
 
 
 def write_tuned(chosen: dict[str, tuple[str, float, dict[float, float]]], path: Path) -> None:
-    """Write the choice as the module ``tuned``."""
+    """Write the chosen values as the module ``tuned``."""
     lines = []
     for name, (parameter, value, tried) in chosen.items():
         scores = ", ".join(f"{key:g}: {score}" for key, score in tried.items())

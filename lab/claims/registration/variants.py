@@ -1,4 +1,4 @@
-"""Methods with a part taken out, for the ablations of SPEC 4.8, or with a parameter laid open, for tuning."""
+"""Methods without a part, for the ablations of SPEC 4.8, or with an exposed parameter, for tuning."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class GatedIcp(Icp):
     fixed_gate_m: float
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """All pairs within the gate, with equal weights."""
+        """Return all pairs within the gate, with equal weights."""
         return evenly(np.flatnonzero(matching.distances_m <= self.fixed_gate_m))
 
     @property
@@ -39,7 +39,7 @@ class GaussianA(CeicpA):
     """CEICP-A without the entropy factor: w = p."""
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """The pairs of CEICP-A, with plain Gaussian weights."""
+        """Return the pairs of CEICP-A, with plain Gaussian weights."""
         return _gaussian(CeicpA.weigh(self, matching), matching)
 
 
@@ -48,7 +48,7 @@ class GaussianN(CeicpN):
     """CEICP-N without the entropy factor: w = p."""
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """The pairs of CEICP-N, with plain Gaussian weights of the same scale."""
+        """Return the pairs of CEICP-N, with plain Gaussian weights of the same scale."""
         return _gaussian(CeicpN.weigh(self, matching), matching)
 
 
@@ -57,29 +57,29 @@ class HardGateA(CeicpA):
     """CEICP-A's shrinking gate with equal weights inside."""
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """The pairs of CEICP-A, all alike."""
+        """Return the pairs of CEICP-A, with equal weights."""
         kept = CeicpA.weigh(self, matching)
         return replace(evenly(kept.rows), sigma_m=kept.sigma_m)
 
 
 @dataclass(frozen=True, slots=True)
 class WeightedCentroidsLiteral(CeicpLiteral):
-    """The thesis's weights with the centroids that belong to them, instead of eq. 3.12."""
+    """The thesis's weights with the matching weighted centroids, instead of eq. 3.12."""
 
     @property
     def unweighted_centroids(self) -> bool:
-        """As a weighted least-squares fit has to."""
+        """False, as a weighted least-squares fit requires."""
         return False
 
 
 @dataclass(frozen=True, slots=True)
 class GatedRicp(Ricp):
-    """RICP that never looks at pairs beyond a gate."""
+    """RICP without pairs beyond a gate."""
 
     fixed_gate_m: float = float("inf")
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """RICP's choice among the pairs within the gate."""
+        """Return RICP's choice among the pairs within the gate."""
         near = np.flatnonzero(matching.distances_m <= self.fixed_gate_m)
         if len(near) <= 4:
             return evenly(near)
@@ -99,20 +99,20 @@ class FicpWithExponent(Ficp):
     exponent: float
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """The fraction of the closest pairs with the least fractional RMSD."""
+        """Return the fraction of the closest pairs with the least fractional RMSD."""
         fraction = inlier_fraction(matching.distances_m, self.exponent)
         return evenly(closest_rows(matching.distances_m, fraction))
 
 
 def _gaussian(kept: PairWeights, matching: Matching) -> PairWeights:
-    """The same pairs weighing exp(-d^2 / 2 sigma^2)."""
+    """Return the same pairs with weights exp(-d^2 / 2 sigma^2)."""
     variance_m2 = max(kept.sigma_m**2, np.finfo(float).tiny)
     kernel = np.exp(-0.5 * matching.distances_m[kept.rows] ** 2 / variance_m2)
     return PairWeights(kept.rows, kernel / kernel.sum() if len(kernel) else kernel, kept.sigma_m)
 
 
 def _as_kind(kind: type[PairWeighting], method: str) -> MethodStart:
-    """A method's own first state, as a state of a subclass."""
+    """Return a method's own first state, as a state of a subclass."""
 
     def start(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> PairWeighting:
         state = METHODS[method](config, source, target)
@@ -122,7 +122,7 @@ def _as_kind(kind: type[PairWeighting], method: str) -> MethodStart:
 
 
 def _fixed_sigma(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> PairWeighting:
-    """CEICP-A whose scale never shrinks: three sigma are the gate T_d."""
+    """Return CEICP-A with a constant scale: three sigma are the gate T_d."""
     sigma_m = config.gate_m / 3.0
     state = CeicpA.starting(config, source, target)
     return replace(state, sigma_m=sigma_m, sigma_0_m=sigma_m, sigma_min_m=sigma_m)
@@ -142,4 +142,4 @@ TUNABLE: dict[str, MethodStart] = {
     "ricp": lambda config, source, target: GatedRicp(config.seed, fixed_gate_m=config.gate_m),
     "ficp": lambda config, source, target: FicpWithExponent(LAMBDA),
 }
-"""Methods whose constants are not settings: their first state with the tuned constant as a field."""
+"""Methods whose constants are no settings: their first state has the tuned constant as a field."""

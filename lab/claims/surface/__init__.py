@@ -1,1 +1,1 @@
-"""What the thesis says of ball pivoting: C21 to C24 (SPEC 5 and 8)."""
+"""The thesis's claims about ball pivoting: C21 to C24 (SPEC 5 and 8)."""

@@ -1,4 +1,4 @@
-"""One node's clouds as the ball of a chain meets them."""
+"""One node's clouds as input of a chain's ball pivoting."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.types import DepthMap, Rig, SurfaceResult
 
 CHAINS = {"thesis": "the thesis's union", "packetmesh": "filling only the holes"}
-"""The presets, and what each does with the inferred points."""
+"""The presets, and their treatment of the inferred points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,14 +29,14 @@ class ChainClouds:
     true_depth: DepthMap
 
     def rolled(self, when: str, sigmas: Sequence[float]) -> SurfaceResult:
-        """The surface of the cloud ``before`` or ``after`` fusion, by balls of r_F + ``sigmas`` sigma_D."""
+        """Return the cloud's surface ``before`` or ``after`` fusion, by balls of r_F + ``sigmas`` sigma_D."""
         merged = self.merged
         cloud = merged.sensor if when == "before" else merged.fused
         return reconstruct_surface(cloud, [merged.r_F_m + factor * merged.sigma_D_m for factor in sigmas])
 
 
 def single_node(rig: Rig, index: int) -> Rig:
-    """Node ``index`` of a rig with known truth as a rig of its own, the thesis's set-up."""
+    """Return node ``index`` of a rig with known truth as a rig of its own, the thesis's set-up."""
     assert rig.truth is not None
     pose = rig.truth.T_world_camera[index]
     frame = replace(rig.frames[index], T_world_camera=pose)
@@ -50,7 +50,7 @@ def single_node(rig: Rig, index: int) -> Rig:
 
 
 def chain_clouds(rig: Rig, index: int, config: PipelineConfig) -> ChainClouds:
-    """Node ``index`` of a rig with known truth by a chain, up to the ball."""
+    """Run a chain on node ``index`` of a rig with known truth, up to the ball."""
     alone = single_node(rig, index)
     assert alone.truth is not None
     frame = alone.frames[0]

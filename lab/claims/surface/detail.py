@@ -28,12 +28,12 @@ CLOUDS = 10
 SAMPLES = 10_000
 CLOSE_M = 0.01
 STRONG = -0.8
-"""Rank correlation from which on a fall counts as monotone."""
+"""Rank correlation below which a fall counts as monotone."""
 
 
 @dataclass(frozen=True, slots=True)
 class Detail:
-    """The surface that one ball makes of the stairs."""
+    """Measures of one ball's surface of the stairs."""
 
     radius_m: float
     accuracy_1cm: float
@@ -45,18 +45,18 @@ class Detail:
 
 
 def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, list[list[Detail]]]:
-    """The same balls over several clouds."""
+    """Run the same balls over several clouds."""
     found = yield from iterate_trials("C23, stairs", stairs_trial, range(CLOUDS), folder, scheduler)
     return [[Detail(**detail) for detail in run] for run in found]
 
 
 def stairs_trial(seed: int) -> list[dict[str, Any]]:
-    """The details of one cloud, as plain values."""
+    """Return the details of one cloud, as plain values."""
     return [asdict(detail) for detail in details(seed)]
 
 
 def details(seed: int, spacings: Sequence[float] = SPACINGS) -> tuple[Detail, ...]:
-    """Balls of growing size, each alone, over one noisy cloud of the stairs."""
+    """Roll balls of growing size, each alone, over one noisy cloud of the stairs."""
     target = stairs()
     cloud = stairs_cloud(target, seed)
     truth, feet_m = triangle_scene(target.vertices_m, target.triangles), feet_samples(target)
@@ -78,7 +78,7 @@ def details(seed: int, spacings: Sequence[float] = SPACINGS) -> tuple[Detail, ..
 
 
 def judge(runs: Sequence[Sequence[Detail]], spacings: Sequence[float] = SPACINGS) -> Outcome:
-    """C23's numbers and verdict from the same balls on several clouds."""
+    """Return C23's numbers and verdict from the same balls on several clouds."""
     accuracy, coverage, gap_m, radius_m = (
         np.array([[getattr(detail, name) for detail in run] for run in runs])
         for name in ("accuracy_1cm", "coverage_1cm", "foot_gap_m", "radius_m")
@@ -113,7 +113,7 @@ def judge(runs: Sequence[Sequence[Detail]], spacings: Sequence[float] = SPACINGS
 
 
 def _rank_correlation(spacings: Sequence[float], accuracy: FloatArray) -> float:
-    """Spearman's; 0 where the accuracy never changes."""
+    """Return Spearman's rank correlation; 0 if the accuracy never changes."""
     return 0.0 if np.ptp(accuracy) == 0.0 else float(spearmanr(spacings, accuracy).statistic)
 
 

@@ -18,14 +18,14 @@ FIGURES: tuple[tuple[str, str, str, float], ...] = (
 )
 """Number, before or after fusion, the radius and its multiple of sigma_D."""
 PICTURE_SIZE = 0.5
-"""Over the camera's own."""
+"""Picture size over the camera's own."""
 
 
 def thesis_figures(clouds: ChainClouds, how: str) -> Picture:
-    """The six surfaces, each of a single radius, from the node's camera.
+    """Return the six surfaces, each of a single radius, from the node's camera.
 
     Args:
-        how: what the chain does with the inferred points, for the title.
+        how: the chain's treatment of the inferred points, for the title.
     """
     camera = Camera(scaled(clouds.camera.intrinsics, PICTURE_SIZE), clouds.camera.T_world_camera)
     images = []

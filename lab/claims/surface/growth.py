@@ -21,9 +21,9 @@ from pipeline.types import PointCloud
 
 SIZES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
 OPEN3D_SIZES = (10_000, 30_000, 100_000)
-"""Where it is quick enough."""
+"""Sizes at which Open3D is fast enough."""
 BALLS = (1.0, 1.25, 1.5, 2.0)
-"""Over the mean nearest-neighbour distance."""
+"""Radii over the mean nearest-neighbour distance."""
 SLOPE = (0.9, 1.2)
 
 
@@ -44,16 +44,16 @@ class Slope:
 
 @dataclass(frozen=True, slots=True)
 class Growth:
-    """What was measured, by number of points ascending."""
+    """Measurements, by ascending number of points."""
 
     ours: tuple[SurfaceRun, ...]
     open3d: tuple[SurfaceRun, ...]
     storage_bytes: tuple[int, ...]
-    """Most that our arrays held at once."""
+    """Peak memory of our arrays."""
 
 
 def fit_slope(counts: Sequence[float], values: Sequence[float]) -> Slope:
-    """Least squares in the logarithms of at least three pairs, with the exponent's 95 % interval."""
+    """Fit at least three pairs by least squares in logarithms, with the exponent's 95 % interval."""
     fit = linregress(np.log(counts), np.log(values))
     reach = float(student_t.ppf(0.975, len(counts) - 2) * fit.stderr)
     exponent = float(fit.slope)
@@ -61,7 +61,7 @@ def fit_slope(counts: Sequence[float], values: Sequence[float]) -> Slope:
 
 
 def storage_bytes(cloud: PointCloud, radii_m: Sequence[float]) -> int:
-    """Most memory that our ball's arrays hold at once, the result included and the cloud not."""
+    """Return the peak memory of our ball's arrays, with the result and without the cloud."""
     assert cloud.normals is not None
     roll_ours(cloud.points_m[:1000], cloud.normals[:1000], radii_m)  # loading compiled code would count
     tracemalloc.start()
@@ -73,7 +73,7 @@ def storage_bytes(cloud: PointCloud, radii_m: Sequence[float]) -> int:
 
 
 def size_trial(size: int) -> dict[str, Any]:
-    """A terrain of one size: ours, Open3D's, each timed in a fresh process, and the storage of ours."""
+    """Return, for a terrain of one size: our time and Open3D's, each in a fresh process, and our memory."""
     cloud = terrain(size)
     ours = time_alone(OURS, cloud, TERRAIN, "four", BALLS)
     open3d = time_alone("open3d", cloud, TERRAIN, "four", BALLS) if size in OPEN3D_SIZES else None
@@ -85,7 +85,7 @@ def size_trial(size: int) -> dict[str, Any]:
 
 
 def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Growth]:
-    """Terrains of one density, one after the other on this machine: other work would disturb the times."""
+    """Run terrains of one density one after the other on this machine: other work would disturb the times."""
     found = yield from iterate_trials("C24, growth", size_trial, SIZES, folder, processes=1)
     return Growth(
         tuple(SurfaceRun(**entry["ours"]) for entry in found),
@@ -95,7 +95,7 @@ def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Grow
 
 
 def judge(growth: Growth) -> Outcome:
-    """C24's numbers and verdict."""
+    """Return C24's numbers and verdict."""
     counts = [run.points for run in growth.ours]
     time = fit_slope(counts, [run.elapsed_s for run in growth.ours])
     storage = fit_slope(counts, growth.storage_bytes)

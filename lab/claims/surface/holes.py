@@ -39,21 +39,21 @@ CLOUDS = (
     ("sensor, packetmesh preset", "packetmesh", "before"),
     ("fill (packetmesh)", "packetmesh", "after"),
 )
-"""Name, chain and moment of each cloud."""
+"""Name, chain and stage of each cloud."""
 OWN_RULES = {"thesis": "r_F to r_F + sigma_D", "packetmesh": "r_F to r_F + 4 sigma_D"}
-"""Each chain's own, by which its accuracy is reported."""
+"""Each chain's own rule, by which its accuracy is reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A surface in its camera."""
+    """A surface as its camera sees it."""
 
     no_hit_share: float
-    """Of all pixel rays."""
+    """Share of all pixel rays without a hit."""
     close_share: float
-    """Of the rays that truly hit something: hit within 5 % of the true depth."""
+    """Share of the rays with a true surface that hit within 5 % of the true depth."""
     median_depth_error_m: float
-    """Of those that hit both."""
+    """Median over the rays that hit both surfaces."""
     loops: int
     """Boundary loops of the mesh."""
 
@@ -63,7 +63,7 @@ Measured = dict[tuple[str, str, str], list[Seen]]
 
 
 def seen(clouds: ChainClouds, when: str, sigmas: tuple[float, ...]) -> Seen:
-    """Roll over the cloud before or after fusion and look at the surface from the node's camera."""
+    """Roll over the cloud before or after fusion, and measure the surface from the node's camera."""
     surface, camera = clouds.rolled(when, sigmas), clouds.camera
     depth = hit_depth(surface.vertices_m, surface.triangles, camera.intrinsics, camera.T_world_camera)
     there = clouds.true_depth.valid
@@ -78,7 +78,7 @@ def seen(clouds: ChainClouds, when: str, sigmas: tuple[float, ...]) -> Seen:
 
 
 def node_trial(node: tuple[str, int]) -> list[dict[str, Any]]:
-    """What a scene's node sees of its surfaces by both chains, before and after fusion, by every rule."""
+    """Measure a node's surfaces by both chains, before and after fusion, by every rule."""
     scene, index = node
     rig = load_demo(scene)
     return [
@@ -91,7 +91,7 @@ def node_trial(node: tuple[str, int]) -> list[dict[str, Any]]:
 
 
 def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Measured]:
-    """Every node of the demo scenes as a rig of its own."""
+    """Run every node of the demo scenes as a rig of its own."""
     nodes = [(scene, index) for scene in CALIBRATED_SCENES for index in range(len(load_demo(scene).frames))]
     found = yield from iterate_trials(
         "C22, holes", node_trial, nodes, folder, scheduler, data=(SHIPPED_MODEL, SHIPPED_COMPLETION, SCENES)
@@ -104,13 +104,13 @@ def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Meas
 
 
 def figures() -> tuple[Exhibit, ...]:
-    """The thesis's figures on the first node of the first scene, by both chains."""
+    """Return the thesis's figures on the first node of the first scene, by both chains."""
     rig = load_demo(CALIBRATED_SCENES[0])
     return tuple(thesis_figures(chain_clouds(rig, 0, PRESETS[preset]), how) for preset, how in CHAINS.items())
 
 
 def judge(measured: Measured, pictures: tuple[Exhibit, ...] = ()) -> Outcome:
-    """C22's numbers and verdict."""
+    """Return C22's numbers and verdict."""
     series: dict[str, FloatArray] = {}
     for preset in CHAINS:
         before, after = (_column(measured, preset, when, "no_hit_share") for when in ("before", "after"))
@@ -148,12 +148,12 @@ def _sentence(ours: dict[str, float], preset: str, how: str) -> str:
 
 
 def _column(measured: Measured, preset: str, when: str, name: str, rule: str = JUDGED) -> FloatArray:
-    """(frames,) one measure."""
+    """Return (frames,) one measure."""
     return np.array([float(getattr(seen, name)) for seen in measured[preset, when, rule]])
 
 
 def rays_table(measured: Measured) -> Table:
-    """What the cameras see by cloud and radius rule."""
+    """Return a table of the cameras' rays by cloud and radius rule."""
 
     def cell(preset: str, when: str, rule: str) -> str:
         missed, close, error_m = (
@@ -175,7 +175,7 @@ def rays_table(measured: Measured) -> Table:
 
 
 def loops_table(measured: Measured) -> Table:
-    """Boundary loops by cloud and radius rule."""
+    """Return a table of boundary loops by cloud and radius rule."""
 
     def cell(preset: str, when: str, rule: str) -> float:
         return float(np.mean(_column(measured, preset, when, "loops", rule)))

@@ -14,35 +14,35 @@ from pipeline.io.demos import CALIBRATED_SCENES, load_demo
 from pipeline.surface.radii import SIGMAS, radii, spacing
 
 PRINTED_M = (0.0102, 0.0131, 0.0156, 0.0209)
-"""Thesis, figures 4.2 to 4.5: before fusion."""
+"""Radii in the thesis's figures 4.2 to 4.5: before fusion."""
 PRINTED_AFTER_M = (0.0102, 0.0156)
-"""Thesis, figures 4.6 and 4.7: after fusion."""
+"""Radii in the thesis's figures 4.6 and 4.7: after fusion."""
 TOLERANCE = 0.02
 READINGS: dict[str, tuple[float, ...]] = {
     "r_F + {0, 1/4, 1/2, 1} sigma_D": SIGMAS["thesis"],
     "r_F + {0, 1/2, 1, 2} sigma_D": (0.0, 0.5, 1.0, 2.0),
     "r_F + {0, 1/3, 2/3, 1} sigma_D": (0.0, 1 / 3, 2 / 3, 1.0),
 }
-"""The rule, an alternative that goes beyond r_F + sigma_D, and even steps."""
+"""The rule, an alternative that exceeds r_F + sigma_D, and equal steps."""
 
 
 def inferred_spacing(sigmas: tuple[float, ...]) -> tuple[float, float]:
-    """r_F and sigma_D, metres, that make the first and the last of the printed radii exact."""
+    """Return r_F and sigma_D, metres, that make the first and the last of the printed radii exact."""
     return PRINTED_M[0], (PRINTED_M[-1] - PRINTED_M[0]) / (sigmas[-1] - sigmas[0])
 
 
 def predicted_radii_m(sigmas: tuple[float, ...], r_F_m: float, sigma_D_m: float) -> tuple[float, ...]:
-    """The radii of a reading."""
+    """Return the radii of a reading."""
     return tuple(r_F_m + factor * sigma_D_m for factor in sigmas)
 
 
 def deviation(radii_m: tuple[float, ...]) -> float:
-    """Largest relative difference from the printed radii."""
+    """Return the largest relative difference from the printed radii."""
     return float(np.max(np.abs(np.array(radii_m) / np.array(PRINTED_M) - 1.0)))
 
 
 def readings_table() -> Table:
-    """What each reading makes of the first and the last printed radius."""
+    """Return r_F and sigma_D that each reading infers from the first and the last printed radius."""
     first, third = _mm(PRINTED_AFTER_M)
     rows: list[tuple[str | float | None, ...]] = [
         ("printed before fusion", None, None, *_mm(PRINTED_M), None),
@@ -64,7 +64,7 @@ def readings_table() -> Table:
 
 
 def scenes_table() -> Table:
-    """Our own r_F, sigma_D and radii, before and after fusion, of the first node of each scene."""
+    """Return our own r_F, sigma_D and radii, before and after fusion, of the first node of each scene."""
     rows: list[tuple[str | float, ...]] = []
     for scene in CALIBRATED_SCENES:
         rig = load_demo(scene)

@@ -1,4 +1,4 @@
-"""A stepped target whose every step is known, and noisy clouds of it."""
+"""Stairs with exactly known steps, and noisy clouds of them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ RISES_M = (0.03, 0.04, 0.05, 0.06, 0.08)
 TREAD_M = 0.12
 WIDTH_M = 0.6
 POINT_DISTANCE_M = 0.01
-"""Before noise and jitter; near to what the demo scenes have."""
+"""Spacing before noise and jitter; close to that of the demo scenes."""
 NOISE_M = 0.002
-"""The depth sensor's at about one metre (SPEC 2)."""
+"""Noise of the depth sensor at about one metre (SPEC 2)."""
 JITTER = 0.2
 """Largest move of a point within its face, in point distances."""
 
@@ -28,13 +28,13 @@ class Stairs:
     vertices_m: FloatArray
     triangles: IntArray
     corners_m: FloatArray
-    """(F, 3, 3) of each rectangular face: a corner and its neighbours along x and across."""
+    """(F, 3, 3) corners of each rectangular face: one corner and its neighbours along x and across."""
     feet_m: FloatArray
     """(S, 2) y and z of the inner edges, where a riser stands on a tread."""
 
 
 def stairs() -> Stairs:
-    """One tread before each riser and one behind the last."""
+    """Return stairs with one tread before each riser and one behind the last."""
     profile_m = [(0.0, 0.0)]
     for rise_m in (*RISES_M, 0.0):
         y_m, z_m = profile_m[-1]
@@ -51,12 +51,12 @@ def stairs() -> Stairs:
 def stairs_cloud(
     target: Stairs, seed: int, point_distance_m: float = POINT_DISTANCE_M, noise_m: float = NOISE_M
 ) -> PointCloud:
-    """A cloud of the target with estimated normals: a jittered grid on every face, and noise.
+    """Return a cloud of the target with estimated normals: a jittered grid on every face, and noise.
 
     Args:
         target: the stairs.
-        seed: of jitter and noise.
-        point_distance_m: of the grid.
+        seed: seed of jitter and noise.
+        point_distance_m: spacing of the grid.
         noise_m: standard deviation in x, y and z.
     """
     rng = np.random.default_rng(seed)
@@ -68,13 +68,13 @@ def stairs_cloud(
 
 
 def feet_samples(target: Stairs, count: int = 100) -> FloatArray:
-    """(S * count, 3) points along the inner edges, their ends left out."""
+    """Return (S * count, 3) points along the inner edges, without their ends."""
     x_m = np.linspace(0.05 * WIDTH_M, 0.95 * WIDTH_M, count)
     return np.concatenate([np.column_stack([x_m, np.tile(foot_m, (count, 1))]) for foot_m in target.feet_m])
 
 
 def _grid(corners_m: FloatArray, distance_m: float, rng: np.random.Generator) -> FloatArray:
-    """(N, 3) points in the middle of their cells, moved within their face."""
+    """Return (N, 3) points in the middle of their cells, jittered within their face."""
     sides_m = corners_m[1:] - corners_m[0]
     counts = np.maximum(1, np.rint(np.linalg.norm(sides_m, axis=1) / distance_m)).astype(int)
     cells = np.stack(np.meshgrid(*(np.arange(count) for count in counts), indexing="ij"), axis=-1)

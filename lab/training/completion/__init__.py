@@ -1,1 +1,1 @@
-"""A network that completes a sensor's depth: how its holes are drawn, what it is, and its training."""
+"""A network that completes a sensor's depth: its training frames with holes, its layers and its training."""

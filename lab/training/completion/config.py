@@ -1,4 +1,4 @@
-"""How the completion network is trained; needs no torch, so that the command line starts at once."""
+"""Settings of the completion network's training; without torch, so that the command line starts at once."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class CompletionConfig:
-    """How a completion network is trained; recorded in its checkpoint."""
+    """Settings of a training; recorded in its checkpoint."""
 
     data: Path
     """Folder of rendered shards."""

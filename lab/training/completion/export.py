@@ -1,4 +1,4 @@
-"""A trained completion network to the ONNX file that ships."""
+"""Export of a trained completion network to the ONNX file that ships."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FACTS = {
 
 
 def export_completion(checkpoint: Path, out: Path) -> int:
-    """Write the ONNX file of a checkpoint, its training in the metadata.
+    """Write the ONNX file of a checkpoint, with its training in the metadata.
 
     Returns:
         The file's size in bytes.
@@ -59,7 +59,7 @@ def export_completion(checkpoint: Path, out: Path) -> int:
 
 
 def facts(saved: dict) -> dict[str, str]:
-    """What the file repeats of its training."""
+    """Return the facts about the training that the file repeats."""
     chosen = ("minutes", "seed", "learning_rate", "batch")
     named = saved["state"] | {key: saved["config"][key] for key in chosen}
     return {name: str(value) for name, value in named.items()}

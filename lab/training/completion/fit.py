@@ -1,4 +1,4 @@
-"""How sure inferred depth is: logistic regression on validation rooms, and how well what it says holds."""
+"""Fit of the confidence in inferred depth: logistic regression on validation rooms, and its calibration."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from pipeline.types import BoolArray, DepthMap, FloatArray
 
 VIEWS = 2
 HIDDEN_SHARE = 0.15
-"""Of the measured pixels of each view."""
+"""Share of the measured pixels that is hidden in each view."""
 ONE_IN = 25
-"""Hole pixels of which one is judged: a large hole counts for more than a small one."""
+"""Every n-th hole pixel is used, so that a large hole counts for more than a small one."""
 TAKEOVERS_PX = (0.0, 5.0, 10.0, 20.0, 40.0)
 """Distances from a rim that are tried for ``COMPLETED_FROM``, at 640 x 480."""
 DIAGONAL_PX = 800.0
@@ -35,16 +35,16 @@ DIAGONAL_PX = 800.0
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Hole pixels of one way of filling."""
+    """Features and correctness of hole pixels filled by one method."""
 
     features: FloatArray
-    """(N, F)."""
+    """(N, F) features."""
     right: BoolArray
-    """(N,) within 5 % of the truth."""
+    """(N,) whether the depth is within 5 % of the truth."""
 
     @staticmethod
     def joined(parts: list[Evidence]) -> Evidence:
-        """All of them in one."""
+        """Return all parts as one."""
         return Evidence(
             np.vstack([part.features for part in parts]), np.concatenate([part.right for part in parts])
         )
@@ -52,16 +52,16 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """Hole pixels of one kind."""
+    """Hole pixels of one kind, filled by both methods."""
 
     aligned: Evidence
     completed: Evidence
     errors: FloatArray
-    """(5, N) AbsRel of both joined at each of the ``TAKEOVERS_PX``."""
+    """(5, N) AbsRel of the two methods joined at each of the ``TAKEOVERS_PX``."""
 
     @staticmethod
     def joined(parts: list[Judged]) -> Judged:
-        """All of them in one."""
+        """Return all parts as one."""
         return Judged(
             Evidence.joined([part.aligned for part in parts]),
             Evidence.joined([part.completed for part in parts]),
@@ -70,7 +70,7 @@ class Judged:
 
 
 def fit_confidence(rooms: int) -> Iterator[str]:
-    """Lines: errors by the takeover; the coefficients from every other room, of the rest said and true."""
+    """Yield errors by takeover, coefficients from every other room, and their calibration in the others."""
     network = DepthNetwork()
     judged = [judged_room(FIRST_SEED["validation"] + k, network) for k in range(rooms)]
     errors = np.concatenate([kind.errors for room in judged for kind in room], axis=1).mean(axis=1)
@@ -89,7 +89,7 @@ def fit_confidence(rooms: int) -> Iterator[str]:
 
 
 def judged_room(seed: int, network: DepthNetwork) -> tuple[Judged, Judged]:
-    """Pixels of the sensor's own holes and of hidden depth, in every view of one room."""
+    """Return pixels of the sensor's own holes and of hidden depth, in all views of one room."""
     rng = np.random.default_rng(seed)
     own, measured = [], []
     for example in held_out_rooms(range(seed, seed + 1), VIEWS):
@@ -102,7 +102,7 @@ def judged_room(seed: int, network: DepthNetwork) -> tuple[Judged, Judged]:
 def judged_view(
     example: Example, hidden: BoolArray, network: DepthNetwork, rng: np.random.Generator
 ) -> Judged:
-    """Some of the hidden pixels; of the sensor's own holes if none are."""
+    """Return some of the hidden pixels, or of the sensor's own holes if none are hidden."""
     sensor = DepthMap(np.where(hidden, np.float32(np.nan), example.sensor.z_m))
     measured, distance = sensor.valid, distance_to_measured(sensor.valid)
     alignment = align_depth(network.infer(example.rgb), sensor, "local")
@@ -132,7 +132,7 @@ def judged_view(
 
 
 def fit(evidence: Evidence) -> FloatArray:
-    """(1 + F,) constant and weights of the features that make what was found most likely."""
+    """Return (1 + F,) constant and feature weights with the largest likelihood."""
     sign = 2.0 * evidence.right - 1.0
     rows = np.hstack([np.ones((len(sign), 1)), evidence.features])
     start = np.zeros(rows.shape[1])
@@ -140,7 +140,7 @@ def fit(evidence: Evidence) -> FloatArray:
 
 
 def calibration(fitted: FloatArray, evidence: Evidence) -> Iterator[str]:
-    """Of the pixels in every tenth of confidence: said, true and how many."""
+    """Yield, for each tenth of confidence: mean confidence, true share and number of pixels."""
     said = expit(fitted[0] + evidence.features @ fitted[1:])
     for low in np.arange(0.0, 1.0, 0.1):
         inside = (said >= low) & (said < low + 0.1)

@@ -1,4 +1,4 @@
-"""Frames with holes to learn from: what sensors lose, and shapes of every size."""
+"""Training frames with holes: the losses of sensors, and shapes of every size."""
 
 from __future__ import annotations
 
@@ -13,38 +13,37 @@ from pipeline.types import BoolArray, ByteArray, FloatArray
 
 NEAR_M, FAR_M = 0.2, 20.0
 NOISE = 0.012
-"""Greatest standard deviation of the noise, in shares of the depth."""
+"""Largest standard deviation of the noise, in shares of the depth."""
 STEP = 0.03
-"""Coarsest steps of inverse depth, 1/m; a Kinect's are 0.003."""
+"""Coarsest step of inverse depth, 1/m; a Kinect's is 0.003."""
 BIAS = 0.02
 OBJECT_STEP = 0.02
 LARGEST_OBJECT = 0.3
 MOST_HIDDEN = 0.85
 FLYING_STEP = 0.05
 MOST_FLYING = 0.15
-"""Share of the pixels at edges that report a depth between front and back."""
+"""Largest share of the pixels at edges that report a depth between front and back."""
 COLORLESS = 0.12
-"""Share of frames without a picture, so that depth alone is learned to be continued too."""
+"""Share of frames without colours, so that the network also learns to continue depth alone."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lesson:
-    """One frame to learn from, on the coarse grid."""
+    """One training frame on the coarse grid."""
 
     grid: Grid
     log_z: FloatArray
-    """(H, W) what the sensor measured, in its holes what it would have measured; NaN where nothing is. A
-    difference from a measured pixel starts at what was measured, noise and all, as it does when depth is
-    completed."""
+    """(H, W) measured log depth; in the sensor's holes, the depth it would have measured; NaN without a
+    surface. Differences from a measured pixel start at its noisy value, as when depth is completed."""
 
 
 def lesson(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> Lesson:
-    """A view of a room as some sensor sees it.
+    """Return a view of a room as a random sensor sees it.
 
     Args:
         rgb: (240, 320, 3).
         depth_m: (240, 320) true depth, NaN where there is none.
-        rng: draws colours, the sensor's faults, and the holes.
+        rng: draws colours, the sensor's errors, and the holes.
     """
     rgb, depth_m = augment(rgb, depth_m, rng)
     step = depth_m.shape[1] // GRID_WIDTH_PX
@@ -53,7 +52,7 @@ def lesson(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> Les
     colors = cv2.resize(rgb, z_m.shape[::-1], interpolation=cv2.INTER_AREA)
     there = np.isfinite(z_m) & (z_m > NEAR_M) & (z_m < FAR_M)
     true = np.log(np.where(there, z_m, 1.0)).astype(np.float32)
-    if rng.random() < 0.5:  # the sensor's bias goes on in its holes
+    if rng.random() < 0.5:  # the sensor's bias continues in its holes
         true += field(z_m.shape, rng.uniform(10.0, 40.0), rng) * np.float32(rng.uniform(0.0, BIAS))
     known = there & ~hidden(true, there, colors, rng)
     if known.sum() < 50:
@@ -71,7 +70,7 @@ def lesson(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> Les
 
 
 def ragged(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> FloatArray:
-    """Depth whose edges are displaced by up to a cell, with a few pixels between front and back."""
+    """Return depth with edges displaced by up to a cell and a few pixels between front and back."""
     window = np.ones((3, 3), np.uint8)
     front, back = cv2.erode(log_z, window), cv2.dilate(log_z, window)
     rows, columns = log_z.shape
@@ -84,7 +83,7 @@ def ragged(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> Flo
 
 
 def astray(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
-    """Colours as a badly registered camera sees them; sometimes there is hardly any picture."""
+    """Return colours as a badly registered camera sees them; sometimes they are nearly invisible."""
     if rng.random() < COLORLESS:
         level = rng.integers(0, 256, 3)
         noise = rng.normal(0.0, rng.uniform(1.0, 20.0), rgb.shape)
@@ -97,7 +96,7 @@ def astray(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
 
 
 def hidden(log_z: FloatArray, there: BoolArray, rgb: ByteArray, rng: np.random.Generator) -> BoolArray:
-    """(H, W) what this sensor does not see: margins, edges, dark, far and random shapes, whole objects."""
+    """Return (H, W) pixels lost by this sensor: margins, edges, dark, far and random shapes, objects."""
     rows, columns = log_z.shape
     lost = np.zeros(log_z.shape, bool)
     top, bottom, left, right = rng.integers(0, 7, 4) if rng.random() < 0.7 else (0, 0, 0, 0)
@@ -122,7 +121,7 @@ def hidden(log_z: FloatArray, there: BoolArray, rgb: ByteArray, rng: np.random.G
 
 
 def around_edges(log_z: FloatArray, width_px: int, rng: np.random.Generator) -> BoolArray:
-    """A ragged band along the steps of depth, sometimes only on the far side, as a projector's shadow."""
+    """Return a ragged band along depth steps, sometimes only on the far side, like a projector's shadow."""
     window = np.ones((3, 3), np.uint8)
     low, high = cv2.erode(log_z, window), cv2.dilate(log_z, window)
     edge = high - low > rng.uniform(0.03, 0.15)
@@ -134,7 +133,7 @@ def around_edges(log_z: FloatArray, width_px: int, rng: np.random.Generator) -> 
 
 
 def ellipse(shape: tuple[int, int], rng: np.random.Generator) -> BoolArray:
-    """A turned ellipse anywhere, with half axes of 2 to 35 cells, every size as often."""
+    """Return a rotated ellipse anywhere, with half axes of 2 to 35 cells, all sizes equally likely."""
     rows, columns = shape
     radius = np.exp(rng.uniform(np.log(2.0), np.log(35.0)))
     axes = radius * np.exp(rng.normal(0.0, 0.25, 2))
@@ -145,7 +144,7 @@ def ellipse(shape: tuple[int, int], rng: np.random.Generator) -> BoolArray:
 
 
 def an_object(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> BoolArray:
-    """The smooth piece of surface about a random pixel, if it is not too large, and a little around it."""
+    """Return the smooth surface piece around a random pixel, if it is not too large, with a small margin."""
     seeds = np.argwhere(there)
     y, x = seeds[rng.integers(len(seeds))]
     mask = np.zeros((log_z.shape[0] + 2, log_z.shape[1] + 2), np.uint8)
@@ -159,7 +158,7 @@ def an_object(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> 
 
 
 def field(shape: tuple[int, int], sigma_px: float, rng: np.random.Generator) -> FloatArray:
-    """(H, W) float32 smooth noise of unit variance."""
+    """Return (H, W) float32 smooth noise of unit variance."""
     noise = rng.standard_normal(shape, dtype=np.float32)
     blurred = cv2.GaussianBlur(noise, (0, 0), sigma_px, borderType=cv2.BORDER_REFLECT)
     return blurred / np.float32(blurred.std() + 1e-9)

@@ -1,4 +1,4 @@
-"""What the completion network learns from: how likely the true differences are under its answer."""
+"""The completion network's loss: the likelihood of the true differences under its output."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from torch import Tensor
 from pipeline.depth.slopes import DISTANCES, LOG_SCALES
 
 MEASURED_WEIGHT = 0.1
-"""Of differences between two measured pixels, which nobody asks for."""
+"""Weight of differences between two measured pixels, which are not needed."""
 
 
 def negative_log_likelihood(output: Tensor, planes: Tensor, start: Tensor, log_z: Tensor) -> Tensor:
-    """Mean of |x - m| / b + log b over the unknown pixels and over the differences, all kinds alike.
+    """Return the mean of |x - m| / b + log b over unknown pixels and differences, all kinds weighted equally.
 
-    Laplace's distribution, so that an edge that might be there widens b and does not move m.
+    Laplace's distribution is used so that a possible edge widens b and does not move m.
 
     Args:
         output: (N, 14, H, W) of the network.
-        planes: (N, 8, H, W) its input; the fourth is the mask of what is measured.
+        planes: (N, 8, H, W) its input; the fourth is the mask of measured pixels.
         start: (N, H, W) logarithmic depth that the first output corrects.
         log_z: (N, H, W) the truth, NaN where there is none.
 
@@ -42,7 +42,7 @@ def negative_log_likelihood(output: Tensor, planes: Tensor, start: Tensor, log_z
 
 
 def weighted(error: Tensor, log_scale: Tensor, weight: Tensor) -> Tensor:
-    """Weighted mean of Laplace's negative logarithm, without its constant."""
+    """Return the weighted mean of Laplace's negative log likelihood, without its constant."""
     log_scale = log_scale.clamp(*LOG_SCALES)
     cost = error.abs() * torch.exp(-log_scale) + log_scale
     return (cost * weight).sum() / weight.sum().clamp(min=1.0)

@@ -1,4 +1,4 @@
-"""The completion network: a small U-Net that says differences of logarithmic depth and how sure they are."""
+"""The completion network: a small U-Net that predicts differences of log depth and their scales."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Block(nn.Module):
 
 
 class CompletionNet(nn.Module):
-    """(N, 8, H, W) of ``pipeline.depth.slopes.network_input`` to (N, 14, H, W)."""
+    """Maps (N, 8, H, W) of ``pipeline.depth.slopes.network_input`` to (N, 14, H, W)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -47,7 +47,7 @@ class CompletionNet(nn.Module):
         self.register_buffer("offset", offset, persistent=False)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Per pixel: correction of the start and its log scale, then both for every difference."""
+        """Return, per pixel, the start's correction and its log scale, then both for every difference."""
         kept = []
         for level, block in enumerate(self.down):
             x = block(nn.functional.max_pool2d(x, 2) if level else x)
@@ -59,7 +59,7 @@ class CompletionNet(nn.Module):
 
 
 def head_units() -> tuple[Tensor, Tensor]:
-    """(1, 14, 1, 1) scales and offsets of the head's numbers, which themselves are of order one."""
+    """Return (1, 14, 1, 1) scales and offsets of the head's outputs, which are of order one."""
     scale, offset = [START_SPREAD, 1.0], [0.0, START_LOG_SCALE]
     for distance in DISTANCES:
         scale += 2 * [STEP_SPREAD * distance**0.5, 1.0]

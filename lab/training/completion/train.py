@@ -31,7 +31,7 @@ VALIDATION_SEED = 5
 
 
 def train_completion(config: CompletionConfig) -> None:
-    """Train until the time budget is spent; the network stays in ``out/last.pt``.
+    """Train until the time budget is spent; the network is in ``out/last.pt``.
 
     Raises:
         InputError: there are no shards.
@@ -61,7 +61,7 @@ def train_completion(config: CompletionConfig) -> None:
 
 
 def learn(model: CompletionNet, optimizer: torch.optim.Optimizer, batch: list[Tensor]) -> None:
-    """One step along the clipped gradients of one batch; none if they are not finite."""
+    """Take one step along the clipped gradients of a batch; none if they are not finite."""
     planes, start, log_z = batch
     model.train()
     with torch.autocast("cpu", torch.bfloat16):
@@ -75,7 +75,7 @@ def learn(model: CompletionNet, optimizer: torch.optim.Optimizer, batch: list[Te
 
 @torch.no_grad()
 def validate(model: CompletionNet, frames: list[Tensor]) -> float:
-    """Negative log likelihood of frames of validation rooms."""
+    """Return the negative log likelihood of frames of validation rooms."""
     model.eval()
     planes, start, log_z = frames
     output = torch.cat([model(part) for part in planes.split(16)])
@@ -84,7 +84,7 @@ def validate(model: CompletionNet, frames: list[Tensor]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Frames(IterableDataset):
-    """Endless frames with holes, every view once an epoch; newly rendered shards join at the next."""
+    """Endless frames with holes, every view once per epoch; new shards are used from the next epoch on."""
 
     data: Path
     seed: int
@@ -99,7 +99,7 @@ class Frames(IterableDataset):
 
 
 def validation_frames(data: Path) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-    """The same frames with the same holes at every call."""
+    """Yield the same frames with the same holes at every call."""
     rng = np.random.default_rng(VALIDATION_SEED)
     for view in Shards(data, "validation").evenly(VALIDATION_IMAGES):
         yield frame(*view, rng)
@@ -108,7 +108,7 @@ def validation_frames(data: Path) -> Iterator[tuple[FloatArray, FloatArray, Floa
 def frame(
     rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The network's input, the start and the truth of one view, all padded to the input's size."""
+    """Return the network's input, the start and the truth of one view, all padded to the input's size."""
     seen = lesson(rgb, depth_m, rng)
     planes, start = network_input(seen.grid)
     pad = [(0, whole - part) for whole, part in zip(planes.shape[1:], start.shape, strict=True)]
@@ -116,12 +116,12 @@ def frame(
 
 
 def collate(frames: list[tuple[FloatArray, FloatArray, FloatArray]]) -> list[Tensor]:
-    """The frames' inputs, starts and truths, each stacked."""
+    """Return the frames' inputs, starts and truths, each stacked."""
     return [torch.from_numpy(np.stack(part)) for part in zip(*frames, strict=True)]
 
 
 def write(config: CompletionConfig, model: CompletionNet, state: TrainingState) -> None:
-    """Replace ``out/last.pt`` in one move."""
+    """Replace ``out/last.pt`` atomically."""
     plain = {name: str(value) for name, value in asdict(config).items()}
     with atomic_path(config.out / "last.pt") as temporary:
         torch.save({"model": model.state_dict(), "state": asdict(state), "config": plain}, temporary)

@@ -22,8 +22,7 @@ Makers = Sequence[tuple[float, Callable[[], _Made]]]
 
 @lru_cache(maxsize=2048)
 def stocked(maker: Callable[[Rng], _Made], variant: int) -> _Made:
-    """Return the piece that a maker builds from its own seed; it is kept: building costs more than
-    rendering."""
+    """Return a maker's piece for its own seed, cached because building costs more than rendering."""
     return maker(np.random.default_rng([variant, 404]))
 
 

@@ -123,8 +123,7 @@ def marble(color: Color, vein: Color, seed: int = 0, scale_m: float = 0.35) -> T
 def _boards(
     light: FloatArray, dark: FloatArray, seed: int, uv: FloatArray, tone: FloatArray, joint: FloatArray
 ) -> FloatArray:
-    """Return (N, 3) albedo at (N, 2) places with the grain along u, for each board's own (N,) tone, 0
-    to 1."""
+    """Return (N, 3) albedo at (N, 2) places, the grain along u, for each board's (N,) tone, 0 to 1."""
     grain = wood_grain(np.column_stack([uv[:, 0], uv[:, 1] + 3.0 * tone, tone]), seed, 0.05, 0)
     color = shade(mix(light, dark, grain), 0.72 + 0.5 * tone)
     return color * (1.0 - 0.75 * joint)[:, None]
