@@ -6,9 +6,9 @@ import viser
 from app.compute.store import Store
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def store(tmp_path_factory):
-    """An empty store for the tests of one file."""
+    """A store that all tests share, so that what one has computed is there for the others."""
     return Store(str(tmp_path_factory.mktemp("store")))
 
 

@@ -48,8 +48,8 @@ WATCH = """
 """
 
 
-@pytest.fixture
-def page(browser, app):
+@pytest.fixture(scope="module")
+def counting(browser, app):
     """The Surface step in a tab of its own, which counts what is drawn."""
     context = browser.new_context(viewport={"width": 900, "height": 640})
     page = context.new_page()
@@ -60,6 +60,17 @@ def page(browser, app):
     page.wait_for_timeout(2000)
     yield page
     context.close()
+
+
+@pytest.fixture
+def page(counting):
+    """The same once it draws: no view is held, and no mesh is awaited."""
+    counting.set_viewport_size({"width": 900, "height": 640})
+    counting.get_by_text("Up to date").wait_for(timeout=PATIENCE_MS)
+    begin_to_count(counting)
+    counting.wait_for_function("() => watched.drawn > 0")
+    counting.wait_for_timeout(500)
+    return counting
 
 
 def begin_to_count(page):
