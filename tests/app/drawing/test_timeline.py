@@ -159,11 +159,11 @@ def test_pointing_from_afar_says_how_many_were_lost_and_why():
     cause[500:520] = 1
     cause[520:523] = 2
     lane = lane_of((start, start + 6, np.zeros(1000, int), cause), 1)
-    text = lane.tell(5100, 3, 300)
+    text = lane.tip(5100, 3, 300)
     assert "60 frames" in text
     assert "23 of them lost (collision 20, bit errors 3)" in text
-    assert lane.tell(5005, 3, 4) == "frame 500"
-    assert lane.tell(50_000, 3, 4) == ""
+    assert lane.tip(5005, 3, 4) == "frame 500"
+    assert lane.tip(50_000, 3, 4) == ""
 
 
 def test_a_cause_is_written_into_a_lost_frame_that_is_wide_enough():

@@ -10,7 +10,7 @@ from markdown_it import MarkdownIt
 from app.compute import jobs
 from app.compute.state import CHAIN, Spec
 from app.lesson.files import CLAUSE, FIELD, LESSONS, SCENE, read_lesson, settled
-from app.lesson.player import BEGIN, COMPUTING, FIRST, OFF, SKIP, SKIPPED, LessonFolder, told
+from app.lesson.player import BEGIN, COMPUTING, FIRST, OFF, SKIP, SKIPPED, LessonFolder, question_paragraphs
 from app.screens.calibrate import lesson as calibrate
 from app.screens.depth import lesson as depth
 from app.screens.fuse import lesson as fuse
@@ -103,8 +103,8 @@ def test_a_stop_sets_what_it_names_and_leaves_the_rest_at_the_default(tmp_path):
 
 
 def test_a_stop_unfolds_what_it_speaks_of(tmp_path):
-    bare, told = lesson(tmp_path, "# A\n## One\nx\n## Two\nopen: Capture range\nopen: Chain\n\nSee.\n").stops
-    assert (bare.opens, told.opens, told.text) == ((), ("Capture range", "Chain"), "See.")
+    bare, stop = lesson(tmp_path, "# A\n## One\nx\n## Two\nopen: Capture range\nopen: Chain\n\nSee.\n").stops
+    assert (bare.opens, stop.opens, stop.text) == ((), ("Capture range", "Chain"), "See.")
     ui = ui_of()
     LessonFolder(ui, lesson(tmp_path, "# A\n## One\nopen: Chain\nx\n"), lambda look: None)
     contents = [one for one in ui.gui.handles if one.kind == "add_html"]
@@ -237,19 +237,19 @@ def test_the_numbers_of_a_lesson_are_those_of_the_scene(scene, store):
     race = Race(start=Start.towards(*fuse.START, seed=0))
     raced = drain(jobs.run("fuse.race_job:race_job", store, spec, race))
     title = views["scene"].title
-    told = {
+    screen_numbers = {
         depth: depth.numbers(views["scene"], 0, views["depth"].nodes[0]),
         fuse: fuse.numbers(title, race, raced),
         surface: surface.numbers(title, views["surface"], {}),
     }
-    for screen, numbers in told.items():
+    for screen, numbers in screen_numbers.items():
         text = screen.SHIPPED.read_text()
         assert set(numbers) == {*screen.NUMBERS, SCENE}
         lacking = {name for _, name in FIELD.findall(text) if numbers[name] == UNKNOWN}
         assert all(name.endswith(("_3", "_4", "_poisson")) for name in lacking)
     missed = views["surface"].after.quality.no_hit_ray_share
-    assert told[surface]["missed"] == f"{missed:.1%}".replace("%", " %")
-    assert told[fuse]["turn"] == "3°"
+    assert screen_numbers[surface]["missed"] == f"{missed:.1%}".replace("%", " %")
+    assert screen_numbers[fuse]["turn"] == "3°"
 
 
 def right_of(screen, path, look, name, numbers):
@@ -278,8 +278,8 @@ def test_the_choice_that_is_marked_right_is_so_by_the_numbers_of_the_scene(scene
     ends_cm, right = raced("others", "Is entropy the reason?")
     assert ("close" in right) == (abs(min(ends_cm[:2]) - min(ends_cm[2:])) <= 0.5)
     poisson = drain(jobs.run("surface.baselines_job:baseline_job", store, spec, "poisson"))
-    told = surface.numbers(scene, views["surface"], {"poisson": poisson})
-    right = right_of(surface, surface.SHIPPED, surface.SurfaceLook(), "better", told)
+    values = surface.numbers(scene, views["surface"], {"poisson": poisson})
+    right = right_of(surface, surface.SHIPPED, surface.SurfaceLook(), "better", values)
     ball, other = (mesh.truth["f_score_5cm"] for mesh in (views["surface"].after, poisson.mesh))
     assert right.startswith("No" if ball >= other else "Yes")
 
@@ -418,7 +418,9 @@ def test_next_waits_for_a_guess_or_a_skip(tmp_path):
 
 def test_a_guess_is_answered_with_the_reason_and_the_right_choice_is_marked(tmp_path):
     question = lesson(tmp_path, ASKED).stops[0].question
-    wrong, right, skipped, waiting = (told(question, guess, "Guess!") for guess in (0, 1, SKIPPED, None))
+    wrong, right, skipped, waiting = (
+        question_paragraphs(question, guess, "Guess!") for guess in (0, 1, SKIPPED, None)
+    )
     assert wrong[:2] == ["1. ✗ Red.", "2. ✓ Blue."]
     assert right[:3] == skipped[:3] == ["1. Red.", "2. ✓ Blue.", "3. Grey."]
     assert "green." in wrong[-1]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.lesson.files import Choice, Question
-from app.lesson.player import told, with_votes
+from app.lesson.player import question_paragraphs, with_votes
 from app.load.connection import Connection, wait_for
 from app.server import build_server
 from app.session.lecture import modules_of, qr_html
@@ -181,7 +181,7 @@ def test_bars_are_as_long_as_their_share_and_stay_when_the_answer_is_told():
     assert with_votes(question, []) == question
     voted = with_votes(question, [0, 0, 0, 1])
     assert [choice.text for choice in voted.choices] == ["a █████████ **3**", "b ███ **1**", "c **0**"]
-    assert told(voted, 0, "")[0].startswith("1. ✓ a █████████ **3**")
+    assert question_paragraphs(voted, 0, "")[0].startswith("1. ✓ a █████████ **3**")
 
 
 def test_the_qr_code_says_the_address():

@@ -235,11 +235,11 @@ def test_what_is_too_much_is_not_kept():
             button = browser.uuids["File"][0]
 
             def send(transfer, said, *parts):
-                browser.say(
+                browser.send(
                     messages.FileTransferStartUpload(button, transfer, "../../x", "", len(parts), said)
                 )
                 for index, part in enumerate(parts):
-                    browser.say(messages.FileTransferPart(button, transfer, index, part))
+                    browser.send(messages.FileTransferPart(button, transfer, index, part))
 
             send("large", MOST_BYTES + 1, b"x")
             send("more", 2, b"x", b"more")

@@ -66,6 +66,12 @@ def test_holes_are_round_patches_not_single_points(cloud):
     assert 0.5 < np.mean(_view(cloud)[gone].std(axis=0) / _view(cloud).std(axis=0)) < 1.2
 
 
+def test_holes_are_about_random_points_not_about_the_middle(cloud):
+    middle = np.argmin(np.linalg.norm(_view(cloud), axis=1))
+    kept = [degrade(cloud, Degradation(hole_share=0.05), seed).pixels for seed in range(20)]
+    assert sum(cloud.pixels[middle] in pixels for pixels in kept) > 10
+
+
 def test_noise_moves_along_the_ray_by_its_standard_deviation(cloud):
     worse = degrade(cloud, Degradation(noise_m=0.05), 5)
     np.testing.assert_allclose(np.cross(worse.points_m, cloud.points_m), 0.0, atol=1e-12)

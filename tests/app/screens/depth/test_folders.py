@@ -9,7 +9,7 @@ import pytest
 from app.compute.records import Picture
 from app.compute.state import Spec
 from app.screens.depth.hide import BESIDE, BUTTON, SILENT, WAITING, HideFolder, fills_table, painted_line
-from app.screens.depth.labels import AS_IT_SAYS, FILLS
+from app.screens.depth.labels import AS_IN_FILE, FILLS
 from app.screens.depth.model import LIMIT_BYTES, SHIPPED, ModelFolder
 from app.screens.depth.numbers import LINES, fitted_line
 from app.screens.depth.settings import with_model
@@ -63,7 +63,7 @@ def hide(server):
 
 def test_the_sliders_say_in_percent_what_is_hidden(hide):
     disc = Disc(0.25, 0.4, 0.1)
-    hide.folder.ask(HideRequest(3, (Disc(), disc)))
+    hide.folder.set(HideRequest(3, (Disc(), disc)))
     sliders = ("Centre x (%)", "Centre y (%)", "Diameter (%)")
     assert [hide.gui.find(label).value for label in sliders] == [25, 40, 10]
     assert hide.asked == [HideRequest(0, (Disc(), disc))]
@@ -159,7 +159,7 @@ def model(tmp_path):
 def test_a_preset_and_a_kind_are_chosen_with_the_file(model):
     model.gui.set("Preset", "midas-small")
     model.gui.set("Gives", "inverse")
-    model.gui.set("Preset", AS_IT_SAYS)
+    model.gui.set("Preset", AS_IN_FILE)
     assert model.asked == [
         ModelChoice(None, "midas-small"),
         ModelChoice(None, "midas-small", "inverse"),
@@ -196,7 +196,7 @@ def test_what_cannot_be_used_waits_for_what_it_expects(model):
     model.gui.set("Preset", "midas-small")
     assert model.asked[-1] == ModelChoice(model.asked[0].model, "midas-small")
     model.folder.write(DepthConfig())
-    assert [model.gui.find(label).value for label in ("Network file", "Preset")] == [SHIPPED, AS_IT_SAYS]
+    assert [model.gui.find(label).value for label in ("Network file", "Preset")] == [SHIPPED, AS_IN_FILE]
 
 
 def test_only_of_a_foreign_network_the_input_can_be_set(model):

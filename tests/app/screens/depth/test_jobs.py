@@ -10,9 +10,9 @@ from app.compute.state import Spec
 from app.drawing.colors import HOLE
 from app.drawing.pictures import UNKNOWN, confidence_colors
 from app.screens.depth.discs import window_around
-from app.screens.depth.hide_job import LEAST_HIDDEN_PX, believed, fill_row, hidden_pixels, hide_job
+from app.screens.depth.hide_job import LEAST_HIDDEN_PX, accepted_depth, fill_row, hidden_pixels, hide_job
 from app.screens.depth.job import depth_job, judged_view, residual_view
-from app.screens.depth.labels import AS_IT_SAYS, FILLS, NETWORK_PRESETS, PICTURES
+from app.screens.depth.labels import AS_IN_FILE, FILLS, NETWORK_PRESETS, PICTURES
 from app.screens.depth.model_job import model_job
 from app.screens.depth.view import Disc, HideRequest, ModelChoice, SeenSample
 from packetmesh.errors import InputError
@@ -226,7 +226,7 @@ def test_a_network_that_knows_the_truth_gives_back_what_was_hidden(rig):
     disc = hidden_pixels(frame.depth, FLAT.discs)
     rest = DepthMap(np.where(disc, np.float32(np.nan), frame.depth.z_m))
     knowing = DepthMap((0.4 * truth.z_m).astype(np.float32), kind="relative")
-    filled = believed(knowing, rest, frame.rgb, replace(DepthConfig(), alignment="affine_depth"))
+    filled = accepted_depth(knowing, rest, frame.rgb, replace(DepthConfig(), alignment="affine_depth"))
     row = fill_row("x", filled.z_m[disc], truth.z_m[disc], 0.0)
     assert row.abs_rel < 0.005
     assert row.within_share > 0.95
@@ -238,7 +238,7 @@ def test_a_node_that_is_not_there_is_one_sentence(store):
 
 
 def test_the_words_of_the_screen_are_those_of_the_pipeline():
-    assert set(NETWORK_PRESETS) == {AS_IT_SAYS, *PRESETS}
+    assert set(NETWORK_PRESETS) == {AS_IN_FILE, *PRESETS}
     assert set(FILLS) == {"measured", "hidden", "ours", "network", *PEERS}
 
 

@@ -47,7 +47,7 @@ def test_no_control_of_the_teacher_goes_dead(lecture, teacher, steers):
         wait_for(lambda: teacher.current == "Scene")
         for uuid in [*student.uuids["Steps"], *student.uuids["Node"], *teacher.uuids["The class may steer"]]:
             for updates in PROPERTIES:
-                student.say(messages.GuiUpdateMessage(uuid, updates))
+                student.send(messages.GuiUpdateMessage(uuid, updates))
         if steers:
             student.go("Depth")
             wait_for(lambda: teacher.current == "Depth")
@@ -62,7 +62,7 @@ def test_no_control_of_the_teacher_goes_dead(lecture, teacher, steers):
 
 def test_a_student_cannot_give_the_class_the_right_to_steer(lecture, teacher):
     with connected(lecture.url, "Seat") as student:
-        student.say(messages.GuiUpdateMessage(teacher.uuids["The class may steer"][0], {"value": True}))
+        student.send(messages.GuiUpdateMessage(teacher.uuids["The class may steer"][0], {"value": True}))
         student.go("Depth")
         teacher.go("Fuse")
         wait_for(lambda: teacher.current == "Fuse")

@@ -128,7 +128,7 @@ def test_what_a_hand_does_passes_and_forty_wrong_values_do_not(server, browser, 
 def test_of_a_control_nothing_but_its_value_can_be_set(server, browser, updates):
     handle = server.controls["list"]
     state = dict(vars(handle._impl))
-    browser.say(messages.GuiUpdateMessage(browser.uuids["list"][0], updates))
+    browser.send(messages.GuiUpdateMessage(browser.uuids["list"][0], updates))
     settle(server, browser)
     assert dict(vars(handle._impl)) == state
     browser.set("list", "b")
@@ -138,7 +138,7 @@ def test_of_a_control_nothing_but_its_value_can_be_set(server, browser, updates)
 def settle(server, browser):
     """Wait until all that was sent before has been judged: a message of a name that is not there is, too."""
     counted = server.gate.dropped["forged CommandTriggerMessage"]
-    browser.say(messages.CommandTriggerMessage("none"))
+    browser.send(messages.CommandTriggerMessage("none"))
     wait_for(lambda: server.gate.dropped["forged CommandTriggerMessage"] > counted)
 
 
@@ -193,7 +193,7 @@ def test_what_is_not_there_for_a_hand_is_not_there_for_anybody(server, browser, 
 )
 def test_a_message_that_nobody_awaits_is_dropped_and_counted(server, browser, message):
     before = server.gate.dropped.total()
-    browser.say(message)
+    browser.send(message)
     wait_for(lambda: server.gate.dropped.total() == before + 1)
     assert not server.heard
 
@@ -201,7 +201,7 @@ def test_a_message_that_nobody_awaits_is_dropped_and_counted(server, browser, me
 def test_a_connection_that_keeps_sending_what_no_page_sends_is_closed(server, browser, caplog):
     with caplog.at_level(logging.WARNING, logger="app.web.gate"):
         for _ in range(MOST_FORGED):
-            browser.say(messages.GuiUpdateMessage("x", {"removed": True}))
+            browser.send(messages.GuiUpdateMessage("x", {"removed": True}))
         wait_for(lambda: browser.lost)
     assert [record.levelname for record in caplog.records] == ["WARNING"]
     assert server.controls["list"].value == "a"
@@ -223,7 +223,7 @@ def test_the_control_of_another_browser_is_nobody_elses(running):
     with connected(running.url, "Radius (mm)") as one, connected(running.url, "Radius (mm)") as other:
         mine, theirs = (page.uuids["Steps"][0] for page in (one, other))
         assert mine != theirs
-        one.say(messages.GuiUpdateMessage(theirs, {"value": "Depth"}))
+        one.send(messages.GuiUpdateMessage(theirs, {"value": "Depth"}))
         one.go("Surface")
         wait_for(lambda: one.current == "Surface")
         assert other.current == "Scene"
@@ -255,9 +255,9 @@ def attack(server, page, handle):
     before = handle._impl.value
     callbacks = list(handle._impl.update_cb)
     for value in wrong_for(handle):
-        page.say(messages.GuiUpdateMessage(handle._impl.uuid, {"value": value}))
+        page.send(messages.GuiUpdateMessage(handle._impl.uuid, {"value": value}))
     for updates in PROPERTIES:
-        page.say(messages.GuiUpdateMessage(handle._impl.uuid, updates))
+        page.send(messages.GuiUpdateMessage(handle._impl.uuid, updates))
     settle(server, page)
     count = len(wrong_for(handle)) + len(PROPERTIES)
     assert handle._impl.value is before or handle._impl.value == before

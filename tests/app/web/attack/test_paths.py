@@ -80,8 +80,8 @@ def test_a_browser_cannot_make_a_list_name_a_folder(tmp_path):
             for target in (str(tmp_path / "stolen"), "../../stolen"):
                 page.set("Taken by", target)
             (button,) = page.uuids["Photograph or ZIP …"]
-            page.say(messages.FileTransferStartUpload(button, "t", "a.png", "image/png", 1, len(PNG)))
-            page.say(messages.FileTransferPart(button, "t", 0, PNG))
+            page.send(messages.FileTransferStartUpload(button, "t", "a.png", "image/png", 1, len(PNG)))
+            page.send(messages.FileTransferPart(button, "t", 0, PNG))
             wait_for(lambda: page.reads("**1 photograph**"))
             kept = [path for path in Path(app.folder.path).rglob("*.png") if path.stat().st_size == len(PNG)]
             assert [path.parent.name for path in kept] == ["node_00"]
